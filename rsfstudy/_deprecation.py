@@ -435,7 +435,10 @@ def user_stacklevel() -> int:
 
 def warn_renamed(former_name: str, new_name: str, owner_name: str) -> None:
     """Emit the deprecation warning for the former name of a member, keyword or module object."""
-    text = f"{former_name!r} of {owner_name} is now called {new_name!r}. The old name will be removed in 1.0.0."
+    text = (
+        f"{former_name!r} of {owner_name} is now called {new_name!r}. The old name will be "
+        "removed in 1.0.0."
+    )
     warnings.warn(text, DeprecationWarning, stacklevel=user_stacklevel())
 
 

@@ -135,8 +135,8 @@ def _wrap_in_error_boundary(
 ) -> Callable[P, T]:
     """Wrap a function in the error boundary.
 
-    If ``is_constructor`` is True, NumPy numbers are converted to Python numbers, which files can hold,
-    and the arguments are also checked against their annotations. The check follows the call,
+    If ``is_constructor`` is True, NumPy numbers are converted to Python numbers, which files can
+    hold, and the arguments are also checked against their annotations. The check follows the call,
     because the errors that the function itself raises are more specific.
     """
     signature = inspect.signature(inspect.unwrap(function))

@@ -1,4 +1,4 @@
-"""Shared by the tests: scenes, and integration with few words."""
+"""Fixtures and helper functions shared by the tests."""
 
 from __future__ import annotations
 
@@ -36,16 +36,18 @@ settings.register_profile(
 )
 settings.load_profile("default")
 os.environ.setdefault("MPLBACKEND", "agg")
-# a console keeps the width that it is made with
+# The console determines its width when it is created.
 os.environ.pop("COLUMNS", None)
 importlib.import_module("rsfstudy.cli.console")
-# a hundred processes that tests start would compile the package to bytecode, a second each
+# Without bytecode files, each of the hundred processes that the tests start would compile the
+# package again, which takes a second per process.
 os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
 sys.dont_write_bytecode = False
 
 
-#: Modules that take longest, which begin first: none of them is left for one process alone at the
-#: end. What uses the results of studies comes later, when they are there: it would wait for each.
+#: Slow modules, which are collected first so that the last process of a parallel run does not
+#: work on one of them while the others are idle. Modules that read the results of named studies
+#: come later, because they would otherwise wait for the studies to finish.
 SLOW_MODULES = (
     "test_studies", "test_resume", "test_public_functions", "test_faults", "test_clusters",
     "test_altered_files",
@@ -56,20 +58,23 @@ SLOW_MODULES = (
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Move the slow modules to the beginning of the test run."""
     order = {name: number for number, name in enumerate(SLOW_MODULES)}
     items.sort(key=lambda item: order.get(item.path.stem, len(order)))
 
 
 def pytest_collection_finish() -> None:
-    """Thousands of tests, and what they import, stay: looked through by every garbage collection,
-    they would take a sixth of the time.
+    """Exclude collected tests and imported modules from garbage collection.
+
+    Scanning these objects in every collection would take a sixth of the test time.
     """
     gc.collect()
     gc.freeze()
     gc.set_threshold(50_000, 20, 20)
 
 
-#: Told at the end of each step: no slider is twice as far from steady sliding as it has ever been.
+#: Event at the end of each step: a slider is always closer to steady sliding than twice its
+#: largest distance so far.
 STEP_END_EVENT = approach_to_steady_state(2.0)
 
 
@@ -80,8 +85,11 @@ def follow_until(
     budget: int = 2_000_000,
     watches: Sequence[EventSpecification] = (),
 ) -> WorkMeter:
-    """Follow a scene until the callback says so, which sees its start, the beginning of each regime
-    and the end of each step; and what else is watched for.
+    """Integrate a scene until the callback ``until`` returns True.
+
+    The callback receives the start of the motion, the beginning of each regime, the end of
+    each step, and the events requested with ``watches``. The function returns the work
+    meter.
     """
     meter, watches = WorkMeter(budget), (*watches, STEP_END_EVENT)
     for event in event_integration.integrate_events(
@@ -93,8 +101,10 @@ def follow_until(
 
 
 def reaches_instability_norm(scene: Scene, rtol: float = 1e-8, peaks: float = math.inf) -> bool:
-    """Whether a motion does, or one of so many first peaks, followed without any of what ends it
-    early.
+    """Return True if the slip rate of a scene reaches the instability norm.
+
+    The motion is integrated without early termination, up to a maximum number of ``peaks``
+    of the slip rate.
     """
     norm, count = scene.log_instability_rate, 0
     watches = (
@@ -103,9 +113,9 @@ def reaches_instability_norm(scene: Scene, rtol: float = 1e-8, peaks: float = ma
         fall("spring_stress", -scene.mu_star, terminal=True),
     )
     accuracy, meter = Accuracy(rtol, engine=COMPILED), WorkMeter(200_000, engine=COMPILED)
-    with contextlib.suppress(MotionStopped):  # slip that dies out, or that decays for ever
+    with contextlib.suppress(MotionStopped):  # Slip may die out, or decay for ever.
         for event in event_integration.integrate_events(scene, accuracy, meter, watches):
-            # a step may pass the norm and come back
+            # The slip rate may exceed the norm and fall below it again within one step.
             if event.kind is EventKind.RISE or event.point.log_slip_rate >= norm:
                 return True
             count += event.kind is EventKind.MAXIMUM
@@ -115,20 +125,23 @@ def reaches_instability_norm(scene: Scene, rtol: float = 1e-8, peaks: float = ma
 
 
 def cot_phi(scene: Scene) -> float:
-    """Cotangent of the driving angle; 0 at constant normal stress."""
+    """Return the cotangent of phi, or 0 at constant normal stress."""
     return 0.0 if scene.phi is None else 1.0 / math.tan(math.radians(scene.phi))
 
 
 @pytest.fixture(autouse=True)
 def patient(monkeypatch):
-    """However long workers take to start, no test gives them up."""
+    """Disable worker timeouts, because slow machines start workers slowly."""
     monkeypatch.setattr(worker_pool, "WARN_AFTER_SECONDS_WITHOUT_WORKER", math.inf)
     monkeypatch.setattr(worker_pool, "GIVE_UP_AFTER_SECONDS_WITHOUT_WORKER", math.inf)
 
 
 @pytest.fixture(autouse=True, scope="session")
 def the_checkout_stays():
-    """Each of hundreds of runs would ask Git three times for the state of the same checkout."""
+    """Cache the Git state of the checkout.
+
+    Otherwise, each run would query the state three times.
+    """
     asked, checkout = provenance.read_git_commit_and_state, provenance._PACKAGE_DIRECTORY.parent
     known = functools.cache(asked)
     with pytest.MonkeyPatch.context() as patch:
@@ -142,8 +155,10 @@ def the_checkout_stays():
 
 @pytest.fixture(autouse=True, scope="session")
 def formulas_are_set_once():
-    """Matplotlib forgets all but fifty formulas, and sets each anew for each renderer; here they
-    are the same in all figures.
+    """Cache parsed formulas in figures.
+
+    By default, Matplotlib caches 50 formulas only and parses each formula once per
+    renderer.
     """
     cached = MathTextParser._parse_cached
     set_once = functools.cache(
@@ -161,7 +176,7 @@ def formulas_are_set_once():
 
 @pytest.fixture(scope="session")
 def cluster(tmp_path_factory):
-    """A Dask client of two worker processes."""
+    """Yield a Dask client of a cluster with two worker processes."""
     log = tmp_path_factory.mktemp("cluster") / "workers.log"
     with clusters.start_local_cluster(2, log) as client:
         yield client

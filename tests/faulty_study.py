@@ -1,7 +1,8 @@
-"""A study whose cells go wrong on demand, as a module of the tests and as a study file of its own.
+"""A study whose cells fail on demand, used as a module and as a study file.
 
-Its measure gives b/a. The environment says how much CPU time a cell takes, what it does at which
-b/a, and whether cells wait until they are let through.
+The measure returns b/a. Environment variables set the CPU time per cell, the fault and the
+values of b/a at which it occurs, and an optional gate that blocks the cells until a file
+exists.
 """
 
 from __future__ import annotations
@@ -39,8 +40,9 @@ def _busy_wait(seconds: float):
 
 
 def _wait_for_file(gate: Path):
-    """The first cell of each process passes, and takes long enough to be handed over by itself; all
-    others wait until the gate is open.
+    """Block all cells except the first of each process until the gate opens.
+
+    The first cell takes long enough to be submitted in a batch of its own.
     """
     mine = gate / str(os.getpid())
     if not mine.exists():
@@ -73,14 +75,14 @@ FAULTS: dict[str, Callable] = {
     "sleeps": lambda _meter: (time.sleep(3.0), Outcome(Status.OK, {"total": 1.0}))[1],
     "hangs": lambda _meter: _hang(),
     "hangs in C": lambda _meter: ctypes.PyDLL(None).sleep(10**6),
-    # holding the interpreter's lock, as the one before
+    # This fault also holds the global interpreter lock, as the fault above.
     "spins in C": lambda _meter: collections.deque(itertools.repeat(1), maxlen=0),
 }
 
 
 @dataclass(frozen=True)
 class Faulty(Measure):
-    """Gives b/a, except where it goes wrong."""
+    """Measure that returns b/a, except in the cells that fail."""
 
     fault: str = ""
     at: tuple[float, ...] = ()
@@ -100,7 +102,7 @@ class Faulty(Measure):
 
 
 def faulty_study(fault: str = "", at: tuple[float, ...] = (), cells: int = 4) -> Study:
-    """A lattice of b/a = 2, 2.5, 3 and so on."""
+    """Return a study over b/a = 2, 2.5, 3, ..., some of whose cells fail."""
     return Study(
         name="faulty",
         title="Cells that go wrong",

@@ -1,7 +1,9 @@
-"""What the frozen motions tell, in columns, and how far two tellings are apart.
+"""Recording of frozen motions, and comparison of two recordings.
 
-python tests/frozen_motion_comparison.py freeze          # writes frozen_events.json anew
-python tests/frozen_motion_comparison.py sensitivity     # what a last bit does to the frozen events
+Usage::
+
+    python tests/frozen_motion_comparison.py freeze          # overwrite frozen_events.json
+    python tests/frozen_motion_comparison.py sensitivity     # effect of rounding errors on events
 """
 
 from __future__ import annotations
@@ -24,25 +26,27 @@ from rsfstudy.slider.motion_point import MotionPoint
 
 FROZEN_EVENTS_FILE = Path(__file__).with_name("frozen_events.json")
 
-#: Numbers of a point that are no states.
+#: Fields of a point, except the state variables.
 POINT_FIELDS = tuple(name for name in MotionPoint._fields if name != "psis")
 
 
 class EventColumns(NamedTuple):
-    """What a motion tells, in columns.
+    """Event table of a motion, stored in columns.
 
     Attributes
     ----------
     kinds : list of str
-        Of each event: kind, what was asked for, and regime; and the status where it cannot go on.
+        Event kind, requested quantity and level, and regime of each event. If the motion stops
+        early, the last entry is its status.
     numbers : dict of str to list of float
-        Time, slip, and the numbers of its points; NaN where there is none.
+        Time, slip, and the fields of the points; NaN where a value is not available.
     work : list of int
-        Right-hand sides spent so far.
-    loose : list of int
-        Rows told where a step happens to end, which rounding moves by as much as it is of the local
-        error: slip has settled, a rupture is over. And those where one begins: how fast ln V grows
-        by the full equations is the quotient of a difference of which few digits are left.
+        Cumulative number of right-hand-side evaluations at each event.
+    step_rows : list of int
+        Rows of events that are located at the end of a step, such as a settled slip or the end of a
+        rupture. These events depend on the step sizes, so rounding errors move them by as much as
+        the local error changes. The list also contains the rows in which a rupture begins, because
+        the derivative of ln V is a difference quotient there, with few significant digits.
     """
 
     kinds: list[str]
@@ -54,7 +58,10 @@ class EventColumns(NamedTuple):
 def record_frozen_motion(
     motion: Motion | Track, engine: str, scene: Scene | None = None
 ) -> EventColumns:
-    """What an engine tells of a motion, or of another scene in its place."""
+    """Return the events of a motion as computed by one engine.
+
+    If ``scene`` is given, it replaces the scene of the motion.
+    """
     scene = Scene(**motion.fields) if scene is None else scene
     events, kinds = [], list[str]()
     try:
@@ -80,21 +87,23 @@ def record_frozen_motion(
 
 
 def number_scale(name: str, a: float) -> float:
-    """The change of a number that weighs as much as one of 1 in ln V."""
+    """Return the change of a quantity that corresponds to 1 in ln V."""
     return 1.0 if name in ("time", "slip", "log_slip_rate", "log_slip_rate_derivative") else a
 
 
 def largest_differences(
     motion: Motion | Track, reference: EventColumns, other: EventColumns
 ) -> tuple[float, float]:
-    """The largest relative differences between what is told of a motion, in all rows but those of
-    steps, and in those; infinite where something else is told.
+    """Return the largest relative differences between two recordings.
 
-    Differences are relative to the largest magnitude of a number along the motion, and at least to
-    the change that weighs as much as one of 1 in ln V: errors of integration, and rounding, add up
-    in these units. Those of times and slips are in proportion to what has passed, and stresses and
-    states are sums in which terms of the largest magnitude cancel, so that a number near zero is as
-    uncertain as its neighbours.
+    The first value covers all rows except the step rows, and the second value covers the
+    step rows. Both are infinite if the event kinds or the columns differ.
+
+    Differences are relative to the largest magnitude of the quantity along the motion, with
+    the change that corresponds to 1 in ln V as a lower bound, because integration and
+    rounding errors accumulate in these units. Errors of times and slips are proportional to
+    the elapsed time and slip. Stresses and states are sums of large terms that cancel, so
+    values near zero are as uncertain as their neighbours.
     """
     if other.kinds != reference.kinds or other.numbers.keys() != reference.numbers.keys():
         return math.inf, math.inf
@@ -111,7 +120,7 @@ def largest_differences(
 
 
 def write_frozen_events() -> None:
-    """Write the events of all frozen scenes, by SciPy, and the work of both engines."""
+    """Write the SciPy events of all frozen motions, and the work counts."""
     frozen = {}
     for name, motion in MOTIONS.items():
         found, other = (record_frozen_motion(motion, engine) for engine in (SCIPY, COMPILED))
@@ -122,7 +131,10 @@ def write_frozen_events() -> None:
 
 
 def sensitivity(draws: int = 20, last_bit: float = 2.3e-16) -> None:
-    """Print how far events move, and those of steps, with a last bit of all fields."""
+    """Print the change of all events caused by rounding errors.
+
+    The last bit of every field is changed at random.
+    """
     chance = random.Random(1)
     for name, motion in MOTIONS.items():
         reference = record_frozen_motion(motion, SCIPY)

@@ -1,8 +1,10 @@
-"""Motions whose events are kept: every law, slot, loading and end, by few rows each.
+"""Frozen motions, whose events are stored in ``frozen_events.json``.
 
-`test_frozen_events.py` holds all engines to `frozen_events.json`. None amplifies rounding: a last
-bit of any field moves no number by more than a tenth of what the tests allow (`python
-tests/frozen_motion_comparison.py sensitivity` measures it).
+The motions cover every law, every selector field, every loading and every reason for
+termination, with a few rows each. ``test_frozen_events.py`` compares all engines with the
+stored events. No motion amplifies rounding errors: a change in the last bit of any field
+changes the stored numbers by less than a tenth of the tolerances of the tests. Run ``python
+tests/frozen_motion_comparison.py sensitivity`` to measure the changes.
 """
 
 from __future__ import annotations
@@ -29,11 +31,12 @@ from rsfstudy.motion.recording import MOTION_VARIABLES, Recording
 from rsfstudy.motion.work_meter import WorkMeter
 from rsfstudy.slider.equations import equations_at_imposed_slip_rate, equations_between_ruptures
 
-#: Rows of a motion that are kept, and what those without end may cost.
+#: Maximum number of rows per motion, and work budget of a motion.
 ROWS, BUDGET = 12, 40_000
 
 
-#: What most motions are asked for: extrema, and levels where nothing else happens.
+#: Events that most motions request: extrema, and crossings of levels that do not coincide with
+#: other events.
 EXTREMA = (
     maximum("log_slip_rate"),
     minimum("log_slip_rate"),
@@ -41,7 +44,7 @@ EXTREMA = (
     minimum("spring_stress"),
 )
 USUAL_EVENTS = (*EXTREMA, rise("log_slip_rate", 0.9), fall("log_slip_rate", 0.5))
-#: Where the friction coefficient that is read has extrema of its own.
+#: Extrema of the apparent friction, which differ from the extrema of spring stress.
 FRICTION_EVENTS = (
     maximum("apparent_friction"),
     minimum("apparent_friction"),
@@ -56,20 +59,22 @@ REVERSAL_EVENTS = (*EXTREMA[2:], rise("frictional_stress", -0.5), rise("state", 
 
 
 class Motion(NamedTuple):
-    """A scene that is followed with time.
+    """A motion of a scene with time.
 
     Attributes
     ----------
     fields : mapping
-        Of the scene.
+        Fields of the scene.
     watches : tuple of EventSpecification
+        Requested events.
     until : float
-        When to end, in D_c/V_*.
+        End time, in D_c/V_*.
     rows : int
-        Events after which not to go on.
+        Maximum number of events.
     rtol : float
+        Requested relative accuracy.
     budget : int
-        Right-hand sides that it may cost.
+        Maximum number of right-hand-side evaluations.
     """
 
     fields: Mapping[str, Any]
@@ -80,7 +85,7 @@ class Motion(NamedTuple):
     budget: int = BUDGET
 
     def events(self, scene: Scene, engine: str) -> Iterator[Any]:
-        """What is told, one event after the other."""
+        """Yield the events of the motion."""
         accuracy, meter = Accuracy(self.rtol, engine=engine), WorkMeter(self.budget, engine=engine)
         return integrate_events(
             scene, accuracy, meter, self.watches, with_time=True, until=self.until
@@ -88,7 +93,11 @@ class Motion(NamedTuple):
 
 
 def frozen_motion(law: str, *parts: Mapping[str, Any], **stated: Any) -> Motion:
-    """A motion of a law, with the fields of parts, fields of its own, and what a motion states."""
+    """Return a motion of a law.
+
+    The scene combines the fields of all ``parts`` with the keyword arguments. Keyword
+    arguments that are fields of ``Motion`` configure the motion instead of the scene.
+    """
     own = {name: stated.pop(name) for name in Motion._fields if name in stated}
     fields = {"law": law}
     for part in parts:
@@ -97,8 +106,10 @@ def frozen_motion(law: str, *parts: Mapping[str, Any], **stated: Any) -> Motion:
 
 
 class Track(NamedTuple):
-    """A system of equations that is followed without time, forward or backward; of a rigid slider
-    where a slip rate is prescribed.
+    """A path of a system of equations without time, forward or backward.
+
+    If ``log_slip_rate`` is given, the path is the response of a rigid slider at this slip
+    rate.
     """
 
     fields: Mapping[str, Any]
@@ -112,7 +123,7 @@ class Track(NamedTuple):
     budget: int = BUDGET
 
     def events(self, scene: Scene, engine: str) -> Iterator[Any]:
-        """What is told, one event after the other."""
+        """Yield the events along the path."""
         if self.log_slip_rate is None:
             equations = equations_between_ruptures(scene, with_time=False)
         else:
@@ -124,8 +135,9 @@ class Track(NamedTuple):
         return self._recorded_events(scene, *asked, **how)
 
     def _recorded_events(self, scene: Scene, *asked: Any, **how: Any) -> Iterator[Any]:
-        """The same, and the rows that are recorded of a rigid slider of one state, in their order;
-        all told with the last of them.
+        """Yield the events and the recorded samples, ordered by slip.
+
+        Only a rigid slider with one state variable is supported.
         """
         recording, events = Recording(sample_times=np.array(self.samples)), []
         for event in iterate_events_of_equations(*asked, **how, recording=recording):
@@ -143,7 +155,8 @@ class Track(NamedTuple):
         return iter(sorted(events, key=lambda event: event.slip))
 
 
-#: A direct effect three times the usual one: rounding of mu_* moves ln V by as much over a.
+#: A direct effect larger than the default, because a rounding error of mu_* changes ln V by the
+#: rounding error divided by ``a``.
 CONSTANT = {"normal_stress": "constant", "a": 0.05}
 VARIABLE = {"normal_stress": "variable", "phi": 75.0, "alpha": 0.3, "a": 0.05}
 IMPOSED, DILATANT = {"normal_stress": "imposed", "a": 0.05}, {"fluid": "dilatant"}
@@ -167,7 +180,8 @@ REVERSED_LOADING = {
     "stiffness": 0.03,
     "load_velocity_ratio": 1.0,
 }
-#: A load point that is held, moves in steps, in a ramp of three stairs, and by protocols.
+#: A hold of the load point, velocity steps, a velocity ramp with three stairs, and two
+#: protocols.
 HOLD = {"hold_time": 30.0, "stiffness_ratio": 3.0}
 STEPS = {"velocity_steps": 4, "velocity_ratio": 5.0, "displacement_between_steps": 1.0}
 STAIRS = {"velocity_ramp": 2.0, "velocity_ramp_duration": 3.0, "velocity_ramp_stairs": 3}
@@ -189,10 +203,10 @@ NORMAL_STRESS_PROTOCOL = protocol(
     name="presses",
 )
 
-#: By what they are called. Parts stand together as in `test_compiled`, where they can: what has
-#: been compiled for one serves the other.
+#: Frozen motions by name. The combinations of parts match the combinations in ``test_compiled`` if
+#: possible, so that both modules share compiled code.
 MOTIONS: dict[str, Motion | Track] = {
-    # steps of rate: each law
+    # Steps of load velocity, for each law.
     "slip": frozen_motion("slip", VARIABLE, STEP_UP),
     "slowness, down": frozen_motion(
         "slowness",
@@ -226,7 +240,7 @@ MOTIONS: dict[str, Motion | Track] = {
     "slowness, dilatant, slips": frozen_motion(
         "slowness", CONSTANT, LESS_DILATANT, UNSTABLE_STEP_UP, rows=9
     ),
-    # radiation damping: each law
+    # Radiation damping, for each law.
     "slip, damped": frozen_motion("slip", CONSTANT, DAMPING, UNSTABLE_STEP_UP),
     "slowness, damped, dilatant": frozen_motion("slowness", IMPOSED, DILATANT, DAMPING, STEP_UP),
     "family, damped, dilatant": frozen_motion("family", IMPOSED, DILATANT, DAMPING, STEP_UP),
@@ -241,7 +255,7 @@ MOTIONS: dict[str, Motion | Track] = {
     "two slowness states, damped": frozen_motion(
         "two_slowness_states", CONSTANT, DAMPING, UNSTABLE_STEP_UP
     ),
-    # ruptures with mass: each law
+    # Ruptures with inertia, for each law.
     "slip, mass, dilatant": frozen_motion(
         "slip", IMPOSED, LESS_DILATANT, WITH_LONG_PERIOD, UNSTABLE_STEP_UP
     ),
@@ -276,7 +290,7 @@ MOTIONS: dict[str, Motion | Track] = {
         watches=ALL_EXTREMA,
         rtol=1e-8,
     ),
-    # stress that acts on the state; slip that reverses
+    # Stress-dependent state evolution, and reversed slip.
     "slip, stress dependence": frozen_motion("slip", CONSTANT, STEP_UP, stress_dependence=0.5),
     "composite, stress dependence": frozen_motion(
         "composite",
@@ -302,7 +316,7 @@ MOTIONS: dict[str, Motion | Track] = {
     "slowness, reversed": frozen_motion(
         "slowness", VARIABLE, REVERSED_LOADING, displacement_step=-21.0, watches=REVERSAL_EVENTS
     ),
-    # other loadings, and another beginning
+    # Other loadings, and another initial condition.
     "slip, displacement step": frozen_motion(
         "slip", VARIABLE, stiffness_ratio=1.25, displacement_step=0.8, watches=SLOWING_EVENTS
     ),
@@ -390,7 +404,7 @@ MOTIONS: dict[str, Motion | Track] = {
     "slowness, ramp": frozen_motion(
         "slowness", IMPOSED, RAMP, stiffness_ratio=1.5, watches=FRICTION_EVENTS, rtol=1e-6
     ),
-    # without time
+    # Paths without time.
     "slip, path": Track(
         {"law": "slip", **VARIABLE, "load_velocity_ratio": 3.0, "stiffness_ratio": 1.2},
         (0.04, 0.01),
@@ -422,7 +436,7 @@ MOTIONS: dict[str, Motion | Track] = {
         samples=(0.0, 0.5, 1.0),
         log_slip_rate=math.log(10.0),
     ),
-    # motions that cannot go on
+    # Motions that stop early.
     "slip, unbounded": frozen_motion("slip", CONSTANT, UNSTABLE_STEP_UP, stress_dependence=0.5),
     "family, budget spent": frozen_motion("family", CONSTANT, STEP_UP, budget=295),
     "perrin_rice_zheng, normal stress lost": frozen_motion(

@@ -1,4 +1,7 @@
-"""Shared by the tests of running: a small lattice, and the command as a process of its own."""
+"""Helper functions that run small studies and the command-line interface.
+
+The command runs in this process or in a new process.
+"""
 
 from __future__ import annotations
 
@@ -22,7 +25,8 @@ import xarray as xr
 
 import rsfstudy
 
-# what prints takes its width from the environment when it is loaded: not from that of a test
+# The console reads its width from the environment at import time, so the console is imported
+# before any test changes the environment.
 from rsfstudy import Axis, Scene, Study
 from rsfstudy.cli import command_line, commands  # noqa: F401
 from rsfstudy.critical_steps.critical_step import CriticalStep
@@ -47,7 +51,7 @@ SMALL_STUDY = Study(
     ],
     measure=CriticalStep(),
 )
-#: A study file with a measure of its own.
+#: Source of a study file with a user-defined measure.
 USER_MEASURE_SOURCE = """
 from dataclasses import dataclass
 from typing import ClassVar
@@ -78,33 +82,33 @@ study = Study(
 )
 """
 FAULTY_STUDY_FILE = Path(__file__).with_name("faulty_study.py")
-#: Time in s after which what has not come on any machine never will.
+#: Timeout in s after which a test fails, chosen for the slowest machines.
 HANG_TIMEOUT = 1200.0
 
 
 def run(study=SMALL_STUDY, **options) -> xr.Dataset:
-    """In this process and in memory, unless told otherwise."""
+    """Run a study in this process and in memory by default."""
     return rsfstudy.run(study, **{"workers": 0, "output": None, "progress": False, **options})
 
 
 def study_of(name, measure, *axes, base=None, **fields) -> Study:
-    """A study, of scenes as they are by default unless told otherwise."""
+    """Return a study of default scenes, unless ``base`` is given."""
     return Study(name=name, title=name, base=base or Scene(), axes=axes, measure=measure, **fields)
 
 
 def example_claim(**fields) -> Claim:
-    """A claim that something is 1, to a tenth."""
+    """Return a claim that a published value is 1, with a tolerance of 0.1."""
     usual = {"id": "C1", "statement": "", "source": "", "where": {}, "published": 1.0}
     return Claim(**usual | {"tolerance": 0.1, "reason": ""} | fields)
 
 
 def cell_key(scene, measure) -> bytes:
-    """Name of a cell that is planned alone."""
+    """Return the key of a cell that is planned separately."""
     return cell_plan.compute_cell_key(scene, measure)
 
 
 def run_with_failures(*words, **options) -> xr.Dataset:
-    """The same, where cells are to fail, which is told."""
+    """Run a study and check the warning that some of its cells failed."""
     with pytest.warns(
         IncompleteWarning, match=r"^\d+ of \d+ cells failed: .*failures\(\) lists them$"
     ):
@@ -113,7 +117,7 @@ def run_with_failures(*words, **options) -> xr.Dataset:
 
 @contextlib.contextmanager
 def record_computed_cells() -> Iterator[list[Cell]]:
-    """The cells that are computed meanwhile, in this process."""
+    """Record the cells that this process computes in the ``with`` block."""
     asked, computed = list[Cell](), cell_computation.compute_cell
 
     def counted(task, cell, **options):
@@ -125,15 +129,16 @@ def record_computed_cells() -> Iterator[list[Cell]]:
         yield asked
 
 
-#: Clusters of Dask whose pages are seen from nowhere.
+#: Options of Dask clusters without a dashboard.
 QUIET_CLUSTER_OPTIONS = {
     "dashboard_address": "127.0.0.1:0",
     "scheduler_kwargs": {"dashboard": False},
 }
 
 
-#: What is enough of a dear study for its verdicts and its figure: of a dense axis, the points that
-#: claims speak of, and some between; of costs, the problems and integrators that they turn on.
+#: Reduced axes of expensive studies, sufficient for their claims and figures. Dense axes keep
+#: the points of the claims and some points between them, and studies of cost keep the problems
+#: and integrators of the claims.
 REDUCED_AXES = {
     "accuracy_cost": {
         "problem": [
@@ -146,7 +151,7 @@ REDUCED_AXES = {
         "repeats": 1,
     },
     "bounded_slip": {"stiffness_ratio": [1.0, 1.1], "load_velocity_ratio": [2.0, 200.0]},
-    # one motion of the draw left out takes as long as all the others
+    # A single motion of the omitted samples takes as long as all other motions.
     "coverage": {"sample": [0, 1]},
     "design_of_steps": {"seed": [0, 1]},
     "dilatant_cycles": {"drainage": [1.0], "dilatancy": [0.0, 0.004, 0.008]},
@@ -179,7 +184,7 @@ REDUCED_AXES = {
         "case": ["imposed, alpha = 0", "imposed, alpha = 0.56", "inclined, alpha = 0.56"],
         "stiffness_ratio": [0.05, 0.25, 0.5, 1.0, 1.25, 2.0],
     },
-    # the first samples are a sample still
+    # The first samples of a sequence are a valid sample.
     "uncertain_recurrence": {"sample": list(range(64))},
     "velocity_steps": {"stiffness_ratio": [1.2, 3.0, 10.0, 300.0]},
     "wave_triggering": {"cycle_phase": [0.5, 0.8, 0.9]},
@@ -190,7 +195,7 @@ REDUCED_AXES = {
 }
 
 
-#: Studies whose motions are left to the compiled engine, which `test_compiled` holds to SciPy's.
+#: Studies whose motions use the compiled engine, which ``test_compiled`` compares with SciPy.
 COMPILED_ONLY_STUDIES = (
     "bounded_slip", "coverage", "dilatant_cycles", "dilatant_steps", "displacement_boundary",
     "injection", "normal_stress_steps", "rate_step_lattice", "resonance", "rig_recurrence",
@@ -200,7 +205,10 @@ COMPILED_ONLY_STUDIES = (
 
 
 def reduced_study(name: str) -> Study:
-    """Return a study, or a part of it with fewer points and the claims about these points."""
+    """Return a named study with fewer points.
+
+    Only the claims about the remaining points are kept.
+    """
     study, points = study_loader.load_study(name), REDUCED_AXES.get(name, {})
     if name in COMPILED_ONLY_STUDIES:
         study = replace(study, accuracy=replace(study.accuracy, engine=COMPILED))
@@ -211,8 +219,9 @@ def reduced_study(name: str) -> Study:
 
 
 def named_results(name: str, tmp_path_factory) -> tuple[xr.Dataset, Path]:
-    """Results of enough of a named study, and their file, computed once for all processes of the
-    tests, by the first of them that asks.
+    """Return the results of a reduced named study, and the file path.
+
+    All test processes share the results. The first process that needs a study computes it.
     """
     place = tmp_path_factory.getbasetemp()
     output = (place.parent if "PYTEST_XDIST_WORKER" in os.environ else place) / "named"
@@ -228,15 +237,19 @@ def named_results(name: str, tmp_path_factory) -> tuple[xr.Dataset, Path]:
 
 
 def have_same_numbers(ours: xr.Dataset, theirs: xr.Dataset) -> None:
-    """The same bits, but for the time they took."""
+    """Assert that two datasets are bitwise identical.
+
+    Wall times and attributes are ignored.
+    """
     xr.testing.assert_identical(
         ours.drop_vars("wall_time").drop_attrs(), theirs.drop_vars("wall_time").drop_attrs()
     )
 
 
 def call_main(*words, encoding: str = "utf-8") -> SimpleNamespace:
-    """The command in this process, from its real entry point; what would be a traceback is raised,
-    and so is what cannot be encoded.
+    """Run the command in this process through its entry point.
+
+    Exceptions, including encoding errors of the output, propagate instead of being printed.
     """
     out = io.TextIOWrapper(io.BytesIO(), encoding, write_through=True)
     said = io.TextIOWrapper(io.BytesIO(), "utf-8", "backslashreplace", write_through=True)
@@ -250,8 +263,8 @@ def call_main(*words, encoding: str = "utf-8") -> SimpleNamespace:
     return SimpleNamespace(returncode=ended.value.code, stdout=texts[0], stderr=texts[1])
 
 
-#: Signals end it even where the tests run in the background, or without a terminal, where shells
-#: have them ignored.
+#: Signal handlers are restored because shells ignore signals in processes that run in the
+#: background or without a terminal.
 _COMMAND_SOURCE = """
 import signal
 signal.signal(signal.SIGINT, signal.default_int_handler)
@@ -262,7 +275,7 @@ main()
 
 
 def start_command(*words, **environment) -> subprocess.Popen:
-    """The command in a process, and a session, of its own."""
+    """Start the command in a new process and a new session."""
     return subprocess.Popen(
         [sys.executable, "-c", _COMMAND_SOURCE, *map(str, words)],
         stdout=subprocess.PIPE,
@@ -274,7 +287,10 @@ def start_command(*words, **environment) -> subprocess.Popen:
 
 
 def wait_for_command(process: subprocess.Popen) -> tuple[int, str, str]:
-    """Exit status, output, and errors without the lines of progress, once it has ended."""
+    """Return exit status, output and errors of a finished command.
+
+    Progress lines are removed from the errors.
+    """
     out, said = process.communicate(timeout=HANG_TIMEOUT)
     assert "Traceback" not in said, said
     return (
@@ -285,36 +301,42 @@ def wait_for_command(process: subprocess.Popen) -> tuple[int, str, str]:
 
 
 def run_command(words: Sequence[str]) -> tuple[int, str]:
-    """Exit status and what is said by the command in this process, on one line."""
+    """Return exit status and output of a command run in this process.
+
+    The output is joined into one line.
+    """
     done = call_main(*words)
     return int(done.returncode or 0), " ".join(f"{done.stdout}{done.stderr}".split())
 
 
 def start_point(scene: Scene) -> MotionPoint:
-    """Point at which the motion of a scene begins."""
+    """Return the initial point of the motion of a scene."""
     return next(integrate_events(scene, Accuracy(), WorkMeter(1_000_000))).point
 
 
 def count_journal_cells(journal: Path) -> int:
-    """Number of cells that a run that has ended has kept; what it left unfinished is rolled back,
-    as by the next run.
+    """Return the number of cells in the journal of a run that has ended.
+
+    Opening the journal rolls back unfinished transactions, as the next run would do.
     """
     with contextlib.closing(sqlite3.connect(f"file:{journal}?mode=rw", uri=True)) as db:
         return int(db.execute("SELECT count(*) FROM cells").fetchone()[0])
 
 
 def wait_for_journal_cells(journal: Path, process: subprocess.Popen) -> None:
-    """Wait until a run has kept cells. It lets nobody else read its journal: what is on disk is
-    looked at without asking.
+    """Wait until a run has stored cells in its journal.
+
+    The run locks its journal, so the function reads the file without locks.
     """
     unfinished = journal.with_name(f"{journal.name}-journal")
 
     def kept() -> bool:
-        with contextlib.suppress(sqlite3.Error):  # not there yet, or in the middle of a write
+        # The journal may not exist yet, or a write may be in progress.
+        with contextlib.suppress(sqlite3.Error):
             uri = f"file:{journal}?immutable=1"
             with contextlib.closing(sqlite3.connect(uri, uri=True)) as db:
                 cells = db.execute("SELECT count(*) FROM cells").fetchone()[0]
-            # what would undo them has been made void
+            # The write is complete when the header of the rollback journal is cleared.
             return cells > 0 and not unfinished.read_bytes()[:8].strip(b"\0")
         return False
 
@@ -322,7 +344,7 @@ def wait_for_journal_cells(journal: Path, process: subprocess.Popen) -> None:
 
 
 def wait_until(true: Callable[[], bool], process: subprocess.Popen) -> None:
-    """Wait until something is so, while a process goes on."""
+    """Wait until a condition is true while a process is running."""
     end = time.monotonic() + HANG_TIMEOUT
     while not true():
         assert process.poll() is None, process.communicate()

@@ -1,7 +1,7 @@
-"""Records made by other code than the package's: the equations of one state and their derivatives,
-integrated by SciPy.
+"""Synthetic records from an independent implementation of one-state friction.
 
-With psi = ln(theta V_0/D_c), w = ln(V/V_0) = (mu - mu_* - b psi)/a and u = psi + w,
+SciPy integrates the equations and their sensitivities. With psi = ln(theta V_0/D_c), w =
+ln(V/V_0) = (mu - mu_* - b psi)/a and u = psi + w, the equations are
 
     mu' = k (V_l - V),    psi' = (V/D_c) h(u),    S' = (df/dy) S + df/dp.
 """
@@ -20,7 +20,7 @@ from scipy.integrate import solve_ivp
 import rsfstudy
 from rsfstudy.fitting.record import Record
 
-#: A velocity step up from 1 to 10 um/s after 40 um: parameters in um and s.
+#: Parameters in um and s, for a velocity step from 1 to 10 um/s after 40 um.
 EXACT_PARAMETERS = {
     "a": 0.010,
     "b": 0.013,
@@ -29,22 +29,23 @@ EXACT_PARAMETERS = {
     "stiffness": 3e-3,
 }
 STEP_UP = ((0.0, 1.0), (40.0, 10.0))
-#: A step down, and a hold between sliding.
+#: A velocity step down, and a slide-hold-slide test.
 STEP_DOWN = ((0.0, 10.0), (4.0, 1.0))
 SLIDE_HOLD_SLIDE = ((0.0, 1.0), (40.0, 0.0), (140.0, 1.0))
-#: Up and back: the second step at 180 um.
+#: A velocity step up, and a step back at 180 um.
 STEP_UP_AND_BACK = ((0.0, 1.0), (40.0, 10.0), (54.0, 1.0))
-#: Options of their fits.
+#: Options of the fits of these records.
 FIT_OPTIONS: dict[str, Any] = {
     "stiffness": EXACT_PARAMETERS["stiffness"],
     "noise": "ar1",
     "engine": "compiled",
 }
-#: Parameters of which augmented equations tell derivatives; of the last two, by their logarithms.
+#: Parameters of the sensitivities. The derivatives by stiffness and slip distance are
+#: logarithmic.
 SENSITIVITY_PARAMETERS = ("a", "b", "stiffness", "slip_distance")
 
 LawFunction = Callable[[float], tuple[float, float]]
-#: h(u) and dh/du, by names of the package.
+#: h(u) and dh/du for each law, with the law names of the package.
 LAW_FUNCTIONS: dict[str, LawFunction] = {
     "slip": lambda u: (-u, -1.0),
     "slowness": lambda u: (math.expm1(-u), -math.exp(-u)),
@@ -54,7 +55,10 @@ LAW_FUNCTIONS: dict[str, LawFunction] = {
 
 
 def sample_times(loading: Sequence[tuple[float, float]], ends: float, count: int) -> np.ndarray:
-    """Times at which a load point has moved evenly; half of them in its holds, if any."""
+    """Return times at equal increments of load point displacement.
+
+    If the loading contains holds, half of the samples are at equal increments of time.
+    """
     times = np.linspace(loading[0][0], ends, 20 * count + 1)
     moved = load_point_displacement(loading, times)
     share = moved / moved[-1]
@@ -64,7 +68,10 @@ def sample_times(loading: Sequence[tuple[float, float]], ends: float, count: int
 
 
 def loading_end_time(loading: Sequence[tuple[float, float]]) -> float:
-    """Time at which the load point has moved by 100 um in the last piece of loading."""
+    """Return the end time of the loading.
+
+    At this time, the load point has moved by 100 um in the last segment.
+    """
     begins, speed = loading[-1]
     return begins + 100.0 / speed
 
@@ -72,7 +79,10 @@ def loading_end_time(loading: Sequence[tuple[float, float]]) -> float:
 def load_point_displacement(
     loading: Sequence[tuple[float, float]], times: np.ndarray
 ) -> np.ndarray:
-    """Its displacement at times: pieces of loading are (begins in s, velocity in um/s)."""
+    """Return the load point displacement in um at the given times.
+
+    Each segment of loading is a pair of its start time in s and its velocity in um/s.
+    """
     begins, speeds = np.array(loading).T
     knots = np.concatenate([[0.0], np.cumsum(np.diff(begins) * speeds[:-1])])
     piece = np.searchsorted(begins, times, side="right") - 1
@@ -85,8 +95,9 @@ def friction_and_sensitivities(
     loading: Sequence[tuple[float, float]] = STEP_UP,
     truth: Mapping[str, float] = EXACT_PARAMETERS,
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Friction at times, and its derivatives by `SENSITIVITY_PARAMETERS`, shape (times,
-    parameters).
+    """Return friction at the given times, and its derivatives.
+
+    The derivatives by ``SENSITIVITY_PARAMETERS`` have shape (times, parameters).
     """
     h, first = LAW_FUNCTIONS[law], loading[0][1]
     a, b, distance = truth["a"], truth["b"], truth["slip_distance"]
@@ -125,8 +136,10 @@ def friction_and_sensitivities(
 def two_state_friction(
     times: np.ndarray, loading: Sequence[tuple[float, float]], truth: Mapping[str, float]
 ) -> np.ndarray:
-    """Friction by the slip law with two states, at times around one step; Theta_i is the part of
-    state i in friction: ``dTheta_i/dt = -(V/L_i)(Theta_i + b_i w)``.
+    """Return friction for the slip law with two states around one step.
+
+    Theta_i is the contribution of state i to friction: ``dTheta_i/dt = -(V/L_i)(Theta_i +
+    b_i w)``.
     """
     (_begins, first), (step, load) = loading
     mu_star, k, a = (truth[name] for name in ("mu_star", "stiffness", "a"))
@@ -146,7 +159,7 @@ def two_state_friction(
 
 
 def correlated_noise(count: int, rho: float, size: float, seed: int) -> np.ndarray:
-    """Noise of first order, or white noise."""
+    """Return first-order autoregressive noise (white if ``rho`` is 0)."""
     drawn = np.random.default_rng(seed).standard_normal(count)
     for row in range(1, count):
         drawn[row] = rho * drawn[row - 1] + math.sqrt(1.0 - rho * rho) * drawn[row]
@@ -162,7 +175,10 @@ def synthetic_record(
     size: float = 3e-4,
     truth: Mapping[str, float] = EXACT_PARAMETERS,
 ) -> Record:
-    """Return a record with a noise correlation of 0.5, and a trend from its first step."""
+    """Return a record with a noise correlation of 0.5.
+
+    The friction has a linear trend if ``trend`` is not 0.
+    """
     times = sample_times(loading, loading_end_time(loading), count)
     moved = load_point_displacement(loading, times)
     friction = friction_and_sensitivities(law, times, loading, truth)[0] + trend * (moved - 40.0)
@@ -173,5 +189,5 @@ def synthetic_record(
 
 
 def deviation_in_stderrs(fit: xr.Dataset, name: str, true: float) -> float:
-    """By how many standard errors a parameter is off."""
+    """Return the deviation from the true value in standard errors."""
     return float((fit[name] - true) / fit[f"{name}_stderr"])

@@ -1,4 +1,4 @@
-"""What a dataset says of itself by its accessor `.rsf`."""
+"""Tests of the dataset accessor ``.rsf``."""
 
 import subprocess
 import sys
@@ -10,7 +10,7 @@ from matplotlib.figure import Figure
 from study_runs import example_claim
 
 import rsfstudy
-import rsfstudy.api.accessor  # datasets of others have it too, whichever test is the first
+import rsfstudy.api.accessor  # Register the accessor.
 from rsfstudy import Axis, Scene, Study
 from rsfstudy.critical_steps.critical_step import CriticalStep
 from rsfstudy.errors import DataError, InvalidValue, NoResultWarning
@@ -116,7 +116,7 @@ def test_only_whole_results_are_drawn_and_checked_in_their_own_units(results):
             getattr(results.sel(law="slip").rsf, ask)()
     converted = results.rsf.to_si(**SI)
     assert converted.rsf.check().verdict.tolist() == ["not applicable"]
-    # drawn with the units that it has, whatever its study declares
+    # The figure uses the units of the converted dataset, not the units of the study.
     assert "(m s$^{-1}$)" in converted.rsf.plot().axes[0].get_ylabel()
 
 

@@ -1,5 +1,7 @@
-"""What accuracy costs: the counts are honest, the references hold, and so does what a user is told
-before a run.
+"""Tests of the study of accuracy and cost.
+
+The tests compare the counted work with the actual work, repeat a reference value, and check
+the work estimate that users see before a run.
 """
 
 import itertools
@@ -42,13 +44,16 @@ CYCLE = Scene(normal_stress="constant", stiffness_ratio=0.8, load_velocity_ratio
 
 @pytest.mark.parametrize("method", sorted(SCIPY_SOLVER_BY_METHOD_NAME))
 def test_every_right_hand_side_is_counted(method, monkeypatch):
-    """By the meter as by the equations themselves: Jacobians and interpolants included."""
+    """The meter and the equations count the same number of evaluations.
+
+    The count includes evaluations for Jacobians and interpolants.
+    """
     system, calls = equations_between_ruptures(SCENE, with_time=False), []
     counted = system._replace(
         rate_function=lambda state, p: (calls.append(state), system.rate_function(state, p))[1]
     )
     meter = WorkMeter(10**6, {"quasi_static": method})
-    # within each step it is recorded, which asks for interpolants
+    # The recording needs interpolants within each step.
     path = iterate_events_of_equations(
         counted, (0.0, 0.0), 1e-6, meter, [STEP_END_EVENT], recording=Recording()
     )
@@ -60,7 +65,10 @@ def test_every_right_hand_side_is_counted(method, monkeypatch):
 
 @pytest.mark.parametrize("method", sorted(SCIPY_SOLVER_BY_METHOD_NAME))
 def test_every_integrator_solves_a_cycle(method):
-    """Right to a hundred times a loose tolerance: multistep methods keep less of it."""
+    """Each integrator agrees to 100 times the loose tolerance.
+
+    Multistep methods lose more of the requested accuracy than other methods.
+    """
     regimes = ("slow_manifold", "inertial")
     accuracy = Accuracy(1e-5, methods=tuple((regime, method) for regime in regimes))
     outcome = LimitCycle(phases=2)(CYCLE, accuracy)
@@ -82,7 +90,7 @@ def test_work_precision_measures_errors():
 
 
 def test_an_accuracy_out_of_reach_is_an_answer():
-    """With what was spent on it, and no time: it belongs to no accuracy."""
+    """The outcome contains the work, but no time, because no run succeeded."""
     found = solved("RK23", 8.0)
     assert found.status is Status.ACCURACY_OUT_OF_REACH
     assert found.status.is_answer
@@ -113,7 +121,11 @@ def runs(achieved, work) -> xr.Dataset:
 
 
 def test_the_cheapest_integrator_is_found_between_its_runs():
-    """The default makes 10 of its 100 to 1000 between 4 and 8 digits: at 6, sqrt(100 1000)."""
+    """The work is interpolated in logarithms between the runs.
+
+    The default integrator needs 100 to 1000 evaluations for 4 to 8 digits, so 6 digits need
+    sqrt(100 x 1000).
+    """
     dataset = runs([[4, 8, 10], [2, 6, 7]], [[100, 1000, 5000], [10, 50, np.nan]])
     found = apply_reductions(
         dataset, (CheapestIntegrator(name="c", of="achieved_digits", digits=(6.0, 9.0)),)
@@ -133,7 +145,11 @@ def test_digits_reached_by_luck_do_not_count():
 
 
 def test_a_reference_computed_anew():
-    """One of those stored: critical velocity of a/(b-a) = 1, slip law, constant normal stress."""
+    """The stored reference value is reproduced with extended precision.
+
+    The value is the critical velocity for a/(b-a) = 1, the slip law and constant normal
+    stress.
+    """
     assert float(critical_velocity(make_slider(), 5e-4)) == pytest.approx(
         1.999949384410229, rel=1e-14
     )
@@ -141,7 +157,10 @@ def test_a_reference_computed_anew():
 
 @pytest.mark.parametrize(("name", "within"), [("critical_step", 0.15), ("limit_cycle", 0.4)])
 def test_the_work_a_user_is_told_is_the_work_it_takes(name, within):
-    """The table of cycles is that of another one."""
+    """The estimate agrees with the actual work within the given fraction.
+
+    The estimate for cycles was calibrated with another cycle.
+    """
     problems = study_loader.load_study("accuracy_cost").measure.problems
     problem = next(p for p in problems if p.measure.name == name)
     measure = problem.measure

@@ -1,5 +1,7 @@
-"""Files from strangers: results that were altered, and paths that are no results.
-Each command ends with an answer, or with an error that names what is wrong; never with a traceback.
+"""Tests of altered results files, and of paths that are not results.
+
+Each command ends with an answer, or with an error that names the problem, but never with a
+traceback.
 """
 
 import contextlib
@@ -23,7 +25,7 @@ from rsfstudy.responses.linear_stability import LinearStability
 from rsfstudy.status import Status
 from rsfstudy.storage import dataset_files
 
-#: It has all that a file can have, and costs next to nothing.
+#: A cheap study with every kind of content that a file can have.
 TINY = Study(
     name="tiny",
     title="A tiny lattice",
@@ -53,12 +55,12 @@ PLACE = {"case": "variable", "load_velocity_ratio": "2"}
 def tiny(tmp_path_factory) -> xr.Dataset:
     output = tmp_path_factory.mktemp("tiny")
     dataset = run(TINY.with_(load_velocity_ratio=[1.0, 2.0, 4.0]), output=output)
-    dataset["status"][0, 0] = int(Status.UNVERIFIED)  # one cell to list
+    # One cell is unverified, so that the commands list a cell.
+    dataset["status"][0, 0] = int(Status.UNVERIFIED)
     return dataset
 
 
 # ---- altered files ------------------------------------------------------------------------------
-
 KINDS = {
     "whole numbers": lambda shape: np.full(shape, -77),
     "dates": lambda shape: np.full(shape, np.datetime64("2020-01-01", "ns")),
@@ -68,14 +70,20 @@ _JSON = ("declaration", "provenance")
 
 
 def attributes(dataset):
-    """All attributes: those of the variables by their names, those of the file by none."""
+    """Return all attributes by variable name.
+
+    The attributes of the file have an empty name.
+    """
     attrs = {str(name): dict(values.attrs) for name, values in dataset.variables.items()}
     attrs[""] = dataset.attrs | {name: json.loads(dataset.attrs[name]) for name in _JSON}
     return attrs
 
 
 def with_other_attributes(dataset, at, change):
-    """The dataset with one attribute, or one part of what its JSON says, changed."""
+    """Return the dataset with one attribute changed.
+
+    The path may also lead to an element of an attribute in JSON format.
+    """
     inside = whole = attributes(dataset)
     for key in at[:-1]:
         inside = inside[key]
@@ -100,7 +108,7 @@ def replaced(by):
 
 
 def with_another_variable(dataset, name, how):
-    """The dataset without one variable, or with another in its place."""
+    """Return the dataset without a variable, or with a replacement of it."""
     dims, shape, rest = dataset[name].dims, dataset[name].shape, dataset.drop_vars(name)
     if how == "removed":
         return rest
@@ -110,15 +118,15 @@ def with_another_variable(dataset, name, how):
 
 
 def sealed(dataset, path: Path) -> str:
-    """Written as by someone who meant it: the digest is right."""
+    """Write a dataset with a valid digest, and return its path."""
     with warnings.catch_warnings():
-        warnings.simplefilter("ignore")  # of xarray, on what it writes
+        warnings.simplefilter("ignore")  # xarray warns of the contents that it writes.
         dataset_files.write_dataset(dataset, path)
     return str(path)
 
 
 def refused(file, complaint) -> None:
-    """By whatever opens it, in Python and on the command line."""
+    """Assert that Python functions and commands reject a file."""
     with pytest.raises(DataError, match=complaint):
         rsfstudy.open(file)
     for command_ in ("show", "check", "plot", "rerun"):
@@ -188,11 +196,9 @@ def test_a_rerun_refuses_what_makes_no_study_by_its_path(at, change, complaint, 
 
 
 # ---- paths that are no results ------------------------------------------------------------------
-
-
 @pytest.fixture
 def nowhere(tmp_path, monkeypatch):
-    """A directory of things that are no results."""
+    """Create a directory of files and links that are not results."""
     monkeypatch.chdir(tmp_path)
     for name in ("dir", "dir.nc", "dir.zarr", "odd.zarr"):
         (tmp_path / name).mkdir()
@@ -220,7 +226,7 @@ def nowhere(tmp_path, monkeypatch):
     ids=lambda path: path[:20],
 )  # fmt: skip
 def test_a_path_that_is_no_results_file(command_, path, nowhere):
-    """It is named, briefly."""
+    """The error message is short and contains the path."""
     code, said = run_command([command_, path])
     assert code in (1, 2)
     assert said.startswith("error: ")
@@ -229,7 +235,10 @@ def test_a_path_that_is_no_results_file(command_, path, nowhere):
 
 
 def test_a_pipe_is_not_waited_for(tmp_path, monkeypatch):
-    """Neither where a file is looked for, nor in the way of what a run writes."""
+    """Commands do not block if a pipe has the name of a file.
+
+    The pipes replace input files, and files that a run writes.
+    """
     monkeypatch.chdir(tmp_path)
     for name in ("pipe.nc", "pipe.zarr", "pipe.py", ".faulty.nc.new", "faulty.cells.sqlite"):
         os.mkfifo(name)
@@ -243,8 +252,6 @@ def test_a_pipe_is_not_waited_for(tmp_path, monkeypatch):
 
 
 # ---- options ------------------------------------------------------------------------------------
-
-
 @pytest.mark.parametrize(("cores", "most"), [(2, 8), (3, 12), (None, 8)])
 def test_more_workers_than_a_machine_can_bear_are_refused(cores, most, monkeypatch):
     monkeypatch.setattr(os, "cpu_count", lambda: cores)
@@ -264,7 +271,7 @@ def test_an_error_keeps_both_ends_of_what_is_long():
 
 
 def test_a_command_may_hold_bytes_that_are_no_text(tmp_path, monkeypatch):
-    """What was typed, and who computed it, are told as far as they are text."""
+    """Undecodable bytes in the command or the creator name are escaped."""
     monkeypatch.setenv("RSFSTUDY_CREATOR_NAME", "G\udcf6del")
     for format_ in ("netcdf", "zarr"):
         run(TINY, output=tmp_path / format_, format=format_, command="rsfstudy run \udcff")
@@ -274,7 +281,8 @@ def test_a_command_may_hold_bytes_that_are_no_text(tmp_path, monkeypatch):
 
 
 def test_a_full_disk_where_the_output_goes_is_told(monkeypatch):
-    with contextlib.suppress(OSError), open("/dev/full", "w") as full:  # raised by closing it too
+    # Closing the file raises an error too.
+    with contextlib.suppress(OSError), open("/dev/full", "w") as full:
         monkeypatch.setattr(sys, "stdout", full)
         with pytest.raises(RunError, match="cannot print: No space left on device"):
             stdout_console.print("anything")

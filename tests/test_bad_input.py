@@ -1,5 +1,7 @@
-"""Bad input fails before any work starts, with an error that names the place: never a traceback,
-never a half-written output.
+"""Tests of invalid input.
+
+Invalid input raises an error that names the problem before any work starts. No traceback is
+printed, and no output is left incomplete.
 """
 
 import string
@@ -18,7 +20,7 @@ from rsfstudy.errors import DataError, InvalidValue
 from rsfstudy.slider.part_registry import FIELD_NAMES
 from rsfstudy.study import study_loader
 
-#: Anything a user, a JSON file or a notebook may put where a value is asked for.
+#: Values that a user, a JSON file or a notebook may pass instead of a valid value.
 ODD = st.one_of(
     st.none(), st.booleans(), st.integers(-5, 5), st.floats(), st.text(max_size=5), st.just([]),
     st.just({}), st.just(np.nan), st.just(np.array([1.0, 2.0])), st.just(1j), st.builds(object),
@@ -26,8 +28,6 @@ ODD = st.one_of(
 
 
 # ---- declarations -------------------------------------------------------------------------------
-
-
 @settings(max_examples=50)
 @given(st.dictionaries(st.sampled_from(FIELD_NAMES) | st.text(max_size=6), ODD, max_size=4))
 def test_a_scene_is_made_or_refused(fields):
@@ -56,9 +56,7 @@ def test_overrides_make_a_study_or_are_refused(overrides):
 
 
 # ---- the command line ---------------------------------------------------------------------------
-
-
-#: Nearly right settings, and anything at all.
+#: Nearly valid settings, and random text.
 SETTINGS = st.one_of(
     st.text(max_size=12),
     st.builds(
@@ -91,8 +89,6 @@ def test_any_setting_is_taken_or_refused(texts):
 
 
 # ---- files --------------------------------------------------------------------------------------
-
-
 @pytest.fixture(scope="module")
 def small(tmp_path_factory):
     output = tmp_path_factory.mktemp("small")
@@ -103,8 +99,10 @@ def small(tmp_path_factory):
 @settings(max_examples=100)
 @given(data=st.data())
 def test_a_damaged_file_is_refused_or_unharmed(small, tmp_path_factory, data):
-    """Bytes changed, blanked or cut off, anywhere: an error that names the file, or, where they
-    were not in use, the same numbers.
+    """A damaged file raises an error, or contains the same numbers.
+
+    Bytes are changed, blanked or cut off at a random position. The numbers stay the same
+    only if the bytes are unused.
     """
     content = bytearray(small.read_bytes())
     at = data.draw(st.integers(0, len(content) - 1))
@@ -119,7 +117,7 @@ def test_a_damaged_file_is_refused_or_unharmed(small, tmp_path_factory, data):
     path.write_bytes(content)
     try:
         with warnings.catch_warnings():
-            warnings.simplefilter("ignore")  # of a digest that was cut off
+            warnings.simplefilter("ignore")  # A missing digest causes a warning.
             found = rsfstudy.open(path)
     except DataError as error:
         said = str(error)
@@ -143,11 +141,9 @@ def test_any_study_file_is_taken_or_refused(tmp_path_factory, text):
 
 
 # ---- where results go ---------------------------------------------------------------------------
-
-
 @pytest.mark.parametrize("output", ["/dev/null/results", "/proc/results"])
 def test_an_output_that_cannot_be_written(output, monkeypatch):
-    """Told before any cell is computed."""
+    """The error is raised before any cell is computed."""
     monkeypatch.setattr("rsfstudy.execution.cell_computation.compute_cell", None)
     with pytest.raises(DataError, match=f"cannot use {output}.*Choose another --output"):
         run(output=output)

@@ -1,4 +1,7 @@
-"""Bad records: each ends in a clear error or a status, with little work and no absurd numbers."""
+"""Tests of records that do not constrain the parameters.
+
+Each fit ends with a clear error or status, with little work and without absurd numbers.
+"""
 
 from __future__ import annotations
 
@@ -20,7 +23,7 @@ FOUR = ("a", "b", "slip_distance", "mu_star")
 
 
 def columns(count: int = ROWS) -> dict[str, np.ndarray]:
-    """A velocity step by the slip law, with correlated noise."""
+    """Return a velocity step for the slip law, with correlated noise."""
     time = synthetic.sample_times(synthetic.STEP_UP, 50.0, count)
     friction = synthetic.friction_and_sensitivities("slip", time)[0] + synthetic.correlated_noise(
         count, 0.5, 1e-4, 3
@@ -36,7 +39,7 @@ GOOD = columns()
 
 
 def fitted(record: dict[str, np.ndarray] | Record, **options: Any) -> xr.Dataset:
-    """Its fit by the slip law."""
+    """Return the fit of a record with the slip law."""
     read = record if isinstance(record, Record) else rsfstudy.read_record(record)
     options = {"stiffness": 3e-3, "laws": ["slip"], "engine": "compiled", **options}
     return rsfstudy.fit(read, **options)
@@ -58,7 +61,7 @@ NOISE = 0.6 + 1e-4 * np.random.default_rng(1).standard_normal(ROWS)
     ("record", "options", "told"),
     [
         (GOOD | {"friction": NOISE}, {}, "a, b, slip_distance"),
-        (  # displacement a thousand times too large
+        (  # The displacement is a thousand times too large.
             SHORT | {"friction": NOISE[:15], "displacement": 1e3 * SHORT["displacement"]},
             {"stiffness": 2e-4, "noise": "white"},
             "a, b, slip_distance",
@@ -78,9 +81,11 @@ def test_what_a_record_does_not_tell(
         found = fitted(record, free=FOUR, **options).isel(law=0)
     assert found.status.item() == Status.NOT_IDENTIFIED
     assert told in found.message.item()
-    # of the 5e7 that a fit may spend; on a stiff spring a motion may take 150,000
+    # A fit may use 5e7 evaluations, and a motion with a stiff spring may need 150,000
+    # evaluations.
     assert found.rhs_evaluations.item() < 3e7
-    # of what has no bounds no end is nearer than the standard error, though others are at bounds
+    # The limits of an unbounded parameter differ from its value by at least the standard error,
+    # even if other parameters are at their bounds.
     ends = np.array([found.mu_star_low.item(), found.mu_star_high.item()])
     assert not (np.abs(ends - found.mu_star.item()) < found.mu_star_stderr.item()).any()
     assert (found.b_low.item(), found.b_high.item()) == (-1.0, 1.0)

@@ -1,4 +1,4 @@
-"""Motions that begin with a stated stress and state instead of steady sliding at V_*."""
+"""Tests of motions with a given initial stress and state."""
 
 from __future__ import annotations
 
@@ -23,8 +23,10 @@ DYNAMICS = ({}, {"radiation_damping": 1e-3}, {"inertia": True})
     dynamics=st.sampled_from(DYNAMICS),
 )
 def test_it_begins_as_stated(stress, state, normal_stress, dependence, dynamics):
-    """With that spring stress and state variable, and the slip rate that friction then has; to
-    rounding, over a for the slip rate.
+    """The initial point has the given spring stress and state variable.
+
+    The slip rate follows from friction. The values agree to rounding error, divided by a
+    for the slip rate.
     """
     scene = Scene(
         normal_stress=normal_stress,
@@ -41,7 +43,7 @@ def test_it_begins_as_stated(stress, state, normal_stress, dependence, dynamics)
 
 
 def test_steps_come_on_top():
-    """With mass, slip rate at the instant of a step is that of the stated stress and state."""
+    """With inertia, the slip rate does not change at the time of a step."""
     scene = Scene(initial_state=0.05, inertia=True, normal_stress="imposed", alpha=0.3)
     begin = initial_point(scene)
     after = initial_point(scene.with_(displacement_step=0.5, normal_stress_step=-0.01))

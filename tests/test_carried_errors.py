@@ -1,4 +1,4 @@
-"""Numerical errors of cells reach what is made of them."""
+"""Tests of the propagation of numerical errors through reductions."""
 
 import numpy as np
 import pytest
@@ -67,7 +67,7 @@ KINDS = [
 
 
 def moved_one_by_one(reduction, dataset) -> xr.DataArray:
-    """What the errors of cells change, each cell moved by its own and reduced again, all added."""
+    """Return the sum of the changes of a result by the error of each cell."""
     still, sums = apply_reductions(dataset, (reduction,)).r, 0.0
     for place in np.ndindex(dataset[OF].shape):
         other = dataset.copy(deep=True)
@@ -80,7 +80,8 @@ def moved_one_by_one(reduction, dataset) -> xr.DataArray:
 def test_the_error_is_what_cells_moved_by_theirs_change_in_all(reduction):
     dataset = lattice()
     error = apply_reductions(dataset, (reduction,)).r_error
-    # 1e-6 of a number is the second order; and the last bits of it
+    # The relative tolerance allows for second-order terms of about 1e-6, and the absolute
+    # tolerance for rounding.
     expected = moved_one_by_one(reduction, dataset).transpose(*error.dims)
     np.testing.assert_allclose(error, expected, rtol=1e-5, atol=2e-15)
     assert error.attrs["comment"] == PROPAGATED_ERROR_COMMENT
@@ -89,7 +90,10 @@ def test_the_error_is_what_cells_moved_by_theirs_change_in_all(reduction):
 
 @pytest.mark.parametrize("noise", [0.0, 1e-3])
 def test_an_inverse_has_them_beside_its_own(noise):
-    """Each cell moved, and the uncertainty of the interpolant as it is without them."""
+    """The error is the sum of the cell errors and the interpolation error.
+
+    The interpolation error is the error of the result for exact cells.
+    """
     values = 1.3 * X**0.8 * (1.0 + noise * RANDOM.uniform(-1.0, 1.0, (2, 5)))
     inverse = Inverse("r", OF, ON, levels=2.0)
     exact = apply_reductions(lattice(values, errors=0.0), (inverse,)).r_error
@@ -102,7 +106,10 @@ def test_an_inverse_has_them_beside_its_own(noise):
 
 
 def test_an_exact_relation_has_no_standard_error_but_that_of_its_cells():
-    """All cells off by the same part: the misfit says nothing, the numerical error covers."""
+    """The numerical error covers a common relative error of all cells.
+
+    The standard error does not, because it measures the misfit only.
+    """
     truth, part = 1.0 + 4.0 / 3.0 * X, 3e-8
     dataset = lattice([truth * (1.0 + part)] * 2, errors=part * truth)
     fit = LinearFit("slope", OF, ON)
@@ -119,7 +126,7 @@ def test_a_reference_is_like_itself_whatever_its_error():
 
 
 def test_a_cell_of_no_known_error_leaves_it_unknown():
-    """Unless the result does not depend on it."""
+    """The error is NaN unless the result is independent of the cell."""
     errors = ERRORS.copy()
     errors[1, 4] = np.nan
     fits = (LinearFit("all", OF, ON), LinearFit("some", OF, ON, within=(0.25, 2.0)))
@@ -158,7 +165,10 @@ def test_cells_without_errors_give_none():
 
 
 def test_a_spread_knows_the_cells_that_may_be_farthest():
-    """The second largest is off by more than what the largest leads by."""
+    """The error allows for a change of the largest cell.
+
+    The error of the second largest value exceeds its distance to the largest value.
+    """
     values = np.tile([1.0, 1.5, 2.0, 2.999, 3.0], (2, 1))
     errors = np.tile([1e-6, 1e-6, 1e-6, 1e-2, 1e-6], (2, 1))
     result = apply_reductions(lattice(values, errors), (Range("r", OF, ON),))
@@ -166,12 +176,16 @@ def test_a_spread_knows_the_cells_that_may_be_farthest():
 
 
 def test_the_error_of_a_quantile_bounds_whatever_cells_change_places():
-    """Each by any part of its own error, of which some are larger than the distance to the next."""
+    """The error bounds the quantile for any errors of the cells.
+
+    Some errors are larger than the distance to the next value, so cells may change their
+    order.
+    """
     quantile, random = Quantile("r", OF, over="b_over_a", level=0.3), np.random.default_rng(7)
     values = np.tile([1.0, 2.0, 2.01, 3.0, 4.0], (2, 1))
     errors = np.array([[1e-6, 1e-6, 0.5, 1e-6, 1e-6], [1e-6, 0.4, 1e-6, np.nan, 1e-6]])
     found = apply_reductions(lattice(values, errors), (quantile,))
-    # 2.002, of which 1.608 is left where 2.01 is 1.51
+    # The quantile is 2.002, and decreases to 1.608 if 2.01 decreases to 1.51.
     assert float(found.r_error[0]) == pytest.approx(0.394, abs=2e-6)
     for _ in range(50):
         off = random.uniform(-1.0, 1.0, (2, 5)) * np.nan_to_num(errors, nan=2.0)

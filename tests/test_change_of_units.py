@@ -1,7 +1,7 @@
-"""A change of units changes no dimensionless number: not of scenes, and not of what comes of them.
+"""Tests of the invariance of dimensionless numbers under changes of units.
 
-Conversions are rounded once, so that whatever has one value has the same bits; and the same scene
-gives the same numbers.
+Unit conversions are rounded once, so equal values have equal bits, and equal scenes have
+equal results.
 """
 
 from fractions import Fraction
@@ -22,7 +22,7 @@ NAMES = {
     "m": ("m", "cm", "mm", "um", "nm"),
     "s": ("s", "ms", "min", "h"),
 }
-#: Of each kind of quantity, all of its units.
+#: All units of each kind of quantity.
 UNITS = NAMES | {
     "m/s": tuple(f"{x}/{t}" for x in NAMES["m"] for t in NAMES["s"]),
     "Pa/m": tuple(f"{s}/{x}" for s in NAMES["Pa"][:5] for x in NAMES["m"]),
@@ -41,7 +41,10 @@ few = settings(max_examples=12)
 
 
 def stated(size, kind):
-    """A quantity in any of its units in which it has no more digits than a number holds."""
+    """Return a strategy for a quantity in various units.
+
+    Only units in which a float represents the value exactly are used.
+    """
 
     def text(unit):
         value = Fraction(size) / unit_factor("x", unit, kind)

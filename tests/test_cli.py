@@ -1,4 +1,4 @@
-"""The command line: what it prints, what it writes, and its exit statuses."""
+"""Tests of the command line: printed output, files and exit statuses."""
 
 import re
 import subprocess
@@ -22,7 +22,7 @@ SMALL = ["--serial", "--set", "b_over_a=2,3,5"]
 
 @pytest.fixture(scope="module")
 def results(tmp_path_factory):
-    """From a process of its own, as a user calls it."""
+    """Run the command in a new process, as a user would do."""
     output = tmp_path_factory.mktemp("outputs")
     command = [sys.executable, "-m", "rsfstudy.cli.command_line", "run", NAME, *SMALL]
     command += ["--output", output]
@@ -78,7 +78,10 @@ def test_check_fails_when_a_verdict_moves(tmp_path, tmp_path_factory):
     ],
 )
 def test_other_lattices_run_check_and_plot_and_say_what_they_are(settings, tmp_path):
-    """Both say how many claims were checked; where none is, `check` fails."""
+    """Both commands print the number of checked claims.
+
+    If no claim applies, ``check`` fails.
+    """
     ran = call_main("run", NAME, "--serial", *settings, "--output", tmp_path)
     assert ran.returncode == 0, ran.stderr
     checked = call_main("check", NAME, "--output", tmp_path)
@@ -90,13 +93,17 @@ def test_other_lattices_run_check_and_plot_and_say_what_they_are(settings, tmp_p
     assert drawn.returncode == 0, drawn.stderr
     assert "not as declared" in ran.stdout
     assert settings[1].split("=")[0] in ran.stdout
-    # a slope needs more than one point
+    # A fit of a slope needs more than one point.
     few = "no zeta: among these cells are none, or too few, to draw on, with 0.25 <= a_over_b_minus"
     assert (few in " ".join(ran.stdout.split())) == (settings[1] == "b_over_a=1.5")
 
 
 def test_a_claim_that_is_named_must_apply(tmp_path):
-    """Of claim C6 the slope is left out with cells of its support, the value at b/a = 2 is not."""
+    """Claim C6 consists of a slope and a value.
+
+    The slope is not applicable because cells of its range are missing, but the value at b/a
+    = 2 is checked.
+    """
     dataset = rsfstudy.run(NAME, workers=0, output=None, progress=False, b_over_a=[2, 3])
     dataset_files.write_dataset(dataset, tmp_path / "few.nc")
     everything = call_main("check", tmp_path / "few.nc")
@@ -151,8 +158,6 @@ def test_a_label_may_hold_commas_and_colons(tmp_path):
 
 
 # ---- several studies, one after the other -------------------------------------------------------
-
-
 def replace_everywhere(monkeypatch, function, other):
     """Replace a function in all modules of rsfstudy that have imported it."""
     for module in [m for n, m in sys.modules.items() if n.startswith("rsfstudy.")]:
@@ -164,7 +169,7 @@ def replace_everywhere(monkeypatch, function, other):
 
 @pytest.fixture
 def catalogued(monkeypatch):
-    """Puts studies in the place of the named ones."""
+    """Return a function that replaces the named studies."""
 
     def named(*studies):
         by_name, load = {study.name: study for study in studies}, study_loader.load_study
@@ -175,15 +180,17 @@ def catalogued(monkeypatch):
 
 
 def rows(said: str) -> dict[str, list[str]]:
-    """The last table, by the first column."""
+    """Return the rows of the last table by their first column."""
     lines = said.rpartition("───\n")[2].splitlines()
     cells = [re.split(r"\s{2,}", line.strip()) for line in lines if line.strip()]
     return {first: others for first, *others in cells}
 
 
 def test_run_all_goes_on_whatever_becomes_of_a_study(catalogued, tmp_path, monkeypatch):
-    """A cell that fails, a verdict that moved, a figure that fits nothing, a run that cannot start:
-    the others are run, and a table says what became of each.
+    """``run --all`` continues after a failure and prints a summary table.
+
+    The failures are a failed cell, a changed verdict, an impossible figure, and a run that
+    cannot start.
     """
     monkeypatch.setenv("COLUMNS", "150")
     claim = example_claim(variable="total", where={"b_over_a": 2.0}, published=3.0)
@@ -212,7 +219,7 @@ def test_run_all_goes_on_whatever_becomes_of_a_study(catalogued, tmp_path, monke
 
 @pytest.fixture
 def without_numba(monkeypatch):
-    """As where Numba is not installed."""
+    """Simulate an environment without Numba."""
     monkeypatch.setitem(sys.modules, "rsfstudy.motion.compiled.numba_backend", None)
     engine_factory.import_compiled_engine.cache_clear()
     yield
@@ -225,7 +232,7 @@ def compiled(**fields):
 
 
 def test_run_all_names_the_studies_it_leaves_out(catalogued, tmp_path, monkeypatch, without_numba):
-    """Where Numba is missing, a study that needs it is no failure."""
+    """Without Numba, a study that needs it is skipped without a failure."""
     monkeypatch.setenv("COLUMNS", "150")
     catalogued(compiled(name="dear"), replace(faulty_study(), name="plain"))
     ran = call_main("run", "--all", "--serial", "--output", tmp_path)
@@ -241,7 +248,10 @@ def test_run_all_names_the_studies_it_leaves_out(catalogued, tmp_path, monkeypat
 
 
 def test_what_is_asked_for_is_not_left_out(catalogued, tmp_path, without_numba):
-    """A study alone, or the engine itself: an error with the remedy, before any work."""
+    """An explicit request raises an error with a remedy before any work.
+
+    The request is a single study, or the compiled engine.
+    """
     catalogued(compiled(name="dear"), replace(faulty_study(), name="plain"))
     for words in (["dear"], ["--all", "--engine", "compiled"]):
         ran = call_main("run", *words, "--serial", "--output", tmp_path / "o")
@@ -281,8 +291,10 @@ def test_wrong_usage_of_a_later_study_is_told_before_any_work(catalogued, tmp_pa
     ],
 )
 def test_exit_statuses_of_a_motion(duration, budget, status, said, tmp_path):
-    """To the end of a hold, beyond the pulse that follows, and where the budget ends it; what is
-    said stands on one stream.
+    """The exit status depends on the reason for the end of the motion.
+
+    The three motions end with the hold, after the pulse that follows, and when the work
+    budget is exhausted. Each message appears in one stream only.
     """
     words = {"law": "slowness", "normal_stress": "constant", "b_over_a": 1.5, "hold_time": 100}
     settings = [word for name, value in words.items() for word in ("--set", f"{name}={value}")]

@@ -1,5 +1,7 @@
-"""On an existing Dask cluster: scheduler and workers as processes of their own, the same bits, and
-faults of the cluster told for what they are.
+"""Tests of runs on an existing Dask cluster.
+
+Scheduler and workers are separate processes. The results are bitwise identical to local
+runs, and error messages name faults of the cluster.
 """
 
 import contextlib
@@ -38,7 +40,7 @@ from rsfstudy.errors import RunError
 from rsfstudy.execution import clusters, provenance
 
 CLUSTERS = Path(__file__).parent.parent / "studies" / "clusters"
-#: What the page has for Kubernetes, by kind and name.
+#: Kubernetes objects of the page, by kind and name.
 PARTS = {
     (part["kind"], part["metadata"]["name"]): part
     for part in yaml.safe_load_all((CLUSTERS / "kubernetes.yaml").read_text())
@@ -46,14 +48,17 @@ PARTS = {
 
 
 def container(name):
-    """Labels of a deployment, and the container that it starts."""
+    """Return the labels of a deployment, and its container."""
     template = PARTS["Deployment", name]["spec"]["template"]
     return template["metadata"]["labels"], template["spec"]["containers"][0]
 
 
 class Cluster:
-    """A scheduler and workers as processes, by the commands of the file for Kubernetes, each worker
-    in an empty directory of its own; what a test kills is started again for the next.
+    """Scheduler and workers in separate processes.
+
+    The processes use the commands of the Kubernetes file, and each worker runs in a
+    separate empty directory. If a test kills a process, the process is started again for
+    the next test.
     """
 
     def __init__(self, place, stack):
@@ -62,7 +67,7 @@ class Cluster:
         self.gate.mkdir()
 
     def repaired(self):
-        """With two workers, and the gate as at the beginning."""
+        """Restore two workers and an empty gate."""
         for mark in self.gate.iterdir():
             mark.unlink()
         if self.scheduler is None or self.scheduler.poll() is not None:
@@ -122,7 +127,7 @@ def separate(started):
 
 
 def test_the_same_bits_as_in_this_process(separate, tmp_path):
-    """The workers write nothing, neither where they are nor where the results go."""
+    """The results are bitwise identical, and the workers write no files."""
     with clusters.connect_to_cluster(separate.address, timeout=HANG_TIMEOUT) as client:
         client.wait_for_workers(2)
         have_same_numbers(run(SMALL_STUDY, client=client, output=tmp_path / "results"), run())
@@ -134,21 +139,23 @@ def test_the_same_bits_as_in_this_process(separate, tmp_path):
 
 @pytest.fixture
 def held(separate, tmp_path):
-    """A run on two workers that has kept some of its cells, while the others wait until the gate is
-    open; its directory, and that gate.
+    """Start a run on two workers whose remaining cells wait at a gate.
+
+    The fixture yields the process, the output directory and the gate.
     """
     output = tmp_path / "results"
     words = ("run", FAULTY_STUDY_FILE, "--scheduler", separate.address, "--output", output)
     process = start_command(*words, FAULT_CELLS="30")
     wait_for_journal_cells(output / "faulty.cells.sqlite", process)
-    wait_until(lambda: len(list(separate.gate.iterdir())) == 2, process)  # both have cells
+    # Both workers have cells now.
+    wait_until(lambda: len(list(separate.gate.iterdir())) == 2, process)
     yield process, output, separate.gate / "open"
     process.kill()
     process.communicate()
 
 
 def test_a_worker_lost_in_mid_run(separate, held):
-    """kill -9 of one of two, from the command line; no cell is blamed."""
+    """A worker that is killed during a run does not cause failed cells."""
     process, output, gate = held
     separate.workers[0].kill()
     gate.touch()
@@ -158,13 +165,13 @@ def test_a_worker_lost_in_mid_run(separate, held):
 
 
 def test_a_scheduler_lost_in_mid_run(separate, held):
-    """The run ends with what it has, and goes on without the cluster."""
+    """The run keeps the finished cells, and resumes without the cluster."""
     process, output, _gate = held
     separate.scheduler.kill()
     code, _out, said = wait_for_command(process)
     assert code == 1
     assert "the Dask scheduler is lost" in said
-    assert "distributed." not in said  # told once, not by Dask too
+    assert "distributed." not in said  # Dask does not print the error again.
     assert "of 30 cells are finished and kept" in said
     assert (output / "faulty.partial.nc").exists()
     resumed = run(faulty_study(cells=30), output=output)
@@ -179,7 +186,7 @@ def test_a_worker_of_another_version_is_refused(cluster, monkeypatch):
 
 
 def test_nothing_listens_beyond_this_machine(cluster):
-    """Neither the scheduler and what watches over workers, in this process, nor the workers."""
+    """Scheduler, nannies and workers listen on the loopback interface only."""
     processes = {os.getpid(), *cluster.run(os.getpid).values()}
     assert len(processes) == 3
     for process in processes:
@@ -190,7 +197,7 @@ def test_nothing_listens_beyond_this_machine(cluster):
 
 
 def test_a_scheduler_by_tls():
-    """With the certificates of Dask's configuration, as of its other clients."""
+    """The client uses the certificates of the Dask configuration."""
     from distributed import LocalCluster, Security
 
     security = Security.temporary()
@@ -236,7 +243,7 @@ def test_a_port_that_listens_and_says_nothing():
 def test_the_slurm_job_is_what_it_says(tmp_path, monkeypatch):
     from dask_jobqueue import SLURMCluster
 
-    monkeypatch.setenv("HOME", str(tmp_path))  # where the certificates are written
+    monkeypatch.setenv("HOME", str(tmp_path))  # The certificates are written to the home directory.
     job = runpy.run_path(str(CLUSTERS / "slurm.py"))["JOB_OPTIONS"]
     with SLURMCluster(**job, scheduler_options={"dashboard_address": "127.0.0.1:0"}) as cluster:
         script = cluster.job_script()
@@ -246,7 +253,7 @@ def test_the_slurm_job_is_what_it_says(tmp_path, monkeypatch):
     assert re.search("tls://.*--tls-ca-file ~/.dask-jobqueue", script)
 
 
-#: Jobs that are processes of this machine, in place of SLURM's.
+#: Source of a script that replaces SLURM jobs by local processes.
 LOCAL_JOBS = """
 import functools, runpy, sys
 from dask_jobqueue.local import LocalCluster
@@ -281,7 +288,10 @@ def test_the_slurm_script_runs_a_study(tmp_path):
 
 
 def test_the_kubernetes_file_joins_its_parts():
-    """Its commands are those by which the cluster above is started."""
+    """The parts of the Kubernetes file refer to each other.
+
+    The cluster of these tests is started with the same commands.
+    """
     service = PARTS["Service", "rsfstudy-scheduler"]["spec"]
     labels, scheduler = container("rsfstudy-scheduler")
     workers, worker = container("rsfstudy-workers")

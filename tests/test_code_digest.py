@@ -1,5 +1,7 @@
-"""The digest of the physics, and that of a user's own measure: the same for the same code wherever
-it runs, another as soon as anything it draws on is another, and cells are not mixed.
+"""Tests of the digests of the physics and of user-defined measures.
+
+The digest is equal for equal code in every process, and changes if any code that a measure
+uses changes. Cells with different digests are not mixed.
 """
 
 import dataclasses
@@ -170,7 +172,10 @@ def test_the_code_of_a_measure_within_another_counts(tmp_path):
 
 
 def test_it_is_the_same_in_other_processes(tmp_path):
-    """Whatever the seed of their hashes; in a script, and in code that has no file, too."""
+    """The digest is independent of the hash seed.
+
+    The code may come from a script or from the command line.
+    """
     expected = digest(study_in(tmp_path))
     script = tmp_path / "script.py"
     ask = "\nfrom rsfstudy.execution import code_digest\nprint(code_digest.digest_classes(Own))"
@@ -198,8 +203,9 @@ def test_cells_of_other_code_are_not_mixed(tmp_path):
 
 
 def test_helpers_reach_the_workers_and_those_of_other_files_do_not_mix(tmp_path, cluster):
-    """Two files, each with a helper of the same name, in one process."""
-    plain = HELPER.replace("@functools.lru_cache\n", "")  # which cannot be sent
+    """Helper modules with the same name are kept apart in one process."""
+    # The cached function cannot be serialised.
+    plain = HELPER.replace("@functools.lru_cache\n", "")
     other = plain.replace("return 2.0 * x", "return 3.0 * x")
     one, two = study_in(tmp_path / "one", helper=plain), study_in(tmp_path / "two", helper=other)
     assert "helper" not in sys.modules
@@ -212,7 +218,7 @@ def test_helpers_reach_the_workers_and_those_of_other_files_do_not_mix(tmp_path,
 
 
 def test_a_worker_with_another_helper_is_refused(tmp_path, monkeypatch, cluster):
-    """Here a module that both import, and only one has edited."""
+    """A worker is rejected if its version of a shared module differs."""
     text = textwrap.dedent(
         HELPER + MEASURE.replace("import helper\nfrom helper import Tool, kept", "")
     )
@@ -236,7 +242,7 @@ def physics_of(study):
 
 
 def with_measures_of_their_own():
-    """Modules of named studies that hold the measure of their study."""
+    """Return the modules of named studies that define their own measure."""
     loaded = [study_loader.load_study(name) for name in study_index.study_names()]
     homes = {study.name: type(study.measure).__module__ for study in loaded}
     return [
@@ -259,7 +265,7 @@ def digest_of_edited(module, edits, monkeypatch):
 
 @pytest.mark.parametrize("module", with_measures_of_their_own(), ids=lambda m: m.__name__)
 def test_what_else_stands_in_the_file_of_a_study_decides_no_number(module, monkeypatch):
-    """Its figure, its axes and claims, and the reductions it alone uses."""
+    """The digest ignores figure, axes, claims and reductions of a study."""
     before = physics_of(module.study)
     others = [n for n, v in vars(module).items() if n == "figure" or is_reduction(v)]
     edited = dataclasses.replace(module.study, claims=[], axes=module.study.axes[:1], plot="lines")
@@ -307,14 +313,14 @@ class Law:
         ("  # twice", "", True),
         ("\n\n\nclass", "\n\n# of rocks\n\n\n\nclass", True),
         ("2.0 * x", "2.0 / x", False),
-        ("2.0 * x", "(2.0 + 2e-16) * x", True),  # the same float
+        ("2.0 * x", "(2.0 + 2e-16) * x", True),  # The sum rounds to the same float.
         ("2.0 * x", "(2.0 + 5e-16) * x", False),
         ("scale=1.0", "scale=-1.0", False),
         ("range(2)", "range(3)", False),
     ],
 )
 def test_of_the_physics_its_code_counts_and_no_remark(old, new, same, tmp_path):
-    """A file of it is copied, edited and digested."""
+    """The digest depends on code, but not on docstrings and comments."""
     for name, text in (("before", LAW), ("after", LAW.replace(old, new))):
         (tmp_path / name / "slider").mkdir(parents=True)
         (tmp_path / name / "slider" / "law.py").write_text(text)
@@ -337,7 +343,7 @@ def test_the_digest_of_the_physics_is_that_of_its_files():
 
 @pytest.mark.parametrize("name", ["triggering", "hard_cases"])
 def test_cached_properties_of_a_study_do_not_change_its_digest(name):
-    """One process may have used the measures and scenes of a study, and another may not."""
+    """The digest is the same before and after the use of a study."""
     study = study_loader.load_study(name)
     fresh = code_digest.digest_physics_and_measures("", study.measure.code_classes)
     values = [

@@ -1,5 +1,7 @@
-"""Two files side by side: what differs in declaration, origin, statuses and numbers, and whether
-beyond error estimates; cells are matched by their places on the axes.
+"""Tests of the comparison of two results files.
+
+The comparison covers declarations, provenance, statuses and numbers, with error estimates
+as tolerances. Cells are matched by their coordinates.
 """
 
 import json
@@ -93,7 +95,10 @@ def test_codes_are_compared_though_they_have_no_errors(two):
 
 
 def test_points_of_one_name_must_hold_the_same(two):
-    """As samples that are drawn anew do not: they are other cells."""
+    """Points with equal names but different values are rejected.
+
+    For example, two sets of random samples contain different cells.
+    """
     first, second = two
     values = ("b_over_a", [0.5, 0.6, 0.7, 0.8])
     first = first.assign_coords(alpha=values)
@@ -105,7 +110,10 @@ def test_points_of_one_name_must_hold_the_same(two):
 
 
 def test_cells_are_matched_by_their_places(two):
-    """In another order, on axes that rounding has moved; the others are counted and named."""
+    """Cells are matched by coordinates, in any order and despite rounding.
+
+    Cells without a match are counted and named.
+    """
     first, second = two
     second = second.isel(b_over_a=[3, 1, 0], law=[1])
     second = second.assign_coords(b_over_a=second.b_over_a * (1.0 + 2e-16))

@@ -1,4 +1,4 @@
-"""The compiled engine: the same physics, told by the same events, whatever the parts of a scene."""
+"""Tests of the compiled engine."""
 
 import ctypes
 import itertools
@@ -32,12 +32,13 @@ from rsfstudy.study import study_loader
 CYCLE = {"stiffness_ratio": 0.8, "load_velocity_ratio": 2.0, "inertia": True}
 
 
-# ---- the same answers; events are held to frozen ones, those of a user's parts in test_extensions
-
-
+# ---- same results; see also the frozen events, and test_extensions for user-defined parts
 @pytest.mark.parametrize("rows", [8, 9, 10, 11, 12, 13])
 def test_a_recording_is_the_same_however_few_rows_a_call_may_fill(rows, monkeypatch):
-    """Regimes change in the middle of a table, and at its last rows."""
+    """The recording does not depend on the number of rows per call.
+
+    The regime changes in the middle of a table and at its last rows.
+    """
     scene, accuracy = Scene(**CYCLE), Accuracy(rtol=1e-3, engine=COMPILED)
     whole = LimitCycle(phases=50)(scene, accuracy)
     monkeypatch.setattr("rsfstudy.motion.motion_driver._RECORDING_ROWS", rows)
@@ -47,7 +48,7 @@ def test_a_recording_is_the_same_however_few_rows_a_call_may_fill(rows, monkeypa
 
 
 def test_hard_cases_come_out():
-    """All that break ordinary codes, held against their answers."""
+    """All hard cases agree with their reference values."""
     study = study_loader.load_study("hard_cases")
     ended = run(study, engine=COMPILED)
     assert (ended["status"] == int(Status.OK)).all()
@@ -62,7 +63,6 @@ def test_one_scene_calls_take_an_engine():
 
 
 # ---- what cannot be ------------------------------------------------------------------------------
-
 TABLE = {"part": 0.5}
 
 
@@ -99,7 +99,10 @@ class Guarded(Law):
 
 
 def test_a_part_that_raises_is_refused():
-    """Compiled functions cannot raise; a motion that goes on regardless would be wrong."""
+    """A law that raises an error is rejected.
+
+    Compiled functions cannot raise, so the motion would continue with wrong values.
+    """
     scene = Scene(law=Guarded, stiffness_ratio=1.5, load_velocity_ratio=20.0)
     with pytest.raises(ValueError, match="too fast"):
         simulate(scene, duration=10.0)
@@ -127,8 +130,6 @@ def test_a_rate_that_is_no_number_ends_the_motion(by):
 
 
 # ---- files and time ------------------------------------------------------------------------------
-
-
 def test_a_file_says_which_engine_and_cells_are_not_mixed(tmp_path):
     small = replace(SMALL_STUDY, axes=SMALL_STUDY.axes[:1])
     ran = run(small, engine=COMPILED, output=tmp_path)
@@ -138,12 +139,15 @@ def test_a_file_says_which_engine_and_cells_are_not_mixed(tmp_path):
         run(small, output=tmp_path)
 
 
-# waves are compared with the same motion without them, which is another's equations
+# Waves are compared with the motion without waves, which has different equations.
 @pytest.mark.parametrize(
     "name", [name for name in COMPILED_ONLY_STUDIES if name != "wave_triggering"]
 )
 def test_what_cells_need_is_compiled_before_them(name, monkeypatch):
-    """By what their measure says of time."""
+    """The equations of all cells are compiled before the first cell.
+
+    The attribute ``needs_time`` of the measure determines these equations.
+    """
     wanted, addresses = list[tuple[str, ...]](), numba_backend.compiled_function_addresses
 
     def asked(equations):
@@ -163,7 +167,6 @@ def test_what_cells_need_is_compiled_before_them(name, monkeypatch):
 
 
 # ---- the cache -----------------------------------------------------------------------------------
-
 known = types.ModuleType("known")
 known.NUMBER = 1.0
 
@@ -183,7 +186,7 @@ def empty_cache(tmp_path, monkeypatch) -> Path:
 
 
 def compiled_programs(function=doubled) -> int:
-    """How many programs it takes to have a function called by its address."""
+    """Return the number of programs compiled to call a function by address."""
     before = compilation_log.compiled_program_count
     (address,) = compile_cache.compile_cfunc_addresses([function])
     assert address
@@ -191,7 +194,10 @@ def compiled_programs(function=doubled) -> int:
 
 
 def test_other_processes_find_equations_again(tmp_path):
-    """Closures too, by which Numba's own cache would find none: it would write them anew."""
+    """Another process loads the compiled equations from the cache.
+
+    The equations are closures, which Numba's own cache would compile again.
+    """
     asks = (
         "from rsfstudy import Scene\n"
         "from rsfstudy.critical_steps.critical_path import CriticalPath\n"
@@ -214,7 +220,7 @@ def test_other_processes_find_equations_again(tmp_path):
 
 
 def test_what_is_compiled_is_found_again(empty_cache):
-    """In folders for the user alone, whatever the umask lets others do."""
+    """The cache is reused, and its folders are private despite the umask."""
     before = os.umask(0o002)
     try:
         assert [compiled_programs() for _ in range(3)] == [1, 0, 0]
@@ -264,7 +270,7 @@ def test_folders_of_others_are_left_alone(empty_cache, monkeypatch):
 
 
 def test_a_user_without_a_home_is_served(monkeypatch):
-    """As in a container whose user is not in passwd."""
+    """Compilation works for a user without an entry in passwd."""
     for name in ("HOME", "XDG_CACHE_HOME"):
         monkeypatch.delenv(name, raising=False)
     monkeypatch.setattr("pwd.getpwuid", {}.__getitem__)
@@ -272,8 +278,10 @@ def test_a_user_without_a_home_is_served(monkeypatch):
 
 
 def test_laws_are_told_apart_whatever_process_compiled_them(empty_cache, monkeypatch):
-    """Their functions are alike in name, and each process numbers those it compiles from one on: as
-    here, where both begin at the same number. Then both are loaded.
+    """Compiled laws from different processes are not confused.
+
+    The functions of the laws have equal names, and each process numbers its compiled
+    functions from the same start. The test resets the numbers and then loads both laws.
     """
     function, state = ctypes.CFUNCTYPE(None, *[ctypes.POINTER(ctypes.c_double)] * 4), (0.01, 0.02)
     for law in ("perrin_rice_zheng", "slip", "perrin_rice_zheng", "slip"):
@@ -293,7 +301,7 @@ def test_laws_are_told_apart_whatever_process_compiled_them(empty_cache, monkeyp
 
 
 def test_a_cache_of_other_code_is_never_used(monkeypatch):
-    """Any change of a function, or of a number it reads, makes another digest."""
+    """The digest changes with any change of a function or its constants."""
     scene = Scene(law=SlipLaw)
     rate = equations_between_ruptures(scene, with_time=False).rate_function
     before = compile_cache.compute_code_digest(None, rate)

@@ -1,5 +1,7 @@
-"""The integrator against exact invariants, references in extended precision, and a second
-formulation.
+"""Tests of the integrator.
+
+The references are exact invariants, results in extended precision, and a second formulation
+of the equations.
 """
 
 import dataclasses
@@ -30,7 +32,10 @@ from rsfstudy.status import Status
 
 @pytest.mark.parametrize("load_velocity_ratio", [1.5, 20.0])
 def test_invariant_of_the_slowness_law_at_critical_stiffness(load_velocity_ratio):
-    """H = Omega - ln Omega + lambda (w - ln w) is conserved at constant normal stress, k = k_cr."""
+    """H = Omega - ln Omega + lambda (w - ln w) is conserved.
+
+    The conservation holds at constant normal stress and k = k_cr.
+    """
     scene = Scene(
         law="slowness", normal_stress="constant", b_over_a=1.7,
         load_velocity_ratio=load_velocity_ratio,
@@ -44,16 +49,19 @@ def test_invariant_of_the_slowness_law_at_critical_stiffness(load_velocity_ratio
 
     def until(event):
         held.append(invariant(event.point))
-        return event.clock > 300.0  # some ten periods
+        return event.clock > 300.0  # This path length covers about ten periods.
 
     follow_until(scene, 1e-9, until)
-    # H is of order 10; its drift is what local errors of 2e-11 add up to
+    # H is of order 10, and local errors of 2e-11 accumulate to its drift.
     assert np.ptp(held) < 1e-8
 
 
 @pytest.mark.parametrize("b_over_a", [1.5, 2.0, math.e])
 def test_separatrix_of_the_slip_law_at_critical_stiffness(b_over_a):
-    """z = kappa v0/v - kappa + f/a + lambda x stays 1 on the path from V_0/V_* = 1 + 1/lambda."""
+    """The separatrix z = kappa v0/v - kappa + f/a + lambda x = 1 is conserved.
+
+    The path starts at V_0/V_* = 1 + 1/lambda.
+    """
     weakening = b_over_a - 1.0
     load = 1.0 + 1.0 / weakening
     scene = Scene(normal_stress="constant", b_over_a=b_over_a, load_velocity_ratio=load)
@@ -67,7 +75,7 @@ def test_separatrix_of_the_slip_law_at_critical_stiffness(b_over_a):
         )
 
     def until(event):
-        # the separatrix repels: what is left of 2e-12 grows with v**lambda
+        # The separatrix is repelling, so an error of 2e-12 grows with v**lambda.
         amplified = math.exp(max(1.0, weakening) * event.point.log_slip_rate)
         assert invariant(event.point) == pytest.approx(1.0, abs=1e-10 * amplified)
         return event.point.log_slip_rate > 6.0
@@ -76,15 +84,16 @@ def test_separatrix_of_the_slip_law_at_critical_stiffness(b_over_a):
 
 
 def cycle(law: str, accuracy: Accuracy) -> tuple[float, float]:
-    """Recurrence interval, and spring stress drop in a sigma_*."""
+    """Return the recurrence interval, and the stress drop in a sigma_*."""
     scene = Scene(law=law, normal_stress="constant", stiffness_ratio=0.8, load_velocity_ratio=2.0,
                   inertia=True)  # fmt: skip
     found = LimitCycle(phases=2)(scene, accuracy).values
     return found["recurrence_interval"], found["static_stress_drop"] / scene.a
 
 
-#: Constant normal stress, b/a = 2, k = 0.8 k_cr, V_0 = 2 V_*: recurrence interval and stress drop
-#: in a sigma_* from an integration in extended precision, after 3 cycles and after 10.
+#: Recurrence interval and stress drop in a sigma_* at constant normal stress, b/a = 2, k = 0.8
+#: k_cr and V_0 = 2 V_*. The values are from an integration in extended precision, after 3 cycles
+#: (slip law) and after 10 cycles (slowness law).
 REFERENCES = {
     "slip": (27.3903182296427, 40.16070456254199),
     "slowness": (23.9399987067, 37.127939244),
@@ -94,14 +103,18 @@ REFERENCES = {
 @pytest.mark.parametrize("law", sorted(REFERENCES))
 @pytest.mark.parametrize("rtol", [1e-4, 1e-6, 1e-7, 1e-9])
 def test_requested_tolerance_is_met_by_stick_slip_cycles(law, rtol):
-    # the references are given to 12 digits
+    # The references have 12 digits.
     allowed = [rtol + 1e-12, rtol + 1e-11]
     for ours, exact, rel in zip(cycle(law, Accuracy(rtol)), REFERENCES[law], allowed, strict=True):
         assert ours == pytest.approx(exact, rel=rel)
 
 
 def test_error_of_the_slow_manifold_goes_with_the_third_power_of_the_weight():
-    """What `Accuracy.max_inertia_correction` rests on; ln V grows by 12.2 per slip of D_c there."""
+    """The error of the slow manifold is of third order in the weight.
+
+    ``Accuracy.max_inertia_correction`` relies on this order. At the switch, ln V increases by
+    12.2 per slip of D_c.
+    """
 
     @dataclasses.dataclass(frozen=True)
     class Switched(Accuracy):
@@ -132,7 +145,10 @@ def test_error_of_the_slow_manifold_goes_with_the_third_power_of_the_weight():
     ],
 )
 def test_growth_on_the_slow_manifold_is_that_of_its_slip_rate(fields):
-    """By differences along the motion, at a weight of mass of 1e-3."""
+    """The derivative of ln V agrees with differences along the motion.
+
+    The weight of inertia is 1e-3.
+    """
     scene = Scene(load_velocity_ratio=2.0, inertia=True, **fields)
     equations = equations_between_ruptures(scene, with_time=False)
     weight = math.sqrt(1e-3 * scene.a / scene.stiffness) / scene.inertial_time
@@ -144,11 +160,11 @@ def test_growth_on_the_slow_manifold_is_that_of_its_slip_rate(fields):
     )
     point = equations.evaluate_point(tuple(state))
     assert abs(point.log_slip_rate_derivative) > 0.1
-    # differences err by the square of the step
+    # The error of the differences is proportional to the square of the step size.
     assert point.log_slip_rate_derivative == pytest.approx(
         (ahead - behind) / (2.0 * step), rel=1e-5
     )
-    # without the growth of what mass takes
+    # The derivative includes the change of the inertial stress.
     assert (
         abs(
             point.log_slip_rate_derivative
@@ -160,7 +176,7 @@ def test_growth_on_the_slow_manifold_is_that_of_its_slip_rate(fields):
 
 @given(st.floats(-1e12, 1e12))
 def test_the_way_along_a_path_is_that_of_its_two_parts(slant):
-    """d(sigma)**2 = ds**2 + (slant ds)**2."""
+    """The path metric satisfies d(sigma)**2 = ds**2 + (slant ds)**2."""
     assert displacement_per_path_length(slant) * math.hypot(1.0, slant) == pytest.approx(
         1.0, rel=1e-15
     )
@@ -170,8 +186,10 @@ def test_the_way_along_a_path_is_that_of_its_two_parts(slant):
 @pytest.mark.parametrize("law", ["slip", "slowness"])
 @pytest.mark.parametrize("log_slip_rate", [-12.0, 1.0, 9.0])
 def test_rates_along_the_path_are_those_by_displacement_over_its_length(law, log_slip_rate):
-    """One unit of ln V is a sixth of the way that slip of D_c is; without mass and at constant
-    normal stress, dx/ds is the growth of ln V.
+    """Rates by displacement are rates along the path times the path length.
+
+    A unit of ln V contributes a sixth of the length of a slip of D_c. Without inertia and
+    at constant normal stress, dx/ds is the derivative of ln V.
     """
     scene = Scene(law=law, normal_stress="constant", load_velocity_ratio=3.0)
     state = (0.01, 0.01 - scene.a * log_slip_rate)
@@ -183,8 +201,9 @@ def test_rates_along_the_path_are_those_by_displacement_over_its_length(law, log
 
 
 def test_inertia_is_integrated_only_where_it_acts():
-    """Between slips the full equations are never used, and a motion that stays slow never builds up
-    their cost.
+    """The full equations are not used between slip events.
+
+    A motion that stays slow never needs the full equations.
     """
     slow = Scene(load_velocity_ratio=1.2, stiffness_ratio=1.2, inertia=True)
     meter = follow_until(slow, 1e-7, lambda event: event.clock > 100.0)
@@ -202,7 +221,8 @@ def test_inertia_is_integrated_only_where_it_acts():
     assert {regime for regime, _norm in regimes} == {"slow_manifold", "inertial"}
 
 
-#: phi = 33 degrees is just above atan(0.6): slowed down, normal stress grows without bound.
+#: The angle of 33 degrees is slightly larger than atan(0.6), so normal stress grows without
+#: bound if the slider slows down.
 LOCKS = {"law": "slowness", "b_over_a": 8.1, "a": 0.066, "mu_star": 0.6, "phi": 33.0, "alpha": 0.0,
          "load_velocity_ratio": 0.3}  # fmt: skip
 

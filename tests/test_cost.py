@@ -1,4 +1,8 @@
-"""What a study will cost is told as its cells took last, or called a guess."""
+"""Tests of the cost estimate of a study.
+
+The estimate uses the times of earlier cells. Without earlier cells, the estimate is marked
+as a guess.
+"""
 
 import sqlite3
 from dataclasses import replace
@@ -20,7 +24,7 @@ def words(study, output):
 
 @pytest.fixture(scope="module")
 def kept(tmp_path_factory):
-    """A journal whose cells took 10 s each."""
+    """Create a journal whose cells took 10 s each."""
     output = tmp_path_factory.mktemp("kept")
     run(SMALL_STUDY, output=output, rtol=1e-4)
     with sqlite3.connect(output / FILE) as db:
@@ -61,8 +65,7 @@ def test_show_tells_it(tmp_path):
 
 
 # ---- advice on the engine ------------------------------------------------------------------------
-
-#: So many cells that SciPy takes above a minute.
+#: A study of so many cells that SciPy needs more than a minute.
 MANY = SMALL_STUDY.with_(b_over_a=np.linspace(1.5, 3.0, 1500))
 
 
@@ -75,5 +78,5 @@ def test_the_compiled_engine_is_named_where_it_would_save_a_minute(tmp_path):
         assert cost_estimates.compiled_engine_hint(CellPlan(MANY), tmp_path).endswith(
             "as a rule: about 30 times with limit_cycle"
         )
-    (tmp_path / FILE).touch()  # its cells would all be computed anew
+    (tmp_path / FILE).touch()  # The cells of this invalid journal would all be computed again.
     assert cost_estimates.compiled_engine_hint(CellPlan(MANY), tmp_path) == ""

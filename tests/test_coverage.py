@@ -1,4 +1,4 @@
-"""Coverage of error estimates: random scenes, what is counted, and that a bad estimate shows."""
+"""Tests of the coverage study of error estimates with random scenes."""
 
 import numpy as np
 import pytest
@@ -52,12 +52,13 @@ def test_shares_worst_and_typical_are_counted():
     )
     np.testing.assert_allclose(found.c_share, [1.0, 2.0 / 3.0])
     np.testing.assert_allclose(found.c_worst, [1.0, 2.0])
-    np.testing.assert_allclose(found.c_typical, [5.5, 2.0])  # of 10 and 1; of 2, 0.5 and 4
+    # Medians of (10, 1) and of (2, 0.5, 4).
+    np.testing.assert_allclose(found.c_typical, [5.5, 2.0])
     assert found.c_numbers.values.tolist() == [2, 3]
 
 
 def test_an_estimate_that_is_too_small_shows(monkeypatch):
-    """The same cell, with estimates of a hundredth: errors beyond them, which were within."""
+    """Errors exceed their estimates if the estimates are reduced to 1 %."""
     cell, like = Coverage(sample=3, requested_digits=5), RANDOM_SCENE_TEMPLATES[1]
     ratios = cell(like, Accuracy()).values["error_over_estimate"]
     usual = limit_cycle.estimate_error
@@ -70,7 +71,7 @@ def test_an_estimate_that_is_too_small_shows(monkeypatch):
 
 
 def test_a_scene_without_a_number_counts_its_status():
-    """Slip without mass runs away, at either accuracy."""
+    """The slip rate grows without bound at both accuracies."""
     found = Coverage(sample=0, requested_digits=4)(RANDOM_SCENE_TEMPLATES[0], Accuracy())
     assert found.status is Status.OK
     assert found.values["status_kept"] == 1.0

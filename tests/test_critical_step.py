@@ -1,5 +1,7 @@
-"""Critical steps: closed forms, limits, a much tighter run, a second formulation, published
-numbers, statuses.
+"""Tests of critical steps.
+
+The references are closed forms, limits, results with a smaller tolerance, a second
+formulation and published numbers. The statuses of failures are tested too.
 """
 
 import math
@@ -32,7 +34,10 @@ CONSTANT, VARIABLE = {"normal_stress": "constant"}, {"alpha": 0.4, "phi": 55.0}
 
 
 def found(scene: Scene, of: str = RATE, direction: str = "up", rtol=1e-7, engine=SCIPY):
-    """Value, error estimate and outcome; the search must succeed."""
+    """Return the value, its error estimate and the outcome of a search.
+
+    The search must succeed.
+    """
     measure = CriticalStep(of=of, direction=direction)
     outcome = measure(scene, Accuracy(rtol, engine=engine))
     assert outcome.status is Status.OK, outcome
@@ -46,7 +51,10 @@ def found(scene: Scene, of: str = RATE, direction: str = "up", rtol=1e-7, engine
 
 @pytest.mark.parametrize("weakening", [1.0, math.e - 1.0, 2.0, 5.0, 10.0])
 def test_eq_10_at_a_large_norm(weakening):
-    """V_0/V_* = 1 + a/(b-a); at norm 1e3 what is left is below norm**(-lambda**2/kappa)."""
+    """V_0/V_* = 1 + a/(b-a) for a large instability norm.
+
+    At a norm of 1e3, the remaining difference is below norm**(-lambda**2/kappa).
+    """
     scene = Scene(b_over_a=1.0 + weakening, instability_norm=1e3, **CONSTANT)
     value, error, _outcome = found(scene)
     left = (scene.instability_norm / scene.inertial_time) ** -weakening
@@ -54,7 +62,10 @@ def test_eq_10_at_a_large_norm(weakening):
 
 
 def test_eq_10_is_approached_from_below_as_the_norm_grows():
-    """At a/(b-a) = 4 the norm of the paper gives 4.66 instead of 5."""
+    """The critical step approaches eq. 10 from below as the norm grows.
+
+    At a/(b-a) = 4, the norm of the paper results in 4.66 instead of 5.
+    """
     values = [
         found(Scene(b_over_a=1.25, instability_norm=norm, **CONSTANT))[0]
         for norm in (5e-4, 1.0, 1e6, 1e12)
@@ -62,14 +73,17 @@ def test_eq_10_is_approached_from_below_as_the_norm_grows():
     assert values[0] == pytest.approx(4.66, abs=0.005)
     assert values == sorted(values)
     distance = [5.0 - value for value in values]
-    # the bias goes like norm**-(lambda**2/kappa) = norm**-0.25
+    # The bias is proportional to norm**-(lambda**2/kappa) = norm**-0.25.
     assert math.log(distance[-2] / distance[-1]) / math.log(1e6) == pytest.approx(0.25, abs=0.01)
 
 
 @pytest.mark.parametrize("stiffness_ratio", [1.0, 1.1, 1.5, 3.0])
 @pytest.mark.parametrize("b_over_a", [1.5, 2.0, 4.0])
 def test_eq_14_displacement_step_at_a_large_norm(stiffness_ratio, b_over_a):
-    """D_c/lambda for every stiffness k >= k_cr, load point held, constant normal stress."""
+    """The critical displacement is D_c/lambda for every stiffness k >= k_cr.
+
+    The load point is held, and the normal stress is constant.
+    """
     scene = Scene(
         b_over_a=b_over_a, stiffness_ratio=stiffness_ratio, instability_norm=1e12,
         **CONSTANT,
@@ -114,8 +128,10 @@ ACCURACY_SCENES = [
 
 @pytest.mark.parametrize(("fields", "of"), ACCURACY_SCENES)
 def test_default_accuracy_and_work(fields, of):
-    """Right to 1e-7 of V_0/V_* - 1 (or of the displacement) against rtol 1e-11, within 8,000
-    right-hand sides.
+    """The default accuracy is met within 8,000 evaluations.
+
+    The value of V_0/V_* - 1, or of the displacement, agrees to 1e-7 with the result for
+    rtol = 1e-11.
     """
     scene = Scene(**fields)
     value, error, outcome = found(scene, of)
@@ -158,7 +174,7 @@ def test_the_error_estimate_covers_the_true_error(law, weakening, stiffness_rati
         value, exact = loose.values[name], tight.values[name]
         allowed = loose.values[f"{name}_error"] + tight.values[f"{name}_error"]
         assert abs(value - exact) <= allowed
-        # all three are one where the jump of slip rate at the step itself is critical
+        # The three values are equal if the jump of slip rate at the step is critical.
         assert loose.values[f"{name}_stable"] <= value <= loose.values[f"{name}_unstable"]
 
 
@@ -167,8 +183,9 @@ def test_the_error_estimate_covers_the_true_error(law, weakening, stiffness_rati
 
 
 def peak_in_time(scene: Scene) -> float:
-    """Highest ln V after a step up to the norm, from equations in time: nothing is shared with the
-    package.
+    """Return the peak of ln V after a step, limited to the norm.
+
+    The integration in time uses no code of the package.
     """
     theirs, norm = TimeDomainMotion(scene), scene.log_instability_rate
 
@@ -197,7 +214,11 @@ def peak_in_time(scene: Scene) -> float:
     ("fields", "of"), [case for case in ACCURACY_SCENES if case[0] != CONSTANT]
 )
 def test_a_second_formulation_agrees_on_both_sides(fields, of):
-    """Steps 2e-7 smaller do not reach the norm, steps 2e-7 larger do, by equations written anew."""
+    """Only steps above the critical step reach the norm.
+
+    The steps differ from the critical step by 2e-7, and the peaks are from an independent
+    integration in time.
+    """
     scene = Scene(**fields)
     value, _error, _outcome = found(scene, of, rtol=1e-9)
     held = scene.load_velocity_ratio or 0.0
@@ -207,7 +228,7 @@ def test_a_second_formulation_agrees_on_both_sides(fields, of):
         else:
             stepped = {of: value * (1.0 + side), RATE: held}
         peak = peak_in_time(scene.with_(**stepped))
-        # where it reaches the norm it stops there, to rounding
+        # The integration stops at the norm, to rounding error.
         assert (peak >= scene.log_instability_rate - 1e-9) is reaches
 
 
@@ -218,13 +239,14 @@ def test_a_second_formulation_agrees_on_both_sides(fields, of):
 @pytest.mark.parametrize("law", ["slip", "slowness"])
 @pytest.mark.parametrize("of", [RATE, DISPLACEMENT])
 def test_mass_hardly_moves_a_boundary_at_the_norm_of_the_paper(law, of):
-    """By less than (K/a) w**2 = 5e-7 of it."""
+    """Inertia changes the boundary by less than (K/a) w**2 = 5e-7."""
     without = found(Scene(law=law), of)
     with_mass = found(Scene(law=law, inertia=True), of)
     assert with_mass[0] == pytest.approx(without[0], rel=5e-7)
 
 
-#: Where the norm is a slip rate of a few V_*, mass matters most: (law, b/a, k/k_cr, V/V_* at it).
+#: Cases (law, b/a, k/k_cr, V/V_* at the norm) with a norm of a few V_*, in which inertia matters
+#: most.
 SLOW_NORMS = [("slip", 3.0, 1.9, 1.5), ("slip", 3.0, 1.9, 4.0), ("slowness", 3.0, 1.2, 10.0)]
 
 
@@ -238,9 +260,10 @@ def whose_norm_is_slow(law, b_over_a, stiffness_ratio, rate, norm) -> Scene:
 
 @pytest.mark.parametrize("case", SLOW_NORMS)
 def test_paths_on_the_slow_manifold_agree_with_motions_of_the_full_equations(case, monkeypatch):
-    """A second formulation of what mass does to a boundary: by paths that hold its first order,
-    and by motions that integrate it; which of the two is right where neither is exact shows the
-    bound of the error.
+    """Two formulations of the effect of inertia on a boundary agree.
+
+    The path solution includes the first order of inertia, and the forward motion integrates
+    inertia. The difference between the two results is within the bound of the second order.
     """
     scene = whose_norm_is_slow(*case, norm=0.01)
     without = found(scene.with_(inertia=False), rtol=1e-8)[0]
@@ -255,14 +278,15 @@ def test_paths_on_the_slow_manifold_agree_with_motions_of_the_full_equations(cas
     assert abs(path - forward) <= error + its_error
     moved = abs(math.log(without / path) / math.log(path))
     weight = scene.stiffness / scene.a * scene.instability_norm**2
-    # the first order of mass is there, and what is left is within the bound of the second
+    # The path contains the first order of inertia, and the remaining difference is below the
+    # second-order bound.
     assert 0.05 * weight < moved < 0.8 * weight
     left = abs(math.log(forward / path) / math.log(path))
     assert left < slow_manifold_relative_error(scene) + 1e-8
 
 
 def test_mass_counts_at_a_norm_just_above_the_loading_rate():
-    """Left out, it would be missed by 2.0e-7 of V_0/V_* here: more than the accuracy asked for."""
+    """Inertia changes V_0/V_* by 2.0e-7, which exceeds the accuracy."""
     scene = whose_norm_is_slow("slip", 3.0, 1.9, 1.5, norm=5e-4)
     value, error, _outcome = found(scene)
     without = found(scene.with_(inertia=False))[0]
@@ -271,8 +295,10 @@ def test_mass_counts_at_a_norm_just_above_the_loading_rate():
 
 
 def test_a_limit_cycle_that_touches_the_norm_is_found_at_once():
-    """A drop of V_0 that ends in a cycle: by a root of its peak, in 5 times the usual work. A cycle
-    attracts little: it is not known to much more than seven digits, whatever is asked for.
+    """A step down that ends in a limit cycle is critical at a root.
+
+    The search finds the root of the peak in five times the usual work. The limit cycle is
+    weakly attracting, so about seven digits are the best possible accuracy.
     """
     scene = Scene(
         law="slip", a=0.007085837776968529, b_over_a=1.2474392015687674, mu_star=0.8169914402658061,
@@ -293,8 +319,9 @@ def test_a_limit_cycle_that_touches_the_norm_is_found_at_once():
 
 
 def test_a_displacement_step_may_jump_to_the_norm_at_once():
-    """A slider that slows down from the start is critical where the step itself takes it to the
-    norm: eq. 13 inverted.
+    """A step is critical if its jump of slip rate reaches the norm.
+
+    For a slider that slows down from the start, the critical step follows from eq. 13.
     """
     scene = Scene(law="slowness", stiffness_ratio=5.0, instability_norm=0.01)
     value, _error, outcome = found(scene, DISPLACEMENT)
@@ -303,7 +330,7 @@ def test_a_displacement_step_may_jump_to_the_norm_at_once():
     assert "jump" in outcome.message
     with_mass = found(scene.with_(inertia=True), DISPLACEMENT)[0]
     assert with_mass == pytest.approx(value, rel=1e-3)
-    # what waves carry away at the norm is stress that the step has to supply as well
+    # The step also supplies the stress that radiation damping carries at the norm.
     damped = scene.with_(stiffness=scene.stiffness, radiation_damping=1e-7)
     carried = damped.radiation_damping * math.expm1(scene.log_instability_rate)
     more = found(damped, DISPLACEMENT)[0] - value
@@ -311,8 +338,9 @@ def test_a_displacement_step_may_jump_to_the_norm_at_once():
 
 
 def test_the_survey_says_how_far_it_came():
-    """Load point velocities so low that the clock of the motion runs out of digits end the survey,
-    not the answer.
+    """Very low velocities end the survey without an error.
+
+    The time of such a motion exceeds the digits of a float.
     """
     scene = Scene(law="slowness", normal_stress="constant", stiffness_ratio=1.5, b_over_a=5.0)
     outcome = CriticalStep(direction="down")(scene, Accuracy())
@@ -321,14 +349,20 @@ def test_the_survey_says_how_far_it_came():
 
 
 def test_an_orbit_that_grows_slowly_is_known_to_reach_the_norm_in_a_few_leaps():
-    """Leaps that had to be shortened each time would take ten times the work."""
+    """A slowly growing orbit reaches the norm in a few extrapolations.
+
+    Extrapolations that were shortened each time would need ten times the work.
+    """
     slowly = {"law": "slowness", "b_over_a": 2.46, "phi": 82.8, "alpha": 0.129}
     scene = Scene(**slowly, stiffness_ratio=0.998, load_velocity_ratio=0.16, instability_norm=3e-4)
     assert motion_after_step.motion_reaches_norm(scene, Accuracy(1e-6), WorkMeter(15_000))
 
 
 def test_mass_holds_an_orbit_that_would_close_beyond_the_norm():
-    """k = k_cr, constant normal stress: without mass it peaks at 10^87 V_*."""
+    """Inertia limits an orbit that would otherwise exceed the norm.
+
+    At k = k_cr and constant normal stress, the orbit without inertia peaks at 10^87 V_*.
+    """
     scene = Scene(law="slowness", load_velocity_ratio=200.0, instability_norm=10.0, **CONSTANT)
     for inertia in (False, True):
         reached = motion_after_step.motion_reaches_norm(
@@ -338,8 +372,10 @@ def test_mass_holds_an_orbit_that_would_close_beyond_the_norm():
 
 
 def test_a_limit_cycle_below_the_norm_is_not_leapt_over():
-    """After these drops of V_0 the motion ends in limit cycles with peaks of 9.57 and 8.49 in ln V,
-    below the norm at 10.89.
+    """Extrapolation does not skip a limit cycle below the norm.
+
+    After these steps down, the motion ends in limit cycles with peaks of 9.57 and 8.49 in
+    ln V, below the norm at 10.89.
     """
     for load, peak in ((0.25, 9.57), (0.3, 8.49)):
         scene = Scene(law="slowness", b_over_a=1.6, load_velocity_ratio=load)
@@ -357,8 +393,9 @@ def test_a_spent_budget_is_a_failure_with_a_name():
 
 
 def test_public_call_returns_a_small_dataset():
-    """The value the scene holds for the quantity sought is ignored; the rest of the scene is
-    not.
+    """The search ignores the scene's value of the solved field.
+
+    All other fields of the scene are used.
     """
     dataset = rsfstudy.critical_step(Scene(load_velocity_ratio=7.0))
     assert float(dataset.critical_velocity_ratio) == pytest.approx(1.66025, abs=1e-5)
@@ -375,7 +412,7 @@ def test_public_call_returns_a_small_dataset():
 @pytest.mark.parametrize("law", ["slip", "slowness"])
 @pytest.mark.parametrize("load", [0.0, 1.5])
 def test_the_critical_path_touches_the_norm_at_rest(law, load):
-    """At the touching point ln V is at the norm and stationary, by the assembled equations."""
+    """At the tangency point, ln V equals the norm and is stationary."""
     scene = Scene(law=law, load_velocity_ratio=load)
     start = CriticalPath.from_scene(scene).tangency_point
     assert start is not None
@@ -388,8 +425,10 @@ def test_the_critical_path_touches_the_norm_at_rest(law, load):
 @pytest.mark.parametrize("normal_stress", ["constant", "variable"])
 @pytest.mark.parametrize("law", ["slip", "slowness"])
 def test_where_a_path_begins_and_ends_is_the_same_by_all_engines(law, normal_stress):
-    """The engine that compiles compiles what the search evaluates; sums may be rounded together
-    there, which the state, a difference of numbers below ten, shows.
+    """The start and end of a path are the same for all engines.
+
+    The compiled functions may round sums differently. The state shows the difference,
+    because it is a difference of numbers below ten.
     """
     for load in (1e-3, 1.5, 40.0):
         scene = Scene(law=law, normal_stress=normal_stress, load_velocity_ratio=load)
@@ -406,7 +445,7 @@ def test_where_a_path_begins_and_ends_is_the_same_by_all_engines(law, normal_str
 
 
 def test_a_root_is_that_of_the_same_method_elsewhere():
-    """Bit for bit, in as many evaluations."""
+    """The root and the number of evaluations equal the results of SciPy."""
     asked = list[float]()
 
     def function(x, given):
@@ -429,8 +468,10 @@ def test_a_root_is_that_of_the_same_method_elsewhere():
 
 
 def test_a_fall_of_normal_stress_leaves_sigma_3_positive():
-    """Beyond, friction falls faster with slip than stress does, and any motion comes to run away:
-    here what is left between is stable.
+    """The search ends where the least principal stress vanishes.
+
+    Beyond this limit, friction decreases faster with slip than the stress, and every motion
+    accelerates. Here, all smaller steps are stable.
     """
     scene = Scene(law="slowness", b_over_a=2.87, stiffness_ratio=2.41, phi=44.45, alpha=0.445)
     outcome = CriticalStep(of=FALL, direction="down")(scene, Accuracy(1e-4))
@@ -449,9 +490,10 @@ ASKED = [
 @pytest.mark.parametrize("law", ["slip", "slowness", "family", "perrin_rice_zheng", "composite"])
 @pytest.mark.parametrize(("of", "direction", "stress"), ASKED)
 def test_motions_on_each_side_go_as_told(law, of, direction, stress):
-    """A little below the critical step none of many peaks reaches the norm, a little above one
-    does: followed forward, without any of what tells a critical step that earlier. Where every step
-    is stable, the largest is.
+    """The norm is reached above the critical step, but not below it.
+
+    The motions are integrated forward over many peaks without early termination. If all
+    steps are stable, the largest step does not reach the norm.
     """
     measure = CriticalStep(of=of, direction=direction)
     scene = Scene(law=law, b_over_a=2.4, stiffness_ratio=1.4, **stress)

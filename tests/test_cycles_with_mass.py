@@ -1,5 +1,6 @@
-"""Limit cycles in which mass acts where V passes V_0, against the full equations followed all
-round, and against the same scene in other words.
+"""Tests of limit cycles in which inertia acts when V passes V_0.
+
+The references are motions of the full equations, and equivalent scenes with other fields.
 """
 
 import math
@@ -15,7 +16,7 @@ from rsfstudy.motion.engines import COMPILED
 from rsfstudy.status import Status
 
 HEADLINES = [output.name for output in LimitCycle().outputs if output.error]
-#: V_0 T/(2 pi D_c) = .1.
+#: Fields with V_0 T/(2 pi D_c) = 0.1.
 SAME = {
     "a": 0.004,
     "normal_stress": "constant",
@@ -25,20 +26,23 @@ SAME = {
     "period": 1.0,
     "reference_rate": 2.0 * math.pi * 1e-2,
 }
-#: A cycle that is approached slowly: V_0 T/(2 pi D_c) = .17.
+#: A cycle that attracts slowly, with V_0 T/(2 pi D_c) = 0.17.
 SLOWLY = Scene(
     law="slowness", a=0.008, b_over_a=2.9, mu_star=0.8, normal_stress="constant", inertia=True,
     period=1.0, reference_rate=0.3624, load_velocity_ratio=3.0, stiffness_ratio=0.92,
 )  # fmt: skip
-#: Recurrence intervals by the full equations, followed all round by collocation of order 13, and
-#: all headline numbers of that cycle.
+#: Recurrence intervals from the full equations by collocation of order 13, and all primary
+#: outputs of the slowly attracting cycle.
 TRUE = {"slip": 4.43330967, "slowness": 6.68229365}
 ALL_SLOWLY = (3.4238872096, 0.1154890132, 0.0768804140, -3.1375369921, 1.6751985654)
 TRUE_SLOWLY = ALL_SLOWLY[0]
 
 
 def in_words(law: str) -> dict[str, Scene]:
-    """One state, the same as two of equal length, and with a dilatancy that does nothing."""
+    """Return three equivalent scenes.
+
+    The scenes have one state, two states with equal lengths, and a negligible dilatancy.
+    """
     two = {"law": f"two_{law}_states", "b1_over_a": 1.5, "b2_over_a": 1.1, "length_ratio": 1.0}
     one = {"law": law, "b_over_a": 2.6}
     dilatant = {**one, "fluid": "dilatant", "dilatancy": 1e-12, "drainage": 1.0}
@@ -51,8 +55,9 @@ def measured(scene: Scene, rtol: float, engine: str = COMPILED):
 
 
 def true_numbers(scene: Scene, until: float) -> list[float]:
-    """Of the last cycle of a motion by equations in time, of which each forgets nine tenths of how
-    it began.
+    """Return the outputs of the last cycle of a motion in time.
+
+    Each cycle reduces the effect of the initial conditions to a tenth.
     """
     load = scene.load_velocity
     watches = [lambda now: now.velocity - load] * 2 + [lambda now: now.log_slip_rate_derivative] * 2
@@ -82,7 +87,11 @@ def true_numbers(scene: Scene, until: float) -> list[float]:
 @pytest.mark.parametrize("law", ["slip", "slowness"])
 @pytest.mark.parametrize("rtol", [1e-4, 1e-6, 1e-8])
 def test_the_same_cycle_in_other_words(law, words, rtol):
-    """Cycles of several states missed 7e-4 of it, told as 1e-7."""
+    """Equivalent scenes have the same limit cycle.
+
+    The tolerance is the error estimate. An earlier version missed the interval of scenes
+    with several states by 7e-4, with an estimate of 1e-7.
+    """
     found = measured(in_words(law)[words], rtol)
     assert found.status is Status.OK
     error = found.values["recurrence_interval_error"]
@@ -92,7 +101,10 @@ def test_the_same_cycle_in_other_words(law, words, rtol):
 
 @pytest.mark.parametrize("rtol", [1e-4, 1e-7, 1e-10])
 def test_a_cycle_that_is_approached_slowly(rtol):
-    """It was 5e-3 off, and known to 1.5 %, at every accuracy."""
+    """The error estimate covers the error of a slowly attracting cycle.
+
+    An earlier version had an error of 5e-3 at every accuracy.
+    """
     found = measured(SLOWLY, rtol)
     assert found.status is Status.OK
     error = found.values["recurrence_interval_error"]
@@ -102,7 +114,10 @@ def test_a_cycle_that_is_approached_slowly(rtol):
 
 @pytest.mark.parametrize("scene", [in_words("slip")["one"], SLOWLY], ids=["slip", "slowly"])
 def test_all_numbers_against_the_full_equations(scene):
-    """Without slow manifold or leap, to some 1e-9."""
+    """All outputs agree with the full equations to about 1e-9.
+
+    The references use neither the slow manifold nor extrapolation.
+    """
     true = ALL_SLOWLY if scene is SLOWLY else true_numbers(scene, 14.0 * TRUE["slip"])
     for rtol in (1e-4, 1e-6, 1e-8):
         values = measured(scene, rtol).values
@@ -111,7 +126,10 @@ def test_all_numbers_against_the_full_equations(scene):
 
 
 def test_the_cycle_of_one_event_is_that_of_the_limit_cycle():
-    """And its multipliers are those of one state; a departure along the motion is forgotten."""
+    """The measure of bifurcations finds the limit cycle.
+
+    The multipliers of one and two states agree, because deviations along the motion decay.
+    """
     one, two = (in_words("slowness")[words] for words in ("one", "two"))
     accuracy = Accuracy(1e-7, 2_000_000, engine=COMPILED)
     found = [Bifurcation(transient=8, events=4)(scene, accuracy).values for scene in (one, two)]

@@ -1,4 +1,4 @@
-"""Damaged results files are refused, also without the digest at their end."""
+"""Tests of damaged results files, with and without the digest at the end."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ import rsfstudy
 from rsfstudy.errors import DataError
 from rsfstudy.storage import content_digest, dataset_files, schema
 
-#: With many claims the declaration is so long that HDF5 keeps no checksum of it.
+#: The declaration with many claims is so long that HDF5 stores no checksum of it.
 STUDY = replace(
     TINY, claims=[replace(TINY.claims[0], id=f"C{number}", reason="x" * 50) for number in range(30)]
 )
@@ -46,7 +46,7 @@ def test_a_file_without_its_end_opens_with_a_warning(written, tmp_path):
 
 @pytest.mark.parametrize("damaged", ["declaration", "number", "text", "content_digest"])
 def test_damage_is_refused_without_the_end(damaged, written, tmp_path):
-    """One byte differs, which HDF5 does not notice."""
+    """A single damaged byte is detected even if HDF5 does not detect it."""
     content, dataset = bytearray(cut(written)), rsfstudy.open(written)
     digest = xr.load_dataset(written).attrs["content_digest"].encode()
     original = {

@@ -1,4 +1,4 @@
-"""Effects on normal stress: derivatives, limits, and what an absent effect costs."""
+"""Tests of the effects of normal stress: derivatives, limits and cost."""
 
 import itertools
 import math
@@ -25,7 +25,7 @@ shear = st.floats(-0.5, 0.5)
 
 @given(shear, st.floats(50.0, 87.0), st.floats(0.1, 0.9))
 def test_strength_is_shear_over_normal_stress(g, phi, mu_star):
-    """tau/sigma - mu_* from the stresses themselves."""
+    """The relation equals tau/sigma - mu_* from the stresses."""
     scene = Scene(phi=phi, mu_star=mu_star, alpha=0.0)
     ratio = 1.0 + cot_phi(scene) * g
     exact = (mu_star + g) / ratio - mu_star
@@ -38,13 +38,13 @@ def test_slopes_are_derivatives(g, alpha, phi):
     ahead, behind, here = relation(g + h), relation(g - h), relation(g)
     for value in (0, 2):
         numeric = (ahead[value] - behind[value]) / (2 * h)
-        # central difference: h**2 f'''/6 plus rounding 1e-16/h
+        # The error of central differences is h**2 f'''/6, plus a rounding error of 1e-16/h.
         assert here[value + 1] == pytest.approx(numeric, rel=1e-7, abs=1e-9)
 
 
 @given(shear, st.floats(0.01, 1.0), st.floats(50.0, 87.0))
 def test_the_shift_is_the_integral_of_the_linker_dieterich_term(g, alpha, phi):
-    """dTheta = -alpha dsigma/sigma over a jump from sigma_* is eq. 2 of the paper."""
+    """The shift is the integral of dTheta = -alpha dsigma/sigma (eq. 2)."""
     scene = Scene(alpha=alpha, phi=phi)
     cot = cot_phi(scene)
     _value, _slope, shift, slope = build_friction_relation(scene)(g)
@@ -53,7 +53,10 @@ def test_the_shift_is_the_integral_of_the_linker_dieterich_term(g, alpha, phi):
 
 
 def eq_13(scene: Scene, displacement: float) -> float:
-    """Slip rate just after a displacement step, eq. 13 with its closing bracket in place."""
+    """Return the slip rate after a displacement step by corrected eq. 13.
+
+    The closing bracket of the published equation is misplaced.
+    """
     jump = scene.stiffness * displacement
     ratio = 1.0 + cot_phi(scene) * jump
     state = -(scene.alpha or 0.0) * math.log(ratio)
@@ -70,7 +73,6 @@ def test_jump_of_slip_rate_is_eq_13(displacement, alpha, phi):
 
 @given(shear)
 def test_alpha_to_zero_is_the_effect_absent(g):
-    """Each effect at vanishing strength equals the effect absent."""
     absent, vanishing = (
         build_friction_relation(Scene(alpha=0.0)),
         build_friction_relation(Scene(alpha=1e-12)),
@@ -107,7 +109,10 @@ def test_number_of_unknowns(equations, unknowns):
 
 
 def test_the_same_functions_serve_all_scenes_of_the_same_parts():
-    """None holds a number of a scene: those are arguments."""
+    """The functions contain no parameters of a scene.
+
+    All parameters are arguments.
+    """
     one, other = (
         equations_between_ruptures(Scene(a=a, phi=phi, load_velocity_ratio=load), with_time=False)
         for a, phi, load in ((0.01, 55.0, 2.0), (0.02, 70.0, 3.0))
@@ -121,9 +126,7 @@ def test_the_same_functions_serve_all_scenes_of_the_same_parts():
 
 
 def test_trial_states_outside_of_the_physics_give_finite_rates():
-    """An integrator's trial steps may ask for anything; the answer is never NaN and never
-    raises.
-    """
+    """Unphysical trial states produce finite rates without an exception."""
     scenes = Scene(), Scene(law="slowness"), Scene(normal_stress="constant")
     fluid = Scene(fluid="dilatant"), Scene(fluid="dilatant", displacement_step=1.0)
     for scene in (*scenes, *fluid):
@@ -142,7 +145,10 @@ def test_trial_states_outside_of_the_physics_give_finite_rates():
 
 
 def test_what_a_right_hand_side_costs_is_relative_to_the_plainest_of_the_moment(monkeypatch):
-    """On a machine that is slower every turn, and ten times slower in some."""
+    """The relative cost is independent of changes in machine speed.
+
+    The simulated machine slows down steadily and is ten times slower in some turns.
+    """
     slowness = {"quasi_static": 1.0, "slow_manifold": 4.0, "inertial": 3.0}
     turns = itertools.count()
 

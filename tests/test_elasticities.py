@@ -1,4 +1,4 @@
-"""Elasticities are held to closed forms, and know their errors."""
+"""Tests of elasticities and of their error estimates."""
 
 import math
 from dataclasses import dataclass
@@ -18,7 +18,7 @@ from rsfstudy.responses.linear_stability import LinearStability
 from rsfstudy.rig.rig_quantities import derive_scene_fields_from_rig
 from rsfstudy.status import Status
 
-#: Where boundaries have closed forms that the norm does not show in.
+#: A scene whose boundaries have closed forms, nearly independent of the instability norm.
 SCENE = Scene(law="slip", normal_stress="constant", b_over_a=3.0)
 COMPILED = Accuracy(engine="compiled")
 
@@ -33,7 +33,7 @@ def told(measure, scene=SCENE, accuracy=COMPILED):
 @pytest.mark.parametrize(
     ("measure", "exact"),
     [
-        # D_c a/(b - a), of r = b/a: 1/(r - 1)
+        # D_c a/(b - a) = D_c/(r - 1) with r = b/a
         (CriticalStep("displacement_step"), {"b_over_a": -1.5, "a": 0.0, "mu_star": 0.0}),
         # 1 + a/(b - a) = r/(r - 1)
         (CriticalStep(), {"b_over_a": -0.5, "a": 0.0, "instability_norm": 0.0}),
@@ -42,7 +42,11 @@ def told(measure, scene=SCENE, accuracy=COMPILED):
     ],
 )
 def test_closed_forms(measure, exact):
-    """Within their error estimates, and those are small: errors of 1e-9 leave 1e-6."""
+    """Elasticities agree with closed forms within their error estimates.
+
+    The estimates are below 1e-5, because errors of 1e-9 of the measure lead to errors of
+    1e-6.
+    """
     found, outcome = told(Elasticities(measure))
     for name, value in exact.items():
         elasticity, error = found[name]
@@ -58,8 +62,10 @@ def test_closed_forms(measure, exact):
 
 
 def test_at_the_critical_stiffness_there_is_one_side():
-    """Below it any step triggers: the difference is one-sided, and its error says so. It is held to
-    one of the second order.
+    """The elasticity at the critical stiffness is a one-sided difference.
+
+    Below the critical stiffness, every step triggers instability. The error estimate covers
+    the deviation from a second-order difference.
     """
     found, _outcome = told(Elasticities(CriticalStep(), parameters=("stiffness_ratio",)))
     elasticity, error = found["stiffness_ratio"]
@@ -82,8 +88,10 @@ SCENES = [
 
 @pytest.mark.parametrize(("measure", "scene"), SCENES)
 def test_errors_are_told_without_closed_forms_too(measure, scene):
-    """By each number of the scene, the stiffness of a cycle near the critical one among them:
-    against steps that are ten times shorter, at 10^-4 of the tolerance.
+    """The error estimates cover the errors for each field.
+
+    The fields include the stiffness of a cycle near the critical stiffness. The reference
+    uses steps that are ten times shorter, and a tolerance smaller by 10^-4.
     """
     of = Elasticities(measure)
     finer = Accuracy(rtol=1e-9, engine="compiled", budget=50_000_000)
@@ -97,7 +105,10 @@ def test_errors_are_told_without_closed_forms_too(measure, scene):
 
 
 def extrapolated(measure, scene, name, steps=(0.004, 0.002, 0.001)):
-    """Compute an elasticity by Richardson extrapolation of central differences at rtol 1e-11."""
+    """Compute an elasticity by Richardson extrapolation.
+
+    The central differences are computed with rtol = 1e-11.
+    """
     accuracy = Accuracy(1e-11, engine="compiled", budget=20_000_000)
 
     def level(by):
@@ -110,7 +121,7 @@ def extrapolated(measure, scene, name, steps=(0.004, 0.002, 0.001)):
 
 
 SHARP = {"normal_stress": "constant", "a": 0.01}
-#: Scenes near b = a, where a difference of the second order leaves out more than curvature shows.
+#: Scenes near b = a, where the truncation error exceeds the estimate from the curvature.
 NEAR_NEUTRAL = [
     (
         CriticalStep("displacement_step"),
@@ -127,7 +138,11 @@ NEAR_NEUTRAL = [
 @pytest.mark.parametrize("rtol", [1e-6, 1e-8])
 @pytest.mark.parametrize(("measure", "scene"), NEAR_NEUTRAL)
 def test_error_covers_the_truncation_near_b_equal_to_a(measure, scene, rtol):
-    """The reference is good to 1e-7 of the elasticity by `b_over_a`, which grows like 1/(b - a)."""
+    """The error estimate covers the truncation error.
+
+    The reference is accurate to 1e-7 of the elasticity by ``b_over_a``, which grows like 1/(b
+    - a).
+    """
     accuracy = Accuracy(rtol, engine="compiled")
     ((elasticity, error),) = told(Elasticities(measure, ("b_over_a",)), scene, accuracy)[0].values()
     exact = extrapolated(measure, scene, "b_over_a")
@@ -137,7 +152,7 @@ def test_error_covers_the_truncation_near_b_equal_to_a(measure, scene, rtol):
 
 @dataclass(frozen=True)
 class Known(Measure):
-    """y = a^2 exp(-mu_star)/(b/a - 1), with an error that is stated, and made."""
+    """Measure y = a^2 exp(-mu_star)/(b/a - 1) with a given error."""
 
     error: float = 0.0
     name: ClassVar[str] = "known"
@@ -159,8 +174,10 @@ class Known(Measure):
 
 @pytest.mark.parametrize("error", [0.0, 1e-12, 1e-9, 1e-6, 1e-3])
 def test_steps_know_the_error_of_the_number(error):
-    """There are 4 n + 1 measurements. Every elasticity is within its error estimate, which scales
-    with the error to the power of two thirds.
+    """Every elasticity is within its error estimate.
+
+    The estimate scales with the error to the power of two thirds. There are 4 n + 1
+    measurements.
     """
     Known.asked.clear()
     found, _outcome = told(Elasticities(Known(error)), SCENE)
@@ -170,13 +187,17 @@ def test_steps_know_the_error_of_the_number(error):
         elasticity, estimate = found[name]
         exact = -SCENE.mu_star if name == "mu_star" else exact
         assert abs(elasticity - exact) <= estimate
-        # rounding: a few parts of 2.2e-16, of y and of its logarithm, which is 10
+        # Rounding errors are a few times 2.2e-16 for y, and for its logarithm, which is about
+        # 10.
         assert estimate <= 4.0 * max(error, 2e-14) ** (2.0 / 3.0)
 
 
 @dataclass(frozen=True)
 class Ending(Known):
-    """y = (1 - k/k_cr)^0.05, no number from k_cr on, and an error that is stated, and made."""
+    """Measure y = (1 - k/k_cr)^0.05 with a given error.
+
+    The measure has no result for k >= k_cr.
+    """
 
     def compute(self, scene, accuracy, meter):
         if scene.stiffness_ratio >= 1.0:
@@ -189,8 +210,10 @@ class Ending(Known):
 @pytest.mark.parametrize("apart", [0.02, 0.005, 0.002, 0.0005])
 @pytest.mark.parametrize("error", [1e-7, 1e-5])
 def test_near_the_end_of_answers_errors_cover(apart, error):
-    """Steps of (e/2)^(1/3), .004 and .017, reach beyond the end: a secant to one side of it would
-    be off by half and more.
+    """The error estimate is valid near the end of the domain.
+
+    Steps of (e/2)^(1/3), which are 0.004 and 0.017, reach beyond the end. A one-sided
+    secant would have an error of more than 50 %.
     """
     measure = Elasticities(Ending(error), parameters=("stiffness_ratio",))
     ((elasticity, estimate),) = told(measure, SCENE.with_(stiffness_ratio=1.0 - apart))[0].values()
@@ -205,17 +228,20 @@ def test_ends_without_elasticities():
     assert beside.status is Status.WORK_BUDGET_SPENT
     assert beside.message.startswith("at mu_star = 0.900")
     assert measure(SCENE.with_(mu_star=0.05), COMPILED).status is Status.NO_LIMIT_CYCLE
-    # at the edge of answers with a number one side is left
+    # At the edge of the domain, one side remains.
     found, _outcome = told(measure, SCENE.with_(mu_star=0.1))
     elasticity, error = found["mu_star"]
     assert abs(elasticity + 0.1) <= error < 1e-4
 
 
 def test_the_elasticities_that_uncertain_recurrence_states():
-    """Of the interval in s on a machine whose stiffness is held: by a and b each with the other
-    held, and by D_c, with which k D_c/sigma_*, V_*/D_c and the unit of time go. Stated to 3 digits;
-    those by numbers of the rig are differences of intervals on two rigs, too: what steps of 1 % of
-    a number leave out is 1e-4.
+    """The elasticities published with the study agree with computed values.
+
+    The elasticities refer to the interval in s of a rig with constant stiffness. The
+    elasticities by a and b each keep the other parameter constant, and D_c also changes k
+    D_c/sigma_*, V_*/D_c and the unit of time. The published values have three digits. The
+    elasticities by rig quantities are also compared with differences between two rigs,
+    whose truncation error is 1e-4 for steps of 1 %.
     """
     from rsfstudy.named_studies import uncertain_recurrence as stated
 

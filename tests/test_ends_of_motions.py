@@ -1,4 +1,4 @@
-"""Motions that cannot go on: what happens before their end is told, and the end is where it is."""
+"""Tests of motions that cannot continue, and of events before their end."""
 
 from __future__ import annotations
 
@@ -42,7 +42,10 @@ def test_a_margin_is_left_where_a_motion_goes_on():
 
 @pytest.mark.parametrize("engine", ENGINES)
 def test_a_runaway_is_followed_to_its_end(engine):
-    """Without mass, slip rate grows without bound within one step: every level before is told."""
+    """All levels are reported before the slip rate becomes unbounded.
+
+    Without inertia, the slip rate grows without bound within one step.
+    """
     scene = Scene(stiffness_ratio=0.5, displacement_step=3.0)
     levels = [rise("log_slip_rate", to) for to in (50.0, 150.0, 250.0)]
     met, meter = [], WorkMeter(100_000, engine=engine)
@@ -64,8 +67,10 @@ def test_a_runaway_is_followed_to_its_end(engine):
 
 @pytest.mark.parametrize("engine", ENGINES)
 def test_slip_that_nothing_loads_is_followed_to_its_end(engine):
-    """By the slowness law ln V falls as state grows, to 10^-290 V_*: evolution over what slip there
-    is has a square beyond all numbers.
+    """Slip without loading is integrated until it stops.
+
+    With the slowness law, ln V falls to ln(10^-290) as the state grows. The square of the
+    evolution per slip overflows there.
     """
     scene = Scene(
         law="slowness", normal_stress="constant", b_over_a=5.0, stiffness_ratio=0.5,
@@ -79,7 +84,10 @@ def test_slip_that_nothing_loads_is_followed_to_its_end(engine):
 
 @pytest.mark.parametrize("engine", ENGINES)
 def test_the_norm_is_met_before_normal_stress_is_lost(engine):
-    """sigma_3 below zero: slip rate grows without bound as normal stress vanishes."""
+    """The slip rate reaches the norm before the normal stress vanishes.
+
+    The least principal stress is negative in these scenes.
+    """
     scene = Scene(
         b_over_a=1.5, stiffness_ratio=1.2, phi=38.0, alpha=0.0, law="slowness",
         load_velocity_ratio=0.0,
@@ -94,8 +102,10 @@ def test_the_norm_is_met_before_normal_stress_is_lost(engine):
 @pytest.mark.parametrize("rise_by", [0.5, 5.0, 11.0, 30.0, 60.0])
 @pytest.mark.parametrize("damping", [1e-6, 1e-3, 0.1])
 def test_waves_after_a_large_rise_of_normal_stress(rise_by, damping):
-    """``mu_* + g = s (mu_* + a x - alpha ln s)`` with g = -eta (e^x - 1) and s = 1 + e + c g has
-    one root, which bisection finds: to rounding over a.
+    """The initial slip rate with radiation damping is the root of an equation.
+
+    The equation ``mu_* + g = s (mu_* + a x - alpha ln s)`` with g = -eta (e^x - 1) and s =
+    1 + e + c g has a single root. The tolerance is the rounding error divided by a.
     """
     scene = Scene(b_over_a=1.5, radiation_damping=damping, normal_stress_step=rise_by)
     cot_phi, alpha = scene.parts.normal_stress.coupling
@@ -108,6 +118,6 @@ def test_waves_after_a_large_rise_of_normal_stress(rise_by, damping):
         strength = scene.mu_star + scene.a * x - alpha * math.log(ratio)
         return scene.mu_star + friction - ratio * strength
 
-    # stress falls and strength rises with x, where normal stress is left
+    # The stress decreases and the strength increases with x while the normal stress is positive.
     expected = brentq(missing, -60.0, 60.0, xtol=1e-13)
     assert start_point(scene).log_slip_rate == pytest.approx(expected, abs=1e-9)

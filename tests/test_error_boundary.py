@@ -1,7 +1,7 @@
-"""Calls of the Python interface with wrong arguments.
+"""Tests of calls of the Python interface with wrong arguments.
 
-The error names the argument, the rule and the remedy, whichever public function, constructor or
-method is called.
+The error message contains the argument, the rule and the remedy for every public function,
+constructor and method.
 """
 
 import inspect
@@ -29,26 +29,26 @@ ROOT = Path(__file__).resolve().parents[1]
 RIG = Rig(normal_stress="5 MPa", slip_distance="10 um", reference_velocity="1 um/s")
 ENDLESS = range(10**12)
 STEP = ROOT / "studies/pages/step.csv"
-#: An array with another dimension than the reductions below expect.
+#: An array with a dimension that the reductions below do not expect.
 ARRAY = xr.DataArray([1.0, 2.0], dims="x")
 
 
 @pytest.fixture(scope="module")
 def record():
-    """Ten rows at constant velocity."""
+    """Create a record of ten rows at constant velocity."""
     time = np.arange(10.0)
     return rsfstudy.read_record({"time": time, "displacement": time, "friction": np.ones(10)})
 
 
 @pytest.fixture(scope="module")
 def dataset():
-    """Results of two cells."""
+    """Create results with two cells."""
     study = study_of("pair", LinearStability(), Axis("b_over_a", [2.0, 3.0]))
     return rsfstudy.run(study, output=None, workers=0, progress=False)
 
 
 def public_classes() -> list[type]:
-    """The classes that users make instances of, and those that functions return."""
+    """Return the public classes, and the classes of returned objects."""
     found = {getattr(rsfstudy, name) for name in rsfstudy.__all__}
     found |= {getattr(reductions, name) for name in reductions.__all__}
     exported = (getattr(measures, name) for name in measures.__all__)
@@ -62,8 +62,6 @@ def public_classes() -> list[type]:
 
 
 # ---- what is within the boundary -----------------------------------------------------------------
-
-
 @pytest.mark.parametrize("kind", public_classes(), ids=lambda kind: kind.__qualname__)
 def test_constructors_and_methods_are_within_the_boundary(kind):
     for name, member in vars(kind).items():
@@ -97,8 +95,6 @@ def test_calls_from_inside_rsfstudy_keep_the_original_exception():
 
 
 # ---- errors of signatures ------------------------------------------------------------------------
-
-
 @pytest.mark.parametrize(
     ("call", "message"),
     [
@@ -119,8 +115,6 @@ def test_a_call_that_does_not_fit_lists_the_parameters(call, message, dataset):
 
 
 # ---- arguments of another type -------------------------------------------------------------------
-
-
 @pytest.mark.parametrize(
     ("call", "message"),
     [
@@ -230,8 +224,6 @@ def test_a_name_of_a_study_leaves_room_for_endings():
 
 
 # ---- annotations ---------------------------------------------------------------------------------
-
-
 def test_numbers_and_lists_of_numpy_match():
     from collections.abc import Callable, Mapping, Sequence
 
@@ -266,7 +258,6 @@ def test_types_are_described_in_words():
 
 
 # ---- control characters --------------------------------------------------------------------------
-
 ESCAPE = "\x1b]0;x\x07\x1b[31m"
 
 
@@ -288,5 +279,5 @@ def test_headings_of_the_terminal_are_spelt_out(dataset, tmp_path, capsys):
     print_summary_piece(TextTable(rows, caption=ESCAPE, wrappable_columns={"why"}))
     print_summary_piece({ESCAPE: "1"})
     wide = {f"{n} {ESCAPE}": "y" * 30 for n in range(5)}
-    print_summary_piece(TextTable([wide]))  # does not fit, and is printed as a list
+    print_summary_piece(TextTable([wide]))  # This table is too wide and is printed as a list.
     assert all(c.isprintable() or c == "\n" for c in capsys.readouterr().out)

@@ -1,4 +1,7 @@
-"""Fits whose standard errors are not valid: their status, their tables and their reductions."""
+"""Tests of fits whose standard errors are not valid.
+
+The tests cover statuses, tables and reductions.
+"""
 
 from __future__ import annotations
 
@@ -17,7 +20,10 @@ from rsfstudy.status import Status
 
 
 def record_with(noise: np.ndarray, jitter: np.ndarray | float = 0.0, trend: float = 0.0):
-    """A record of a velocity step with this noise of friction and of displacement."""
+    """Return a record of a velocity step with noise.
+
+    The noise is added to friction, and the jitter is added to the displacement.
+    """
     time = synthetic.sample_times(STEP_UP, synthetic.loading_end_time(STEP_UP), len(noise))
     moved = synthetic.load_point_displacement(STEP_UP, time)
     friction = synthetic.friction_and_sensitivities("slowness", time)[0] + trend * (moved - 40.0)
@@ -27,7 +33,7 @@ def record_with(noise: np.ndarray, jitter: np.ndarray | float = 0.0, trend: floa
 
 @functools.cache
 def naive() -> xr.Dataset:
-    """A fit that assumes white noise, of a record with correlated noise."""
+    """Return a fit that assumes white noise for correlated noise."""
     record = record_with(synthetic.correlated_noise(400, 0.9, 3e-4, 0)).with_steps(
         [(40, 40, 1, 10)]
     )
@@ -41,12 +47,12 @@ def test_autocorrelated_whitened_residuals_change_the_status() -> None:
     assert row["status"] == "errors_not_valid"
     assert row["p_value"] < 1e-6
     assert "still autocorrelated" in naive().message.item()
-    # the values stand
+    # The estimates are still correct.
     assert row["a"] == pytest.approx(EXACT_PARAMETERS["a"], rel=0.2)
 
 
 def test_tables_mark_standard_errors_that_are_not_valid() -> None:
-    assert not fit_tables.all_fits_are_valid(naive())  # exit status 1
+    assert not fit_tables.all_fits_are_valid(naive())  # The exit status is 1.
     assert fit_tables.format_with_stderr(naive().squeeze(), "a").endswith("*")
     texts = [piece for piece in summaries.build_summary_pieces(naive()) if isinstance(piece, str)]
     assert any("standard errors marked by * are not valid" in text for text in texts)
@@ -66,7 +72,10 @@ def test_reductions_do_not_use_standard_errors_that_are_not_valid() -> None:
 
 
 def test_a_fit_that_explains_nothing_has_no_valid_errors() -> None:
-    """Friction goes down at the step, and the only free parameter is its level."""
+    """A fit with a free friction level only has no valid errors.
+
+    The friction decreases at the step.
+    """
     record = record_with(synthetic.correlated_noise(300, 0.0, 3e-4, 1))
     record.columns["friction"] = 1.2 - record.columns["friction"]
     fixed = {"a": 0.01, "b_over_a": 1.3, "slip_distance": 10.0, "laws": ["slowness"]}
@@ -78,7 +87,10 @@ def test_a_fit_that_explains_nothing_has_no_valid_errors() -> None:
 
 @pytest.mark.parametrize("seed", [1, 2])
 def test_the_regressor_of_the_trend_has_no_noise(seed: int) -> None:
-    """Friction has noise that wanders and a trend, and the load point signal has jitter."""
+    """Jitter of the load point does not bias the fit.
+
+    The friction has strongly correlated noise and a trend.
+    """
     noise = synthetic.correlated_noise(600, 0.97, 3e-4, seed)
     jitter = synthetic.correlated_noise(600, 0.0, 0.3, 10 + seed)
     record = record_with(noise, jitter, trend=-6e-5)
@@ -86,7 +98,8 @@ def test_the_regressor_of_the_trend_has_no_noise(seed: int) -> None:
     found = rsfstudy.fit(record, **options).squeeze()
     assert found.status.item() == Status.OK
     for name, true in {**EXACT_PARAMETERS, "trend1": -6e-5}.items():
-        if f"{name}_stderr" in found:  # of 10 numbers one is off by 3.5 once in 200 records
+        # A deviation of 3.5 standard errors in any of 10 parameters occurs once in 200 records.
+        if f"{name}_stderr" in found:
             assert abs(synthetic.deviation_in_stderrs(found, name, true)) < 3.5, name
     assert float(found.slip_distance_stderr) < 2.0
 
@@ -112,7 +125,7 @@ def test_outliers_are_left_out_and_named() -> None:
 def test_rounded_friction_has_valid_errors_if_the_noise_covers_it(
     quantum: float, valid: bool
 ) -> None:
-    """The noise is 1e-4."""
+    """Rounding is harmless if the quantum is at most twice the noise."""
     record = record_with(synthetic.correlated_noise(400, 0.0, 1e-4, 4))
     rounded = quantum * np.rint(record.columns["friction"] / quantum)
     columns = record.columns | {"friction": rounded}
@@ -125,7 +138,10 @@ def test_rounded_friction_has_valid_errors_if_the_noise_covers_it(
 
 @pytest.mark.parametrize("seed", range(3))
 def test_errors_include_the_rounding_of_displacement(seed: int) -> None:
-    """An encoder: displacement is rounded to 0.5 um, and the step lies between two rows."""
+    """The standard errors cover the resolution of an encoder.
+
+    The displacement is rounded to 0.5 um, and the step occurs between two rows.
+    """
     shift = np.random.default_rng(seed).uniform(0.0, 0.5, 2)
     loading = ((0.0, 1.0), (40.0 + shift[0], 10.0))
     time = np.arange(0.0, 52.0, 0.1)
@@ -145,7 +161,10 @@ def test_errors_include_the_rounding_of_displacement(seed: int) -> None:
 
 @pytest.mark.parametrize(("rows", "status"), [(2.4, Status.OK), (1.0, Status.NOT_IDENTIFIED)])
 def test_coarse_sampling_is_fitted_as_far_as_intervals_cover(rows: float, status: Status) -> None:
-    """The load point moves by 10 um/s after the step, and D_c is 10 um."""
+    """Coarse sampling is fitted down to 1.5 rows per D_c.
+
+    The load point moves at 10 um/s after the step, and D_c is 10 um.
+    """
     time = np.concatenate([np.arange(0.5, 40.0, 1.0), np.arange(40.1, 80.0, 1.0 / rows)])
     friction = synthetic.friction_and_sensitivities("slowness", time)[0]
     friction += synthetic.correlated_noise(len(time), 0.0, 3e-4, 2)
@@ -161,7 +180,7 @@ def test_coarse_sampling_is_fitted_as_far_as_intervals_cover(rows: float, status
 
 
 def test_a_stiffness_that_is_bounded_from_below_only_is_reported() -> None:
-    """A machine so stiff that friction reaches its peak between two rows."""
+    """Friction of a very stiff machine reaches its peak between two rows."""
     found = rsfstudy.fit(
         synthetic.synthetic_record(truth=EXACT_PARAMETERS | {"stiffness": 0.5}, seed=6, size=1e-4),
         laws=["slowness"],

@@ -1,4 +1,4 @@
-"""Catalogues of events: of motions, held to limit cycles, and of records with noise."""
+"""Tests of event catalogues of motions, and of records with noise."""
 
 import math
 
@@ -20,8 +20,10 @@ def motion():
 
 
 def test_events_of_a_motion_are_those_of_its_cycle(motion):
-    """Errors of reading, and of both motions: 1e-8 of numbers near 1 to 10, by a factor for what
-    three cycles add up.
+    """Events agree with the limit cycle within their error estimates.
+
+    The additional tolerance of 1e-6 covers errors of 1e-8 of both motions, multiplied by
+    the size of the numbers and the number of cycles.
     """
     cycle = rsfstudy.limit_cycle(STICK_SLIP, engine="compiled", rtol=1e-8)
     found = motion.rsf.events()
@@ -37,14 +39,17 @@ def test_events_of_a_motion_are_those_of_its_cycle(motion):
         assert off <= float(event[f"{ours}_error"]) + 1e-6, ours
         assert float(event[f"{ours}_error"]) < 1e-3 * abs(float(event[ours])), ours
     assert (found.cut == 0).all()
-    # spring stress falls by k times what slips beyond the load point meanwhile
+    # Spring stress decreases by k times the slip in excess of the load point displacement.
     event = found.isel(event=2)
     fell = STICK_SLIP.stiffness * (event.slip - 10.0 * event.duration)
     assert 0.0 < float(event.static_stress_drop - fell) < 0.03 * float(event.static_stress_drop)
 
 
 def test_crossings_are_read_within_steps(motion):
-    """A motion told at given times, which miss the rupture, says how little it knows of it."""
+    """The error estimates cover the sampling of the rupture.
+
+    A motion at given times that miss the rupture has large error estimates.
+    """
     event = motion.rsf.events().isel(event=2)
     about = float(event.time) + np.linspace(-0.02, 0.02, 4001)
     asked = rsfstudy.simulate(STICK_SLIP, times=about, engine="compiled", rtol=1e-8)
@@ -52,14 +57,17 @@ def test_crossings_are_read_within_steps(motion):
     for name in ("time", "slip", "duration", "peak_log10_slip_rate", "stress_after"):
         allowed = float(event[f"{name}_error"] + again[f"{name}_error"])
         assert abs(float(event[name] - again[name])) <= allowed + 1e-6, name
-    assert float(event.time_error) < 2e-6  # rows are 1e-5 apart
+    assert float(event.time_error) < 2e-6  # The rows are 1e-5 apart.
     assert float(event.slip_error) < 1e-4
     assert float(again.slip_error) > 10.0
-    assert int(again.cut) == 1  # stress was highest before the first time
+    assert int(again.cut) == 1  # Stress has its maximum before the first time.
 
 
 def test_events_of_a_motion_in_units_are_in_them(motion):
-    """As those of the motion, once these are converted: to the errors of reading of both."""
+    """Events of a converted motion equal converted events.
+
+    The tolerance is the sum of both error estimates.
+    """
     rate = float(motion.reference_rate)
     scales = {"normal_stress": "5 MPa", "slip_distance": 1e-5, "reference_velocity": 1e-5 * rate}
     rig = rsfstudy.Rig(**scales)
@@ -97,15 +105,16 @@ SAMPLES = 20_000
 
 
 def noise(seed, correlation=0.0):
-    """Gaussian noise of standard deviation 1."""
+    """Return Gaussian noise with a standard deviation of 1."""
     white = np.random.default_rng(seed).standard_normal(SAMPLES + 1000)
     return lfilter([math.sqrt(1.0 - correlation**2)], [1.0, -correlation], white)[1000:]
 
 
 @pytest.mark.parametrize("correlation", [0.0, 0.5, 0.9, 0.99])
 def test_nothing_is_invented_in_noise(correlation):
-    """Loading up, down and not at all: the chance of one false event in 100 records is 1 %, and
-    the records are always these.
+    """Noise contains no false events, with and without a trend.
+
+    The probability of a false event in 100 records is 1 %, and the seeds are fixed.
     """
     time = np.arange(SAMPLES) / 100.0
     for seed in range(25):
@@ -123,14 +132,17 @@ def test_all_drops_of_three_standard_deviations_are_found(correlation):
         found = rsfstudy.events(time=time, shear_stress=stress)
         assert float(found.smallest_drop) < 3.0
         assert float(found.noise) == pytest.approx(1.0, abs=0.1)
-        # to within the window that tells them from noise
+        # The events are located to within the window of the detection.
         np.testing.assert_allclose(found.time, time[places], atol=0.5)
         off = np.abs(found.static_stress_drop - 3.0) / found.static_stress_drop_error
-        assert float(off.max()) < 5.0  # of 105
+        assert float(off.max()) < 5.0  # The largest of 105 deviations.
 
 
 def test_a_record_tells_slip_rate_and_dynamic_drop(tmp_path):
-    """A fall over ten samples, twice as fast in its second half, by displacement."""
+    """Slip rate and dynamic stress drop follow from the displacement.
+
+    The stress drop lasts ten samples and is twice as fast in its second half.
+    """
     fall = np.interp(np.arange(4000), [2000, 2005, 2010], [0.0, 1.0, 3.0])
     time, rng = 0.1 * np.arange(4000), np.random.default_rng(5)
     record = xr.Dataset(
@@ -144,7 +156,8 @@ def test_a_record_tells_slip_rate_and_dynamic_drop(tmp_path):
     assert rsfstudy.events(record).sizes["event"] == 1
     assert float(event.static_stress_drop) == pytest.approx(3.0, abs=0.1)
     assert float(event.slip) == pytest.approx(120.0, abs=4.0)
-    assert float(event.peak_slip_rate) == pytest.approx(160.0, abs=10.0)  # noise 2.8, largest of 5
+    # The noise of the slip rate is 2.8, and the peak is the largest of five values.
+    assert float(event.peak_slip_rate) == pytest.approx(160.0, abs=10.0)
     assert 0.0 < float(event.dynamic_stress_drop) <= float(event.static_stress_drop) + 0.1
     assert event.slip.attrs["units"] == "um"
     assert event.peak_slip_rate.attrs["units"] == "um s-1"
@@ -153,7 +166,7 @@ def test_a_record_tells_slip_rate_and_dynamic_drop(tmp_path):
     header = [f"{name} ({values.units})" for name, values in record.items()]
     record.to_dataframe().to_csv(file, index=False, header=header)
     of_file, of_record = rsfstudy.events(file), rsfstudy.events(record)
-    of_file.attrs.pop("history")  # with the time of the call
+    of_file.attrs.pop("history")  # The attribute contains the time of the call.
     of_record.attrs.pop("history")
     xr.testing.assert_identical(of_file, of_record)
     plain = rsfstudy.events(**{name: values.values for name, values in record.items()})
@@ -161,8 +174,11 @@ def test_a_record_tells_slip_rate_and_dynamic_drop(tmp_path):
 
 
 def test_a_load_point_moves_on_through_drops(motion):
-    """Its displacement is no slip: it is refused, or read with the stiffness as that of the fault.
-    Both displacements smear slip over windows of four samples alike, but for noise.
+    """Load point displacement is rejected, or corrected with the stiffness.
+
+    Without a stiffness, the displacement is not accepted as slip. With the stiffness, the
+    slip agrees with the slip of the fault. Both displacements spread slip over windows of
+    four samples and differ by noise only.
     """
     rng = np.random.default_rng(8)
     time = np.linspace(0.0, 32.0, 10_000)
@@ -195,8 +211,10 @@ def test_a_load_point_moves_on_through_drops(motion):
 
 
 def test_slip_counts_that_noise_moves_the_place_of_an_event():
-    """Of 160 drops of five standard deviations some are placed a sample early or late: slip of a
-    sample is 2.5 of 10 in a window of four.
+    """The error of slip includes the error of the event location.
+
+    Noise shifts some of 160 events by one sample, and a shift by one sample changes the
+    slip by 2.5 of 10 in a window of four samples.
     """
     rng, count = np.random.default_rng(3), 8000
     off = []
@@ -206,6 +224,7 @@ def test_slip_counts_that_noise_moves_the_place_of_an_event():
             stress[at:] -= 5.0
             moved[at:] += 10.0
         found = rsfstudy.events(time=np.arange(count), shear_stress=stress, displacement=moved)
-        assert (found.slip_error < 0.02).all()  # half of a 95 % interval: two standard errors
+        # The error is half of a 95 % interval, that is two standard errors.
+        assert (found.slip_error < 0.02).all()
         off += ((found.slip - 10.0) / found.slip_error).values.tolist()
     assert np.abs(off).max() < 5.0

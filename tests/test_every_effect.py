@@ -1,6 +1,8 @@
-"""The contract of every effect on steady sliding: growth rates are eigenvalues of the assembled
-equations, critical stiffness is where they change sign, small oscillations grow by them, and ln V
-grows as the equations say. Closed forms of single effects stand in files of their own.
+"""Tests of the linear stability of steady sliding for all effects.
+
+Growth rates must equal the eigenvalues of the assembled equations, and the critical
+stiffness must be the stiffness at which they change sign. Small oscillations must grow at
+these rates. Closed forms of single effects are tested in other modules.
 """
 
 from __future__ import annotations
@@ -31,9 +33,9 @@ from rsfstudy.status import Status
 
 CONSTANT = {"normal_stress": "constant"}
 STRESSES = [CONSTANT, {"normal_stress": "imposed"}, {"alpha": 0.0}, {"alpha": 0.56}, {"alpha": 0.9}]
-#: Two states of which one strengthens, and of several lengths.
+#: Two states, one of which strengthens friction, with different lengths.
 STRENGTHENING = {"a": 0.01, "b1_over_a": 1.4, "b2_over_a": -0.6, "length_ratio": 50.0}
-#: What may act beside a law and normal stress.
+#: Effects that can be combined with a law and a normal stress.
 EFFECTS = [
     {},
     {"radiation_damping": 1e-4},
@@ -42,14 +44,14 @@ EFFECTS = [
     {"fluid": "dilatant", "dilatancy": 0.004, "drainage": 3.0},
     {"fluid": "dilatant", "dilatancy": 0.004, "drainage": 0.7, "radiation_damping": 1e-4},
 ]
-#: Any law, under any normal stress, with each of them that goes with both.
+#: All laws and normal stresses, with each effect that is compatible with both.
 SCENES = [
     {"law": law, **stress, **effect}
     for law, stress, effect in itertools.product(sorted(laws.BUILT_IN_PARTS), STRESSES, EFFECTS)
     if not ("stress_dependence" in effect and stress.get("normal_stress") == "imposed")
 ]
 SCENES += [{"law": law, **STRENGTHENING} for law in ("two_slip_states", "two_slowness_states")]
-#: Those with mass: periods at which double precision sees it in every rate.
+#: Scenes with inertia, and with periods at which the effect of inertia exceeds rounding errors.
 MASSIVE = [
     {"inertia": True, "period": 1e8, **stress, **effect}
     for stress in (CONSTANT, {"alpha": 0.56})
@@ -58,16 +60,22 @@ MASSIVE = [
 
 
 def scene_of(fields: dict, ratio: float, log_slip_rate: float = 0.0) -> Scene:
-    """A scene whose stiffness is so many times critical at the rate of its load point."""
+    """Return a scene with a given stiffness ratio.
+
+    The critical stiffness is evaluated at the velocity of the load point.
+    """
     scene = Scene(**{"load_velocity_ratio": math.exp(log_slip_rate), "stiffness": 0.01, **fields})
     return scene.with_(stiffness=ratio * stability.critical_stiffness(scene, log_slip_rate))
 
 
 def eigenvalues(equations: Equations, state: tuple[float, ...]) -> np.ndarray:
-    """Of the assembled equations around a steady state, by central differences."""
+    """Return the eigenvalues of the assembled equations at a steady state.
+
+    The Jacobian consists of central differences.
+    """
     at, columns = np.array(state), []
     for unit, scale in zip(np.eye(len(at)), equations.unknown_scales, strict=True):
-        step = 1e-5 * scale * unit  # rounding and truncation balance
+        step = 1e-5 * scale * unit  # This step balances rounding and truncation errors.
         ahead, behind = (equations.evaluate_rates(tuple((at + s).tolist())) for s in (step, -step))
         columns.append((np.array(ahead) - np.array(behind)) / (2e-5 * scale))
     return np.sort_complex(np.linalg.eigvals(np.array(columns).T))
@@ -76,7 +84,11 @@ def eigenvalues(equations: Equations, state: tuple[float, ...]) -> np.ndarray:
 @pytest.mark.parametrize("fields", SCENES, ids=str)
 @pytest.mark.parametrize(("ratio", "log_slip_rate"), [(0.8, -3.0), (1.2, 0.0), (0.9, 2.0)])
 def test_growth_rates_are_eigenvalues_of_the_assembled_equations(fields, ratio, log_slip_rate):
-    """Their clock is slip and load point displacement: twice as fast as slip."""
+    """The eigenvalues equal half of the growth rates.
+
+    The independent variable of the equations is the sum of slip and load point
+    displacement, which grows twice as fast as slip.
+    """
     scene = scene_of(fields, ratio, log_slip_rate)
     found = steady_state.steady_sliding(scene, log_slip_rate)
     equations, at = equations_against_displacement(scene), (found.spring_stress, *found.states)
@@ -86,15 +98,15 @@ def test_growth_rates_are_eigenvalues_of_the_assembled_equations(fields, ratio, 
         eigenvalues(equations, at),
     )
     assert len(ours) == 1 + scene.state_count
-    # pore pressure may drain, and one of two states evolve, many times as fast as others:
-    # differences have the digits of the fastest
+    # Some rates, for example of drainage, are much larger than others, and the accuracy of the
+    # differences is relative to the largest rate.
     within = 1e-7 * np.abs(ours).max()
     np.testing.assert_allclose(np.sort_complex(ours), theirs, rtol=0, atol=within)
 
 
 @pytest.mark.parametrize("fields", MASSIVE, ids=str)
 def test_growth_rates_with_mass_are_eigenvalues_of_the_full_equations(fields):
-    """In inertial time: w times as much."""
+    """Growth rates times the inertial time equal the eigenvalues."""
     scene = Scene(**{"stiffness_ratio": 0.9, **fields})
     found = steady_state.steady_sliding(scene, 0.0)
     at = (found.spring_stress, 0.0, found.frictional_stress, *found.states[1:])
@@ -105,7 +117,11 @@ def test_growth_rates_with_mass_are_eigenvalues_of_the_full_equations(fields):
 
 @pytest.mark.parametrize("fields", SCENES + [{**f, "period": 1e6} for f in MASSIVE], ids=str)
 def test_critical_stiffness_is_where_growth_begins(fields):
-    """Linearly in what is missing of it; pore pressure that hardly drains makes it slow."""
+    """Growth rates change sign at the critical stiffness.
+
+    Close to it, the rates are proportional to the difference of stiffness. Slow drainage
+    makes them small.
+    """
     for off, grows in ((-1e-6, True), (1e-6, False)):
         rates = stability.linear_growth_rates(scene_of(fields, 1.0 + off, 0.7), 0.7)
         assert bool(rates[0].real > 0.0) is grows
@@ -124,7 +140,10 @@ def test_critical_stiffness_is_where_growth_begins(fields):
 def test_the_measure_finds_the_threshold_of_growth(
     law, alpha, phi, log_slip_rate, log_norm, log_damping, dilatancy
 ):
-    """By differences of the assembled equations, which have nothing of the formulas."""
+    """Two independent computations of the critical stiffness agree.
+
+    The second computation uses differences of the assembled equations instead of formulas.
+    """
     stress = CONSTANT if alpha is None else {"alpha": alpha, "phi": phi}
     fields = {
         "law": law,
@@ -148,8 +167,9 @@ def test_the_measure_finds_the_threshold_of_growth(
     )
     if outcome.status is Status.OK:
         told = outcome.values
-        # what damping takes is the difference of two numbers of the size of the undamped one; and
-        # close to where no stiffness is stable the threshold is ill-conditioned by its own rise
+        # The effect of damping is the difference of two numbers of the size of the undamped
+        # stiffness. Close to the limit beyond which no stiffness is stable, the threshold is
+        # ill-conditioned.
         undamped = stability.critical_stiffness(Scene(**fields), log_slip_rate, quasi_static=True)
         slack = 1e-6 * max(undamped, told["critical_stiffness"])
         slack *= 1.0 + max(0.0, told["rise_by_dynamics"])
@@ -159,7 +179,10 @@ def test_the_measure_finds_the_threshold_of_growth(
 
 @pytest.mark.parametrize("fields", SCENES[::3], ids=str)
 def test_slip_rate_grows_as_the_unknowns_change(fields):
-    """The growth of ln V that is told is that along the equations, away from steady sliding."""
+    """The derivative of ln V agrees with differences along the motion.
+
+    The test state is away from steady sliding.
+    """
     scene = Scene(**{"load_velocity_ratio": 3.0, "stiffness": 0.01, **fields})
     equations = equations_between_ruptures(scene, with_time=False)
     at = scene.a * np.array([0.3, 0.2, 0.1, 0.05, 0.02][: 1 + scene.state_count])
@@ -167,7 +190,8 @@ def test_slip_rate_grows_as_the_unknowns_change(fields):
     ahead, behind = (
         equations.evaluate_point(tuple(at + s * rates)).log_slip_rate for s in (step, -step)
     )
-    # differences err by the square of the step, and by rounding over it
+    # The error of the differences is proportional to the square of the step size, plus the
+    # rounding error divided by the step size.
     told = equations.evaluate_point(tuple(at)).log_slip_rate_derivative
     assert told == pytest.approx((ahead - behind) / (2.0 * step), rel=1e-6, abs=1e-9)
 
@@ -192,10 +216,13 @@ def test_slip_rate_grows_as_the_unknowns_change(fields):
 )
 @pytest.mark.parametrize("ratio", [0.95, 1.05])
 def test_small_oscillations_grow_as_linear_theory_says(fields, ratio):
-    """Read off the peaks of a motion set off by a small step, from which it bends away in second
-    order: their intervals, and by how much they grow or shrink.
+    """Interval and growth of the peaks agree with linear theory to 1e-3.
+
+    A small displacement step starts the oscillation. The nonlinear deviation is of second
+    order.
     """
-    # full equations are stiff this slowly: what sets them off must stand out from their errors
+    # The full equations are stiff at these slip rates, so the step must exceed their integration
+    # errors.
     small = 1e-4 if "period" in fields else 1e-5
     scene = Scene(stiffness_ratio=ratio, load_velocity_ratio=1.0, displacement_step=small, **fields)
     rates = stability.linear_growth_rates(scene, 0.0)

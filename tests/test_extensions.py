@@ -1,5 +1,7 @@
-"""A part, a measure, a reduction or a figure of a user's own is one file outside of the package: it
-runs, is checked, rerun and drawn like ours, and gives the numbers that mathematics says it must.
+"""Tests of user-defined parts, measures, reductions, figures and steppers.
+
+Each example is a single file outside of the package. The examples must run, can be checked,
+repeated and plotted, and reproduce closed forms.
 """
 
 import copy
@@ -35,12 +37,12 @@ from rsfstudy.status import Status
 from rsfstudy.study import study_loader
 from rsfstudy.study.figure_declarations import Figure, Panel
 
-#: Fields of every scene; others are among its values only if they are stated.
+#: Fields of every scene. Other fields are part of a scene only if they have a value.
 PLAIN = tuple(
     name for name in part_registry.FIELD_NAMES if name not in part_registry.FIELDS_OMITTED_IF_NONE
 )
 EXAMPLES = sorted((Path(__file__).parent / "extensions").glob("*.py"))
-#: One cell of each.
+#: One cell of each study.
 PLACES = {
     "steep_law": {"law": "steep", "stiffness_ratio": 2.0},
     "saturating_law": {"sharpness": 0.5, "stiffness_ratio": 1.5},
@@ -55,7 +57,7 @@ PLACES = {
 
 @pytest.fixture(scope="module")
 def outside(tmp_path_factory, cluster):
-    """Each example, copied to a directory of its own and run there on two workers."""
+    """Run each example in a separate directory on two workers."""
     ran = {}
     for example in EXAMPLES:
         place = tmp_path_factory.mktemp(example.stem)
@@ -72,8 +74,6 @@ def test_every_example_is_used():
 
 
 # ---- like ours ----------------------------------------------------------------------------------
-
-
 @pytest.mark.parametrize("name", PLACES)
 def test_it_is_checked_rerun_and_drawn(name, outside):
     example = outside[name]
@@ -102,7 +102,10 @@ def test_one_cell_and_all_cells_are_as_on_the_workers(name, outside):
     "name", ["steep_law", "saturating_law", "hold_and_reload", "stress_weakening"]
 )
 def test_its_motions_are_the_same_compiled(name, outside):
-    """As ours are held to frozen events: SciPy's stepper takes the same steps but for rounding."""
+    """Motions with user-defined parts are the same for both engines.
+
+    Both engines take the same steps, so the motions differ by rounding errors only.
+    """
     *_others, scene = study_loader.load_study(str(outside[name].study)).scenes()
     stepped = {"rest_time": 30.0} if name == "hold_and_reload" else {"load_velocity_ratio": 2.0}
     scene = scene.with_(**stepped)
@@ -128,7 +131,7 @@ def test_what_it_says_of_itself_is_in_the_file_and_on_the_figure(outside):
 
 
 def test_what_has_no_meaning_in_a_cell_is_left_out(outside):
-    """As alpha at constant normal stress: the cells without it are one."""
+    """Cells that differ in an inapplicable field only are the same cell."""
     study = study_loader.load_study(str(outside["saturating_law"].study))
     dataset = run(study, law=["slip", "saturating"], stiffness_ratio=[0.8])
     assert dataset.sizes == {"law": 2, "sharpness": 3, "stiffness_ratio": 1}
@@ -138,12 +141,12 @@ def test_what_has_no_meaning_in_a_cell_is_left_out(outside):
 
 
 # ---- the numbers are those of mathematics -------------------------------------------------------
-
-
 def test_a_stepper_of_a_users_own(outside):
-    """V_0/V_* = 1 + a/(b - a) at critical stiffness, constant normal stress and a norm without
-    bound; the norm of 5e-4 takes 5e-3 of it at b/a = 1.5, and 2e-5 at b/a = 2. The accuracy asked
-    for is 1e-4.
+    """A user-defined stepper agrees with V_0/V_* = 1 + a/(b - a).
+
+    The closed form holds at the critical stiffness, constant normal stress and infinite
+    norm. The norm of 5e-4 lowers the value by a fraction of 5e-3 at b/a = 1.5, and of 2e-5
+    at b/a = 2. The requested accuracy is 1e-4.
     """
     found = outside["order_four"]
     bias = {1.5: 0.02, 2.0: 1e-4}
@@ -161,8 +164,11 @@ def test_a_stepper_of_a_users_own(outside):
 
 
 def test_a_hold_and_a_reload(outside):
-    """Slowness law, r = k/k_cr: stress relaxes by a r ln(r)/(r - 1) sigma_*, and after a long hold
-    of t peaks at b ln(t) - a b ln(K/b)/(K - b); what is left out of both goes as 1/t.
+    """Relaxation and peak stress agree with closed forms.
+
+    For the slowness law with r = k/k_cr, the stress relaxes by a r ln(r)/(r - 1) sigma_*.
+    After a long hold t, it peaks at b ln(t) - a b ln(K/b)/(K - b). The neglected terms are
+    proportional to 1/t.
     """
     found = outside["hold_and_reload"]
     study = study_loader.load_study(str(found.study))
@@ -177,8 +183,10 @@ def test_a_hold_and_a_reload(outside):
 
 
 def test_the_symmetric_law(outside):
-    """With the load point held, steps of asinh(2 r)/(2 r) a/(b - a) D_c are critical, r = k/k_cr,
-    and by the slip law those of a/(b - a) D_c.
+    """Critical steps of the symmetric law agree with the closed form.
+
+    If the load point is held, the critical step is asinh(2 r)/(2 r) a/(b - a) D_c with r =
+    k/k_cr, and a/(b - a) D_c for the slip law.
     """
     found = outside["steep_law"].dataset.critical_displacement
     ratio = found.stiffness_ratio
@@ -188,21 +196,25 @@ def test_the_symmetric_law(outside):
 
 
 def test_the_saturating_laws(outside):
-    """Steps of artanh(n r)/(n r) a/(b - a) D_c, r = k/k_cr, and none that runs away without bound
-    where n r reaches 1.
+    """Critical steps of the saturating law agree with the closed form.
+
+    The critical step is artanh(n r)/(n r) a/(b - a) D_c with r = k/k_cr. If n r is 1 or
+    larger, no step triggers instability.
     """
     found = outside["saturating_law"].dataset.critical_displacement
     for sharpness, ratio in ((0.0, 0.8), (0.0, 1.5), (0.5, 0.8), (0.5, 1.5), (1.0, 0.8)):
         product = sharpness * ratio
         exact = math.atanh(product) / product if product else 1.0
-        tolerance = 1e-6 if product < 0.75 else 1e-4  # the norm is finite
+        tolerance = 1e-6 if product < 0.75 else 1e-4  # The norm is finite.
         ours = float(found.sel(sharpness=sharpness, stiffness_ratio=ratio))
         assert ours == pytest.approx(exact, rel=tolerance)
 
 
 def test_stress_that_wears_the_state_away(outside):
-    """k_cr is 1/(1 + c) of that without, at constant normal stress; with all effects, that of the
-    assembled equations.
+    """The critical stiffness is divided by 1 + c at constant normal stress.
+
+    With all effects, the critical stiffness agrees with the growth rates of the assembled
+    equations.
     """
     dataset = outside["stress_weakening"].dataset
     constant = dataset.critical_stiffness.sel(normal_stress="constant")
@@ -224,10 +236,11 @@ def test_a_measure_a_reduction_and_a_figure(outside):
 
 
 # ---- without its file, and with another ---------------------------------------------------------
-
-
 def test_without_the_study_file(outside, tmp_path, monkeypatch):
-    """What needs no code works; the rest says what it lacks."""
+    """Without the study file, errors explain which operations need it.
+
+    Operations that need no code still work.
+    """
     gone = tmp_path / "mine.py"
     for name in ("own_figure", "saturating_law"):
         shutil.copy(outside[name].file, tmp_path)
@@ -262,8 +275,6 @@ def test_a_process_that_does_not_know_the_parts_opens_their_results(outside, mon
 
 
 # ---- in a notebook, or anywhere -----------------------------------------------------------------
-
-
 @dataclass(frozen=True, kw_only=True)
 class Doubled(SlipLaw):
     factor: float = number(2.0, "$f$", "1", "factor of nothing", rule="must be 0 or greater")
@@ -296,7 +307,7 @@ def test_a_scene_of_ones_own_parts():
     own = {"factor": 3.0, "is_odd": False, "dynamics": "sticky", "grip": 1.0, "loading": "steplike"}
     assert {name: values[name] for name in tuple(values)[len(PLAIN) :]} == own
     assert (scene.law, scene.normal_stress, scene.alpha) == ("doubled", "unvaried", None)
-    assert Scene(**values) == scene  # by the names, which are known now
+    assert Scene(**values) == scene  # The names are known now.
     for again in (pickle.loads(pickle.dumps(scene)), copy.deepcopy(scene),
                   cloudpickle.loads(cloudpickle.dumps(scene))):  # fmt: skip
         assert again == scene
@@ -330,7 +341,7 @@ def linear(x, state, p):
 
 
 def made(base=laws.Law, frozen=True, **body):
-    """A class of a law, or of what is none."""
+    """Return a class of a law, or an invalid class."""
     annotations = {name: float for name, value in body.items() if hasattr(value, "metadata")}
     stated = {"name": "made", "evolution": staticmethod(linear), **body}
     kind = type("Made", (base,), {**stated, "__annotations__": annotations})
@@ -338,7 +349,7 @@ def made(base=laws.Law, frozen=True, **body):
 
 
 ANOTHER = number(1.0, "", "1", "another")
-#: Bodies that make no law, by what is said of them.
+#: Bodies of invalid classes, by error message.
 NO_LAW = {
     "must be a frozen dataclass": [{"frozen": False}],
     "must be named by a Python identifier": [{"name": None}, {"name": "my law"}],
@@ -381,7 +392,10 @@ def test_classes_that_fill_no_slot(rule):
     ],
 )
 def test_a_law_rests_in_its_steady_states(body, complaint):
-    """Weakening by 0.9 b, whose steady states are not the usual ones."""
+    """The steady states of a user-defined law are verified.
+
+    The law weakens by 0.9 b, so its steady states differ from the default.
+    """
     functions = {"evolution": lambda x, state, p: -(state + 0.9 * p[LAW] * x), **body}
     functions = {name: staticmethod(function) for name, function in functions.items()}
     with pytest.raises(InvalidValue, match=complaint) if complaint else nullcontext():
@@ -410,7 +424,10 @@ def test_a_field_may_be_stated_anew_with_another_default():
 
 
 def test_a_cell_of_a_notebook_that_is_run_twice():
-    """Its class is known anew; what was made of the earlier one stays what it is."""
+    """A class that is defined again replaces the earlier class.
+
+    Existing scenes keep the earlier class.
+    """
     first, second = made(name="again"), made(name="again")
     scene = Scene(law=first)
     assert type(Scene(law="again").parts.law) is first
@@ -437,7 +454,7 @@ def test_a_field_that_would_be_mistaken_in_a_file(name):
 
 @dataclass(frozen=True)
 class Held(Measure):
-    """Says which parts a scene has, where it is computed."""
+    """Measure that returns fields of user-defined parts."""
 
     name = "held"
     primary_output = "held"
@@ -450,8 +467,9 @@ class Held(Measure):
 
 
 def test_parts_along_zipped_axes_reach_the_workers(cluster, tmp_path):
-    """Here, and on workers that have only what they are sent; numbers, flags and texts of cells
-    without them are left out.
+    """User-defined parts along zipped axes are sent to the workers.
+
+    Fields of cells without the part are missing in the results.
     """
     study = study_of(
         "zipped",
@@ -490,15 +508,16 @@ def test_overrides_by_class_whatever_their_order():
 
 
 # ---- figures ------------------------------------------------------------------------------------
-
-
 def squares(dataset, axes):
     axes.plot(dataset.held.values.ravel() ** 2)
     axes.set_title("squares")
 
 
 def test_panels_draw():
-    """By the name of their study; with labels and units from what the measure says of itself."""
+    """A figure is stored under the name of its study.
+
+    The labels and units come from the description of the measure.
+    """
     figure = Figure([Panel(x="phi", y="held", facet=["law"]), squares])
     axes = [Axis("law", ["slip", "slowness"]), Axis("phi", [60, 70])]
     study = Study(name="n", title="t", base=Scene(), axes=axes, measure=Held(), plot=figure)

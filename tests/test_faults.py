@@ -1,5 +1,7 @@
-"""A cell that goes wrong is found, isolated and recorded; its neighbours are not blamed; nothing
-is drawn from it unless one says so.
+"""Tests of failing cells.
+
+A failing cell is detected, isolated and recorded, and its neighbours are not affected.
+Reductions ignore the failure only on request.
 """
 
 import shlex
@@ -36,12 +38,15 @@ LABELS = {s.label: s for s in Status}
 
 
 def only_one_failed(dataset, status):
-    """Of b/a = 2, 2.5, 3, 3.5 the second failed, and the others have their values."""
+    """Assert that only the second cell failed, with the given status.
+
+    The cells are b/a = 2, 2.5, 3 and 3.5.
+    """
     assert dataset.status.values.tolist() == [0, LABELS[status], 0, 0]
     np.testing.assert_array_equal(dataset.total, [2.0, np.nan, 3.0, 3.5])
 
 
-#: What goes wrong in a cell, how it ends, and with which message.
+#: Faults with the status and the message of the failed cell.
 WRONG = {
     fault: (status, message)
     for fault, status, message in [
@@ -66,8 +71,9 @@ WRONG = {
 
 @pytest.fixture(scope="module")
 def gone_wrong(tmp_path_factory, cluster):
-    """Cells that go wrong in all these ways, each among others that do not: computed in this
-    process and on workers, and the files.
+    """Run studies with all faults in this process and on workers.
+
+    The fixture returns the datasets and the reopened files.
     """
     each = faulty_study(at=(2.5,))
     study = replace(each, axes=[Axis("fault", list(WRONG)), *each.axes])
@@ -80,7 +86,7 @@ def gone_wrong(tmp_path_factory, cluster):
 
 @pytest.mark.parametrize("fault", WRONG)
 def test_a_cell_that_goes_wrong(fault, gone_wrong, capsys):
-    """In this process and on a worker alike; the file and the terminal hold the message."""
+    """Local and remote failures have the same status and message."""
     status, message = WRONG[fault]
     for dataset in gone_wrong:
         cells = dataset.sel(fault=fault)
@@ -92,14 +98,14 @@ def test_a_cell_that_goes_wrong(fault, gone_wrong, capsys):
 
 @pytest.fixture(scope="module")
 def sturdy(tmp_path_factory):
-    """A worker that is started again when a cell kills it."""
+    """Start a cluster whose worker restarts after a crash."""
     log = tmp_path_factory.mktemp("sturdy") / "workers.log"
     with clusters.start_local_cluster(1, log) as client:
         yield client, log
 
 
 def lost(*words, **options):
-    """A run that says that a worker ended, and which cell is to blame."""
+    """Run a study and check the warnings about a lost worker."""
     with (
         pytest.warns(UserWarning, match="a worker ended: the cells it held"),
         pytest.warns(UserWarning, match="cell b_over_a = .* failed, .*The run goes on"),
@@ -108,7 +114,7 @@ def lost(*words, **options):
 
 
 def test_a_cell_that_kills_its_worker(sturdy, monkeypatch):
-    """One batch holds the killer and its neighbours: only the killer is recorded."""
+    """Only the crashing cell of a batch is recorded as failed."""
     monkeypatch.setattr(CellBatchIterator, "compute_next_batch_size", lambda _self: 4)
     dataset = lost(faulty_study("segfaults", at=(2.5,)), client=sturdy[0])
     only_one_failed(dataset, "worker_lost")
@@ -116,14 +122,14 @@ def test_a_cell_that_kills_its_worker(sturdy, monkeypatch):
 
 
 def test_a_cell_that_raises_keyboard_interrupt_on_a_worker(cluster):
-    """Nobody pressed Ctrl-C there."""
+    """KeyboardInterrupt on a worker is recorded as an error of the cell."""
     dataset = run_with_failures(faulty_study("interrupts", at=(2.5,)), client=cluster)
     only_one_failed(dataset, "cell_raised")
     assert "KeyboardInterrupt" in dataset.message.values[1]
 
 
 def test_a_time_limit_does_not_end_the_process_of_the_user(monkeypatch):
-    """A worker may be a thread of it."""
+    """Workers that are threads of the user's process are not killed."""
     from distributed import Client
 
     monkeypatch.setenv("FAULT_TAKES", "0.3")
@@ -133,28 +139,28 @@ def test_a_time_limit_does_not_end_the_process_of_the_user(monkeypatch):
 
 
 def test_a_cell_that_computes_for_ever(sturdy, monkeypatch):
-    """Past the time limit its worker ends, even where it cannot run any Python; the cell is tried
-    alone before it is blamed.
+    """A worker is killed at the time limit, even in C code.
+
+    The cell is repeated in isolation before it is marked as failed.
     """
     client, log = sturdy
-    monkeypatch.setattr(
-        worker_pool, "_MAX_WORKER_DEATHS_PER_CELL", 1
-    )  # a worker takes seconds to start
+    # Only one worker death is allowed, because a worker takes seconds to start.
+    monkeypatch.setattr(worker_pool, "_MAX_WORKER_DEATHS_PER_CELL", 1)
     dataset = lost(faulty_study("spins in C", at=(2.5,)), client=client, time_limit=0.5)
     only_one_failed(dataset, "time_limit_spent")
     assert "no answer within 0.5 s of CPU time" in dataset.message.values[1]
     assert "--time-limit" in dataset.message.values[1]
-    assert "faulty_study.py" in log.read_text()  # where it was
+    assert "faulty_study.py" in log.read_text()  # The log contains the location in the code.
 
 
 def test_a_cell_that_waits_for_ever(sturdy):
-    """It takes no CPU time, and has ten times as long."""
+    """A cell without CPU time is stopped after ten times the time limit."""
     dataset = lost(faulty_study("hangs in C", cells=1), client=sturdy[0], time_limit=0.1)
     assert dataset.status.values.tolist() == [Status.TIME_LIMIT_SPENT]
 
 
 def test_a_time_limit_is_one_of_cpu_time():
-    """Whatever the clock says, before and after."""
+    """The limit applies to CPU time, not to wall time."""
     script = """
 import collections, itertools, time
 from rsfstudy.execution import cell_computation as cells
@@ -168,11 +174,11 @@ with cells._cpu_time_limits.enforced(0.1):
     words = [sys.executable, "-u", "-c", script]
     ran = subprocess.run(words, capture_output=True, text=True, check=False, timeout=HANG_TIMEOUT)
     assert (ran.returncode, ran.stdout) == (-signal.SIGPROF, "slept\n")
-    assert 'File "<string>"' in ran.stderr  # where it was
+    assert 'File "<string>"' in ran.stderr  # The output contains the location in the code.
 
 
 def test_a_cell_that_is_slow_on_the_clock_alone_is_not_ended(sturdy):
-    """As on a machine that is busy with something else."""
+    """A cell that needs wall time but no CPU time is not stopped."""
     dataset = run(faulty_study("sleeps", at=(2.5,)), client=sturdy[0], time_limit=2.0)
     assert dataset.status.values.tolist() == [0, 0, 0, 0]
 
@@ -188,7 +194,10 @@ def test_if_everything_fails_at_the_start_the_run_stops_and_says_why(fault, tmp_
 
 
 def test_a_corner_of_the_lattice_that_fails_does_not_stop_a_run():
-    """The first cells are a sample of all, wherever they stand on their axis."""
+    """A failing corner of the lattice does not stop a run.
+
+    The first cells are a sample of the whole lattice.
+    """
     corner = tuple(2.0 + 0.5 * i for i in range(100))
     study = faulty_study("raises", at=corner, cells=400)
     status = run_with_failures(study).status.values
@@ -197,7 +206,7 @@ def test_a_corner_of_the_lattice_that_fails_does_not_stop_a_run():
 
 
 def test_a_run_says_which_cells_failed(tmp_path, capsys):
-    """In Python by a warning, with their statuses; the command prints a table, and no more."""
+    """Python warns about failed cells, and the command prints a table."""
     study = faulty_study("nan", at=(2.5, 3.0))
     with pytest.warns(
         IncompleteWarning, match=r"^2 of 4 cells failed: not_finite 2; dataset\.rsf\."
@@ -231,7 +240,7 @@ def test_failed_cells_are_listed_with_how_to_reproduce_each_alone(tmp_path, monk
     assert len(commands) == 2
     words = shlex.split(commands[0])
     assert words[-2:] == ["--cell", "b_over_a=2.5"]
-    # it fails as it failed, with the traceback that says where
+    # The repeated cell fails with the same error and prints the traceback.
     alone = call_main(*words[1:])
     assert alone.returncode == 1
     assert "in compute" in alone.stderr
@@ -242,7 +251,7 @@ AWKWARD = ["1:2:3", "p,q", "true", "3", "1e3", " lead", "a='b\"", "[red]", "Grö
 
 
 def test_cells_with_awkward_labels_alone(tmp_path):
-    """The command that is printed finds the cell, whatever its label."""
+    """The printed command recomputes the cell for any label."""
     rows = {label: {"b_over_a": 2.0 + i} for i, label in enumerate(AWKWARD)}
     study = Study(
         name="awkward",
@@ -266,7 +275,10 @@ def test_cells_with_awkward_labels_alone(tmp_path):
 
 
 def test_a_cell_is_that_of_the_file_and_not_of_the_study_as_it_is_now(tmp_path):
-    """The study file has other values meanwhile; its measure is what is taken from it."""
+    """The cell uses the values of the file, and the measure of the study.
+
+    The study file contains other values.
+    """
     run(FAULTY_STUDY_FILE, output=tmp_path, b_over_a=[7.0, 8.0])
     scene, outcome = rsfstudy.recompute_cell(
         tmp_path / "faulty.nc", {"b_over_a": "8"}, study=FAULTY_STUDY_FILE
@@ -295,14 +307,14 @@ def test_reductions_draw_on_what_there_is_when_told_to_and_say_so():
     assert int(found.slope_points) == 5
     assert found.slope.despite == "1 failed cells are left out"
     assert found.attrs["reduced_despite"] == "1 failed cells are left out"
-    # the lattice itself is as it was
+    # The lattice is unchanged.
     assert found.status.values[2] == Status.CELL_RAISED
     whole = apply_reductions(lattice(failing=(99.0,)), FIT, despite_failures=True)
     assert "reduced_despite" not in whole.attrs
 
 
 def test_the_run_passes_it_on(tmp_path):
-    """One cell of a fit over b/a fails: its slope is refused, or drawn from the others."""
+    """A fit is rejected if a cell fails, unless failures are permitted."""
     study = replace(faulty_study("raises", at=(3.0,), cells=6), reductions=FIT)
     assert np.isnan(run_with_failures(study, output=tmp_path).slope)
     told = run_with_failures(study, output=tmp_path, despite_failures=True)
@@ -311,7 +323,7 @@ def test_the_run_passes_it_on(tmp_path):
 
 
 def test_workers_that_never_come(monkeypatch):
-    """A scheduler without workers: the run says so, and ends with the reason."""
+    """A run on a scheduler without workers warns and ends with an error."""
     from distributed import Client, LocalCluster
 
     for name, seconds in {

@@ -1,4 +1,7 @@
-"""Figures that a journal would print: of every named study, of any lattice, in any style."""
+"""Tests of figures of named studies and of any lattice, in any style.
+
+The figures must meet the requirements of a journal.
+"""
 
 import itertools
 import math
@@ -26,27 +29,28 @@ from rsfstudy.storage import dataset_files
 from rsfstudy.study import study_index
 
 MM = 25.4
-#: Inches by which neighbours may seem to overlap. Extents are those of the highest letters, rounded
-#: up to pixels of 0.01 inches, and those of formulas depend on the version of matplotlib.
+#: Permitted apparent overlap in inches. Text extents use the height of the tallest letters,
+#: rounded up to pixels of 0.01 inches, and the extents of formulas depend on the version of
+#: Matplotlib.
 SLACK = 0.015
 
 
 @pytest.fixture(scope="module", params=study_index.study_names())
 def figure(request, tmp_path_factory):
-    """The figure of enough of each study."""
+    """Draw the figure of each reduced named study."""
     dataset, _path = named_results(request.param, tmp_path_factory)
     return plots.draw_figure(dataset)
 
 
 def boxes(figure, artists):
-    """Extents in inches, of what has any."""
+    """Return the artists with nonzero extents, and the extents in inches."""
     found = [(artist, artist.get_window_extent()) for artist in artists]
     dpi = figure.dpi
     return [(a, np.array(box.extents) / dpi) for a, box in found if box.width and box.height]
 
 
 def overlap(first, second, slack=SLACK):
-    """Whether two extents have more than a hair in common."""
+    """Return True if two extents overlap by more than a tolerance."""
     low, high = np.maximum(first[:2], second[:2]), np.minimum(first[2:], second[2:])
     return bool((high - low > slack).all())
 
@@ -56,10 +60,11 @@ def texts(figure):
 
 
 def written(figure):
-    """Titles, letters, labels of axes, and legends: all that stands around data."""
+    """Return the titles, panel letters, axis labels and legends."""
     around = [figure.legends]
     for axes in figure.axes:
-        # the letters and titles, left, centred and right, and no tick
+        # The selection contains panel letters and titles (left, centre and right), but no tick
+        # labels.
         titles = [child for child in axes.get_children() if isinstance(child, Text)]
         around.append([t for t in titles if t not in axes.texts and t.get_text()])
         around.append([axes.xaxis.label, axes.yaxis.label])
@@ -68,7 +73,7 @@ def written(figure):
 
 
 def assert_printable(figure):
-    """Nothing sticks out, covers anything else, or names what is not there."""
+    """Assert that all elements lie inside the figure and do not overlap."""
     width, height = figure.get_size_inches()
     left, low, right, high = figure.get_tightbbox().extents
     assert left > -SLACK, "sticks out on the left"
@@ -91,7 +96,7 @@ def assert_printable(figure):
 
 
 def is_seen(artist):
-    """Whether there is anything of it to be seen."""
+    """Return True if an artist has visible elements."""
     line = artist.lines[0] if isinstance(artist, ErrorbarContainer) else artist
     if isinstance(line, Line2D):
         return bool(np.isfinite(np.asarray(line.get_xydata(), dtype=float)).all(axis=1).any())
@@ -99,7 +104,7 @@ def is_seen(artist):
 
 
 def test_nothing_sticks_out_or_covers_anything_else(figure):
-    """The figure of every study; all of its axes are labelled."""
+    """Elements do not overlap, and all axes have labels."""
     assert_printable(figure)
     for axes in figure.axes:
         assert axes.get_xlabel() or axes.get_label() == "<colorbar>"
@@ -110,13 +115,13 @@ def test_a_figure_says_where_its_results_are_partial(tmp_path):
     dataset = run().assign_attrs(completeness="partial: 1 of 2 cells")
     assert (
         plots.draw_figure(dataset).get_suptitle() == "[partial: 1 of 2 cells]"
-    )  # once, for all panels
+    )  # The title appears once for all panels.
     plots.save_figure(dataset, tmp_path / "figure.png")
     assert (tmp_path / "figure.png").stat().st_size > 10_000
 
 
 def test_it_fits_a_journal(figure):
-    """One column wide, or two, and no higher than a page."""
+    """A figure is one or two columns wide, and fits on a page."""
     width, height = figure.get_size_inches() * MM
     assert min(abs(width - 84.0), abs(width - 174.0)) < 0.1
     assert height < 235.0
@@ -135,7 +140,10 @@ def test_legends_name_what_is_drawn(figure):
 
 
 def test_symbols_are_written_as_symbols(figure):
-    """No raw underscore, no name of a Greek letter; and formulas that can be set."""
+    """Texts contain no underscores and no names of Greek letters.
+
+    Matplotlib can parse all formulas.
+    """
     parser = MathTextParser("path")
     for text in texts(figure):
         if "$" in text:
@@ -165,7 +173,7 @@ def test_numbers_along_axes_do_not_touch(figure):
 
 
 def test_narrowed_studies_repeat_no_panel(tmp_path_factory):
-    """One law, one case and a selected cell: a panel for each point that there is, and no more."""
+    """Selections of a study have one panel per remaining point."""
     laws, _path = named_results("displacement_boundary", tmp_path_factory)
     assert len(plots.draw_figure(laws).axes) == 5
     assert len(plots.draw_figure(laws.isel(law=[0])).axes) == 3
@@ -183,7 +191,10 @@ def test_narrowed_studies_repeat_no_panel(tmp_path_factory):
 
 
 def test_where_no_line_fits_the_figure_says_so(tmp_path_factory):
-    """And draws none: the drops of the slowness law at 50 degrees are curved."""
+    """The legend names curves without a fit, and no line is drawn.
+
+    The stress drops of the slowness law at 50 degrees are curved.
+    """
     dataset, _path = named_results("stress_drop", tmp_path_factory)
     for axes in plots.draw_figure(dataset).axes[1:4:2]:
         labels = set(axes.get_legend_handles_labels()[1])
@@ -197,7 +208,7 @@ def test_where_no_line_fits_the_figure_says_so(tmp_path_factory):
 
 
 def lattice(*axes, **fields):
-    """Critical stiffness over some axes."""
+    """Return critical stiffness over the given axes."""
     return run(
         Study(
             name="mine",
@@ -243,7 +254,10 @@ def test_any_lattice_is_printable(axes):
 
 
 def test_curves_that_lie_on_each_other_are_one():
-    """An angle means nothing at constant normal stress: one curve, named once."""
+    """Identical curves are drawn once.
+
+    The angle is not applicable at constant normal stress.
+    """
     stress = Axis("normal_stress", ["constant", "variable"])
     axes = plots.draw_figure(lattice(stress, Axis("phi", [50.0, 60.0]), RATES)).axes[0]
     assert axes.get_legend_handles_labels()[1] == [
@@ -339,7 +353,7 @@ def test_a_style_in_which_nothing_can_be_drawn_is_named(settings, tmp_path):
 
 
 def test_a_variable_is_drawn_if_the_study_declares_the_figure_of_fits():
-    """The name of the figure is known, but the figure is not the one that was asked for."""
+    """A requested variable takes precedence over the declared figure."""
     dataset = lattice(RATES, plot="fits")
     drawn = rsfstudy.plot(dataset, variable="critical_stiffness")
     assert len(drawn.axes[0].lines) == 1
@@ -366,7 +380,7 @@ def test_style_sheets_are_read_as_matplotlib_reads_them():
 
 
 def test_ours_is_left_alone():
-    """Nothing is drawn in another style later."""
+    """Drawing does not change the global style."""
     import matplotlib
 
     before = dict(matplotlib.rcParams)

@@ -1,5 +1,7 @@
-"""Files: what is written is what is read, old files survive, damage is named, finished cells are
-kept.
+"""Tests of results files and journals.
+
+Written files can be read again, failed writes keep old files, damage is reported, and
+finished cells are kept.
 """
 
 import contextlib
@@ -35,7 +37,11 @@ def dataset(value=1.0) -> xr.Dataset:
 
 
 def test_attributes_netcdf_would_change_are_made_plain(tmp_path):
-    """None vanishes, flags become words, dicts JSON, lists of one their element; nothing raises."""
+    """Attributes are converted to types that NetCDF preserves.
+
+    None is removed, flags become words, dicts become JSON, and lists with one element
+    become that element.
+    """
     odd = dataset().assign_attrs(
         none=None, flag=True, table={"a": 1}, one=[3.0], several=(1, 2), empty=[]
     )
@@ -102,7 +108,7 @@ def test_a_motion_is_no_results_of_a_study(tmp_path):
 
 
 class Pair(Measure):
-    """A number and a curve."""
+    """Measure with a scalar and a curve."""
 
     name = "pair"
     variables = {"v": (), "profile": ("phase",)}  # noqa: RUF012
@@ -152,7 +158,7 @@ def test_a_number_changed_in_the_journal_is_noticed(tmp_path):
 
 
 def test_a_result_moved_to_another_cell_of_the_journal_is_noticed(tmp_path):
-    """It is whole, but for the other."""
+    """A valid result under the key of another cell is detected."""
     with journal(tmp_path) as kept:
         kept.add_cells([LAYOUT.pack_cell(KEYS[0].tobytes(), *DONE)])
     with contextlib.closing(sqlite3.connect(tmp_path / "trial.cells.sqlite")) as db, db:
@@ -168,8 +174,6 @@ def test_cells_differ_by_the_last_bit():
 
 
 # ---- what a file says of itself -----------------------------------------------------------------
-
-
 @pytest.fixture(scope="module")
 def written(tmp_path_factory):
     output = tmp_path_factory.mktemp("small")
@@ -179,12 +183,12 @@ def written(tmp_path_factory):
 
 @pytest.fixture
 def small(written, tmp_path):
-    """A file of its own for each test, which may change it."""
+    """Return a copy of the file that the test may change."""
     return shutil.copy(written, tmp_path / "small.nc")
 
 
 def test_what_another_program_saved_is_read_and_told(small, tmp_path):
-    """What a notebook adds is left alone."""
+    """Variables and attributes that a user adds are kept."""
     mine = xr.load_dataset(small)
     mine["log"] = np.log(mine.critical_velocity_ratio)
     mine.attrs["comment"] = "with logarithms"
@@ -203,7 +207,7 @@ def test_a_file_of_a_later_version_is_told_for_what_it_is(small, tmp_path):
 
 
 def test_opening_a_file_runs_no_code(small, tmp_path, monkeypatch):
-    """Not even where its declaration names a measure or a plot that could be imported."""
+    """Opening a file does not import modules named in its declaration."""
     (tmp_path / "evil.py").write_text("raise SystemExit('the code of a results file ran')")
     monkeypatch.syspath_prepend(tmp_path)
     dataset = xr.load_dataset(small)
@@ -230,7 +234,7 @@ def test_a_file_says_what_decided_its_numbers(small):
 
 
 def test_git_tells_the_commit_and_whether_it_was_clean(tmp_path):
-    """What runs and tests leave in a checkout changes no number; the package and studies do."""
+    """Only changes of package and studies mark a checkout as modified."""
 
     def git(*words):
         who = "-c", "user.name=x", "-c", "user.email=x"
@@ -255,8 +259,6 @@ def test_git_tells_the_commit_and_whether_it_was_clean(tmp_path):
 
 
 # ---- from the file alone ------------------------------------------------------------------------
-
-
 @pytest.mark.parametrize("name", study_index.study_names())
 def test_every_declaration_restores_its_study(name):
     study = study_loader.load_study(name)
@@ -266,16 +268,17 @@ def test_every_declaration_restores_its_study(name):
     )
     assert json.loads(json.dumps(restored.describe())) == described
     assert restored.size == study.size
-    # of thousands of cells some, which have all points of every axis
+    # Large studies are sampled, and the sample contains all points of every axis.
     for number in range(0, study.size, 1 if study.size < 1000 else 23):
         assert restored.scene(number) == study.scene(number)
 
 
 def test_measures_and_reductions_in_the_files_of_studies_are_found_by_their_names():
-    """In a process that has loaded no study."""
+    """The modules are found by a process that has not loaded any study."""
     described = [study_loader.load_study(name).describe() for name in ("effects", "coverage")]
     asked = (
-        "import json, sys; from rsfstudy.storage import schema as contents, rebuild_from_file as restore\n"
+        "import json, sys; from rsfstudy.storage import schema as contents, "
+        "rebuild_from_file as restore\n"
         "for plain in json.load(sys.stdin):\n"
         "    study = restore.study_from_declaration(contents.parse_declaration(plain), {})\n"
         "    print(*(type(p).__name__ for p in (study.measure, study.reductions[0])))"
@@ -307,7 +310,7 @@ def test_a_rerun_of_a_study_as_it_was_overridden(tmp_path):
 
 
 def test_a_rerun_shows_what_differs(small, tmp_path):
-    """Sealed anew, as by someone who meant it: the comparison finds the value."""
+    """A changed value in a file with a valid digest is found."""
     other = xr.load_dataset(small)
     other["critical_velocity_ratio"][0, 0] += 1e-9
     about = json.loads(other.attrs["provenance"])

@@ -1,4 +1,4 @@
-"""Files of motions: what they say of themselves, and what commands make of them."""
+"""Tests of the files of motions, and of the commands that read them."""
 
 import re
 import shutil
@@ -24,7 +24,7 @@ RIG = ("--normal-stress", "5 MPa", "--slip-distance", "10 um", "--reference-velo
 
 @pytest.fixture(scope="module")
 def place(tmp_path_factory):
-    """Motions in units of the slider and of a rig, by the command line, and one at times."""
+    """Create files of motions, in slider units and in rig units."""
     place = tmp_path_factory.mktemp("motions")
     fields = ("--set", "stiffness_ratio=0.5", "--set", "load_velocity_ratio=10")
     common = ("simulate", *fields, "--set", "inertia=yes", "--engine", "compiled")
@@ -101,16 +101,17 @@ def test_other_programs_read_what_is_exported(place, tmp_path):
         assert call_main("export", place / "rig.nc", f"--{form}", "--output", file).returncode == 2
     table = pd.read_csv(tmp_path / "motion.csv")
     np.testing.assert_allclose(table["shear_stress (MPa)"], motion["shear_stress"], rtol=1e-15)
-    assert not any(name.startswith("reference_rate") for name in table)  # it never changes
+    # The reference rate is constant and therefore not a column.
+    assert not any(name.startswith("reference_rate") for name in table)
     read = rsfstudy.read_table(tmp_path / "motion.csv")
     units = {"time": "s", "slip": "um", "slip_rate": "um s-1", "log10_slip_rate": "1"}
     assert {name: read[name].units for name in units} == units
     mat = loadmat(tmp_path / "motion.mat", squeeze_me=True)
     np.testing.assert_array_equal(mat["slip"], motion["slip"])
-    assert mat["reference_rate"] == pytest.approx(0.1, rel=1e-15)  # V_*/D_c, one rounding
+    assert mat["reference_rate"] == pytest.approx(0.1, rel=1e-15)  # V_*/D_c, to rounding error.
     assert str(mat["units"]["shear_stress"]) == "MPa"
     assert "simulate" in str(mat["attributes"]["history"])
-    assert call_main("export", place / "rig.nc").returncode == 2  # of which kind?
+    assert call_main("export", place / "rig.nc").returncode == 2  # The file format is missing.
     shutil.copy(place / "rig.nc", tmp_path / "both.nc")
     both = call_main("export", tmp_path / "both.nc", "--csv", "--mat")
     assert both.returncode == 0, both.stderr
@@ -152,5 +153,5 @@ def test_a_table_of_a_study_has_a_row_a_cell():
     table = results.rsf.to_dataframe()
     assert table["stiffness_ratio"].tolist() == [0.5, 0.6, 0.7]
     assert "load_velocity_ratio" not in table
-    assert "status" not in table  # all are ok
+    assert "status" not in table  # All statuses are OK.
     np.testing.assert_array_equal(table["static_stress_drop"], results["static_stress_drop"])

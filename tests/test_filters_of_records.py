@@ -1,4 +1,4 @@
-"""Friction that was averaged or filtered before it was recorded."""
+"""Tests of friction that was averaged or filtered before the recording."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ LAW = {"noise": "ar", "laws": ["slowness"]}
 
 
 def filtered(text: str, size: float, seed: int) -> rsfstudy.Record:
-    """A record at 12.5 Hz whose friction and noise passed a filter."""
+    """Return a record at 12.5 Hz with filtered friction and noise."""
     fine = np.arange(0.0, 60.0, 0.016)
     friction = synthetic.friction_and_sensitivities("slowness", fine, LOADING)[0]
     friction += size * np.random.default_rng(seed).standard_normal(len(fine))
@@ -36,7 +36,10 @@ def filtered(text: str, size: float, seed: int) -> rsfstudy.Record:
 
 @pytest.mark.parametrize("kind", FILTER_KINDS)
 def test_filters_of_an_exponential_are_exact(kind: str) -> None:
-    """Friction that is steady up to 10 s and then decays with a rate of 1/s."""
+    """Filters agree with closed forms for an exponential decay.
+
+    The friction is constant up to 10 s and then decays at a rate of 1/s.
+    """
     time, size = np.arange(5.0, 20.0, 0.05), 0.8
     one = Filter(kind, size)
     at = one.sample_times(time)
@@ -45,19 +48,22 @@ def test_filters_of_an_exponential_are_exact(kind: str) -> None:
         late = time + (0.5 * size if kind == "mean" else 0.0)
         whole = late - size > 10.0
         exact = (np.exp(10.0 - late + size) - np.exp(10.0 - late)) / size
-        # midpoints of 16 parts of 0.05 s: (0.05)^2/24
+        # The error of the midpoint rule with 16 parts of 0.05 s is (0.05)^2/24.
         np.testing.assert_allclose(found[whole], exact[whole], rtol=2e-4)
     if kind == "first_order":
         rate = 2.0 * math.pi * size
         lag = np.maximum(time - 10.0, 0.0)
         exact = (rate * np.exp(-lag) - np.exp(-rate * lag)) / (rate - 1.0)
-        # 60 points per period of the corner frequency
+        # There are 60 points per period of the corner frequency.
         np.testing.assert_allclose(found, exact, atol=3e-3)
     np.testing.assert_allclose(found[time < 9.0], 1.0, rtol=1e-12)
 
 
 def test_the_correlation_of_averages_is_removed() -> None:
-    """Running means over 5 rows, and the matrix of their overlaps."""
+    """Whitening removes the correlation of running means over 5 rows.
+
+    The reference is the matrix of overlaps.
+    """
     time = 0.2 * np.arange(60.0)
     lags = np.abs(time[:, None] - time)
     exact = np.maximum(1.0 - lags, 0.0) + 0.002 * np.eye(60)
@@ -65,11 +71,11 @@ def test_the_correlation_of_averages_is_removed() -> None:
     root = np.linalg.inv(np.linalg.cholesky(exact))
     np.testing.assert_allclose(overlap.whiten_columns(np.eye(60)), root, atol=1e-9)
     assert overlap.log_determinant == pytest.approx(np.linalg.slogdet(exact)[1])
-    assert overlap.row_count_per_independent_sample == pytest.approx(
-        5.0, rel=0.1
-    )  # but for the ends
+    # The ratio is smaller at the ends.
+    assert overlap.row_count_per_independent_sample == pytest.approx(5.0, rel=0.1)
     line = apply_running_mean(time, time[:, None] ** 2, 1.0)[:, 0]
-    # the mean of t^2 over 1 s is t^2 + 1/12; lines between rows add less than 0.2^2/2
+    # The mean of t^2 over 1 s is t^2 + 1/12, and linear interpolation between rows adds less
+    # than 0.2^2/2.
     np.testing.assert_allclose(line[3:-3], time[3:-3] ** 2 + 1.0 / 12.0, atol=0.02)
 
 

@@ -1,5 +1,7 @@
-"""Intervals of fits against closed forms and refits; work that is not done; ramps; noise of a load
-point that is taken as recorded; and the fit of basalt that the page tells.
+"""Tests of the results of fits.
+
+The tests compare intervals with closed forms and repeated fits, and cover skipped work,
+ramps, noise of the load point, and the fit of basalt in the documentation.
 """
 
 from __future__ import annotations
@@ -27,17 +29,21 @@ from rsfstudy.motion.accuracy import Accuracy
 from rsfstudy.motion.work_meter import WorkMeter
 
 WHITE = {**FIT_OPTIONS, "noise": "white", "laws": ["slowness"]}
-#: The true parameters where they are not looked for.
+#: True values of the parameters that are not free.
 TRUE = {"a": 0.01, "b_over_a": 1.3, "slip_distance": EXACT_PARAMETERS["slip_distance"]}
 
 
 def test_intervals_of_linear_parameters_are_those_of_students_t() -> None:
-    """Friction before the step and a trend: a regression with n - 2 degrees of freedom."""
+    """Intervals of linear parameters follow Student's t distribution.
+
+    The free parameters are the initial friction and a trend, so the fit is a regression
+    with n - 2 degrees of freedom.
+    """
     fit = rsfstudy.fit(
         synthetic_record(count=60), free=("mu_star", "trend1"), **WHITE, **TRUE
     ).squeeze()
     bare, moved = fit.detrended_friction - fit.mu_star, fit.record_displacement.values
-    moved = moved - 40.0  # from the step
+    moved = moved - 40.0  # The trend starts at the step.
     columns = np.column_stack([np.ones(60), moved])
     left = fit.record_friction.values - bare.values
     exact, (squares,), *_ = np.linalg.lstsq(columns, left)
@@ -45,13 +51,16 @@ def test_intervals_of_linear_parameters_are_those_of_students_t() -> None:
     reach = student.isf(0.025, 58) * spread
     for name, value, by in zip(("mu_star", "trend1"), exact, reach, strict=True):
         ends = [float(fit[f"{name}_{end}"]) for end in ("low", "high")]
-        # friction repeats to 1e-11, over 1e-4 of the interval
+        # Friction is reproducible to 1e-11, compared with an interval of 1e-4.
         assert ends == pytest.approx([value - by, value + by], abs=1e-6 * by), name
 
 
 @pytest.mark.parametrize("law", LAW_FUNCTIONS)
 def test_a_spring_softer_than_critical_is_not_followed(law: str) -> None:
-    """(b - a)/D_c is critical for all laws of one state."""
+    """Motions below the critical stiffness are not integrated.
+
+    The critical stiffness is (b - a)/D_c for all laws with one state.
+    """
     fields = {"normal_stress": "constant", "stiffness": 0.03, "mu_star": 0.6}
     scene = Scene(law=law, a=0.01, b_over_a=1.3, **fields)
     meter, loading = WorkMeter(10**9), np.array([(t, v, 1.0, 0.0) for t, v in STEP_UP])
@@ -65,7 +74,8 @@ def test_a_spring_softer_than_critical_is_not_followed(law: str) -> None:
     assert meter.evaluations > 0
 
 
-#: A ramp of 0.4 s: the load point moves by 2.2 um, of which a steady velocity misses up to 0.45.
+#: A ramp of 0.4 s, during which the load point moves by 2.2 um. A constant velocity during the
+#: ramp would have a displacement error of up to 0.45 um.
 RAMP = ((0.0, 1.0), *((40.0 + 0.002 * n, 1.0225 + 0.045 * n) for n in range(200)), (40.4, 10.0))
 
 
@@ -82,10 +92,11 @@ def test_a_ramp_is_loaded_at_steady_acceleration() -> None:
     np.testing.assert_allclose(moved[:-1], exact)
     fit = rsfstudy.fit(one, **WHITE).squeeze()
     for name in ("a", "b", "slip_distance"):
-        # pieces leave displacement off by 0.45 um/16^2, k of which is 5e-6 of friction
+        # The pieces have a displacement error of 0.45 um/16^2, which is 5e-6 in friction if
+        # multiplied by k.
         assert float(fit[name]) == pytest.approx(EXACT_PARAMETERS[name], rel=1e-3), name
     found = rsfstudy.fit(rsfstudy.read_record(columns), **WHITE).squeeze()
-    # rows are 0.4 s apart before the ramp, so that it seems twice as long
+    # The rows before the ramp are 0.4 s apart, so the ramp appears to be twice as long.
     assert float(found.slip_distance) == pytest.approx(EXACT_PARAMETERS["slip_distance"], rel=0.03)
 
 
@@ -99,7 +110,8 @@ def test_noise_of_a_load_point_that_is_loaded_as_recorded(noise: float, told: bo
     columns = {"time": times, "displacement": moved, "friction": friction}
     one = rsfstudy.read_record(columns).with_steps([(40.0, 40.0, 1.0, 10.0)])
     fit = rsfstudy.fit(one, **{**WHITE, "stiffness": 0.02}, loading="recorded").squeeze()
-    assert float(fit.load_point_noise) == pytest.approx(noise, rel=0.2)  # 600 samples, by a median
+    # The noise is estimated from a median of 600 samples.
+    assert float(fit.load_point_noise) == pytest.approx(noise, rel=0.2)
     assert ("noise of the recorded load point" in str(fit.message.values)) == told
     assert (float(fit.slip_distance) > 1.1 * EXACT_PARAMETERS["slip_distance"]) == told
     steps = rsfstudy.fit(one, **{**WHITE, "stiffness": 0.02}).squeeze()
@@ -108,7 +120,10 @@ def test_noise_of_a_load_point_that_is_loaded_as_recorded(noise: float, told: bo
 
 
 def with_noise(size: float, seed: int, rho: float = 0.0) -> rsfstudy.Record:
-    """A record of 400 rows whose steps are found in displacement with noise."""
+    """Return a record of 400 rows with noise in the displacement.
+
+    The steps are detected.
+    """
     columns = {
         name: of.copy() for name, of in synthetic_record(size=5e-5, seed=seed).columns.items()
     }
@@ -117,8 +132,10 @@ def with_noise(size: float, seed: int, rho: float = 0.0) -> rsfstudy.Record:
 
 
 def test_errors_of_steps_are_those_of_two_straight_lines() -> None:
-    """In closed form: of n even rows over a time T, 12 s^2/(n T^2) is the variance of a velocity,
-    and 4 s^2/n that of either end.
+    """Errors of steps agree with the closed form for two straight lines.
+
+    For n even rows over a time T, the variance of a velocity is 12 s^2/(n T^2), and the
+    variance of either end is 4 s^2/n.
     """
     one = with_noise(0.1, 0)
     times = np.array(
@@ -134,7 +151,7 @@ def test_errors_of_steps_are_those_of_two_straight_lines() -> None:
     lasts = np.array([step.start - one.time[0], one.time[-1] - step.start])
     of_time = np.sum(4 * 0.01 / counts) / (step.velocity_after - step.velocity_before) ** 2
     exact = [of_time, *(12 * 0.01 / (counts * lasts**2))]
-    # 400 rows tell s^2 to 7 per cent, and an order above 0 that chance may take to some more
+    # 400 rows determine s^2 to 7 %, and a random noise order above 0 adds to this error.
     assert variances == pytest.approx(exact, rel=0.25)
     assert shift_steps_by_their_errors(one.with_steps([step[:4]]), [step]) == []
     assert shift_steps_by_their_errors(synthetic_record(), [step]) == []
@@ -142,8 +159,10 @@ def test_errors_of_steps_are_those_of_two_straight_lines() -> None:
 
 @pytest.mark.parametrize("rho", [0.0, 0.9])
 def test_errors_count_noise_of_the_load_point(rho: float) -> None:
-    """Squared distances of the truth, over six fits, are those of chance; without what the load
-    point adds their sum is 50 and more for a.
+    """Standard errors include the noise of the load point.
+
+    The sum of squared deviations over six fits has a chi-squared distribution. Without the
+    contribution of the load point, the sum for a would exceed 50.
     """
     names = ("a", "b", "slip_distance")
     squares = dict.fromkeys(names, 0.0)
@@ -156,11 +175,16 @@ def test_errors_count_noise_of_the_load_point(rho: float) -> None:
             )
             low, high = (float(fit[f"{name}_{end}"].item()) for end in ("low", "high"))
             assert high - low > 3.9 * float(fit[f"{name}_stderr"].item())
-    assert all(0.5 < found < 25.0 for found in squares.values()), squares  # chi^2 of 6
+    # The sum has a chi-squared distribution with 6 degrees of freedom.
+    assert all(0.5 < found < 25.0 for found in squares.values()), squares
 
 
 def test_basalt_is_what_the_page_tells() -> None:
-    """D_c of 8.7 um by the slip law, errors 2.2 times those of the formula, 643 of 2,863 rows."""
+    """The fit agrees with the published page.
+
+    The slip law gives a D_c of 8.7 um, errors of 2.2 times the white-noise errors, and 643
+    effective samples in 2,863 rows.
+    """
     one = rsfstudy.read_record(Path(__file__).parent.parent / "studies/records/basalt.txt")
     free = ("a", "b", "slip_distance", "mu_star", "trend1", "stiffness", "step_time")
     options = {"laws": ["slip"], "free": free, "before": "60 um", "after": "250 um"}

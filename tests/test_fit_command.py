@@ -1,6 +1,4 @@
-"""The command `fit`: what it prints, draws and writes; what becomes of its files; and how columns
-of records are named.
-"""
+"""Tests of the command ``fit``: output, figures, files and column names."""
 
 import math
 import re
@@ -20,7 +18,7 @@ from rsfstudy.reporting.fit_tables import format_with_stderr
 from rsfstudy.status import Status
 
 PAGES = Path(__file__).parent.parent / "studies" / "pages"
-#: Of the records below, by the slowness law: 1 -> 10 -> 1 um/s.
+#: True parameters of the records below, for the slowness law and 1 -> 10 -> 1 um/s.
 TRUE = {"a": 0.010, "b": 0.013, "slip_distance": 12.0, "mu_star": 0.6, "trend1": -5e-6}
 STIFFNESS = 2e-3
 COLUMNS = "time=t (s),displacement=lp (um),friction=mu"
@@ -28,8 +26,10 @@ FIT = ("--columns", COLUMNS, "--stiffness", f"{STIFFNESS} /um", "--law", "slowne
 
 
 def rows() -> np.ndarray:
-    """Time, load point displacement and friction of two velocity steps, with noise correlated by
-    .8.
+    """Return the columns of a record of two velocity steps.
+
+    The columns are time, load point displacement and friction. The noise has a correlation
+    of 0.8.
     """
     loading = ((0.0, 1.0), (100.0, 10.0), (140.0, 1.0))
     times = [np.arange(0.0, 100.0, 0.5), 100.0 + 0.1 * np.arange(400), np.arange(140.0, 440.0, 0.5)]
@@ -44,7 +44,7 @@ def rows() -> np.ndarray:
 
 @pytest.fixture(scope="module")
 def written(tmp_path_factory):
-    """A directory with a record, its fits by the command, and what that said."""
+    """Create a directory with a record, its fits, and the command output."""
     here = tmp_path_factory.mktemp("fits")
     with (here / "record.csv").open("w") as file:
         file.write("t (s),lp (um),mu\n")
@@ -74,7 +74,10 @@ def test_it_prints_the_steps_and_a_table_that_is_never_broken(written):
 
 
 def test_what_it_finds_is_what_the_record_was_made_of(written):
-    """Each within 4 standard errors: of 8 numbers one lies outside once in 2,000 records."""
+    """Parameters agree with the true values within 4 standard errors.
+
+    A larger deviation in any of 8 parameters occurs once in 2,000 records.
+    """
     here, _said = written
     found = rsfstudy.open(here / "fit.nc")
     for name in ("a", "b", "slip_distance", "trend1"):
@@ -110,13 +113,11 @@ def test_steps_fitted_together_have_one_law_and_a_curve_each(written, tmp_path, 
     for name in ("a", r"Dc \(um\)", "mu_0_1", "mu_0_2", r"trend_2 \(1/um\)"):
         assert len(re.findall(rf"^{name} +\S", ran.stdout, re.MULTILINE)) == 1, name
     found = rsfstudy.open(tmp_path / "fit.nc").squeeze()
-    assert found.rsf.scene.mu_star == float(
-        found.mu_star_1
-    )  # of the step that its velocities are of
+    assert found.rsf.scene.mu_star == float(found.mu_star_1)  # The scene belongs to the first step.
     figure = rsfstudy.open(tmp_path / "fit.nc").rsf.plot()
     curves = [line for line in figure.axes[0].lines if line.get_label() == "slowness law"]
     symbols = [text.get_text() for text in figure.axes[-1].get_xticklabels()]
-    assert len(curves) == 1  # windows that follow each other are one piece
+    assert len(curves) == 1  # Consecutive windows are drawn as a single curve.
     assert symbols[3:] == [r"$\mu_*^{(1)}$", "$c_1^{(1)}$", r"$\mu_*^{(2)}$", "$c_1^{(2)}$"]
 
 
@@ -180,14 +181,15 @@ def test_a_number_has_the_digits_that_its_error_gives_it():
     assert told(1e-4, 1e7) == "not told"
 
 
-#: A number and its error as they are printed, times a power of ten perhaps.
+#: A number and its error as printed, with an optional power of ten.
 NUMBER = re.compile(r"\(?(-?[\d.]+) \+- ([\d.]+)\)?(?:e[+-]\d+)?")
 
 
 def test_the_page_prints_what_the_command_does(tmp_path, monkeypatch):
-    """Compare numbers to a tenth of their errors, and text without the widths of columns.
+    """The output agrees with the page.
 
-    Another machine may round the last digit differently, and other versions of rich choose other
+    Numbers are compared to a tenth of their errors, and texts without column widths. Other
+    machines may round the last digit differently, and other versions of rich choose other
     widths.
     """
     text = (PAGES / "fits.md").read_text()

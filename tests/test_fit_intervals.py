@@ -1,4 +1,7 @@
-"""Intervals of fits against profiles by brute force, on a relaxation that is told badly."""
+"""Tests of fit intervals against brute-force likelihood profiles.
+
+The test record is a relaxation that barely constrains the parameters.
+"""
 
 from __future__ import annotations
 
@@ -18,7 +21,7 @@ FREE = ("b", "slip_distance", "mu_star")
 
 
 class Relaxation:
-    """``mu_star - b (1 - exp(-x/D_c))`` over 30 um, in place of the model of a record."""
+    """Model ``mu_star - b (1 - exp(-x/D_c))`` over a displacement of 30 um."""
 
     averaging_time = 0.0
 
@@ -34,25 +37,25 @@ class Relaxation:
     def model_friction(
         self, values: ParameterValues, *, refined: bool = False, require_stable: bool = False
     ) -> np.ndarray:
-        """The relaxation."""
+        """Return the friction of the model."""
         return np.asarray(
             values["mu_star"]
             - values["b"] * -np.expm1(-self.displacement / values["slip_distance"])
         )
 
     def trend(self, _values: ParameterValues) -> np.ndarray:
-        """None."""
+        """Return a trend of zero."""
         return np.zeros(ROWS)
 
     def is_linear(self, name: str) -> bool:
-        """Only its level is told without a step."""
+        """Return True for the friction level only."""
         return name == "mu_star"
 
     def check_parameters(self, values: ParameterValues) -> None:
-        """All is right."""
+        """Accept all values."""
 
     def loading_sensitivity(self, _values: ParameterValues) -> np.ndarray:
-        """Nothing: no load point moves it."""
+        """Return an empty sensitivity, because there is no load point."""
         return np.zeros((ROWS, 0))
 
     def jacobian(
@@ -61,7 +64,7 @@ class Relaxation:
         free: Sequence[str],
         difference_scheme: DifferenceScheme = QUICK_DIFFERENCE_SCHEME,
     ) -> np.ndarray:
-        """In closed form."""
+        """Return the derivatives in closed form."""
         over = self.displacement / values["slip_distance"]
         columns = {
             "b": np.expm1(-over),
@@ -72,7 +75,7 @@ class Relaxation:
 
 
 def fit(distance: float) -> tuple[Relaxation, FitProblem, FitSolution]:
-    """A search on such a record, and what it found."""
+    """Return a model, its fit problem and the solution."""
     truth = {"a": 0.01, "b": 0.01, "slip_distance": distance, "mu_star": 0.6}
     model = Relaxation(truth)
     search = FitProblem(model, truth, FREE, "white")  # type: ignore[arg-type]
@@ -80,13 +83,13 @@ def fit(distance: float) -> tuple[Relaxation, FitProblem, FitSolution]:
 
 
 def squares(model: Relaxation, b: float, distance: float) -> float:
-    """Least sum of squares whatever mu_star is, in closed form."""
+    """Return the minimum of the sum of squares over mu_star."""
     left = model.friction + b * -np.expm1(-model.displacement / distance)
     return ROWS * float(np.var(left))
 
 
 def by_hand(model: Relaxation, b: float) -> float:
-    """The same whatever D_c is too, by brute force over its logarithm."""
+    """Return the minimum of the sum of squares over mu_star and D_c."""
     logs = np.linspace(math.log(1.0), math.log(300.0), 400)
     at = int(np.argmin([squares(model, b, math.exp(u)) for u in logs]))
     ends = logs[max(at - 1, 0)], logs[min(at + 1, 399)]
@@ -99,11 +102,12 @@ def test_intervals_end_where_the_likelihood_has_fallen() -> None:
     far = confidence_intervals.student_t_multiplier(found, confidence_intervals.CONFIDENCE_LEVEL)
     b = found.parameter_values["b"]
     low, high = confidence_intervals.confidence_interval(search, found, "b")
-    # squared distances are off by a fifth, to first order, where a parabola is nearly one
+    # To first order, the squared distances have an error of 20 % on the side where the
+    # likelihood is nearly parabolic.
     for end, slack in ((low, 0.25), (high, 0.06)):
         fallen = (by_hand(model, end) - by_hand(model, b)) / found.noise_sd**2
         assert fallen == pytest.approx(far**2, rel=slack)
-    assert high - b > 1.5 * (b - low)  # no parabola
+    assert high - b > 1.5 * (b - low)  # The likelihood is not parabolic.
 
 
 def test_noise_alone_tells_neither_b_nor_its_slip_distance() -> None:
@@ -114,6 +118,6 @@ def test_noise_alone_tells_neither_b_nor_its_slip_distance() -> None:
             model = Relaxation(first | {"b": size}, seed)
             search = FitProblem(model, first, FREE, "ar")  # type: ignore[arg-type]
             told[size] += not {"b", "slip_distance"} & set(search.solve().unidentified_parameters)
-    # chance passes a difference of ten of criteria in some of a thousand records
+    # A difference of ten in the criterion occurs by chance in a few of a thousand records.
     assert told[0.0] == 0
     assert told[4.0 * SIZE] > 15

@@ -1,4 +1,4 @@
-"""Fits of records: derivatives, estimates, errors and what is said where there are none."""
+"""Tests of fits of records: derivatives, estimates, errors and statuses."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ ENOUGH = 10**9
 
 
 def scene_of(law: str, **fields: Any) -> Scene:
-    """A scene of a law, with numbers that a fit replaces."""
+    """Return a scene of a law, with parameters that a fit replaces."""
     fields = {"normal_stress": "constant", "stiffness": 0.03, "mu_star": 0.6, **fields}
     return Scene(law=law, a=0.01, b_over_a=1.3, **fields)
 
@@ -39,7 +39,7 @@ def scene_of(law: str, **fields: Any) -> Scene:
 def model_of(
     law: str, loading: Sequence[tuple[float, float]], times: np.ndarray, friction: np.ndarray
 ) -> WindowModel:
-    """A model of a record."""
+    """Return the model of a record."""
     pieces = np.array([(begins, speed, 1.0, 0.0) for begins, speed in loading])
     accuracy = Accuracy(1e-9, ENOUGH, engine="compiled")
     moved = synthetic.load_point_displacement(loading, times)
@@ -50,13 +50,13 @@ def model_of(
     ("law", "loading", "changes"),
     [
         *((law, STEP_UP, {}) for law in LAW_FUNCTIONS),
-        ("slip", STEP_UP, {"stiffness": 1e-3}),  # a threefold critical stiffness: nearly unstable
+        ("slip", STEP_UP, {"stiffness": 1e-3}),  # A third of this stiffness is critical.
         ("perrin_rice_zheng", STEP_UP, {"stiffness": 1e-3}),
         (
             "slowness",
             STEP_DOWN,
-            {"stiffness": 0.05},
-        ),  # stiff: steps are those that stability allows
+            {"stiffness": 0.05},  # Stability limits the step size.
+        ),
         ("slowness", STEP_DOWN, {"b": -0.004}),
         ("slip", SLIDE_HOLD_SLIDE, {}),
         ("slowness", SLIDE_HOLD_SLIDE, {"stiffness": 1e-3}),
@@ -69,7 +69,7 @@ def test_derivatives_are_those_of_the_augmented_equations(
     times = synthetic.sample_times(loading, synthetic.loading_end_time(loading), 200)
     friction, exact = synthetic.friction_and_sensitivities(law, times, loading, truth)
     model = model_of(law, loading, times, friction)
-    # friction to ten times the accuracy asked for, which local errors of order eight stay below
+    # The tolerance is ten times the requested accuracy.
     assert np.abs(model.model_friction(truth) - friction).max() < 1e-8 * truth["a"]
     largest = np.abs(exact).max(axis=0)
     fine = (
@@ -85,7 +85,7 @@ def test_derivatives_are_those_of_the_augmented_equations(
         )
         / largest
     )
-    assert (quick < 2e-3).all(), quick  # enough to go downhill by
+    assert (quick < 2e-3).all(), quick  # This accuracy is sufficient for the optimisation.
 
 
 def test_derivatives_by_offset_trend_and_time_of_a_step() -> None:
@@ -99,20 +99,24 @@ def test_derivatives_by_offset_trend_and_time_of_a_step() -> None:
     np.testing.assert_allclose(
         found[:, 1], synthetic.load_point_displacement(STEP_UP, times) ** 2, rtol=1e-15
     )
-    # a motion that comes late is the motion of some time before
+    # A delayed motion equals an earlier part of the motion.
     late = 1e-3
     ahead, behind = (
         synthetic.friction_and_sensitivities("slip", times + s * late)[0] for s in (1.0, -1.0)
     )
     exact = -(ahead - behind) / (2.0 * late)
-    away = np.abs(times - 40.0) > 0.03  # friction has a kink at the step
+    away = np.abs(times - 40.0) > 0.03  # Friction has a kink at the step.
     off = np.abs(found[:, 2] - exact)[away].max() / np.abs(exact).max()
-    assert off < 2e-5  # second order in `late` over D_c/V = 1 s of the peak: some 1e-6 times ten
+    # The truncation error is of second order in ``late`` relative to D_c/V = 1 s of the peak.
+    assert off < 2e-5
 
 
 @pytest.mark.parametrize("exponent", [0.0, 0.012, 1.0])
 def test_derivatives_at_the_ends_of_the_family(exponent: float) -> None:
-    """By a difference of sixth order of motions by SciPy, that goes beyond the ends."""
+    """Derivatives by the exponent agree with differences of SciPy motions.
+
+    The differences are of sixth order and extend beyond the ends of the family.
+    """
     times = synthetic.sample_times(STEP_UP, 46.0, 60)
     truth = EXACT_PARAMETERS | {"law_exponent": exponent}
     model = model_of("family", STEP_UP, times, times)
@@ -128,5 +132,5 @@ def test_derivatives_at_the_ends_of_the_family(exponent: float) -> None:
     weights = {1: 0.75, 2: -0.15, 3: 1.0 / 60.0}
     exact = sum(w / 0.02 * (moved[n] - moved[-n]) for n, w in weights.items())
     found = model.jacobian(truth, ("law_exponent",), ACCURATE_DIFFERENCE_SCHEME)[:, 0]
-    # to one side the third order of the step, .005, is what is left
+    # The one-sided difference has an error of third order in its step of 0.005.
     assert np.abs(found - exact).max() < 2e-5 * np.abs(exact).max()

@@ -1,4 +1,8 @@
-"""Fits of several windows as one, of two states and of a free exponent; draws, tables and holds."""
+"""Tests of joint fits of several windows.
+
+The tests also cover laws with two states, a free exponent, posterior draws, tables and
+holds.
+"""
 
 from __future__ import annotations
 
@@ -39,11 +43,13 @@ def test_two_steps_of_a_record_share_a_law() -> None:
     one = synthetic_record(STEP_UP_AND_BACK, trend=trend, seed=1)
     alone = rsfstudy.fit(one, laws=["slowness"], **FIT_OPTIONS)
     both = rsfstudy.fit(one, laws=["slowness"], together=True, **FIT_OPTIONS).squeeze()
-    # at the second step the load point has moved by 140 um, at ten times the velocity
+    # At the second step, the load point has moved by 140 um, and the velocity has been ten times
+    # higher.
     second = 0.6 + (EXACT_PARAMETERS["a"] - EXACT_PARAMETERS["b"]) * math.log(10.0) + 140.0 * trend
     true = {n: EXACT_PARAMETERS[n] for n in SHARED} | {"mu_star_1": 0.6, "mu_star_2": second}
     true |= {"trend1_1": trend, "trend1_2": trend}
-    for name, value in true.items():  # 4 standard errors: one of 2,000 records for seven numbers
+    # A deviation above 4 standard errors in any of seven parameters occurs once in 2,000 records.
+    for name, value in true.items():
         assert abs(deviation_in_stderrs(both, name, value)) < 4.0, name
     for name in SHARED:
         assert both[f"{name}_stderr"] < alone[f"{name}_stderr"].min(), name
@@ -84,9 +90,10 @@ def test_derivatives_of_windows_are_differences() -> None:
     for column, name in enumerate(free):
         step = 1e-3 if name == "slip_distance" else 1e-5
         exact = (friction(name, step) - friction(name, -step)) / (2.0 * step)
-        # of second order: a relative step of 1e-3 leaves 1e-6 times some tens
+        # The error is of second order, so a relative step of 1e-3 leaves some 1e-5.
         assert np.abs(found[:, column] - exact).max() < 1e-4 * np.abs(exact).max(), name
-    assert not found[:60, 2].any()  # a window knows nothing of the friction of the other
+    # The friction of a window is independent of the parameters of the other window.
+    assert not found[:60, 2].any()
     assert not found[60:, 3].any()
 
 
@@ -102,18 +109,22 @@ def test_a_pair_of_steps_tells_the_exponent(law: str, exponent: float) -> None:
     assert low >= 0.0
     assert high <= 1.0
     assert abs(deviation_in_stderrs(fit, "law_exponent", exponent)) < 4.0
-    assert float(fit.law_exponent_stderr) < 0.05  # one step tells it to some .1
+    # A single step constrains the exponent to about 0.1.
+    assert float(fit.law_exponent_stderr) < 0.05
     ends = {0.0: low, 1.0: high}
-    assert ends.get(exponent, exponent) == exponent  # the interval ends at the bound
+    assert ends.get(exponent, exponent) == exponent  # The interval ends at the bound.
 
 
-#: Of a synthetic test of trends that is published with the code steadystate.
+#: Parameters of a published synthetic test of trends, included with the code steadystate.
 TWO_STATES = {"a": 0.0012, "b1": 0.010, "b2": 0.007, "slip_distance": 20.0}
 TWO_STATES |= {"slip_distance_2": 500.0, "mu_star": 0.6}
 
 
 def test_two_states_come_back_in_their_order() -> None:
-    """From a first guess of both slip distances that is nearer to the longer one."""
+    """The two states are returned in the order of their slip distances.
+
+    The initial guess of both slip distances is closer to the longer slip distance.
+    """
     loading, size = ((0.0, 1.0), (500.0, 10.0)), 2.5e-4
     times = np.concatenate([np.linspace(0.0, 499.0, 100), np.linspace(500.0, 650.0, 300)])
     friction = synthetic.two_state_friction(times, loading, TWO_STATES | {"stiffness": 0.01})
@@ -129,7 +140,10 @@ def test_two_states_come_back_in_their_order() -> None:
 
 
 def test_laws_of_one_and_of_two_states_are_fitted_beside_each_other() -> None:
-    """Each by the parameters that it has, as if it were alone; those of others are NaN."""
+    """Laws with different parameters can be fitted in the same call.
+
+    The results equal separate fits, and parameters of other laws are NaN.
+    """
     one, options = synthetic_record(count=150), FIT_OPTIONS | {"noise": "white"}
     own = {"slip": {"b"}, "two_slip_states": {"b1", "b2", "slip_distance_2"}}
     fits = rsfstudy.fit(one, laws=list(own), **options)
@@ -180,7 +194,8 @@ def test_windows_tell_the_error_of_a_trend_that_is_none_of_the_fit() -> None:
         fit = fits.squeeze().isel(part=0)
         for name in SHARED:
             assert abs(deviation_in_stderrs(fit, name, EXACT_PARAMETERS[name])) > 5.0, name
-            # of a trend with x^2, 3/4 of what the whole window is off by is gone in half of it
+            # For a trend with x^2, half of the window removes 3/4 of the error of the whole
+            # window.
             told = math.hypot(fit[f"{name}_stderr"], fit[f"{name}_windows"])
             assert abs(float(fit[name]) - EXACT_PARAMETERS[name]) < 2.0 * told, name
             apart = float(fits[name].max() - fits[name].min())
@@ -195,7 +210,10 @@ def test_windows_tell_the_error_of_a_trend_that_is_none_of_the_fit() -> None:
     ],
 )
 def test_noise_tells_nothing_but_friction(law: str, free: tuple[str, ...], tmp_path: Path) -> None:
-    """A report does not call that ok."""
+    """Pure noise constrains the friction level only.
+
+    A report does not mark such a fit as successful.
+    """
     times = synthetic.sample_times(STEP_UP, synthetic.loading_end_time(STEP_UP), 200)
     arrays = {"time": times, "displacement": synthetic.load_point_displacement(STEP_UP, times)}
     arrays["friction"] = 0.6 + synthetic.correlated_noise(200, 0.5, 0.02, 0)
@@ -209,7 +227,7 @@ def test_noise_tells_nothing_but_friction(law: str, free: tuple[str, ...], tmp_p
     untold = set(message.partition(";")[0].split(", "))
     assert untold == set(free) - {"mu_star", "trend1"}
     assert abs(deviation_in_stderrs(fit, "mu_star", 0.6)) < 4.0
-    for name in untold - {"slip_distance"}:  # nothing within the bounds of the search is excluded
+    for name in untold - {"slip_distance"}:  # The intervals extend to the bounds of the search.
         bounds = {"a": (1e-4, 1.0), "b": (-1.0, 1.0), "law_exponent": (0.0, 1.0)}[name]
         assert (float(fit[f"{name}_low"]), float(fit[f"{name}_high"])) == bounds, name
 
@@ -221,8 +239,9 @@ def test_draws_have_the_mean_and_covariance_of_the_fit() -> None:
     spread = np.array([drawn[n] - fit[n] for n in names]) / [
         [float(fit[f"{n}_stderr"])] for n in names
     ]
-    # of 20,000 draws means have standard errors of .007, covariances of .01 at most; curvature of
-    # the logarithm shifts D_c by half its relative standard error, a hundredth here
+    # With 20,000 draws, the standard errors are 0.007 for means and at most 0.01 for
+    # covariances. The curvature of the logarithm shifts D_c by half its relative standard error,
+    # which is 0.01 here.
     assert np.abs(spread.mean(axis=1)).max() < 0.05
     exact = fit.correlation.values * degrees / (degrees - 2.0)
     assert np.abs(np.cov(spread) - exact).max() < 0.08
@@ -248,7 +267,7 @@ def test_a_window_does_not_begin_within_a_hold() -> None:
         )
     hold, reloading = (fit.squeeze().sel(step=n) for n in (1, 2))
     assert (float(hold.velocity_before), float(hold.velocity_after)) == (1.0, 0.0)
-    for name in SHARED:  # the reloading tells them, to a few per cent
+    for name in SHARED:  # The reloading determines the parameters to a few per cent.
         assert abs(deviation_in_stderrs(hold, name, EXACT_PARAMETERS[name])) < 4.0, name
         assert float(hold[f"{name}_stderr"]) < 0.1 * EXACT_PARAMETERS[name], name
     assert "begins in a hold" in str(reloading.message.values)
@@ -264,18 +283,22 @@ def test_a_law_is_fitted_without_the_compiled_engine(law: str) -> None:
     for name in free:
         assert abs(deviation_in_stderrs(fit, name, EXACT_PARAMETERS[name])) < 5.0, (
             name
-        )  # noise is correlated, and taken white
+        )  # The noise is correlated, but the fit assumes white noise.
 
 
 def test_the_scene_of_a_fit_moves_as_fitted() -> None:
-    """From the instant of the step on, in units of D_c and of the velocity before it."""
+    """The scene of a fit reproduces the fitted friction.
+
+    Its motion starts at the step, in units of D_c and the velocity before the step.
+    """
     fit = rsfstudy.fit(synthetic_record(seed=4), laws=["slowness"], **FIT_OPTIONS).squeeze()
     rows = fit.record_time.values > 40.0
     times = (fit.record_time.values[rows] - 40.0) / float(fit.slip_distance)
     motion = rsfstudy.simulate(fit.rsf.scene, times=times, engine="compiled")
     seen, fitted = motion.friction_coefficient.values, fit.detrended_friction.values[rows]
-    assert np.abs(seen - fitted).max() < 1e-6  # the default accuracy, 1e-7, times some
-    # what was not looked for is as it was while it was looked for
+    # The tolerance is ten times the default accuracy of 1e-7.
+    assert np.abs(seen - fitted).max() < 1e-6
+    # Parameters that are not free keep their values.
     held = {"b_over_a": 1.3, "a": 0.01, "slip_distance": "10 um"}
     some = rsfstudy.fit(
         synthetic_record(seed=4), laws=["slowness"], free=("a", "mu_star"), **FIT_OPTIONS | held
@@ -286,7 +309,10 @@ def test_the_scene_of_a_fit_moves_as_fitted() -> None:
 
 
 def test_the_rig_of_a_fit_gives_the_record_back() -> None:
-    """In s and um, where the record states its normal stress."""
+    """The rig of a fit reproduces the record in s and um.
+
+    The record must contain the normal stress.
+    """
     one = synthetic_record(seed=4)
     columns = {**one.columns, "normal_stress": np.full(len(one), 20.0)}
     stressed = rsfstudy.read_record(columns).with_steps(one.loading_steps)
@@ -299,18 +325,20 @@ def test_the_rig_of_a_fit_gives_the_record_back() -> None:
     seen = rig.in_units(motion, stress="MPa", length="um")
     rows = (fit.record_time.values > 40.0) & (fit.record_time.values < 45.0)
     at = np.interp(fit.record_time.values[rows] - 40.0, seen.time, seen.shear_stress)
-    # straight lines between points of the motion
+    # The motion is interpolated linearly between its points.
     np.testing.assert_allclose(at / 20.0, fit.detrended_friction.values[rows], atol=1e-4)
 
 
-#: What is looked for, posterior draws, and by how many errors of sampling they may be off: 5.
+#: Free parameters and numbers of posterior draws. The tolerance is 5 sampling errors.
 POSTERIOR = [(("mu_star", "trend1"), 200), (("a", "b", "slip_distance"), 100)]
 
 
 @pytest.mark.parametrize(("free", "draws"), POSTERIOR)
 def test_the_posterior_is_that_of_the_errors(free: tuple[str, ...], draws: int) -> None:
-    """In closed form where friction is linear in parameters; next to it for a step with some 100
-    independent rows, whose likelihood is nearly a parabola.
+    """The posterior agrees with the standard errors and correlations.
+
+    If friction is linear in the free parameters, the agreement is exact. For a step with
+    about 100 independent rows, the likelihood is nearly parabolic.
     """
     known = {"slip_distance": 10.0, "a": 0.01, "b_over_a": 1.3, "mu_star": 0.6}
     options = FIT_OPTIONS | {n: v for n, v in known.items() if n not in free}

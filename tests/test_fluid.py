@@ -1,5 +1,7 @@
-"""Pore pressure: dilatancy with drainage against the closed forms of Segall and Rice (1995), and
-one friction relation for steady sliding, its stability and motions.
+"""Tests of pore pressure.
+
+Dilatancy with drainage is compared with the closed forms of Segall and Rice (1995). Steady
+sliding, its stability and motions must use the same friction relation.
 """
 
 import math
@@ -42,7 +44,11 @@ def dilatant(dilatancy: float = 0.005, drainage: float = 1.0, **fields) -> Scene
 
 
 def closed_form(a: float, b: float, weakening: float, drainage: float) -> float:
-    """The larger K at which [K + a (1 + c) - b + E] [K (1 + c) - c (b - a)] = a c K."""
+    """Return the critical stiffness in closed form.
+
+    The stiffness is the larger root K of [K + a (1 + c) - b + E] [K (1 + c) - c (b - a)] =
+    a c K.
+    """
     c = drainage
     offset = a * (1.0 + c) - b + weakening
     linear = (1.0 + c) * offset - c * (b - a) - a * c
@@ -60,7 +66,10 @@ def closed_form(a: float, b: float, weakening: float, drainage: float) -> float:
     st.sampled_from(LAWS),
 )
 def test_critical_stiffness_is_the_closed_form(a, b_over_a, part, log_drainage, log_slip_rate, law):
-    """With E up to nine tenths of b - a at V_*, at any slip rate: c falls with it."""
+    """The critical stiffness agrees with the closed form to 1e-9.
+
+    E is up to 90 % of b - a at V_*. The drainage ratio c decreases with slip rate.
+    """
     b, drainage = a * b_over_a, 10.0**log_drainage
     scene = dilatant(
         part * (b - a) / 0.76, drainage, law=law, a=a, b_over_a=b_over_a, stiffness=0.1, **CONSTANT
@@ -69,8 +78,8 @@ def test_critical_stiffness_is_the_closed_form(a, b_over_a, part, log_drainage, 
     assume(weakening < 0.95 * (b - a))
     exact = closed_form(a, b, weakening, drainage * math.exp(-log_slip_rate))
     ours = stability.critical_stiffness(scene, log_slip_rate)
-    # slopes of the law are differences of order eight, and roots of polynomials lose digits where
-    # drainage is many times faster or slower than slip: up to c = 1.5e6 here
+    # The slopes of the law are differences of order eight, and roots of polynomials lose digits
+    # if drainage is much faster or slower than slip (up to c = 1.5e6).
     assert ours == pytest.approx(exact, rel=1e-9)
 
 
@@ -80,8 +89,11 @@ def test_critical_stiffness_is_the_closed_form(a, b_over_a, part, log_drainage, 
 @pytest.mark.parametrize("rate", [0.1, 20.0])
 @pytest.mark.parametrize("drainage", [1e-9, 0.5, 30.0])
 def test_a_rigid_slider_after_a_step_of_its_slip_rate(rate, drainage):
-    """phi = E ln V (1 - exp(-s)); P = -E ln V [exp(-s) - exp(-c s)]/(c - 1) with c drainage over
-    slip rate; stress is friction on 1 - P, with the slip law in closed form.
+    """Porosity, pressure and stress agree with closed forms.
+
+    The closed forms are phi = E ln V (1 - exp(-s)) and P = -E ln V [exp(-s) - exp(-c s)]/(c
+    - 1), where c is the ratio of drainage to slip rate. The stress is friction times 1 - P,
+    with the closed form for the slip law.
     """
     scene = dilatant(0.01, drainage, load_velocity_ratio=rate, **CONSTANT)
     x, c, start = math.log(rate), drainage / rate, scene.a * math.log(rate)
@@ -103,7 +115,8 @@ def test_a_rigid_slider_after_a_step_of_its_slip_rate(rate, drainage):
         assert pressure == pytest.approx(exact, abs=1e-10)
         coefficient = 0.76 + scene.a * x + scene.b * x * math.expm1(-slip)
         stress = (1.0 - exact) * coefficient - 0.76
-        # tolerance of a step 1e-11 of the scale a, over hundreds of steps
+        # The tolerance per step is 1e-11 times a, and the errors of hundreds of steps
+        # accumulate.
         assert friction == pytest.approx(stress, abs=1e-10)
         ratio = row[RECORDED_VARIABLES.index("normal_stress_ratio")]
         assert ratio == pytest.approx(1.0 - exact, abs=1e-10)
@@ -120,14 +133,15 @@ def test_a_rigid_slider_after_a_step_of_its_slip_rate(rate, drainage):
     ],
 )
 def test_without_drainage_pressure_is_lost_to_porosity(fields):
-    """P = -(phi - phi_0)/beta: no fluid comes or goes, in any regime."""
+    """Without drainage, P = -(phi - phi_0)/beta in every regime."""
     scene, far = dilatant(0.01, 1e-30, load_velocity_ratio=10.0, **fields), 0.0
     for event in integrate_events(
         scene, Accuracy(1e-9), WorkMeter(20_000), [maximum("log_slip_rate")], until=40.0
     ):
         porosity, pressure = event.point.psis[1:]
         far = max(far, porosity)
-        # the two are integrated separately, to 7e-11 of a or of themselves a step
+        # Pressure and porosity are integrated separately, with relative errors of 7e-11 per
+        # step.
         assert pressure + porosity == pytest.approx(0.0, abs=1e-9)
     assert far > 0.02
 
@@ -135,7 +149,10 @@ def test_without_drainage_pressure_is_lost_to_porosity(fields):
 @pytest.mark.parametrize("law", LAWS)
 @pytest.mark.parametrize("stress", STRESS)
 def test_without_dilatancy_the_fluid_does_nothing(law, stress):
-    """Two unknowns more make other steps: the motions agree to their accuracy."""
+    """Without dilatancy, a fluid does not change the motion.
+
+    The tolerance is the error estimate, because two additional unknowns change the steps.
+    """
     fields = {"law": law, "stiffness_ratio": 3.0, "load_velocity_ratio": 3.0, **stress}
     drained, idle = Scene(**fields), dilatant(0.0, 2.0, **fields)
     assert idle.critical_stiffness == pytest.approx(drained.critical_stiffness, rel=1e-9)
@@ -151,8 +168,10 @@ def test_without_dilatancy_the_fluid_does_nothing(law, stress):
 
 @pytest.mark.parametrize("law", LAWS)
 def test_a_hold_drains(law):
-    """Slip goes on ever slower while the load point is held: pore pressure that compaction has
-    raised drains, which takes time and hardly any slip.
+    """Pore pressure drains during a hold.
+
+    Compaction during the slow slip of a hold increases the pore pressure, which then drains
+    almost without slip.
     """
     scene = dilatant(0.005, 0.1, law=law, load_velocity_ratio=0.0, stiffness_ratio=2.0, **CONSTANT)
     motion = simulate(scene, duration=1e3)
@@ -160,7 +179,8 @@ def test_a_hold_drains(law):
     pressure, porosity = motion["pore_pressure"].values, motion["porosity"].values
     assert pressure.max() > 1e-3
     assert 0.0 < pressure[-1] < 0.01 * pressure.max()
-    # fluid that has left is porosity lost: c times the time integral of P
+    # The volume of fluid that has drained equals the lost porosity, which is c times the time
+    # integral of P.
     left = 0.1 * PchipInterpolator(motion["time"].values, pressure).integrate(0.0, 1e3)
     assert left == pytest.approx(-porosity[-1] - pressure[-1], rel=1e-3)
 
@@ -179,7 +199,7 @@ def filled(log_slip_rate, p):
 
 @dataclass(frozen=True, kw_only=True)
 class Tight(Fluid):
-    """Pores that no fluid leaves or enters."""
+    """User-defined fluid: pores without drainage."""
 
     opening: float = number(0.005, "", "1", "dilatancy")
 
@@ -194,8 +214,10 @@ class Tight(Fluid):
 
 @pytest.mark.parametrize("law", LAWS)
 def test_a_fluid_of_your_own(law):
-    """Undrained exactly, the critical stiffness at V_* is b - a - E. Pressure is that of porosity,
-    and of two unknowns one is too many: a small change of it neither grows nor decays.
+    """The undrained critical stiffness is b - a - E at V_*.
+
+    The pressure is a function of porosity, so the second unknown is redundant and small
+    changes of it neither grow nor decay.
     """
     scene = Scene(law=law, fluid=Tight, opening=0.004, **CONSTANT)
     assert scene.critical_stiffness == pytest.approx(0.0145 - 0.76 * 0.004, rel=1e-11)
@@ -207,12 +229,16 @@ def test_a_fluid_of_your_own(law):
 @pytest.mark.parametrize("engine", ENGINES)
 @pytest.mark.parametrize("stress", [{"normal_stress": "constant"}, {"alpha": 0.2}])
 def test_a_rig_knows_nothing_of_the_pressure_inside_the_fault(stress, engine):
-    """It divides by normal stress less the pressure outside, and so reads dilatant hardening."""
+    """The apparent friction does not include the pressure inside the fault.
+
+    A rig divides by the normal stress minus the external pressure, so it measures dilatant
+    hardening.
+    """
     scene = Scene(law="slowness", **stress, fluid="dilatant", dilatancy=0.01, drainage=0.1,
                   stiffness_ratio=5.0, load_velocity_ratio=10.0)  # fmt: skip
     motion = simulate(scene, duration=5.0, engine=engine)
     outside = motion.normal_stress_ratio + motion.pore_pressure
     expected = motion.shear_stress / outside
     assert np.allclose(motion.friction_coefficient, expected, rtol=1e-12, atol=0.0)
-    # suction of two parts in a hundred, of mu_* = 0.76
+    # The suction reduces friction by about 2 % of mu_* = 0.76.
     assert float((motion.shear_stress / motion.normal_stress_ratio - expected).min()) < -0.01

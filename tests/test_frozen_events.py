@@ -1,6 +1,8 @@
-"""All engines tell what they told when `frozen_events.json` was written: a change of code that is
-not to change numbers changes none. `python tests/frozen_motion_comparison.py freeze` writes the
-file anew, after a change that is to.
+"""Tests of all engines against the events in ``frozen_events.json``.
+
+Changes of the code must not change the events unless they are meant to change numbers.
+After such a change, run ``python tests/frozen_motion_comparison.py freeze`` to update the
+file.
 """
 
 import json
@@ -19,15 +21,18 @@ from rsfstudy.motion.engines import ENGINES
 from rsfstudy.motion.events import EventKind
 from rsfstudy.slider.part_registry import SLOTS
 
-#: What numbers may differ by, relative to what `telling.largest_differences` says. Last bits are
-#: another CPU's own (its exponentials, the order of its sums, whether it fuses multiplication and
-#: addition): by `frozen_motion_comparison.py sensitivity` none of them moves an event by more than
-#: a tenth of this, a root that ends an iteration earlier included.
+#: Tolerance of the differences from ``frozen_motion_comparison.largest_differences``. The last
+#: bits depend on the CPU, for example on its exponentials, the order of sums, and fused
+#: multiplication and addition. According to ``frozen_motion_comparison.py sensitivity``, these
+#: effects move an event by at most a tenth of the tolerance, even if a root search ends one
+#: iteration earlier.
 WITHIN = 1e-12
-#: The same where steps end. A step is as long as its error estimate says, which is a difference of
-#: slopes: rounding is 1e-9 of it where it just meets a tolerance of 7e-9.
+#: Tolerance of events at the end of steps. The step size depends on an error estimate, which is
+#: a difference of slopes. If this estimate is close to a tolerance of 7e-9, its rounding error
+#: is about 1e-9 of the estimate.
 OF_STEPS = 1e-8
-#: Right-hand sides may differ by a share, and by what one more step and its root take.
+#: Tolerance of the number of evaluations, which may differ by a fraction, and by an additional
+#: step with a root search.
 OF_WORK, MORE_WORK = 0.03, 30
 
 with FROZEN_EVENTS_FILE.open() as file:
@@ -39,7 +44,7 @@ with FROZEN_EVENTS_FILE.open() as file:
 def test_events_are_as_they_were(name, engine):
     now, kept = record_frozen_motion(MOTIONS[name], engine), KEPT[name]
     assert now.kinds == kept["kinds"]
-    # plain Python takes the compiled steps
+    # The engine ``python`` takes the same steps as the compiled engine.
     work = kept["work"].get(engine, kept["work"]["compiled"])
     then = EventColumns(kept["kinds"], kept["numbers"], work, now.step_rows)
     motion, of_steps = largest_differences(MOTIONS[name], then, now)
@@ -49,7 +54,7 @@ def test_events_are_as_they_were(name, engine):
 
 
 def test_what_is_kept_is_all_there_is():
-    """Every part in every slot, every kind of event; in a file that is small."""
+    """The small file covers every part and every kind of event."""
     assert set(KEPT) == set(MOTIONS)
     parts = {type(p) for motion in MOTIONS.values() for p in Scene(**motion.fields).parts}
     assert parts >= {part for slot in SLOTS for part in slot.built_in_parts.values()}
@@ -59,7 +64,10 @@ def test_what_is_kept_is_all_there_is():
 
 @pytest.mark.parametrize("engine", ENGINES)
 def test_what_moves_is_seen(engine):
-    """A field of which the tenth digit is another, in one of the least sensitive motions."""
+    """A relative change of 1e-10 of a field is detected.
+
+    The motion is one of the least sensitive motions.
+    """
     motion = MOTIONS["slowness, displacement step, mass"]
     scene = Scene(**motion.fields, mu_star=0.76 * (1.0 + 1e-10))
     assert (

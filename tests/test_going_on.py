@@ -1,4 +1,7 @@
-"""A motion goes on from the end of another as if it had never been interrupted."""
+"""Tests of motions that continue from the end of another motion.
+
+The result must equal an uninterrupted motion.
+"""
 
 import numpy as np
 import pytest
@@ -39,7 +42,11 @@ WHAT = ["shear_stress", "log10_slip_rate", "slip", "state_variable", "load_point
 @pytest.mark.parametrize("engine", ENGINES)
 @pytest.mark.parametrize("name", SCENES)
 def test_a_cut_changes_nothing(name, engine, tmp_path):
-    """Within segments, at their ends and at samples; through a file. Cycles amplify the error."""
+    """A motion can be interrupted anywhere and stored in a file.
+
+    The interruptions are within segments, at their ends and at samples. Limit cycles
+    amplify the error.
+    """
     scene, how = SCENES[name], {"rtol": 1e-9, "engine": engine}
     whole = simulate(scene, times=[15.0], **how)
     part, file = None, tmp_path / "part.nc"

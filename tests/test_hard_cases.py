@@ -1,5 +1,7 @@
-"""Hard cases stay stable: over random scenes, over hundreds of cycles, over a million slip times at
-rest; and a wrong answer is never called right.
+"""Tests of hard cases.
+
+The tests cover random scenes, hundreds of cycles, and rest over a million characteristic
+slip times. A wrong result must not have the status OK.
 """
 
 import math
@@ -49,7 +51,7 @@ def test_a_wrong_status_is_unverified():
     assert "ended as locked, not no_limit_cycle" in wrong.message
 
 
-#: Work beyond five times the usual, and why.
+#: Cases that need more than five times the usual work, with the reasons.
 DEAR = {
     "200-fold step, peak at 10^87 V_*": "two loops from 10^-85 to 10^87 V_*",
     "tiny step, k = (1 -0.001) k_cr": "a growth of 1e-3 an orbit, followed up to the norm",
@@ -61,8 +63,9 @@ DEAR = {
 
 
 def test_work_stays_bounded(tmp_path_factory):
-    """Boundaries within 5 x 4,000 right-hand sides, cycles within 5 x 3,000 each; the others are
-    listed with the reason.
+    """Only listed cases exceed 20,000 evaluations.
+
+    Critical steps usually need 4,000 evaluations, and limit cycles 3,000 evaluations.
     """
     cells, _path = named_results("hard_cases", tmp_path_factory)
     assert set(cells.hard_case.values) == set(PROBLEMS)
@@ -80,17 +83,19 @@ def test_two_hundred_cycles_do_not_drift():
         if len(intervals) == 203:
             break
     settled = np.array(intervals[3:])
-    # the same to rounding of the steps, which fall elsewhere in each cycle
+    # The intervals differ by rounding errors of the steps, which differ in each cycle.
     assert np.ptp(settled) < 1e-5 * settled.mean()
-    # a thousand of them would drift by a tenth of the tolerance
+    # Over a thousand cycles, the drift would be a tenth of the tolerance.
     drift = np.polyfit(np.arange(len(settled)), settled, 1)[0]
     assert abs(drift) * 1000 < 1e-6 * settled.mean()
 
 
 @pytest.mark.parametrize(("law", "slope"), [("slowness", -2.0), ("slip", 0.0)])
 def test_a_million_slip_times_at_rest(law, slope):
-    """The load point held after a step back by 20 D_c: with the slowness law theta = t heals the
-    fault, and V falls as t**(-b/a); with the slip law the state needs slip, and V stays.
+    """The slip rate of a held slider follows the closed form.
+
+    The load point is held after a step back by 20 D_c. For the slowness law, theta = t, and
+    V decreases as t**(-b/a). For the slip law, the state and V stay constant without slip.
     """
     rest = rsfstudy.simulate(
         Scene(law=law, normal_stress="constant", displacement_step=-20.0), duration=1e6
@@ -128,7 +133,10 @@ SCENES = {
 def test_any_scene_ends_in_numbers_or_in_a_name(
     law, a, b_over_a, stiffness_ratio, load, effects, dynamics, log_period, measure
 ):
-    """No NaN that looks fine, no warning, no exception, no hang."""
+    """A random scene has a finite result, or a status with a message.
+
+    There are no warnings, exceptions or hangs.
+    """
     scene = Scene(
         law=law,
         a=a,

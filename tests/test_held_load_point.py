@@ -1,4 +1,7 @@
-"""Load point at rest: critical steps where several states may weaken one after the other."""
+"""Tests of critical steps with a held load point and several states.
+
+Several states may weaken one after another.
+"""
 
 import math
 
@@ -19,8 +22,8 @@ from rsfstudy.status import Status
 DISPLACEMENT, FALL = "displacement_step", "normal_stress_step"
 CONSTANT = {"normal_stress": "constant"}
 
-#: One state with b < 0, and a dilatant fault whose pressure comes back: the first peak is not the
-#: last.
+#: Scenes whose first peak is not the last peak: two states, one of which has b < 0, and a
+#: dilatant fault whose pressure recovers.
 LATE = [
     (
         DISPLACEMENT,
@@ -54,7 +57,10 @@ def test_the_first_peak_of_several_states_is_not_the_last(of, direction, fields,
 
 
 def random_scene(draw: np.random.Generator, number: int) -> tuple[str, str, dict[str, object]]:
-    """A kind of step, its direction, and the fields of a scene of several states."""
+    """Return a step type, its direction and the fields of a random scene.
+
+    The scene has several states.
+    """
     fields = {
         "a": 10 ** draw.uniform(-2.5, -1.7),
         "mu_star": draw.uniform(0.4, 0.8),
@@ -79,12 +85,15 @@ def random_scene(draw: np.random.Generator, number: int) -> tuple[str, str, dict
     return (FALL, "down", fields) if fall_of_stress else (DISPLACEMENT, "up", fields)
 
 
-# they end early where slip runs away, and where drainage holds the integrator to short steps
+# The motions end early if the slip rate grows without bound, or if drainage limits the steps.
 @pytest.mark.filterwarnings("ignore::rsfstudy.errors.IncompleteWarning")
 @pytest.mark.filterwarnings("ignore::rsfstudy.errors.NoResultWarning")
 @pytest.mark.parametrize("number", range(12))
 def test_no_smaller_step_runs_away(number):
-    """Of random scenes, by `simulate`, which knows of nothing that ends a motion early."""
+    """Only steps above the critical step reach the norm.
+
+    The random scenes are simulated without early termination.
+    """
     of, direction, fields = random_scene(np.random.default_rng([20, number]), number)
     measure = CriticalStep(of=of, direction=direction)
     scene = Scene(**fields)
@@ -102,7 +111,10 @@ def test_no_smaller_step_runs_away(number):
 @pytest.mark.parametrize("law", ["slip", "slowness"])
 @pytest.mark.parametrize("drainage", [0.01, 1.0, 100.0])
 def test_pore_pressure_stays_below_its_bound(law, drainage):
-    """It comes as close as the pressure that drainage lets slip build up."""
+    """The pore pressure stays below the bound of the fluid.
+
+    If drainage is fast, the pressure approaches the bound.
+    """
     scene = Scene(law=law, **CONSTANT, fluid="dilatant", drainage=drainage, dilatancy=0.01,
                   stiffness_ratio=2.0, displacement_step=0.5, load_velocity_ratio=0.0)  # fmt: skip
     points = [
@@ -124,7 +136,8 @@ def test_pore_pressure_stays_below_its_bound(law, drainage):
         highest = max(later.log_slip_rate for later in to_come)
         told = bound(highest, point.psis[1:])
         assert max(later.psis[-1] for later in to_come) <= told * (1.0 + 1e-6)
-    # slip rate falls slowly against drainage at last: pressure is then in balance
+    # Finally, the slip rate decreases slowly compared with drainage, and the pressure is in
+    # equilibrium.
     last = points[-1]
     if drainage > 10.0:
         assert bound(last.log_slip_rate, last.psis[1:]) == pytest.approx(last.psis[-1], rel=0.05)
@@ -134,8 +147,10 @@ def test_pore_pressure_stays_below_its_bound(law, drainage):
 @pytest.mark.parametrize("of", ["load_velocity_ratio", DISPLACEMENT])
 @pytest.mark.parametrize("direction", ["up", "down"])
 def test_springs_far_stiffer_than_critical_end_in_a_status(stiffness_ratio, of, direction):
-    """They follow the load point: a displacement step is critical that takes ln V to the norm by
-    itself, and the closed form for k = k_cr leads beyond the largest number.
+    """Extremely stiff springs produce a result or a status.
+
+    A stiff slider follows the load point, so a displacement step is critical if its jump
+    reaches the norm. The closed form for k = k_cr overflows.
     """
     scene = Scene(**CONSTANT, stiffness_ratio=stiffness_ratio)
     measure = CriticalStep(of=of, direction=direction)

@@ -1,5 +1,7 @@
-"""Records as loading: what is sampled is followed exactly, however it is cut; bad records say where
-they are wrong.
+"""Tests of records as loading.
+
+Samples are followed exactly, in any partition. Errors of invalid records contain the
+position of the problem.
 """
 
 import copy
@@ -65,7 +67,10 @@ def test_steps_as_a_history_tell_what_the_steps_do(slider, engine):
 
 @pytest.mark.parametrize("slider", SLIDERS)
 def test_finer_samples_where_it_is_linear_change_nothing(slider):
-    """Beyond the accuracy: each of a hundred kinks that are none begins a step."""
+    """Additional samples on linear segments change nothing.
+
+    Each additional sample begins a new step.
+    """
     record = wave(21)
     finer = np.union1d(record["time"], np.linspace(0.0, 20.0, 102))
     between = {"time": finer, "displacement": np.interp(finer, *record.values())}
@@ -83,7 +88,7 @@ def test_sampled_normal_stress_is_a_ramp(engine):
         record = history({"time": [0.0, 4.0, 8.0, 21.0], column: values})
         found = told(record, engine=engine, **fields)
         for name, numbers in zip(WHAT, found, strict=True):
-            # slip is integrated over all that time, at rates of which 1e-8 of ln V is unknown
+            # Slip accumulates an error of 1e-8 of ln V over the whole time.
             np.testing.assert_allclose(numbers, known[name], atol=3e-7)
 
 
@@ -98,7 +103,10 @@ def test_a_step_of_normal_stress_at_the_first_sample_is_one():
 
 @pytest.mark.parametrize("engine", ENGINES)
 def test_a_sample_costs_one_step(engine):
-    """Thirteen right-hand sides a sample where the motion needs next to none."""
+    """A sample costs about 13 evaluations, which is a single step.
+
+    The motion itself needs few steps.
+    """
     work = []
     for samples in (400, 800):
         scene = Scene(**PLAIN, loading=history(wave(samples, period=40.0)))
@@ -131,7 +139,10 @@ def test_units_of_a_rig(tmp_path):
 
 
 def test_a_history_is_data():
-    """Equal where its samples are; copied and pickled; told by its digest."""
+    """Histories can be compared, copied and pickled.
+
+    The digest identifies the samples.
+    """
     one, same, other = history(wave(20)), history(wave(20)), history(wave(30), name="finer")
     assert one == same != other
     assert pickle.loads(pickle.dumps(one)) == copy.deepcopy(one) == one
@@ -140,7 +151,10 @@ def test_a_history_is_data():
 
 
 def test_a_motion_holds_its_samples(tmp_path):
-    """Two of one name are told apart; other samples than those of the scene are refused."""
+    """The file of a motion contains the samples of its history.
+
+    Histories with equal names are distinguished, and modified samples are rejected.
+    """
     scene = Scene(**PLAIN, loading=history(wave(20)))
     file = tmp_path / "motion.nc"
     simulate(scene, duration=2.0, engine=COMPILED).to_netcdf(file)
@@ -154,8 +168,10 @@ def test_a_motion_holds_its_samples(tmp_path):
 
 
 def test_results_hold_the_loadings_of_their_study(tmp_path):
-    """Records and protocols are data: a study is had of its file, and computed again, without the
-    file that declares it. Two of one name are told apart.
+    """Results contain the records and protocols of their study.
+
+    The study can be computed again without its study file. Histories with equal names are
+    distinguished.
     """
     steps = protocol([{"velocity": 3.0, "duration": 5.0}, {"velocity": 0.5}], "steps")
     record = history(wave(20))
@@ -193,7 +209,7 @@ def test_the_command_line_follows_files(tmp_path, monkeypatch):
 
 
 def test_the_files_that_ship_are_followed():
-    """Beside the page of the rig: a protocol and a record."""
+    """The protocol and the record of the documentation are valid loadings."""
     pages = Path(__file__).parent.parent / "studies" / "pages"
     rig = Rig(
         normal_stress="5 MPa", slip_distance="10 um", reference_velocity="1 um/s",
@@ -208,7 +224,8 @@ def test_the_files_that_ship_are_followed():
         assert float(motion.time[-1]) == pytest.approx(lasts)
 
 
-# other tests load its file as a study file, in which the name stands for another class
+# Other modules load the file of this stepper as a study file, which defines the name with
+# another class.
 engines._USER_STEPPERS.pop(OrderFour.name)
 
 
@@ -218,7 +235,10 @@ class Followed(OrderFour):
 
 @pytest.mark.parametrize("method", ["Radau", "LSODA", "RK45", Followed])
 def test_other_steppers_follow_it_too(method):
-    """Those that cannot reach a kink in one step end there as they end a motion."""
+    """Other steppers follow the samples too.
+
+    Steppers that cannot end a step at a kink are restarted there.
+    """
     scene = Scene(**PLAIN, law="slowness", loading=history(wave(12)))
     known = told(history(wave(12)), "", law="slowness")[0, -1]
     own = isinstance(method, type)

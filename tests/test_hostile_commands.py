@@ -1,4 +1,7 @@
-"""Command lines with paths, numbers and texts that no one would mean, and the fuzzer of them."""
+"""Tests of command lines with unusual paths, numbers and texts.
+
+The tests also cover the fuzzer of command lines.
+"""
 
 from __future__ import annotations
 
@@ -96,7 +99,7 @@ def test_numbers_are_bounded_before_memory_is_allocated(words, message, tmp_path
     ],
 )
 def test_pipes_are_neither_read_nor_replaced(words, tmp_path, monkeypatch):
-    """Opening a pipe to see what would be replaced would never end."""
+    """Commands reject pipes as output files without opening them."""
     monkeypatch.chdir(tmp_path)
     pipes = ("pipe.png", "pipe.svg", "pipe.html", "data.nc")
     for name in pipes:
@@ -114,7 +117,7 @@ def test_usage_errors_print_no_control_characters(words):
 
 
 def test_a_full_disk_is_named_whatever_prints(monkeypatch):
-    """Click prints lists and help by itself."""
+    """The error is also caught if Click itself prints the output."""
     said = io.StringIO()
     with open("/dev/full", "w") as full, monkeypatch.context() as patch:
         patch.setattr(sys, "argv", ["rsfstudy", "list"])

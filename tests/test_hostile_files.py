@@ -1,4 +1,8 @@
-"""Hostile files are refused by a rule, in bounded time, and leave nothing locked."""
+"""Tests of hostile files.
+
+Hostile files are rejected in bounded time, with an error that contains the rule, and leave
+no locks.
+"""
 
 from __future__ import annotations
 
@@ -28,8 +32,6 @@ LONG = 130_000
 
 
 # ---- headings ------------------------------------------------------------------------------------
-
-
 @pytest.mark.parametrize("units", ["a" * LONG, " " * LONG, "m/" * LONG, "(" * LONG, "1 * " * LONG])
 def test_a_heading_is_bounded_before_it_is_parsed(units: str, tmp_path: Path) -> None:
     file = tmp_path / "long.csv"
@@ -89,8 +91,6 @@ def test_few_choices_are_compared_with_a_value(monkeypatch) -> None:
 
 
 # ---- nesting -------------------------------------------------------------------------------------
-
-
 @pytest.mark.parametrize(
     "text",
     ["parameters = " + "[" * 5000 + "]" * 5000, "parameters = " + "{a=" * 5000 + "1" + "}" * 5000,
@@ -116,15 +116,13 @@ def test_a_journal_with_a_hostile_fingerprint_is_refused_and_not_locked(
         database.execute("UPDATE fingerprint SET json = ?", (fingerprint,))
     with pytest.raises(DataError, match="its fingerprint is damaged") as refused:
         CellJournal(path, {"rtol": 1e-7}, LAYOUT)
-    assert refused.value.__traceback__ is not None  # which keeps its frames alive
+    assert refused.value.__traceback__ is not None  # The traceback keeps its frames alive.
     assert read_timings(path) is None
     with CellJournal(path, {"rtol": 1e-7}, LAYOUT, fresh=True) as again:
         assert again.statuses(np.empty(0, dtype="V16")).size == 0
 
 
 # ---- attributes ----------------------------------------------------------------------------------
-
-
 @pytest.fixture(scope="module")
 def tiny() -> xr.Dataset:
     return run(TINY)
@@ -185,7 +183,6 @@ def test_a_lattice_with_the_same_point_twice_is_refused(tiny, tmp_path: Path) ->
 
 
 # ---- long names ----------------------------------------------------------------------------------
-
 TOO_LONG = "a" * 300
 
 

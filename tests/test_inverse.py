@@ -1,4 +1,8 @@
-"""An inverse bounds its place by what the cells can support, or says why it cannot."""
+"""Tests of the reduction ``Inverse``.
+
+The error bounds the deviation that the sampling permits, and a status explains missing
+results.
+"""
 
 import numpy as np
 import pytest
@@ -11,7 +15,10 @@ OK, OUT_OF_REACH, NOT_UNIQUE, UNRESOLVED, TOO_FEW = (float(verdict) for verdict 
 
 
 def inverted(x, y, level):
-    """Invert samples of a curve of ln y over ln x; ln of the place, its error and the status."""
+    """Invert samples of a curve of ln y against ln x.
+
+    The function returns the position, its error and the status.
+    """
     dataset = xr.Dataset(
         {"y": ("x", np.exp(y)), "status": ("x", np.zeros(len(x), np.int8))},
         coords={"x": np.exp(x)},
@@ -29,7 +36,7 @@ def assert_covered(curve, x, place):
 
 @pytest.mark.parametrize("cells", range(5, 15))
 def test_error_covers_a_kink(cells):
-    """Wherever it is: in the bracket, next to it, or far away; on a curved background too."""
+    """The error covers a kink at any position, on a curved background."""
     x, draw = np.linspace(0.0, 4.0, cells), np.random.default_rng(cells)
     for _ in range(12):
         kink, place = draw.uniform(0.2, 3.8, 2)
@@ -46,14 +53,17 @@ def test_error_covers_a_kink(cells):
 @pytest.mark.parametrize("phase", np.linspace(0.0, 6.0, 7))
 @pytest.mark.parametrize("cycles", [1.0, 2.3, 3.6])
 def test_error_covers_an_oscillation(cycles, phase):
-    """Of a curve that rises throughout, in ten cells: down to three cells a period."""
+    """The error covers an oscillation down to three cells per period.
+
+    The curve increases monotonically over ten cells.
+    """
     x, rate = np.linspace(0.0, 4.0, 11), 2.0 * np.pi * cycles / 4.0
     for place in (0.7, 1.1, 1.9, 2.6, 3.3):
         assert_covered(lambda at: at + 0.45 / rate * np.sin(rate * at + phase), x, place)
 
 
 def test_oscillation_that_may_hide_other_crossings_is_unresolved():
-    """The samples cross the level once, by less than they scatter."""
+    """A crossing smaller than the scatter of the samples is unresolved."""
     x = np.linspace(0.0, 4.0, 11)
     y = 0.01 * x + 0.3 * np.where(np.arange(11) % 2, 1.0, -1.0) * np.linspace(1.0, 0.6, 11)
     y[:6], y[6:] = y[:6] - 0.35, y[6:] + 0.35
@@ -82,7 +92,7 @@ def test_status_says_why_there_is_no_place(y, level, status):
     "curve", [np.sinh, np.expm1, lambda x: np.tanh(x - 1.5), lambda x: x + 0.02 * x**3]
 )
 def test_smooth_curves_are_resolved_and_errors_fall_with_spacing(curve, cells):
-    """The error is of the second order in the spacing, times a bound of the curvature."""
+    """The error is proportional to the square of the spacing."""
     x = np.linspace(0.5, 3.0, cells)
     slopes = np.diff(curve(x)) / np.diff(x)
     turn = np.abs(np.diff(slopes)).max()
@@ -93,7 +103,7 @@ def test_smooth_curves_are_resolved_and_errors_fall_with_spacing(curve, cells):
 
 
 def test_noise_far_below_the_slope_is_no_oscillation():
-    """Alternating changes of slope by a hundredth: the bound is far smaller than the interval."""
+    """Small alternating changes of slope increase the error only slightly."""
     x = np.linspace(0.0, 4.0, 11)
     y = x + 0.001 * np.where(np.arange(11) % 2, 1.0, -1.0)
     at, error, status = inverted(x, y, 1.77)

@@ -1,4 +1,4 @@
-"""The units of a rig: every conversion by its dimension, and what is no quantity."""
+"""Tests of the units of a rig: conversions and invalid quantities."""
 
 import json
 import math
@@ -28,7 +28,7 @@ THREE = {"normal_stress": SIGMA, "slip_distance": D_C, "reference_velocity": V}
 LAW = {"law": "slowness", "normal_stress": "constant", "a": 0.01, "b_over_a": 1.4}
 
 
-#: What 1 of each scale is, in SI units.
+#: The scales of the rig in SI units.
 SCALES = {
     "sigma_*": SIGMA, "D_c": D_C, "V_*": V, "D_c/V_*": D_C / V, "V_*/D_c": V / D_C,
     "sigma_*/D_c": SIGMA / D_C,
@@ -36,7 +36,7 @@ SCALES = {
 
 
 def test_scales_by_dimension():
-    """Exponents of kilogram, metre and second of each scale are those of its SI unit."""
+    """The exponents of kilogram, metre and second agree with the SI unit."""
     exponents = {"Pa": (1, -1, -2), "m": (0, 1, 0), "s": (0, 0, 1)}
     of = {
         "sigma_*": (1, -1, -2), "D_c": (0, 1, 0), "V_*": (0, 1, -1), "D_c/V_*": (0, 0, 1),
@@ -51,7 +51,7 @@ def test_scales_by_dimension():
         assert tuple(total) == of[name], name
 
 
-#: A quantity for each scale that a field of a scene has, and what it is without dimension.
+#: A quantity for each scale of the scene fields, and its dimensionless value.
 VALUES = {
     "D_c": ("25 um", 2.5), "V_*": ("10 um/s", 10.0), "D_c/V_*": ("1 min", 6.0),
     "sigma_*/D_c": ("0.1 MPa/um", 0.2), "sigma_*": ("50 kPa", 0.01),
@@ -108,7 +108,7 @@ def test_mass_and_radiation():
         normal_stress=SIGMA, slip_distance=D_C, reference_velocity=V,
         shear_modulus="30 GPa", density="2700 kg/m^3",
     )  # fmt: skip
-    # G/(2 c_s), c_s = sqrt(G/rho)
+    # G/(2 c_s) with c_s = sqrt(G/rho)
     impedance = 30e9 / (2.0 * math.sqrt(30e9 / 2700.0))
     assert radiating.scene().radiation_damping == pytest.approx(impedance * V / SIGMA, rel=1e-12)
 
@@ -119,7 +119,7 @@ def test_a_scale_that_is_unusual_is_told():
 
 
 def test_results_say_their_units():
-    """In units of the rig, and the same in SI as `to_si` gives it."""
+    """Results in units of the rig agree with the conversion by ``to_si``."""
     scene = RIG.scene(**LAW, velocity_steps=1)
     motion = simulate(scene, duration=2.0, rtol=1e-4)
     shown = RIG.in_units(motion, stress="MPa", length="um", time="min")
@@ -139,12 +139,12 @@ def test_results_say_their_units():
     assert '"normal_stress": 5000000.0' in shown.attrs["laboratory"]
     with pytest.raises(DataError, match="in other units already"):
         RIG.in_units(shown)
-    # displacement of the load point is 10 V_* t
+    # The displacement of the load point is 10 V_* t.
     np.testing.assert_allclose(motion.load_point_displacement, 10.0 * motion.time, atol=1e-9)
 
 
 def heavy_cycles(axis):
-    """Limit cycles of which each has a reference rate of its own."""
+    """Return limit cycles of which each has a different reference rate."""
     study = Study(
         name="rates", title="Cycles at two rates", measure=LimitCycle(phases=2),
         base=Scene(stiffness_ratio=0.8, load_velocity_ratio=2.0, inertia=True),
@@ -154,13 +154,13 @@ def heavy_cycles(axis):
 
 
 def test_each_cell_is_converted_by_its_own_reference_rate():
-    """As it would be if it were the only one, and with the names and units of that."""
+    """Each cell is converted in the same way as a single cell."""
     results = heavy_cycles(Axis("b_over_a", [1.5, 2.0]))
     found = rsfstudy.to_si(results, normal_stress=SIGMA, slip_distance=D_C)
     rates = np.array([[1e-2], [8e-3]])
     interval = results.recurrence_interval.values
     assert np.isfinite(interval).all()
-    # products of the same numbers: roundings alone
+    # Products of the same numbers differ by rounding errors only.
     np.testing.assert_allclose(found.recurrence_interval, interval / rates, rtol=1e-14)
     fastest = 10.0**results.max_log10_slip_rate.values * D_C * rates
     np.testing.assert_allclose(found.max_slip_rate, fastest, rtol=1e-13)
@@ -215,7 +215,7 @@ def test_a_protocol_from_a_file(tmp_path):
 @pytest.mark.parametrize("laboratory", [None, RIG])
 @pytest.mark.parametrize("against", ["load_point_displacement", "time"])
 def test_the_picture_of_a_motion(laboratory, against):
-    """Whatever its parts: the line of steady sliding does not depend on the loading."""
+    """The line of steady sliding is independent of the loading."""
     scene = RIG.scene(**LAW, loading=protocol([{"velocity": 3, "duration": 2}], "three"))
     drawn = plot_motion(simulate(scene, rtol=1e-4), laboratory, against=against)
     upper, lower, plane = drawn.axes
@@ -224,29 +224,32 @@ def test_the_picture_of_a_motion(laboratory, against):
     assert all(axes.get_ylabel() for axes in (upper, lower, plane))
     path, _start, steady = plane.get_lines()
     rates, friction = steady.get_data()
-    # V_* is 1 um/s
+    # V_* is 1 um/s.
     expected = scene.mu_star + (scene.a - scene.b) * np.log(np.asarray(rates))
     np.testing.assert_allclose(friction, expected, rtol=1e-12)
     assert np.asarray(path.get_xdata()).max() > 2.5
 
 
 def test_a_limit_cycle_has_a_picture():
-    """A closed curve, in units of the rig."""
+    """The figure of a limit cycle is a closed curve in units of the rig."""
     scene = RIG.scene(**LAW, load_velocity_ratio=2.0).with_(stiffness_ratio=0.8, inertia=True)
     cycle = limit_cycle(scene, rtol=1e-4)
     upper, lower, plane = cycle.rsf.plot(RIG).axes
     assert (upper.get_ylabel(), lower.get_xlabel()) == ("Shear stress (MPa)", "Time (s)")
     rates, friction = np.array(plane.get_lines()[0].get_data())
     assert friction[0] == pytest.approx(friction[-1], abs=1e-6)
-    assert rates[0] == pytest.approx(2.0, rel=1e-6)  # um/s
+    assert rates[0] == pytest.approx(2.0, rel=1e-6)  # 2 um/s
 
 
 def test_the_picture_of_steady_sliding_has_limits_about_its_slip_rate():
-    """Without them matplotlib warns, which is an error here."""
+    """The axis limits enclose the constant slip rate.
+
+    Equal limits would cause a warning of Matplotlib, which is an error in the tests.
+    """
     with pytest.warns(NoResultWarning, match="nothing is stepped"):
         motion = simulate(RIG.scene(**LAW), duration=1.0)
     low, high = plot_motion(motion, RIG).axes[1].get_ylim()
-    assert low < 1.0 < high  # um/s, which is V_*
+    assert low < 1.0 < high  # V_* = 1 um/s
 
 
 def test_the_command_simulates_a_rig(tmp_path):
@@ -296,7 +299,8 @@ def test_a_motion_replaces_a_motion_whole_and_nothing_else(tmp_path):
     assert call_main(*words, "5", "--output", image).returncode == 0
     with xr.open_dataset(data) as seen:
         assert call_main(*words, "9", "--output", image).returncode == 0
-        assert float(seen.time[-1]) == pytest.approx(5.0)  # whoever reads the old one goes on
+        # An open dataset keeps the data of the old file.
+        assert float(seen.time[-1]) == pytest.approx(5.0)
     with xr.open_dataset(data) as seen:
         assert float(seen.time[-1]) == pytest.approx(9.0)
     assert sorted(tmp_path.iterdir()) == [data, image]

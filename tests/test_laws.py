@@ -1,4 +1,4 @@
-"""State evolution laws: contract over every law found, and closed forms of each."""
+"""Tests of state evolution laws: common requirements, and closed forms."""
 
 import math
 
@@ -33,8 +33,10 @@ CUT_OFFS = ("composite", "cut_off")
 
 @pytest.mark.parametrize("law", sorted(laws.BUILT_IN_PARTS))
 def test_every_law_rests_where_it_says(law):
-    """At -b ln V for most; either side of it each state returns. Rounding is that of the exponents,
-    of order ten, times b.
+    """States are at rest in steady sliding and return after a perturbation.
+
+    For most laws, the steady state is -b ln V. The tolerance is the rounding error of
+    exponents of order ten, times b.
     """
     scene = Scene(law=law)
     evolutions = build_state_evolution_function(scene)
@@ -60,8 +62,10 @@ def test_friction_is_mu_star_at_the_reference_rate(law, cutoff):
 
 @given(st.floats(-3000.0, 30.0), st.floats(-60.0, 60.0), st.floats(-20.0, 5.0))
 def test_evolution_goes_over_to_that_of_stationary_contact(log_slip_rate, log_theta, log_load):
-    """Slowness law, in time: b (V_*/theta - V)/(V + V_0) per unit of slip and load point
-    displacement, whatever the slip rate; slip law: none without slip.
+    """The evolution is accurate at any slip rate.
+
+    For the slowness law, the rate is b (V_*/theta - V)/(V + V_0) per slip and load point
+    displacement. For the slip law, the state does not evolve without slip.
     """
     b, slip_rate, load = 0.03, math.exp(log_slip_rate), math.exp(log_load)
     exact = b * (math.exp(-log_theta) - slip_rate) / (slip_rate + load)
@@ -74,7 +78,8 @@ def test_evolution_goes_over_to_that_of_stationary_contact(log_slip_rate, log_th
             x, (b * log_theta,), 0.0, share, scene.parameter_values
         )[0]
 
-    # exp(-100) of the slip rate is taken too much where slip is slower than that
+    # If the slip rate is below exp(-100) of the load velocity, the rate contains an additional
+    # share of exp(-100).
     assert evolving("slowness") == pytest.approx(exact, abs=100.0 * rounding + 1e-40)
     share = slip_rate / (slip_rate + load)
     slipping = -share * b * (log_theta + log_slip_rate)
@@ -86,7 +91,7 @@ def test_evolution_goes_over_to_that_of_stationary_contact(log_slip_rate, log_th
 
 @given(st.floats(-60, 60), st.floats(-2, 2))
 def test_the_ends_of_the_family_are_the_two_laws_of_the_paper(log_slip_rate, state):
-    """To the last bit: they are the same arithmetic."""
+    """The ends of the family are bitwise equal to the two laws."""
     for exponent, law in ((0.0, "slip"), (1.0, "slowness")):
         ours, theirs = Scene(law="family", law_exponent=exponent), Scene(law=law)
         assert build_single_state_evolution_function(ours)(
@@ -96,8 +101,10 @@ def test_the_ends_of_the_family_are_the_two_laws_of_the_paper(log_slip_rate, sta
 
 @given(st.floats(-30, 30), st.floats(-20, 20))
 def test_cut_offs_beyond_all_slip_leave_plainer_laws(log_slip_rate, log_theta):
-    """The composite law becomes the slip law as V_c goes to 0, the cut-off the slowness law as it
-    goes to infinity; 1e-14 is rounding of ln V, some tens.
+    """Extreme cut-off velocities lead to the simpler laws.
+
+    The composite law becomes the slip law for V_c = 0, and the cut-off law becomes the
+    slowness law for infinite V_c. The rounding error of ln V is about 1e-14.
     """
     state = 0.029 * log_theta
     for law, cutoff, plain in (("composite", 1e-300, "slip"), ("cut_off", 1e300, "slowness")):
@@ -115,7 +122,10 @@ def test_lambert_w(value):
 
 
 def test_steady_sliding_of_a_cut_off_keeps_its_digits_however_far_from_it():
-    """ln[(1 + r/V)/(1 + r)], r = V_c/V_*; near V_* it is -r/(1 + r) ln V."""
+    """The steady state is ln[(1 + r/V)/(1 + r)] with r = V_c/V_*.
+
+    Near V_*, the steady state is -r/(1 + r) ln V.
+    """
     for cutoff in (1e-6, 1.0, 1e6):
         scene = Scene(law="cut_off", cutoff_velocity_ratio=cutoff, stiffness=0.01)
         for log_slip_rate in (-900.0, -40.0, 40.0, 600.0):
@@ -126,7 +136,8 @@ def test_steady_sliding_of_a_cut_off_keeps_its_digits_however_far_from_it():
             assert ours == pytest.approx(exact, rel=1e-12, abs=1e-12)
         share = cutoff / (1.0 + cutoff)
         tiny = compute_steady_states(scene, 1e-9, 0.0)[0] / scene.b
-        assert tiny == pytest.approx(-share * 1e-9, rel=1e-8)  # of second order: 1e-9 of it
+        # The second-order term is 1e-9 of the value.
+        assert tiny == pytest.approx(-share * 1e-9, rel=1e-8)
 
 
 # ---- a rigid slider, in closed form --------------------------------------------------------------
@@ -146,7 +157,10 @@ def test_steady_sliding_of_a_cut_off_keeps_its_digits_however_far_from_it():
     ids=str,
 )
 def test_a_rigid_slider_follows_the_closed_form(fields, rate):
-    """Ten times the accuracy, relative to a, after a step of nine in ln V."""
+    """The response agrees with the closed form to ten times the accuracy.
+
+    The step is 9 in ln V, and the tolerance is relative to a.
+    """
     scene = Scene(load_velocity_ratio=rate, **CONSTANT, **fields)
     found = RigidResponse()(scene, Accuracy(1e-9)).values
     assert found["closed_form_misfit"] < 1e-8 * scene.a
@@ -172,8 +186,10 @@ def test_the_composite_law_weakens_at_its_cut_off_without_b_above_a():
 @pytest.mark.parametrize("law", ["slip", "slowness", "family"])
 @pytest.mark.parametrize("engine", ["scipy", "compiled"])
 def test_without_b_a_step_is_relaxed_as_by_the_direct_effect_alone(law, engine):
-    """``a dx/dt = K (V_0 - exp(x))`` has ``1/V = 1/V_0 + (1 - 1/V_0) exp(-K V_0 t/a)``. Tolerance:
-    ten times rtol, of ln V.
+    """Without state evolution, the relaxation has a closed form.
+
+    The solution of ``a dx/dt = K (V_0 - exp(x))`` is ``1/V = 1/V_0 + (1 - 1/V_0) exp(-K V_0
+    t/a)``. The tolerance is ten times rtol in ln V.
     """
     scene = Scene(
         law=law, b_over_a=0.0, normal_stress="constant", stiffness=0.02, load_velocity_ratio=3.0
@@ -189,8 +205,10 @@ def test_without_b_a_step_is_relaxed_as_by_the_direct_effect_alone(law, engine):
 @given(b=st.floats(-3.0, 0.9).filter(lambda b: b == 0.0 or abs(b) > 1e-30))
 @settings(max_examples=5, deadline=None)
 def test_with_any_b_below_a_every_spring_slides_steadily_in_the_end(law, b):
-    """At ``mu_* + (a - b) ln(V_0/V_*)``, where the law has that; no cycle, and no critical
-    stiffness.
+    """Every slider with b < a ends in steady sliding.
+
+    The friction is ``mu_* + (a - b) ln(V_0/V_*)`` for laws with this steady state. There is
+    no limit cycle and no critical stiffness.
     """
     scene = Scene(
         law=law, b_over_a=b, normal_stress="constant", stiffness=0.02, load_velocity_ratio=3.0
@@ -218,7 +236,7 @@ def test_b_of_zero_is_refused_where_stress_acts_on_the_state_by_alpha_over_b():
 
 
 def test_what_has_no_meaning_at_b_of_zero_or_next_to_it_is_answered_by_status():
-    """Readings of an evolution that is none."""
+    """Measures of the state evolution are not applicable without evolution."""
     plain = {"law": "slowness", "normal_stress": "constant", "stiffness": 0.02}
     accuracy = Accuracy(rtol=1e-6, engine="compiled")
     step = Scene(**plain, b_over_a=0.0, load_velocity_ratio=2.0)
@@ -234,7 +252,7 @@ def test_what_has_no_meaning_at_b_of_zero_or_next_to_it_is_answered_by_status():
 
 @pytest.mark.parametrize("b", [-3.0, -0.1, 0.5])
 def test_strengthening_friction_with_radiation_is_stable_within_a_usual_budget(b):
-    """The state lags on the side of b; the motion is seen to rise to the load point."""
+    """The motion approaches the load velocity monotonically."""
     fields = {"law": "slowness", "normal_stress": "constant", "radiation_damping": 0.01}
     outcome = CriticalStep()(Scene(**fields, b_over_a=b, stiffness=0.02), Accuracy(1e-6))
     assert outcome.status is Status.STABLE_FOR_ALL_STEPS

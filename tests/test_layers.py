@@ -1,4 +1,7 @@
-"""A lower floor never imports a higher one; Dask and matplotlib stay where they belong."""
+"""Tests of the layers of the package.
+
+Packages import from lower layers only, and heavy libraries are imported by few modules.
+"""
 
 import ast
 import importlib.util
@@ -15,7 +18,8 @@ from rsfstudy.study import study_index, study_loader
 ROOT = Path(rsfstudy.__file__).parent
 
 FILES = sorted(ROOT.rglob("*.py"))
-#: From the bottom up: each imports from lower floors alone. The studies and their pages are above.
+#: Layers from bottom to top. Each package imports from lower layers only. The studies and their
+#: pages are above all layers.
 FLOORS = (
     ("_deprecation",),
     ("errors", "status", "defaults", "formatting", "_lazy", "_former_modules"),
@@ -38,7 +42,7 @@ FLOORS = (
     ("cli",),
     ("named_studies",),
 )
-#: Only these may import a library that would weigh on all others.
+#: Modules that may import a library which is slow to import.
 HOMES = {
     "dask": {"execution/clusters", "storage/store", "storage/zarr_store"},
     "distributed": {"execution/clusters", "execution/workers", "execution/worker_log"},
@@ -53,7 +57,7 @@ HOMES = {
     "pint": {"rig/units"},
     "rich": {"cli", "api/progress"},
     "sqlite3": {"storage/journal"},
-    "zarr": set(),  # xarray writes and reads it
+    "zarr": set(),  # xarray writes and reads Zarr stores.
     "msgspec": {"storage/schema", "storage/rebuild", "referee/problem_files"},
 }
 
@@ -73,25 +77,32 @@ def room(file: Path) -> str:
 
 
 def test_every_module_has_a_floor():
-    # an editable install leaves the named studies where they are, in studies/
+    # An editable install leaves the named studies in studies/.
     rooms = {room(file) for file in FILES} | {"named_studies"}
     assert rooms == set(itertools.chain(*FLOORS))
 
 
 def test_imports_point_down():
-    """Those for types alone too: nobody can read a room first that speaks of one above it."""
+    """Imports go from higher to lower layers, including type imports.
+
+    A reader can therefore read the layers from bottom to top.
+    """
     floor = {name: number for number, names in enumerate(FLOORS) for name in names}
     for file in FILES:
         for name in imports(file):
             package, _, within = name.partition(".")
             to = within.partition(".")[0]
-            to = to if to in floor else "__init__"  # which hands on what users call
+            # The top-level package exports the functions for users.
+            to = to if to in floor else "__init__"
             if package == "rsfstudy" and within and to != room(file):
                 assert floor[to] < floor[room(file)], f"{file} imports {name}"
 
 
 def test_no_circle_of_modules():
-    """Imports inside functions count; those for types alone do not."""
+    """There are no circular imports.
+
+    Imports inside functions are included, but type imports are not.
+    """
     modules = set(map(name_of, FILES))
     asks = {name_of(file): needed(file, modules) for file in FILES}
     while free := [name for name, others in asks.items() if not others & set(asks)]:
@@ -101,7 +112,7 @@ def test_no_circle_of_modules():
 
 
 def needed(file: Path, modules: set[str]) -> set[str]:
-    """Those of the modules that a file imports, wherever it does, but for types."""
+    """Return the modules that a file imports, except for types."""
     tree = ast.parse(file.read_text())
     for node in ast.walk(tree):
         if isinstance(node, ast.If) and ast.unparse(node.test) == "TYPE_CHECKING":
@@ -129,7 +140,10 @@ def test_heavy_libraries_stay_in_their_rooms():
 
 
 def test_physics_is_plain_python():
-    """No xarray, files or Dask in the slider; its parts need nothing but Python."""
+    """The slider package imports neither xarray nor Dask.
+
+    Its parts import the standard library only.
+    """
     for file in (ROOT / "slider").rglob("*.py"):
         top = file.parent.name == "slider"
         allowed = {"rsfstudy", *sys.stdlib_module_names, *(("numpy", "scipy") if top else ())}
@@ -138,7 +152,7 @@ def test_physics_is_plain_python():
 
 
 def test_the_guide_to_the_physics_names_modules_that_are_there():
-    """Each equation of the paper is said to be in a module, or several."""
+    """The modules in the table of equations exist."""
     rows = [line for line in (slider.__doc__ or "").splitlines() if line.startswith("    ")]
     named = {name.strip() for row in rows for name in row[56:].split(",")}
     assert len(rows) == 11
@@ -147,7 +161,7 @@ def test_the_guide_to_the_physics_names_modules_that_are_there():
 
 
 def test_studies_load_nothing_that_draws():
-    """A worker that is given a cell of any of them has no matplotlib."""
+    """Loading the studies does not import Matplotlib."""
     asked = (
         "import sys; from rsfstudy.study import study_loader as catalogue, study_index as names\n"
         "for name in names.study_names(): catalogue.load_study(name)\n"
@@ -158,7 +172,7 @@ def test_studies_load_nothing_that_draws():
 
 
 def test_a_worker_loads_nothing_more_for_a_measure_in_the_file_of_a_study(tmp_path):
-    """It is sent what the measure draws on, and not what declares, reduces and draws."""
+    """A worker receives the measure of a study, but no plots or reductions."""
     for name in study_index.study_names():
         study = study_loader.load_study(name)
         task = cell_computation.CellTask(study.base, study.measure, study.accuracy)
@@ -180,7 +194,7 @@ HEAVY = (
 
 
 def test_help_and_the_list_of_studies_load_next_to_nothing():
-    """They answer at once: nothing is loaded that they do not need."""
+    """Help texts and the list of studies do not import heavy libraries."""
     asked = (
         "import contextlib, sys; from rsfstudy.cli.command_line import main\n"
         "for words in (['--help'], ['list'], ['run', '--help'], ['show', '--help']):\n"

@@ -1,5 +1,7 @@
-"""Stick-slip limit cycles: references in extended precision, the requested accuracy, balances, and
-published numbers.
+"""Tests of stick-slip limit cycles.
+
+The tests compare limit cycles with references in extended precision and with published
+numbers, and check the requested accuracy and the balances of an orbit.
 """
 
 import functools
@@ -31,7 +33,7 @@ def scene(**fields) -> Scene:
 
 @functools.cache
 def measured(of: Scene, rtol: float = 1e-7) -> dict:
-    """Its numbers, measured once for all tests."""
+    """Return the outputs of a limit cycle, cached for all tests."""
     outcome = LimitCycle()(of, Accuracy(rtol, 3_000_000))
     assert outcome.status is Status.OK, outcome.message
     return dict(outcome.values)
@@ -39,8 +41,9 @@ def measured(of: Scene, rtol: float = 1e-7) -> dict:
 
 @pytest.mark.parametrize("case", CASES)
 def test_default_accuracy_and_work(case):
-    """Converged to a relative 1e-6 against a tolerance 100 times tighter, each within its error
-    estimate.
+    """The outputs agree to 1e-6 with a tolerance that is 100 times smaller.
+
+    The differences are within the error estimates.
     """
     found, tight = measured(scene(**case)), measured(scene(**case), 1e-9)
     for name in HEADLINES:
@@ -51,15 +54,18 @@ def test_default_accuracy_and_work(case):
 
 
 def test_work_per_cycle():
-    """At the default tolerance no more than 3,000 right-hand sides a cycle, in the mean over the
-    paper's cases.
+    """The mean work per cycle is at most 3,000 evaluations.
+
+    The mean is over the cases of the paper, at the default tolerance.
     """
     assert np.mean([measured(scene(**case))["work_per_cycle"] for case in CASES]) <= 3_000
 
 
 @pytest.mark.parametrize("case", CASES)
 def test_balances_of_the_orbit(case):
-    """Slip per cycle is V_0 times the interval, the orbit closes, and the drops are those of its
+    """The orbit is closed and consistent with the scalar outputs.
+
+    Slip per cycle is V_0 times the interval, and the stress drops follow from the recorded
     stress.
     """
     found = measured(scene(**case))
@@ -70,22 +76,24 @@ def test_balances_of_the_orbit(case):
         assert found[name][-1] == pytest.approx(found[name][0], abs=1e-5)
     assert (np.diff(found["time"]) >= 0.0).all()
     assert np.ptp(found["shear_stress"]) == pytest.approx(found["static_stress_drop"], rel=1e-3)
-    # the dynamic drop ends at peak slip rate; the orbit is kept at 400 points
+    # The dynamic stress drop ends at the peak slip rate, and the orbit has 400 points.
     peak = found["shear_stress"][found["log10_slip_rate"].argmax()]
     dynamic = found["shear_stress"].max() - peak
     assert dynamic == pytest.approx(found["dynamic_stress_drop"], rel=0.1)
     assert dynamic < 0.9 * found["static_stress_drop"]
     assert found["log10_slip_rate"].max() == pytest.approx(found["max_log10_slip_rate"], abs=0.05)
     assert found["log10_slip_rate"].min() == pytest.approx(found["min_log10_slip_rate"], abs=0.3)
-    # both the slow part and the rupture are resolved: no stride longer than a few per cent of the
-    # range
+    # Both regimes are resolved, because no change of the slip rate exceeds a few per cent of its
+    # range.
     assert np.abs(np.diff(found["log10_slip_rate"])).max() < 0.05 * np.ptp(found["log10_slip_rate"])
 
 
 @pytest.mark.parametrize("case", CASES, ids=str)
 def test_an_orbit_of_two_points_is_the_ends_of_any(case):
-    """It is not recorded, and all numbers are the same. Recording halves steps of the second run,
-    ten times as accurate, whose orbit is kept and which tells the errors.
+    """The outputs do not depend on the number of recorded points.
+
+    An orbit of two points is not recorded. Recording limits the steps of the second, ten
+    times more accurate run, which provides the orbit and the error estimates.
     """
     ends, orbit = (LimitCycle(phases=n)(scene(**case), Accuracy(1e-5)) for n in (2, 50))
     assert ends.rhs_evaluations < orbit.rhs_evaluations
@@ -101,8 +109,9 @@ def test_an_orbit_of_two_points_is_the_ends_of_any(case):
     ("law", "load", "drop"), [("slip", 120.0, 0.0560), ("slowness", 110.0, 0.1107)]
 )
 def test_cycles_near_their_onset_are_waited_for(law, load, drop):
-    """phi = 50, 0.8 k_cr: stick-slip ends at 139.5 V_*; before that, cycles shrink slowly to a
-    limit.
+    """Cycles near the end of stick-slip at 139.5 V_* are found.
+
+    At phi = 50 and 0.8 k_cr, cycles at slightly lower velocities converge slowly.
     """
     scene = Scene(law=law, phi=50.0, stiffness_ratio=0.8, load_velocity_ratio=load, inertia=True)
     outcome = LimitCycle(phases=2)(scene, Accuracy(1e-6))
@@ -112,8 +121,8 @@ def test_cycles_near_their_onset_are_waited_for(law, load, drop):
     assert beyond.status is Status.NO_LIMIT_CYCLE
 
 
-#: Cycles in which slip nearly stops, and their recurrence intervals by a code of its own (other
-#: unknowns, time as the clock), to the digits it gives.
+#: Cycles in which slip nearly stops, and their recurrence intervals from an independent code
+#: with other unknowns and time as the independent variable, to its accuracy.
 NEARLY_STOPPED = [
     (
         {"law": "slip", "a": 0.008794017206350683, "b_over_a": 4.941051988536554,
@@ -136,8 +145,10 @@ NEARLY_STOPPED = [
 
 @pytest.mark.parametrize(("fields", "interval"), NEARLY_STOPPED)
 def test_time_goes_on_where_slip_nearly_stops(fields, interval):
-    """At 10^-137 and 10^-1745 V_*. The spring takes the static drop back at the rate K V_0 while
-    hardly anything slips, which bounds the interval from below.
+    """The interval is accurate at slip rates of 10^-137 and 10^-1745 V_*.
+
+    With negligible slip, the spring recovers the static stress drop at the rate K V_0,
+    which is a lower bound of the interval.
     """
     slider = Scene(inertia=True, **fields)
     found = measured(slider)
@@ -148,8 +159,10 @@ def test_time_goes_on_where_slip_nearly_stops(fields, interval):
 
 
 def test_cycles_that_come_closer_slowly_are_leapt_ahead_of():
-    """A return map whose derivative is 0.06 takes six cycles to seven digits; its fixed point is
-    known after three. The first event is not taken for the cycle.
+    """The fixed point is extrapolated from three cycles.
+
+    The derivative of the return map is 0.06, so plain iteration would need six cycles for
+    seven digits. The first event is not mistaken for the cycle.
     """
     outcome = measured(scene(law="slowness", normal_stress="constant"))
     assert 5 < outcome["events_until_repeat"] < 9
@@ -160,9 +173,11 @@ def test_cycles_that_come_closer_slowly_are_leapt_ahead_of():
 
 @pytest.mark.parametrize("rtol", [1e-8, 1e-9])
 def test_a_leap_lands_where_time_is_counted_from(rtol):
-    """A line from one maximum of spring stress to the next leaves the slip rate of the load point,
-    where normal stress varies: the interval of this cycle would be off by 2.5e-7. The reference is
-    where 60 cycles settle that are followed at 1e-9 without leaps.
+    """An extrapolation ends on the section that defines the interval.
+
+    At variable normal stress, a straight line between two maxima of spring stress leaves
+    this section, which would change the interval by 2.5e-7. The reference is the result of
+    60 cycles with rtol = 1e-9 without extrapolation.
     """
     found = measured(scene(law="slowness", stiffness_ratio=0.9, load_velocity_ratio=30.0), rtol)
     assert found["recurrence_interval"] == pytest.approx(0.59456737078, rel=rtol)
@@ -181,7 +196,11 @@ def test_a_leap_lands_where_time_is_counted_from(rtol):
     ],
 )
 def test_the_healing_exponent_is_that_of_theta_where_there_is_one(fields, known):
-    """b ln(theta/theta_*) is not the state of several, nor of a cut-off; b may be 0 of two."""
+    """The healing exponent is defined if the state is b ln(theta/theta_*).
+
+    The exponent is undefined for several states and for a cut-off. With two states, b may
+    be 0.
+    """
     found = LimitCycle(phases=2)(
         scene(normal_stress="constant", **{"stiffness_ratio": 0.7, **fields}), Accuracy(1e-4)
     )
@@ -192,7 +211,7 @@ def test_the_healing_exponent_is_that_of_theta_where_there_is_one(fields, known)
 @pytest.mark.parametrize(
     ("changes", "mode"),
     [
-        # peaks at 10^4.4 and 10^3.3 V_*, on both sides of a/eta = 10^4.16
+        # The peaks are 10^4.4 and 10^3.3 V_*, on both sides of a/eta = 10^4.16.
         ({"radiation_damping": 1e-6, "stiffness_ratio": 0.9}, "stick_slip"),
         ({"radiation_damping": 1e-6, "stiffness_ratio": 0.99}, "slow_slip"),
         ({"inertia": True, "stiffness_ratio": 0.9}, "stick_slip"),
@@ -200,7 +219,8 @@ def test_the_healing_exponent_is_that_of_theta_where_there_is_one(fields, known)
             {"radiation_damping": 0.0, "inertia": True, "stiffness_ratio": 1.05},
             "damped_oscillation",
         ),
-        # p^2 + (k - 1) p + k = 0 in units of a, whose roots are complex below 3 + sqrt 8 = 5.83
+        # The roots of p^2 + (k - 1) p + k = 0, in units of a, are complex for k below 3 + sqrt 8
+        # = 5.83.
         ({"stiffness_ratio": 5.75}, "damped_oscillation"),
         ({"stiffness_ratio": 5.9}, "steady"),
     ],
@@ -216,7 +236,10 @@ def test_slip_modes(changes, mode):
 
 
 def test_a_slow_peak_is_slow_by_the_norm_where_nothing_radiates():
-    """The norm is V T/(2 pi D_c), so the mode turns with the period that the scene states."""
+    """Without radiation damping, the slip mode follows from the norm.
+
+    The norm is V T/(2 pi D_c), so the mode depends on the period of the scene.
+    """
     scene = Scene(law="slowness", normal_stress="constant", stiffness_ratio=0.9, inertia=True,
                   load_velocity_ratio=2.0)  # fmt: skip
     cycle = rsfstudy.limit_cycle(scene, rtol=1e-4, engine="compiled")
@@ -230,7 +253,11 @@ def test_a_slow_peak_is_slow_by_the_norm_where_nothing_radiates():
 
 
 def test_a_spring_that_is_critical_is_told_from_one_that_takes_its_time():
-    """Mass lowers critical stiffness by 6e-6 of itself, which leaves swings as they are."""
+    """The message distinguishes neutral from slowly growing oscillations.
+
+    Inertia lowers the critical stiffness by a relative 6e-6, which makes the oscillations
+    neutral.
+    """
     spring = {"stiffness": 0.006, "period": 0.02, "inertia": True}
     kind = {"law": "slowness", "normal_stress": "constant"}
     slow = Scene(**kind, a=0.01, b_over_a=1.6, reference_rate=1.0, **spring)

@@ -1,4 +1,7 @@
-"""A loading is a sequence of segments; their motion is one, told as it is wherever it is cut."""
+"""Tests of loadings as sequences of segments.
+
+The motion is independent of the partition into segments.
+"""
 
 from dataclasses import dataclass
 from itertools import pairwise
@@ -54,7 +57,10 @@ def told(of: Scene, *watches, until: float, rtol: float = 1e-7) -> list:
     "first", [(0.0, 0.0, 1e4), (1.0, 0.1, 120.0), (3.0, 0.0, 60.0), (1e-6, 0.0, 1e4)]
 )
 def test_the_limit_cycle_is_that_of_the_last_segment(first):
-    """Whatever was before: a hold, or cycles at another velocity."""
+    """The limit cycle is independent of earlier segments.
+
+    The earlier segments are a hold, or cycles at another velocity.
+    """
     outcome = LimitCycle(phases=10)(scene(first, inertia=True), Accuracy(1e-6))
     assert outcome.status is Status.OK
     assert outcome.values["recurrence_interval"] == pytest.approx(49.1365, rel=2e-6)
@@ -73,8 +79,10 @@ def test_a_hold_does_not_count_as_far_from_steady_sliding():
 
 
 def test_jumps_between_segments_are_told():
-    """A displacement takes slip rate past a level at once; a change of velocity ends the rise of
-    the spring.
+    """Jumps between segments are reported as events.
+
+    A displacement step jumps across a level of slip rate, and a change of velocity ends the
+    increase of spring stress.
     """
     jump = told(
         scene((1.0, 0.0, 5.0), (1.0, 1.2), stiffness_ratio=4.0),
@@ -94,7 +102,10 @@ def test_jumps_between_segments_are_told():
 
 
 def test_what_ends_a_motion_ends_it_between_regimes_too():
-    """From rupture to slow slip the rate falls past the level at once."""
+    """A terminal event may occur at a change of regime.
+
+    At the end of a rupture, the slip rate jumps across the level.
+    """
     of = scene((1.0, 0.1, 1e3), stiffness_ratio=0.5, inertia=True)
     *_before, last = told(of, fall("log_slip_rate", 8.0, terminal=True), until=500.0)
     assert (last.kind, last.regime) == (EventKind.FALL, "slow_manifold")
@@ -143,7 +154,7 @@ INCLINED = {"normal_stress": "variable", "alpha": 0.3, "phi": 60.0, "stiffness_r
     ids=str,
 )  # fmt: skip
 def test_no_strength_is_the_scene_without_the_effect(idle, still, law):
-    """No unknown, no term, no other number, not even a function."""
+    """An effect of zero strength adds no unknowns, numbers or functions."""
     if "stress_dependence" in idle and still is IMPOSED:
         still = {**still, "normal_stress": "constant", "alpha": None}
     plain = Scene(law=law, **still)
@@ -169,7 +180,7 @@ def test_steady_sliding_and_its_stability_are_those_before_normal_stress_changes
     scene = still.with_(**change)
     assert scene.critical_stiffness == still.critical_stiffness
     assert scene.stiffness == still.stiffness
-    if "normal_stress_step" in change:  # after which sliding is steady at another stress
+    if "normal_stress_step" in change:  # After the step, steady sliding occurs at another stress.
         return
     rates = linear_growth_rates(still, still.log_load_velocity)
     assert linear_growth_rates(scene, scene.log_load_velocity) == pytest.approx(rates)

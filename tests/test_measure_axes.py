@@ -1,5 +1,7 @@
-"""An axis over a field of the measure is as one over a field of the scene: its cells are computed,
-kept, found again, selected, claimed, written and reproduced in the same way.
+"""Tests of axes over fields of a measure.
+
+The cells are computed, stored, found again, selected, compared with claims and reproduced
+in the same way as for fields of the scene.
 """
 
 from contextlib import nullcontext
@@ -40,7 +42,7 @@ BOTH = study_of(
 
 @dataclass(frozen=True)
 class Scaled(Measure):
-    """b/a times a factor, so often, and with a sign and a unit in words."""
+    """Measure that returns b/a times a factor, with further options."""
 
     factor: float = 1
     times: int = 1
@@ -68,7 +70,10 @@ def scaled(*axes: Axis, **fields) -> Study:
 
 
 def test_each_cell_is_measured_as_the_axis_says():
-    """Upward steps trigger instability here, downward ones never do."""
+    """Each cell equals a single call with the fields of the axis.
+
+    Upward steps trigger instability in these scenes, and downward steps do not.
+    """
     found = run(BOTH).isel(b_over_a=0)
     for direction, told in (("up", nullcontext()), ("down", pytest.warns(NoResultWarning))):
         with told:
@@ -84,7 +89,10 @@ def test_each_cell_is_measured_as_the_axis_says():
 
 
 def test_numbers_flags_and_texts_of_a_measure_of_ones_own():
-    """Whole numbers arrive as such, whole numbers that stand for any number do not bind."""
+    """Fields of a user-defined measure keep their types.
+
+    An integer default of a float field permits fractions.
+    """
     axes = [Axis("factor", [0.5, 2]), Axis("times", [1, 3]), Axis("negative", [False, True])]
     found = run(scaled(*axes, Axis("unit", ["one", "two"])))
     assert found.total.dims == ("factor", "times", "negative", "unit", "b_over_a")
@@ -131,7 +139,7 @@ def test_a_field_that_decides_the_shape_is_refused():
 
 
 def computed_by(study: Study, output) -> int:
-    """How many cells a run of it computes."""
+    """Return the number of cells that a run computes."""
     with record_computed_cells() as asked:
         run(study, output=output)
     return len(asked)
@@ -190,7 +198,10 @@ def test_the_file_alone_reproduces_its_cells(tmp_path):
 
 
 def test_a_study_file_with_a_measure_of_its_own(tmp_path, monkeypatch):
-    """On workers, which cannot import it; and a failed cell is told with its place."""
+    """A user-defined measure is sent to workers that cannot import it.
+
+    A failed cell is listed with its coordinates.
+    """
     file = tmp_path / "own.py"
     file.write_text(USER_MEASURE_SOURCE)
     monkeypatch.setenv("COLUMNS", "500")

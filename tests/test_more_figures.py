@@ -1,4 +1,4 @@
-"""Figures of laws, of dilatant cycles and of motions: comparable, and printable as all others."""
+"""Tests of figures of laws, dilatant cycles and motions."""
 
 import numpy as np
 import pytest
@@ -30,7 +30,10 @@ def test_the_picture_of_a_motion_is_printable():
 
 
 def test_a_title_is_broken_where_the_figure_would_cut_it(tmp_path_factory):
-    """Names along y move the panel, and its title with it; each curve has a name."""
+    """A long title is wrapped if labels along y narrow the panel.
+
+    Each curve has a legend entry.
+    """
     dataset, _path = named_results("accuracy_cost", tmp_path_factory)
     drawn = plots.draw_figure(dataset, variable="status")
     checks.assert_printable(drawn)
@@ -40,7 +43,7 @@ def test_a_title_is_broken_where_the_figure_would_cut_it(tmp_path_factory):
 
 
 def test_an_added_axis_lays_out_what_a_panel_shows_one_point_of():
-    """The panel is at the first law; of two laws it is drawn twice, with the curves of each."""
+    """A panel of a single point is drawn once per point of an added axis."""
     study = study_loader.load_study("rate_step_boundary")
     narrow = {"b_over_a": [1.5, 2.0, 3.0], "case": ["constant normal stress"]}
     dataset = run(study.with_(**narrow, law=["slip", "slowness"]), rtol=1e-3)
@@ -51,7 +54,7 @@ def test_an_added_axis_lays_out_what_a_panel_shows_one_point_of():
 
 
 def stiffnesses() -> xr.Dataset:
-    """Critical stiffness at two angles, of two values of b/a that have names."""
+    """Return critical stiffness for two angles and two labelled b/a."""
     points = {"strong": {"b_over_a": 2.0}, "weak": {"b_over_a": 1.5}}
     axes = [Axis("phi", [50.0, 60.0]), Axis("weakening", points)]
     return run(Study(name="n", title="t", base=Scene(), axes=axes, measure=LinearStability()))
@@ -79,7 +82,7 @@ def test_slip_rates_beyond_the_range_of_floats_are_refused():
 
 
 def test_nothing_is_drawn_where_nothing_came_out():
-    """Neither a number nor a cell that is fine: there is no panel."""
+    """A panel without numbers is drawn only if its cells have not failed."""
     dataset = stiffnesses()
     failed = dataset["phi"] == 50.0
     dataset["critical_stiffness"] = dataset["critical_stiffness"].where(~failed)
@@ -100,8 +103,9 @@ def test_where_nothing_was_measured_the_statuses_are_drawn():
 
 
 def test_a_legend_beside_a_scale_of_colours_leaves_the_panel_its_room():
-    """Three fifths of the figure are the panel's, where a legend as wide as all leaves it less than
-    half.
+    """The panel occupies more than 55 % of the figure width.
+
+    A wide legend next to a colour bar could leave less than half of the width.
     """
     axes = [
         Axis("law", ["slip", "slowness"]),
@@ -115,7 +119,10 @@ def test_a_legend_beside_a_scale_of_colours_leaves_the_panel_its_room():
 
 
 def test_more_panels_than_can_be_read_are_lines_or_maps():
-    """Seven panels, at each of two points of an axis that they do not know."""
+    """A figure with too many panels is replaced by lines or maps.
+
+    The figure has seven panels, and the added axis has two points.
+    """
     many = rsfstudy.Figure([Panel(x="weakening", y="critical_stiffness", hue=["phi"])] * 7)
     dataset = run(stiffnesses().rsf.study.with_(alpha=[0.2, 0.5]))
     assert len(plots.draw_figure(dataset.isel(alpha=[0]), many).axes) == 7

@@ -1,4 +1,4 @@
-"""Scenes refuse parts whose rates need quantities that the scene does not provide."""
+"""Tests of parts that require quantities which a scene may not provide."""
 
 import math
 import re
@@ -15,13 +15,13 @@ from rsfstudy.slider.parameter_layout import LAW, MU_STAR, A
 
 
 def evolution(log_slip_rate, state, p):
-    """The slip law, with a state that also falls with the work of friction, tau V."""
+    """Return the slip law with an additional decrease by frictional work."""
     work = (p[MU_STAR] + p[A] * log_slip_rate + state) * math.exp(log_slip_rate)
     return -(state + p[LAW] * log_slip_rate) - 1e-4 * (work - p[MU_STAR] * math.exp(log_slip_rate))
 
 
 def steady_states(log_slip_rate, shift, p):
-    """The zero of `evolution`, which is linear in the state."""
+    """Return the zero of ``evolution``, which is linear in the state."""
     heated = 1e-4 * math.exp(log_slip_rate)
     rest = -log_slip_rate * (p[LAW] + heated * p[A]) / (1.0 + heated)
     return (shift + rest,)

@@ -1,4 +1,4 @@
-"""Readings of a slider with inertia count the inertia that both of their runs neglect."""
+"""Tests of the error due to inertia that both runs of a measure neglect."""
 
 import math
 
@@ -19,7 +19,7 @@ from rsfstudy.slider.equations import RUPTURE_REGIME
 from rsfstudy.status import Status
 
 INERTIA = {"inertia": True, "reference_rate": 1e-3}
-#: Holds and a step that stay on the slow manifold, or leave it late, in both runs.
+#: Holds and a step whose runs stay on the slow manifold, or leave it late.
 CASES = [
     (
         Healing(phases=2),
@@ -59,7 +59,10 @@ def read(measure, scene, rtol):
 
 @pytest.mark.parametrize(("measure", "rtol", "scene"), CASES)
 def test_errors_cover_what_both_runs_neglect(measure, rtol, scene):
-    """A run a thousand times tighter leaves the slow manifold earlier."""
+    """The error estimates cover the error relative to a tighter run.
+
+    A tolerance that is a thousand times smaller leaves the slow manifold earlier.
+    """
     found, exact = read(measure, scene, rtol), read(measure, scene, 1e-3 * rtol)
     for name in measure.outputs_with_error:
         error = abs(found[name] - exact[name])
@@ -81,8 +84,11 @@ def test_a_scene_without_inertia_neglects_none():
 
 
 def test_estimate_goes_with_the_accuracy():
-    """The error of the slow manifold is of the third order in its thresholds, which scale with the
-    cube root of rtol. A motion that is in the full equations throughout neglects nothing.
+    """The estimate is proportional to rtol.
+
+    The error of the slow manifold is of third order in its thresholds, which are
+    proportional to the cube root of rtol. A motion that always uses the full equations
+    neglects nothing.
     """
     scene, found = CASES[2][2], []
     for rtol in (1e-4, 1e-5, 1e-6, 1e-8):
@@ -96,7 +102,10 @@ def test_estimate_goes_with_the_accuracy():
 
 
 def test_growth_at_a_peak_has_one_unit_in_both_regimes():
-    """A peak that is found on the slow manifold or in the full equations, depending on rtol."""
+    """The growth rate at a peak has the same unit in both regimes.
+
+    Depending on rtol, the peak is on the slow manifold or in the full equations.
+    """
     scene, growths = CASES[0][2], {}
     for rtol in (1e-5, 1e-8):
         meter, wanted = (

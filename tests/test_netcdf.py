@@ -1,5 +1,7 @@
-"""Every dataset that a public function returns can be written by xarray as it is, reads back
-identical, and follows the CF conventions.
+"""Tests of the datasets that public functions return.
+
+Each dataset can be written by xarray without changes, is identical after reading, and
+follows the CF conventions.
 """
 
 import functools
@@ -93,7 +95,7 @@ def rig_motion(**units) -> xr.Dataset:
     return RIG.in_units(rsfstudy.simulate(scene, **QUICK), **units)
 
 
-#: A dataset of each public function that returns one, in each of its forms; each takes a folder.
+#: Datasets of each public function in all variants. Each function receives a directory.
 MADE = {
     "simulate": lambda _: motion(),
     "simulate at times": lambda _: rsfstudy.simulate(STEPPED, times=[0.0, 1.0, 2.0], **QUICK),
@@ -138,14 +140,14 @@ MADE = {
 }
 
 
-#: Forms whose files hold the same as those of another form: "run" and "open a store".
+#: Variants whose files equal the files of "run" and "open a store".
 ALIKE = ("run into a file", "run into a store", "open", "Backend.open_dataset")
 
 
 @functools.cache
 def load_checkers() -> None:
     with warnings.catch_warnings():
-        warnings.simplefilter("ignore")  # of their own
+        warnings.simplefilter("ignore")  # Warnings of the checkers.
         CheckSuite.load_all_available_checkers()
 
 
@@ -163,8 +165,8 @@ def cf_errors(path: Path, monkeypatch: pytest.MonkeyPatch) -> set[str]:
     return {message for part in found for message in part["msgs"]}
 
 
-#: The checker demands this of every dimension called time, but then rejects units without a date,
-#: which time since a step does not have.
+#: The checker requires this attribute for every dimension called time, but then rejects units
+#: without a date. The time since a step has no date.
 ELAPSED = "Coordinate variable 'time' should have standard_name='time', found: 'None'"
 
 
@@ -175,7 +177,7 @@ def test_any_dataset_is_written_as_it_is_and_follows_cf(name, tmp_path, monkeypa
     dataset.to_netcdf(path)
     with xr.open_dataset(path) as written:
         xr.testing.assert_identical(dataset.load(), written.load())
-    if name not in ALIKE:  # the checker is what takes time
+    if name not in ALIKE:  # The checker is slow.
         assert cf_errors(path, monkeypatch) - {ELAPSED} == set()
 
 
@@ -184,7 +186,7 @@ def test_every_public_function_that_returns_a_dataset_is_tried():
     names = {"": rsfstudy.__all__}
 
     def find(of, name):
-        # the former names of a class would warn
+        # Access to the former names of a class would raise a warning.
         return inspect.getattr_static(of, name) if inspect.isclass(of) else getattr(of, name)
 
     returning = {
@@ -200,7 +202,10 @@ def test_every_public_function_that_returns_a_dataset_is_tried():
 
 
 def test_no_encoding_of_a_store_prevents_netcdf(tmp_path):
-    """Older versions of xarray cannot write the string dtype of Zarr stores."""
+    """The encoding of a Zarr store does not prevent writing NetCDF files.
+
+    Older versions of xarray cannot write the string dtype of Zarr stores.
+    """
     pytest.importorskip("zarr")
     stored = run(STABILITY, output=tmp_path, format="zarr")
     dtypes = [variable.encoding.get("dtype") for variable in stored.variables.values()]

@@ -1,4 +1,7 @@
-"""Noise of records: whitening, determinants and REML against dense linear algebra, and draws."""
+"""Tests of noise models against dense linear algebra and random samples.
+
+The tests cover whitening, determinants, and REML estimates.
+"""
 
 from __future__ import annotations
 
@@ -19,12 +22,12 @@ from rsfstudy.fitting.uniform_sampling_runs import (
     find_sampling_runs,
 )
 
-#: Coefficients of an autoregressive process of third order, with a pair of complex roots.
+#: Coefficients of a third-order autoregressive process with a pair of complex roots.
 AR3 = -np.real(np.poly([0.8, 0.5 + 0.4j, 0.5 - 0.4j]))[1:]
 
 
 def correlations(coefficients: np.ndarray, lags: int) -> np.ndarray:
-    """Autocorrelation of a process, by the response to an impulse."""
+    """Return the autocorrelation of a process from its impulse response."""
     impulse = np.zeros(2_000)
     impulse[0] = 1.0
     response = lfilter([1.0], [1.0, *(-coefficients)], impulse)
@@ -33,13 +36,16 @@ def correlations(coefficients: np.ndarray, lags: int) -> np.ndarray:
 
 
 def partial(coefficients: np.ndarray) -> np.ndarray:
-    """Partial autocorrelations: the last coefficients of predictors of every order."""
+    """Return the partial autocorrelations of a process.
+
+    The partial autocorrelations are the last coefficients of the predictors of every order.
+    """
     seen = correlations(coefficients, len(coefficients) + 1)
     orders = range(1, len(coefficients) + 1)
     return np.array([np.linalg.solve(toeplitz(seen[:n]), seen[1 : n + 1])[-1] for n in orders])
 
 
-#: Runs of two processes, of which one is shorter than their order.
+#: Runs of two processes. The length of one run is less than the order.
 RUNS = (
     SamplingRun(0, 40, 0, 0, 0),
     SamplingRun(40, 42, 1, 0, 1),
@@ -48,7 +54,8 @@ RUNS = (
 )
 SIZES = [1.0, 0.3]
 BOTH = NoiseModel(RUNS, np.array([partial(AR3), [0.9, 0.0, 0.0]]), np.array(SIZES))
-#: One process whose size changes, first after fewer rows than its order.
+#: Runs of a single process with a variable noise level. The level first changes after fewer rows
+#: than the order.
 JOINED = (
     SamplingRun(0, 2, 0, 0, 0),
     SamplingRun(2, 42, 1, 2, 1),
@@ -59,7 +66,11 @@ CHANGING = NoiseModel(JOINED, np.array([partial(AR3)] * 2), np.array(SIZES))
 
 
 def dense(noise: NoiseModel) -> np.ndarray:
-    """The covariance: runs of an AR(3) and of an AR(1) process in blocks, or one AR(3) process."""
+    """Return the covariance matrix of a noise model.
+
+    The matrix has blocks of an AR(3) and an AR(1) process, or belongs to a single AR(3)
+    process.
+    """
     seen = [correlations(AR3, 300), correlations(np.array([0.9]), 300)]
     sizes = np.concatenate(
         [
@@ -84,7 +95,7 @@ def test_whitening_is_that_of_the_triangle_of_the_correlation_matrix(noise: Nois
     matrix = dense(noise)
     triangle = np.linalg.cholesky(matrix)
     found = noise.whiten_columns(np.eye(len(matrix)))
-    # rounding times the condition of the matrix, 1e3
+    # The rounding error is multiplied by the condition number of 1e3.
     np.testing.assert_allclose(found, np.linalg.inv(triangle), atol=1e-11)
     exact = 2.0 * np.log(np.diag(triangle)).sum()
     assert noise.log_determinant == pytest.approx(exact, abs=1e-10)
@@ -122,7 +133,11 @@ def test_independent_samples_of_first_order() -> None:
 
 
 def test_degrees_of_freedom_count_the_coefficients_that_are_found() -> None:
-    """In closed form for first order; else by how the power at zero frequency scatters."""
+    """The degrees of freedom include the uncertainty of the coefficients.
+
+    The first-order case has a closed form. For higher orders, the reference is the scatter
+    of the estimated power at zero frequency.
+    """
     one = NoiseModel((SamplingRun(0, 500, 0, 0, 0),), np.array([[0.9]]), np.ones(1))
     assert one.degrees_of_freedom_of_slow_noise == pytest.approx(500 / (1 + 2 * 1.9 / 0.1))
     assert noises.white_noise(np.arange(500.0)).degrees_of_freedom_of_slow_noise == 500
@@ -138,15 +153,18 @@ def test_degrees_of_freedom_count_the_coefficients_that_are_found() -> None:
     exact = NoiseModel(
         (SamplingRun(0, 3_000, 0, 0, 0),), np.array([partial(AR3)]), np.ones(1)
     ).degrees_of_freedom_of_slow_noise
-    # a variance of 400 draws has a standard error of a fourteenth
+    # The variance of 400 samples has a relative standard error of 1/14.
     assert 2.0 / np.var(logs) == pytest.approx(exact, rel=0.25)
 
 
 def test_coefficients_are_recovered() -> None:
-    """By Burg's recursion, and by REML with what the fit has taken up."""
+    """Burg's recursion and REML recover the coefficients.
+
+    REML corrects for the degrees of freedom of the fit.
+    """
     rng = np.random.default_rng(3)
     long = lfilter([1.0], [1.0, *(-AR3)], rng.normal(size=50_000))
-    # standard errors are below 1/sqrt(n)
+    # The standard errors are below 1/sqrt(n).
     assert np.abs(noises._burg_coefficients([long], 3) - partial(AR3)).max() < 5.0 / math.sqrt(
         50_000
     )
@@ -159,9 +177,9 @@ def test_coefficients_are_recovered() -> None:
         left = noise - base @ (base.T @ noise)
         plain.append(noises._burg_coefficients([left], 1)[0])
         reml.append(noises.fit_noise("ar1", time, left, jacobian).partial_autocorrelations[0, 0])
-    # of 60 draws the mean has a standard error of sqrt((1 - .81)/400/60) = .0028
+    # The mean of 60 samples has a standard error of sqrt((1 - 0.81)/400/60) = 0.0028.
     assert abs(np.mean(reml) - 0.9) < 0.009
-    assert np.mean(plain) < 0.885  # what the fit takes up is missing
+    assert np.mean(plain) < 0.885  # The fit has absorbed a part of the noise.
 
 
 @pytest.mark.parametrize(("order", "coefficients"), [(0, np.zeros(0)), (3, AR3)])
@@ -172,7 +190,8 @@ def test_the_order_is_chosen(order: int, coefficients: np.ndarray) -> None:
         left = lfilter([1.0], [1.0, *(-coefficients)], rng.normal(size=800))
         chosen.append(noises._select_autoregressive_order([[left]]))
     assert min(chosen) >= order
-    assert np.median(chosen) == order  # the criterion takes too many at times, too few seldom
+    # The criterion overestimates the order sometimes and underestimates it rarely.
+    assert np.median(chosen) == order
 
 
 def test_noise_of_other_sampling_intervals_is_another() -> None:
@@ -192,7 +211,8 @@ def test_noise_of_other_sampling_intervals_is_another() -> None:
     for number, exact in coefficients.items():
         assert found.partial_autocorrelations[number, 0] == pytest.approx(exact, abs=0.12)
     for noise in (found, noises.fit_noise("white", time, left, np.ones((1_500, 1)))):
-        # 900 samples at .95 are 23 independent ones, which tell a size to 15 per cent
+        # 900 samples with a correlation of 0.95 contain 23 independent samples, which determine
+        # the level to 15 %.
         sizes = noise.noise_level_standard_deviations[
             [run.noise_level_index for run in noise.sampling_runs]
         ]
@@ -201,7 +221,10 @@ def test_noise_of_other_sampling_intervals_is_another() -> None:
 
 @pytest.mark.parametrize("quantum", [0.0, 0.01])
 def test_a_clock_that_is_uneven_is_one_process(quantum: float) -> None:
-    """Intervals that vary, or that a logger has rounded to one or two ticks, tell one noise."""
+    """Sampling intervals that vary slightly belong to a single process.
+
+    The intervals are irregular, or rounded to one or two ticks of a logger.
+    """
     rng = np.random.default_rng(6)
     time = np.cumsum(np.where(rng.random(2_000) < 0.5, 1.0, 2.0 if quantum else 1.2)) * 0.01
     assert find_sampling_runs(time) == (SamplingRun(0, 2_000, 0, 0, 0),)
@@ -209,8 +232,10 @@ def test_a_clock_that_is_uneven_is_one_process(quantum: float) -> None:
 
 @pytest.mark.parametrize("order", [0, 3])
 def test_whiteness_is_that_of_ljung_and_box(order: int) -> None:
-    """``n (n + 2) sum of r_k**2/(n - k)`` over 20 lags more than the order, chi-squared of 20
-    degrees, whatever the mean.
+    """The p-value agrees with the statistic of Ljung and Box.
+
+    The statistic ``n (n + 2) sum of r_k**2/(n - k)`` over 20 lags more than the order has a
+    chi-squared distribution with 20 degrees of freedom for any mean.
     """
     left = np.random.default_rng(8).normal(size=300) + np.sin(np.arange(300.0))
     lags = range(1, 20 + order + 1)
@@ -218,7 +243,8 @@ def test_whiteness_is_that_of_ljung_and_box(order: int) -> None:
     size = 300 * 302 * sum(r**2 / (300 - k) for r, k in zip(seen, lags, strict=True))
     told = noises.ljung_box_p_value(left + 5.0, order)
     assert told == pytest.approx(noises.ljung_box_p_value(left, order), rel=1e-9)
-    # means and sizes of parts are not those of the whole: a few lags in 300
+    # The means and variances of parts differ from the whole series by the effect of a few lags
+    # in 300.
     assert chi2.isf(told, 20) == pytest.approx(size, rel=0.1)
 
 
@@ -231,7 +257,7 @@ def test_the_noise_level_may_change(rho: float) -> None:
     assert len(found.noise_level_standard_deviations) == 2
     assert abs(found.sampling_runs[1].start_row - 300) < 30
     assert found.noise_level_standard_deviations[1] == pytest.approx(4.0, rel=0.3)
-    # the level, not the whole record, decides on the error of the quiet part
+    # The local noise level determines the weights of the quiet rows.
     weights = found.whiten_columns(np.ones((900, 1)))[:, 0] ** 2
     assert weights[:250].sum() > 4.0 * weights[350:600].sum()
 
@@ -248,7 +274,7 @@ def test_changes_of_the_noise_level_are_located(ratio: float) -> None:
     scale = np.where(np.arange(700) < 500, 1.0, ratio)
     rows = [find_level_changes(scale * rng.normal(size=700)) for _ in range(50)]
     assert all(len(found) == 1 for found in rows)
-    # rows are misplaced only while the louder noise is as small as the quieter noise
+    # Rows are misplaced only if the louder noise is as small as the quieter noise.
     assert max(abs(found[0] - 500) for found in rows) <= 5
 
 
@@ -269,7 +295,7 @@ def test_outliers_are_found_and_peaks_of_the_model_are_not() -> None:
     spikes = [7, 120, 121, 333]
     left[spikes] += 0.02
     curve[250:] = 0.05 * np.exp(-np.arange(250) / 2.0)
-    left[250] += 0.02  # a misfit at the step
+    left[250] += 0.02  # A misfit at the step.
     kept = find_non_outlier_mask(left, curve, 0.0)
     assert kept is not None
     assert np.flatnonzero(~kept).tolist() == spikes

@@ -1,5 +1,7 @@
-"""Critical steps of normal stress: closed forms, limits, the three triggers as changes of stress,
-motions on either side, both engines, bad input.
+"""Tests of critical steps of normal stress.
+
+The tests cover closed forms, limits, the comparison of three triggers as stress changes,
+motions on both sides, both engines and invalid input.
 """
 
 from __future__ import annotations
@@ -31,7 +33,10 @@ IMPOSED = {"normal_stress": "imposed"}
 
 
 def found(scene: Scene, measure: CriticalStep = FALL, accuracy: Accuracy | None = None):
-    """Value, error estimate and outcome; the search must succeed."""
+    """Return the value, its error estimate and the outcome of a search.
+
+    The search must succeed.
+    """
     outcome = measure(scene, accuracy or Accuracy())
     assert outcome.status is Status.OK, outcome
     return outcome.values[VALUE], outcome.values[f"{VALUE}_error"], outcome
@@ -41,7 +46,7 @@ def found(scene: Scene, measure: CriticalStep = FALL, accuracy: Accuracy | None 
 
 
 def test_an_extreme_law():
-    """Perrin, Rice and Zheng: its threshold is asinh(q k^)."""
+    """The threshold of the law ``perrin_rice_zheng`` is asinh(q k/k_cr)."""
     scene = Scene(
         law="perrin_rice_zheng", **IMPOSED, alpha=0.4, stiffness_ratio=2.0, instability_norm=1e12
     )
@@ -57,7 +62,7 @@ def test_an_extreme_law():
 
 
 def test_triggers_are_the_critical_steps_and_their_stresses():
-    """The numbers of each search, and what they are as changes of stress."""
+    """The measure returns the three critical steps and their stresses."""
     scene = Scene(law="slowness", alpha=0.4, phi=60.0, stiffness_ratio=1.2)
     outcome = Triggers()(scene, Accuracy(1e-5))
     for measure in (FALL, CriticalStep(of="displacement_step"), CriticalStep()):
@@ -109,7 +114,10 @@ DYNAMICS = [{}, {"radiation_damping": 1e-6}, {"inertia": True, "instability_norm
     moves=st.booleans(),
 )
 def test_either_side_of_a_fall(law, stress, dynamics, ratio, b_over_a, moves):
-    """A number that motions confirm at another tolerance, or an answer that says why not."""
+    """Motions confirm a critical step, or the outcome contains the reason.
+
+    The motions have another tolerance.
+    """
     load = {"load_velocity_ratio": 1.0} if moves and ratio > 1.05 else {}
     scene = Scene(law=law, b_over_a=b_over_a, stiffness_ratio=ratio, **stress, **dynamics, **load)
     outcome = FALL(scene, Accuracy(1e-5))
@@ -129,7 +137,7 @@ def test_either_side_of_a_fall(law, stress, dynamics, ratio, b_over_a, moves):
 
 @pytest.mark.parametrize("dynamics", DYNAMICS, ids=str)
 def test_paths_and_motions_agree(dynamics, monkeypatch):
-    """What is shot for, and what a survey by motions alone closes in on."""
+    """The path solution and the search with motions agree."""
     scene = Scene(**STRESSES[2], **dynamics, stiffness_ratio=1.2, load_velocity_ratio=1.0)
     value, error, _outcome = found(scene)
     for shot in ("find_boundary_by_critical_path", "find_boundary_by_limit_cycle"):
@@ -141,14 +149,18 @@ def test_paths_and_motions_agree(dynamics, monkeypatch):
 @pytest.mark.parametrize(
     ("fields", "published"),
     [
-        # sliding at the new normal stress comes to be unstable at k_cr = 1.3, and next to that
+        # Sliding at the new normal stress becomes unstable near k_cr = 1.3.
         ({"law": "slip", "alpha": 0.0}, 0.16747205),
-        # the first peak, before that
+        # The first peak is critical.
         ({"law": "slowness", "alpha": 0.56}, 0.29498411),
     ],
 )
 def test_rises_under_a_load_point_that_moves(fields, published):
-    """They take stress away at first, and stability with it; held, a rise never triggers."""
+    """A rise of normal stress may trigger instability if the load point moves.
+
+    The rise first reduces the shear stress ratio and the stability. If the load point is
+    held, a rise never triggers instability.
+    """
     scene = Scene(**IMPOSED, **fields, stiffness_ratio=1.3, load_velocity_ratio=1.0)
     value, error, _outcome = found(scene, RISE, Accuracy(1e-6))
     assert value == pytest.approx(published, abs=error + 1e-8)
@@ -160,8 +172,10 @@ def test_rises_under_a_load_point_that_moves(fields, published):
 
 
 def test_normal_stress_that_is_imposed_is_constant_between_steps():
-    """Whatever alpha: friction acts alone, orbits may close, and critical stiffness is in
-    proportion to normal stress.
+    """Imposed normal stress is constant between steps.
+
+    For any alpha, friction is the only damping, orbits may be closed, and the critical
+    stiffness is proportional to normal stress.
     """
     scene = Scene(**IMPOSED, alpha=0.5, load_velocity_ratio=2.0)
     assert has_frictional_damping_only(scene)
@@ -176,7 +190,11 @@ def test_normal_stress_that_is_imposed_is_constant_between_steps():
 
 
 def test_coulomb_stresses_add_up():
-    """Half by a fall of normal stress, the other half by a displacement: exactly, without alpha."""
+    """Without alpha, two triggers add up to the critical Coulomb stress.
+
+    The first half is a decrease of normal stress, and the second half is a displacement
+    step.
+    """
     scene = Scene(**IMPOSED, alpha=0.0, stiffness_ratio=1.2)
     fallen = found(scene)[0]
     part = scene.with_(normal_stress_step=0.5 * fallen)

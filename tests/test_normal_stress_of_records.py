@@ -1,4 +1,7 @@
-"""Fits of records whose normal stress differs between steps, or changes within a window."""
+"""Tests of fits of records with variable normal stress.
+
+The normal stress differs between steps, or changes within a window.
+"""
 
 from __future__ import annotations
 
@@ -14,7 +17,7 @@ from rsfstudy.errors import InvalidValue
 from rsfstudy.fitting.record import Record
 from rsfstudy.status import STATUS_LABELS
 
-#: Stiffness of the machine in MPa/um: TRUTH["stiffness"] at 8 MPa.
+#: Stiffness of the machine in MPa/um, equal to the true stiffness at 8 MPa.
 MACHINE = 8.0 * EXACT_PARAMETERS["stiffness"]
 OPTIONS: dict[str, Any] = {
     "laws": ["slowness"],
@@ -26,10 +29,11 @@ OPTIONS: dict[str, Any] = {
 
 
 def record_at(stress: float, seed: int, name: str, later: float | None = None) -> Record:
-    """Make a record of a velocity step at a normal stress in MPa.
+    """Return a record of a velocity step at a normal stress in MPa.
 
-    If `later` is given, the normal stress rises to that value 60 um after the step, when friction
-    is steady; friction then stays as it is, so that only the window decides which stress counts.
+    If ``later`` is given, the normal stress changes to this value 60 um after the step, when
+    friction is steady. Friction stays constant, so the fit depends on the normal stress
+    within the window only.
     """
     times = synthetic.sample_times(STEP_UP, 52.0, 400)
     moved = synthetic.load_point_displacement(STEP_UP, times)

@@ -1,5 +1,6 @@
-"""What is read off a motion under oscillating normal stress, and after a step of it: linear theory
-and how it is approached, closed forms, then errors and engines.
+"""Tests of measures of oscillations and steps of normal stress.
+
+The tests cover linear theory and the approach to it, closed forms, errors and engines.
 """
 
 import cmath
@@ -21,7 +22,7 @@ IMPOSED = {"normal_stress": "imposed", "alpha": 0.3}
 INCLINED = {"normal_stress": "variable", "alpha": 0.3, "phi": 60.0}
 PERIOD = 7.0
 OSCILLATES = {"oscillation_amplitude": 1e-3, "oscillation_period": PERIOD, "stiffness_ratio": 1.5}
-#: A slider whose mass acts in steady sliding: V T/(2 pi D_c) is 0.05.
+#: A slider whose inertia acts in steady sliding, with V T/(2 pi D_c) = 0.05.
 HEAVY = {"inertia": True, "period": 1.0, "reference_rate": 0.1 * math.pi, "instability_norm": 50.0}
 
 
@@ -43,7 +44,10 @@ def response(scene: Scene, amplitude: float) -> complex:
 @pytest.mark.parametrize("velocity", [1.0, 3.0])
 @pytest.mark.parametrize("law", LAWS)
 def test_linear_theory_is_the_formula(law, velocity):
-    """``K [mu + (mu - alpha) z]/[a z**2 + (K - b + a) z + K]``."""
+    """The linear response agrees with the closed form.
+
+    The response is ``K [mu + (mu - alpha) z]/[a z**2 + (K - b + a) z + K]``.
+    """
     scene = Scene(law=law, **IMPOSED, **OSCILLATES, load_velocity_ratio=velocity)
     a, b, stiffness, rate = scene.a, scene.b, scene.stiffness, math.log(velocity)
     mu, z = scene.mu_star + (a - b) * rate, 2j * math.pi / PERIOD / velocity
@@ -53,7 +57,7 @@ def test_linear_theory_is_the_formula(law, velocity):
 
 
 def test_waves_and_mass_resist():
-    """``eta V z`` and ``K w**2 z**2`` beside K; and a rigid slider has no spring to tell."""
+    """Radiation damping adds ``eta V z``, and inertia adds ``K w**2 z**2``."""
     z = 2j * math.pi / PERIOD
     plain, waves, heavy = (
         Scene(law="slip", **IMPOSED, **OSCILLATES, **more)
@@ -80,7 +84,10 @@ def test_waves_and_mass_resist():
     ids=["imposed", "inclined", "waves", "faster", "mass"],
 )
 def test_motions_tend_to_linear_theory_as_the_square_of_their_amplitude(fields):
-    """What is left at two amplitudes falls by four; without that, they agree to the accuracy."""
+    """The deviation from linear theory is proportional to amplitude squared.
+
+    Without this deviation, both results agree to the requested accuracy.
+    """
     scene = Scene(**{**OSCILLATES, **fields})
     linear = spring_response_to_normal_stress(
         scene, scene.log_load_velocity, 2.0 * math.pi / PERIOD
@@ -91,7 +98,7 @@ def test_motions_tend_to_linear_theory_as_the_square_of_their_amplitude(fields):
 
 
 def test_what_is_shown_is_one_period():
-    """Time, load point, slip and normal stress of it; gain is that of what is shown."""
+    """The recorded motion covers a period and reproduces the gain."""
     scene = Scene(law="slip", **IMPOSED, **OSCILLATES)
     found = read(NormalStressResponse(samples=16), scene)
     assert found["time"][-1] == pytest.approx(PERIOD, rel=1e-12)
@@ -115,8 +122,9 @@ STEP = {"normal_stress_step": 0.1, "load_velocity_ratio": 1.0}
 @pytest.mark.parametrize("step", [-0.1, 0.1])
 @pytest.mark.parametrize("law", ["slip", "slowness", "perrin_rice_zheng"])
 def test_a_stiff_slider_comes_close_to_a_rigid_one(law, step):
-    """The departure from the closed form falls in proportion to 1/K; at once, the state has lost
-    alpha ln r.
+    """The deviation from the closed form is proportional to 1/K.
+
+    The immediate change of the state is -alpha ln r.
     """
     departures = []
     for ratio in (60.0, 600.0):
@@ -129,16 +137,18 @@ def test_a_stiff_slider_comes_close_to_a_rigid_one(law, step):
     assert departures[1] < 0.05 * 0.3 * abs(math.log1p(step))
 
 
-#: Strong oscillations near critical stiffness, which the slider answers every other time alike.
+#: Strong oscillations near the critical stiffness, for which every second period of the response
+#: is the same.
 STRONG = {"law": "slip", **IMPOSED, "a": 0.0148, "mu_star": 0.505, "alpha": 0.41, "b_over_a": 1.58,
           "radiation_damping": 2.22e-8, "stiffness_ratio": 1.18, "oscillation_period": 17.4,
           "oscillation_amplitude": 0.0792, "load_velocity_ratio": 0.616}  # fmt: skip
 
 
 def test_a_response_of_two_periods_is_told_as_that():
-    """And its gain is that over both, which share none: of single periods it is 1.102 and .399.
+    """The gain of a response with two periods includes both periods.
 
-    Slip events jump through spring stress, so that instants resolve it as their number only.
+    The gains of single periods would be 1.102 and 0.399. Slip events cause jumps of spring
+    stress, so the resolution is limited by the number of samples.
     """
     measure, scene = NormalStressResponse(), Scene(**STRONG)
     outcome = measure(scene, Accuracy(1e-5, engine=COMPILED))
@@ -152,11 +162,11 @@ def test_a_response_of_two_periods_is_told_as_that():
     assert single == pytest.approx([1.102, 0.399] * 2, abs=5e-3)
     both = 2.0 / 0.0792 * abs((stress * turn)[:2].mean())
     assert found["gain"] == pytest.approx(both, abs=found["gain_error"])
-    # so many points are kept of both
+    # The number of points is the same for both periods.
     assert np.ptp(found["time"]) == pytest.approx(2.0 * 17.4, rel=1e-9)
     assert found["friction_coefficient"].shape == (65,)
     assert np.ptp(found["friction_coefficient"][[0, 32]]) > 0.05
-    # known to half a per cent, where 1e-5 was asked for
+    # The result has an error of 0.5 %, although 1e-5 was requested.
     assert outcome.status is Status.UNVERIFIED
     assert "gain = 0.389" in outcome.message
     assert "was asked for" in outcome.message

@@ -1,4 +1,4 @@
-"""Sudden changes of imposed normal stress: what they do at once, and what triggers."""
+"""Tests of steps of imposed normal stress and their critical size."""
 
 from __future__ import annotations
 
@@ -23,8 +23,11 @@ from rsfstudy.motion.work_meter import WorkMeter
     inertia=st.booleans(),
 )
 def test_at_the_instant_of_a_step(step, alpha, inertia):
-    """Spring stress stays; the state loses alpha ln s; slip rate jumps by what friction then lacks,
-    or stays with mass, where friction jumps: all to rounding over a.
+    """A step of normal stress changes state and slip rate at once.
+
+    Spring stress is continuous, and the state changes by -alpha ln s. The slip rate jumps
+    so that friction balances the spring. With inertia, the slip rate is continuous and
+    friction jumps. The tolerance is the rounding error divided by a.
     """
     scene = Scene(
         normal_stress="imposed",
@@ -50,9 +53,11 @@ def test_at_the_instant_of_a_step(step, alpha, inertia):
 @pytest.mark.parametrize("law", ["slip", "slowness", "perrin_rice_zheng"])
 @pytest.mark.parametrize("alpha", [0.0, 0.4])
 def test_a_fall_of_normal_stress_triggers_beyond_its_closed_form(law, alpha):
-    """It starts at u = mu_* (q - 1)/a - alpha (1/a - 1/b) ln q with q = sigma_*/sigma; under a load
-    point at rest the threshold is h(u) = -q k/k_cr, where the norm is far enough off. A relative
-    1e-6 on either side decides.
+    """The critical decrease of normal stress agrees with the closed form.
+
+    The motion starts at u = mu_* (q - 1)/a - alpha (1/a - 1/b) ln q with q = sigma_*/sigma.
+    If the load point is held and the norm is large, the threshold is h(u) = -q k/k_cr.
+    Steps that differ by a relative 1e-6 are on both sides of it.
     """
     threshold = {"slip": lambda x: x, "slowness": lambda x: -math.log1p(-x)}
     threshold["perrin_rice_zheng"] = math.asinh

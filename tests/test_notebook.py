@@ -1,4 +1,4 @@
-"""The notebooks run as they stand, and are stored with what they print and draw."""
+"""Tests of the notebooks, which must run and contain their outputs."""
 
 import re
 from pathlib import Path
@@ -11,7 +11,7 @@ from study_runs import HANG_TIMEOUT
 HERE = Path(__file__).parent.parent / "studies"
 NOTEBOOK, FITTING = HERE / "analysis.ipynb", HERE / "fitting.ipynb"
 
-#: What the text of the notebook says of its numbers.
+#: Statements of the notebook about its numbers.
 CONCLUDED = """
 assert errors["ratio"].loc[["a", "b", "slip_distance", "trend1"]].between(2.0, 2.5).all()
 assert 1.3 < errors["ratio"]["mu_star"] < 1.7  # the noise is quieter before the step
@@ -38,7 +38,7 @@ def executed(tmp_path_factory):
     outputs = tmp_path_factory.mktemp("outputs")
     notebook = nbformat.read(NOTEBOOK, as_version=4)
     with pytest.MonkeyPatch.context() as patch:
-        patch.delenv("MPLBACKEND", raising=False)  # the kernel chooses its own
+        patch.delenv("MPLBACKEND", raising=False)  # The kernel selects its own backend.
         patch.setenv("RSFSTUDY_OUTPUTS", str(outputs))
         client = NotebookClient(
             notebook, timeout=HANG_TIMEOUT, resources={"metadata": {"path": outputs}}
@@ -63,7 +63,10 @@ def test_no_cell_complains(executed):
 
 
 def test_fits_tell_what_their_notebook_says():
-    """In the directory of studies, where a user opens it."""
+    """The results agree with the text of the notebook.
+
+    The notebook runs in the directory of studies, as for a user.
+    """
     notebook = nbformat.read(FITTING, as_version=4)
     assert notebook.cells[-1].source.startswith("mine = ")
     notebook.cells.append(nbformat.v4.new_code_cell(CONCLUDED))
@@ -83,7 +86,7 @@ def test_the_record_has_its_licence_beside_it():
 
 
 def test_results_need_nothing_of_ours_to_be_read():
-    """One cell computes the studies, and the last section makes motions to be fitted."""
+    """Only two cells of the notebook import rsfstudy."""
     cells = [c.source for c in nbformat.read(NOTEBOOK, as_version=4).cells if c.cell_type == "code"]
     using = [text for text in cells if "rsfstudy." in text]
     assert len(using) == 2
@@ -92,7 +95,7 @@ def test_results_need_nothing_of_ours_to_be_read():
 
 @pytest.mark.parametrize("path", [NOTEBOOK, FITTING], ids=lambda path: path.stem)
 def test_it_is_stored_with_its_outputs(path):
-    """Small, without complaints and without paths of the machine that ran it."""
+    """The stored notebook is small and contains no errors or local paths."""
     cells = [c for c in nbformat.read(path, as_version=4).cells if c.cell_type == "code"]
     outputs = [output for cell in cells for output in cell.outputs]
     assert sum("image/png" in output.get("data", {}) for output in outputs) >= 2

@@ -1,4 +1,4 @@
-"""Where there is nothing to read off a velocity step or a hold, and where it is hard to see."""
+"""Tests of steps and holds without a measurable response."""
 
 import importlib
 import math
@@ -37,7 +37,11 @@ from rsfstudy.status import Status
     ],
 )  # fmt: skip
 def test_a_peak_stands_above_what_follows_by_more_than_its_error(fields, relaxation, digits):
-    """Friction comes from below to steady sliding, and turns there within the tolerance alone."""
+    """A peak within the error estimate is not reported.
+
+    Friction approaches steady sliding from below, and has a maximum only within the
+    tolerance.
+    """
     scene = Scene(normal_stress="constant", **fields)
     outcome = Healing(phases=2)(scene, Accuracy(10.0**-digits, engine=COMPILED))
     assert (outcome.status, outcome.message[:7]) == (Status.NOT_APPLICABLE, "no peak")
@@ -45,7 +49,10 @@ def test_a_peak_stands_above_what_follows_by_more_than_its_error(fields, relaxat
 
 
 def drawn(number: int) -> Scene:
-    """A scene with a step of velocity, from wide ranges; of some, states strengthen."""
+    """Return a random scene with a velocity step.
+
+    In some scenes, a state strengthens friction.
+    """
     draw = np.random.default_rng([4, number])
     several = {
         "law": "two_slowness_states",
@@ -67,9 +74,11 @@ def drawn(number: int) -> Scene:
 
 
 def test_no_number_of_a_step_that_is_ok_is_missing():
-    """Whether friction has no extremum (above the cut-off), evolves the way of the direct effect (a
-    state that strengthens), or crosses the level twice in the integration step of its peak (at
-    loose tolerances): of each kind there are some.
+    """All outputs of a measure with the status OK are finite.
+
+    Friction may have no extremum (above the cut-off), may evolve in the direction of the
+    direct effect (a strengthening state), or may cross the level twice in one integration
+    step (at loose tolerances). The random scenes include all cases.
     """
     ended = []
     for number in range(90):
@@ -84,16 +93,16 @@ def test_no_number_of_a_step_that_is_ok_is_missing():
 
 
 NOTHING = Record({name: np.arange(3.0) for name in ("time", "displacement", "friction")})
-#: What measures need to be asked with.
+#: Arguments that measures require.
 ASKED: dict[type, list[Any]] = {Fit: [(NOTHING,)], Elasticities: [VelocityStep()]}
-#: What fits look for bears the names that it has in scenes and rigs.
+#: Parameters of fits that have the same names as fields of scenes and rigs.
 SHARED = {"a", "mu_star", "slip_distance"}
 
 
 def every_measure() -> list[Measure]:
-    """Those of rsfstudy, as they are without an argument."""
+    """Return all measures of rsfstudy with default fields."""
     for name in measures.__all__:
-        getattr(measures, name)  # loads its module
+        getattr(measures, name)  # The access loads the module of the measure.
     for module in pkgutil.iter_modules(named_studies.__path__):
         importlib.import_module(f"{named_studies.__name__}.{module.name}")
 
@@ -107,8 +116,9 @@ def every_measure() -> list[Measure]:
 
 @pytest.mark.parametrize("measure", every_measure(), ids=lambda measure: measure.name)
 def test_each_number_is_described_once(measure):
-    """By its measure or by the vocabulary; an error, and what else stands beside, by what it is
-    of.
+    """Each output is described by its measure or by the vocabulary.
+
+    The description of an error refers to the output.
     """
     own = {about.name: about for about in measure.quantities}
     assert len(own) == len(measure.quantities)
@@ -120,8 +130,11 @@ def test_each_number_is_described_once(measure):
 
 @pytest.mark.parametrize("measure", every_measure(), ids=lambda measure: measure.name)
 def test_no_outcome_is_ok_without_a_number_that_has_an_error(measure, monkeypatch):
-    """Whatever `compute` gives: each such number, and its error, is there and finite, or is left
-    out because the measure says that it may be. (Errors of 1 would be more than was asked for.)
+    """An outcome with missing or NaN outputs does not have the status OK.
+
+    Outputs with error estimates must be finite unless the measure declares them optional.
+    The errors in this test are small, because errors of 1 would exceed the requested
+    accuracy.
     """
     whole = {
         name: np.full([len(measure.inner_coordinates[dim]) for dim in dims], 2.0 + number)

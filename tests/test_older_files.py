@@ -1,4 +1,7 @@
-"""Files of older layouts: they open, are checked and drawn, and the run they are of goes on."""
+"""Tests of files with older layouts.
+
+The tests cover reading, checking, plotting and resuming.
+"""
 
 import contextlib
 import json
@@ -17,8 +20,9 @@ from rsfstudy.status import Status
 from rsfstudy.storage import schema
 from rsfstudy.study import study_loader
 
-#: Written by rsfstudy 0.1.0 before files named their layout: a study with its journal and as a
-#: store, a named one narrowed by --set, one with failed cells, and a motion.
+#: Files written by rsfstudy 0.1.0, before files contained a layout number: a study with its
+#: journal and as a Zarr store, a named study narrowed with --set, a study with failed cells, and
+#: a motion.
 LAYOUT_1 = Path(__file__).with_name("layout_1.tar.xz")
 RESULTS = ["tiny.nc", "tiny.zarr", "rate_step_boundary.nc", "displacement_boundary.nc"]
 
@@ -66,7 +70,8 @@ def test_they_hold_what_they_held(older):
 def test_they_are_computed_again_from_themselves(older):
     table = rsfstudy.rerun(older / "tiny.nc", workers=0, progress=False)
     assert (table.beyond_errors.fillna(0) == 0).all()
-    assert "python" in table.attrs["differs"]  # which fingerprints did not name
+    # Old fingerprints did not contain the Python version.
+    assert "python" in table.attrs["differs"]
 
 
 def test_files_name_their_layout(tmp_path):
@@ -84,7 +89,7 @@ def test_a_motion_opens_and_is_drawn(older):
 
 
 def test_a_run_goes_on(older, tmp_path, monkeypatch):
-    """With code of today, whose fingerprint the journal is given."""
+    """A run resumes from an old journal with a current fingerprint."""
     study = rsfstudy.open(older / "tiny.nc").rsf.study
     journal = tmp_path / "tiny.cells.sqlite"
     journal.write_bytes((older / "tiny.cells.sqlite").read_bytes())

@@ -1,5 +1,7 @@
-"""A measure of a user's own that goes wrong: what no lattice can hold is refused before any work,
-and an outcome that cannot be is a failed cell, with its message.
+"""Tests of invalid user-defined measures.
+
+Invalid declarations are rejected before any work, and invalid outcomes lead to failed cells
+with a message.
 """
 
 import re
@@ -17,12 +19,12 @@ from rsfstudy.status import Status
 
 
 def named(value: object) -> str:
-    """The name of a case: the same in each process, where the address of an object is not."""
+    """Return a test id without memory addresses, equal in all processes."""
     return re.sub(" at 0x[0-9a-f]+", "", repr(value))[:80]
 
 
 class Own(Measure):
-    """Gives b/a."""
+    """Measure that returns b/a."""
 
     name = "own"
     primary_output = "total"
@@ -40,12 +42,12 @@ def study(measure, **parts):
 
 
 def own(**declared) -> Measure:
-    """A measure that declares something else."""
+    """Return a measure with other declarations."""
     return type("Own", (Own,), declared)()
 
 
 def along(values) -> Measure:
-    """A measure with an inner dimension."""
+    """Return a measure with an inner dimension."""
     return own(variables={"total": (), "curve": ("x",)}, inner_coordinates={"x": values})
 
 
@@ -53,7 +55,10 @@ def along(values) -> Measure:
 
 
 class Outputs(Measure):
-    """Gives b/a, as a stress and along a dimension, and now and then its logarithm."""
+    """Measure that returns b/a as a stress and a curve, and its logarithm.
+
+    The logarithm is missing in some cells.
+    """
 
     name = "outputs"
     primary_output = "total"
@@ -76,7 +81,7 @@ class Outputs(Measure):
 
 
 def test_a_measure_states_its_outputs_once(tmp_path):
-    """Names, errors, dimensions and descriptions of a file follow from them."""
+    """The attributes of a file follow from the declared outputs."""
     measure = Outputs()
     assert dict(measure.variables) == {
         "total": (),
@@ -102,7 +107,7 @@ def test_a_measure_states_its_outputs_once(tmp_path):
     assert (error["units"], error["scale"]) == ("1", "sigma_*")
     assert dataset.x.attrs["long_name"] == "distance along the fault"
     assert dataset.curve.attrs["long_name"] == "curve"
-    # the vocabulary describes what says no more than its name
+    # The vocabulary describes outputs that are declared by name only.
     assert dataset.slip_per_event.attrs["long_name"] == "slip per stick-slip cycle"
 
 
@@ -150,7 +155,7 @@ def test_inner_coordinates_that_a_file_gives_back(values, tmp_path):
 
 @pytest.mark.parametrize("count", [2**63, -1, -(2**70), 1.5, np.nan, "many"])
 def test_work_that_is_no_count(count, tmp_path):
-    """Each cell ends as one that raised; the journal and the file hold it."""
+    """Cells with an invalid work count fail with a message in the file."""
 
     def compute(self, scene, accuracy, meter):
         meter.evaluations = count

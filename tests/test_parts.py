@@ -1,4 +1,4 @@
-"""A part is one file: what a law of another kind takes, and that everything follows from it."""
+"""Tests of the parts of a scene, and of properties that follow from them."""
 
 import inspect
 import math
@@ -21,8 +21,10 @@ from rsfstudy.status import Status
 
 
 def test_orbits_of_another_law_need_not_close_at_critical_stiffness():
-    """By the laws of the paper they do; by others they may grow, so that a boundary has to leave
-    open what happens there.
+    """Orbits at the critical stiffness need not be closed for every law.
+
+    Orbits are closed for the laws of the paper, but orbits of other laws may grow.
+    Therefore, the boundary at the critical stiffness is not verified for other laws.
     """
     critical = {"normal_stress": "constant", "load_velocity_ratio": 1.05}
     grown = {}
@@ -37,7 +39,7 @@ def test_orbits_of_another_law_need_not_close_at_critical_stiffness():
 
 
 def test_a_part_owns_its_fields():
-    """Each is described once, by the part."""
+    """Each field is described once, by its part."""
     described = {quantity.name for quantity in part_registry.FIELD_QUANTITIES}
     assert described == set(part_registry.FIELD_NAMES)
     assert Scene(inertia=True, radiation_damping=0.0).inertia is True
@@ -49,7 +51,10 @@ def half_as_strong(friction, ratio, change, p):
 
 
 def test_every_part_states_its_equation():
-    """In its own docstring or in those of its functions: the page of names shows them."""
+    """The docstring of each part, or of its functions, contains an equation.
+
+    The reference page of names shows the equations.
+    """
     for part in part_registry.PART_CLASS_BY_FIELD_NAME.values():
         functions = (one.__func__ for one in vars(part).values() if isinstance(one, staticmethod))
         stated = " ".join(inspect.getdoc(one) or "" for one in (part, *functions))
@@ -69,8 +74,10 @@ class LeakyFault(DilatantFluid):
 
 
 def test_a_part_with_equations_of_its_own_inherits_no_conclusions():
-    """What follows from the equations of another: d sigma/d tau and alpha, by which published
-    formulas and the friction of Coulomb stress go, or a bound of pore pressure.
+    """User-defined equations do not inherit properties of other equations.
+
+    Examples of such properties are d sigma/d tau and alpha, which published formulas and
+    the Coulomb stress use, and a bound of pore pressure.
     """
     own, half = Scene(normal_stress=HalfEffect, alpha=0.4), Scene(alpha=0.2)
     assert own.critical_stiffness == pytest.approx(half.critical_stiffness, rel=1e-12)

@@ -1,4 +1,4 @@
-"""Motions that repeat themselves after several events, or never; and Floquet multipliers."""
+"""Tests of periodic and aperiodic motions, and of Floquet multipliers."""
 
 import math
 
@@ -22,7 +22,7 @@ from rsfstudy.motion.work_meter import WorkMeter
 from rsfstudy.slider.stability import linear_growth_rates
 from rsfstudy.status import Status
 
-#: Slow oscillations of two slip states, started close to where they end (Gu et al. 1984).
+#: Slow oscillations of two slip states, started close to their attractor (Gu et al. 1984).
 SLOW = {
     "law": "two_slip_states",
     "normal_stress": "constant",
@@ -37,7 +37,7 @@ def slow(ratio: float, **fields) -> Scene:
 
 
 def quick(rtol: float) -> Accuracy:
-    """By the engine that is quick: of hundreds of events, few things depend on who follows them."""
+    """Return an accuracy with the compiled engine, for hundreds of events."""
     return Accuracy(rtol, 2_000_000, engine=COMPILED)
 
 
@@ -49,7 +49,7 @@ def came_to(scene: Scene, events: int = 64, rtol: float = 1e-7, **how):
 
 @pytest.mark.parametrize("law", ["slip", "slowness"])
 def test_the_multiplier_of_one_state_is_the_slope_of_its_return_map(law):
-    """Which limit cycles have known all along, from two cycles in a row."""
+    """The multiplier equals the slope from two successive cycles."""
     scene = Scene(law=law, stiffness_ratio=0.8, load_velocity_ratio=2.0, inertia=True)
     accuracy, meter = Accuracy(1e-8), WorkMeter(2_000_000)
     approach = LimitCycleSearch(scene, accuracy, meter)
@@ -63,8 +63,10 @@ def test_the_multiplier_of_one_state_is_the_slope_of_its_return_map(law):
 
 
 def test_close_to_critical_stiffness_a_multiplier_is_what_growth_leaves():
-    """Where small oscillations have grown to their limit, departures die down twice as fast as the
-    small ones grew (Hopf), once around in 2 pi/omega.
+    """Near the critical stiffness, the multiplier follows from growth rates.
+
+    After a Hopf bifurcation, deviations from the limit cycle decay at twice the growth rate
+    of small oscillations, over a period of 2 pi/omega.
     """
     for off in (2e-3, 5e-4):
         scene = slow(1.0 - off, displacement_step=0.02 + 14.0 * math.sqrt(off))
@@ -82,7 +84,7 @@ def followed(scene: Scene, count: int) -> list[Cycle]:
     ("ratio", "period"), [(0.95, 1), (0.9, 1), (0.868, 1), (0.865, 2), (0.86, 2), (0.856, 4)]
 )
 def test_periods(ratio, period):
-    """And what comes after a period is what was there before, to the accuracy."""
+    """The motion repeats after each period to the requested accuracy."""
     scene = slow(ratio)
     found = LimitCycle(phases=50)(scene, quick(1e-7))
     assert found.status is Status.OK
@@ -92,7 +94,7 @@ def test_periods(ratio, period):
     assert orbit.is_attracting
     begin, end = map(section_vector_at, (orbit.cycles[0].start_point, orbit.cycles[-1].end_point))
     assert np.abs(end - begin).max() < 1e-6 * scene.a
-    # the orbit is that of the whole period, and the numbers are those of its largest event
+    # The orbit covers the whole period, and the outputs belong to its largest event.
     assert found.values["time"][-1] == pytest.approx(
         sum(cycle.recurrence_interval for cycle in orbit.cycles), rel=1e-6
     )
@@ -104,7 +106,8 @@ def test_periods(ratio, period):
         largest.recurrence_interval, rel=1e-6
     )
     assert np.ptp(found.values["shear_stress"]) >= 0.99 * found.values["static_stress_drop"]
-    # slip over the period is that of the load point; over an event, less what the spring keeps
+    # Slip over a period equals the load point displacement. Slip per event also depends on the
+    # change of spring stress.
     slips = [
         cycle.recurrence_interval
         - (cycle.end_point.spring_stress - cycle.start_point.spring_stress) / scene.stiffness
@@ -136,7 +139,7 @@ def test_a_multiplier_passes_minus_one_where_the_period_doubles():
     assert before["lyapunov_exponent"] == pytest.approx(
         math.log(-before["floquet_multiplier"]), abs=1e-5
     )
-    # the cycle of one event goes on, and the peaks lie around it
+    # The one-event cycle still exists, and the peaks lie on both sides of it.
     peaks = after["peak_log10_slip_rate"]
     assert peaks.min() < after["one_event_log10_peak"] < peaks.max()
     assert after["peak_spread"] == pytest.approx(np.ptp(peaks), abs=1e-12)
@@ -159,17 +162,23 @@ def test_what_never_repeats_itself_says_so(engine):
 
 
 def test_swings_that_still_shrink_are_not_called_aperiodic():
-    """Above critical stiffness each is a part smaller than the last, and twelve are not at rest."""
+    """Decaying oscillations are not reported as aperiodic.
+
+    Above the critical stiffness, each oscillation is a fraction of the previous
+    oscillation, and twelve events are not enough to settle.
+    """
     found = LimitCycle(events=12)(slow(1.12, load_velocity_ratio=1.02), quick(1e-6))
     assert found.status is Status.WORK_BUDGET_SPENT
     assert "no cycle repeats yet" in found.message
 
 
 def test_the_growth_of_departures_is_that_of_the_motion_alone(monkeypatch):
-    """Which way a departure begins is forgotten: by derivatives of each event, along more of them.
+    """The Lyapunov exponent is independent of the initial deviation.
 
-    Each event errs by the second order of a step of 1e-4 swings, over a hundredth in which slopes
-    bend: 1e-4. Derivatives in all directions bend more, and have a smaller step here.
+    The reference uses derivatives of each event over more events. The derivatives vary over
+    about 1 % of the oscillation, so steps of 1e-4 times the oscillation cause an error of
+    about 1e-4. The reference uses a smaller step, because the curvature is larger in other
+    directions.
     """
     scene, transient, events = slow(0.853), 24, 16
     found = Bifurcation(transient=transient, events=events)(scene, quick(1e-7)).values

@@ -1,4 +1,4 @@
-"""How far a run has come: lines in a log file, a bar on a terminal, nothing where not wanted."""
+"""Tests of progress reports: lines in a log file, or a bar in a terminal."""
 
 import io
 import itertools
@@ -26,7 +26,7 @@ def told(stream: io.StringIO, monkeypatch, done: list[int], show: bool = True) -
 
 @pytest.fixture
 def clock(monkeypatch):
-    """A clock that goes on by so many seconds whenever it is looked at."""
+    """Return a function that simulates a clock with constant increments."""
 
     def goes(by):
         monkeypatch.setattr(progress.time, "monotonic", itertools.count(0.0, by).__next__)
@@ -36,7 +36,7 @@ def clock(monkeypatch):
 
 @pytest.mark.parametrize(("by", "lines"), [(0.005, 1), (0.11, 10), (5.0, 10)])
 def test_lines_are_few(by, lines, monkeypatch, clock):
-    """A run of 10 s, or less, has its last one; a long one has no more than ten."""
+    """A short run prints its last line, and a long run at most ten lines."""
     clock(by)
     said = told(io.StringIO(), monkeypatch, [0, *range(1001), 1000]).splitlines()
     assert len(said) == lines

@@ -1,4 +1,4 @@
-"""Protocols of the laboratory are segments of loading: identities, then what they cost."""
+"""Tests of protocols as segments of loading."""
 
 import copy
 import json
@@ -55,7 +55,11 @@ def test_protocols_are_what_their_fields_say():
 @pytest.mark.parametrize("engine", ENGINES)
 @pytest.mark.parametrize("begins", [0.0, 7.0])
 def test_a_segment_may_be_as_short_as_time_can_tell(engine, begins):
-    """Below that it is refused. The pulse moves the load point by 1e-11 D_c, of rtol 1e-7."""
+    """Segments may be as short as the resolution of time.
+
+    Shorter segments are rejected. The pulse moves the load point by 1e-11 D_c, and rtol is
+    1e-7.
+    """
     before = [{"velocity": 1.0, "duration": begins}] if begins else []
     after, short = {"velocity": 2.0}, max(1e-16, float(np.spacing(begins)))
 
@@ -71,19 +75,26 @@ def test_a_segment_may_be_as_short_as_time_can_tell(engine, begins):
 
 @pytest.mark.parametrize("engine", ENGINES)
 def test_a_step_may_end_where_its_clock_rounds_to_the_begin(engine, monkeypatch):
-    """As that of slip may; here by a hold that is too short to be told. It changes nothing."""
+    """A step that is shorter than the resolution of time changes nothing.
+
+    The step is a hold in this test, but it may also be a step of slip.
+    """
     monkeypatch.setattr(loading, "MIN_SEGMENT_DURATION", 0.0)
     ends = [
         simulate(Scene(**STIFF, load_velocity_ratio=2.0, **hold), duration=5.0, engine=engine)
         for hold in ({}, {"hold_time": 1e-300})
     ]
     one, other = (motion.shear_stress[-1].item() for motion in ends)
-    assert one == pytest.approx(other, abs=1e-7)  # rtol of both
+    assert one == pytest.approx(other, abs=1e-7)  # The tolerance is rtol.
 
 
 @pytest.mark.parametrize("engine", ENGINES)
 def test_a_very_long_hold_ends_when_it_should(engine):
-    """Its clock is slip, which tells time to 1e-7 by then; its end is told by the history."""
+    """A very long hold ends at the exact time.
+
+    The independent variable is slip, which resolves time to 1e-7 after such a hold. The
+    loading determines the end.
+    """
     scene = Scene(**STIFF, hold_time=1e10)
     asked = integrate_events(
         scene,
@@ -114,7 +125,7 @@ def test_scenes_differ_by_the_segments_of_their_protocols():
 
 
 def test_a_trajectory_tells_the_segments_of_its_protocol():
-    """As `protocol` takes them; its steady sliding can be drawn whatever loads it."""
+    """The dataset of a motion contains the segments of its protocol."""
     scene = Scene(**STIFF, loading=protocol(HOLDS, "held"))
     motion = simulate(scene, duration=6.0, rtol=1e-4)
     told = json.loads(motion.attrs["scene"])

@@ -1,8 +1,9 @@
-"""Whatever is asked of rsfstudy ends with an answer or an error of its own, in one line: junk for
-each parameter of each call, altered datasets, and junk for each option of each command.
+"""Tests of public functions and commands with invalid arguments.
 
-What is tried is drawn from signatures, options and the parts of a dataset, with a seed: what is new
-is tried too.
+Each call returns a result or raises an error of rsfstudy with a message of one line. The
+tests pass junk to each parameter of each function and to each option of each command, and
+use altered datasets. Parameters and options are taken from signatures with a seed, so new
+parameters are included.
 """
 
 import contextlib
@@ -65,7 +66,10 @@ def place(tmp_path_factory) -> Path:
 
 
 def answered(ask) -> None:
-    """It answers, or refuses in one line of text."""
+    """Assert that a call succeeds or raises an error with a short message.
+
+    The message must be printable text on one line.
+    """
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
         try:
@@ -82,7 +86,7 @@ FIT = (("laws", ["slip"]), ("free", ["a", "mu_star"]), ("noise", "white"), ("sli
 
 
 def record() -> Record:
-    """A step of a load point in 40 rows."""
+    """Return a record of a velocity step with 40 rows."""
     time = np.arange(40.0)
     moved = np.where(time < 20.0, time, 20.0 + 10.0 * (time - 20.0))
     friction = 0.6 + np.where(time < 20.0, 0.0, 0.01 * np.exp(-(time - 20.0)))
@@ -94,7 +98,7 @@ def record() -> Record:
 
 @pytest.fixture(scope="module")
 def calls(place: Path) -> dict[str, dict]:
-    """A call of each function that computes next to nothing."""
+    """Return the arguments of a cheap call of each function."""
     quick = {"duration": 0.1, "rtol": 1e-2, "engine": "compiled"}
     scene = Scene(stiffness_ratio=1.5, load_velocity_ratio=2.0, normal_stress="constant")
     cycling = Scene(stiffness_ratio=0.8, normal_stress="constant")
@@ -123,16 +127,16 @@ def calls(place: Path) -> dict[str, dict]:
 
 
 def functions() -> list[tuple[str, str]]:
-    """Functions that are public, and their parameters."""
+    """Return the public functions and their parameters."""
     named = {name: getattr(rsfstudy, name) for name in rsfstudy.__all__}
     return [
         (name, parameter)
         for name, function in named.items()
         if inspect.isfunction(function) and name not in ("protocol", "studies")
         for parameter, kind in inspect.signature(function).parameters.items()
-        # a client, or a figure, of one's own may be anything
+        # A user-defined client or figure may be any object.
         if parameter not in ("client", "own", "workers", "progress")
-        # fields of scenes are tried in what is made
+        # The constructors are tested with fields of scenes.
         and not (name == "run" and parameter in FIELD_NAMES)
         and kind.kind not in (inspect.Parameter.VAR_KEYWORD, inspect.Parameter.VAR_POSITIONAL)
     ]
@@ -177,18 +181,18 @@ def test_a_call_that_does_not_fit_is_a_type_error_of_python():
 
 
 def declared_in(dataset: xr.Dataset) -> dict[str, object]:
-    """What its declaration says, if it has one."""
+    """Return the declaration of a dataset as a dictionary."""
     return json.loads(dataset.attrs.get("declaration", "{}"))
 
 
 def undeclared(dataset: xr.Dataset, name: str) -> xr.Dataset:
-    """The dataset without a part of its declaration."""
+    """Return the dataset without one element of its declaration."""
     rest = {n: part for n, part in declared_in(dataset).items() if n != name}
     return dataset.assign_attrs(declaration=json.dumps(rest))
 
 
 def alterations(dataset: xr.Dataset) -> dict[str, xr.Dataset]:
-    """Whatever a notebook may make of a dataset."""
+    """Return altered copies of a dataset, as a notebook may create them."""
     dims = list(map(str, dataset.dims))
     numbers = [str(n) for n, v in dataset.data_vars.items() if v.dtype.kind == "f"]
     made = {
@@ -240,7 +244,7 @@ def test_altered_datasets(of, place):
             lambda d=dataset: rsfstudy.compare(whole, d),
         ):
             answered(ask)
-        if name in drawn:  # figures take a while
+        if name in drawn:  # Figures are slow.
             answered(dataset.rsf.plot)
 
 
@@ -273,7 +277,7 @@ def test_a_declaration_without_end_is_refused_at_once(crafted, tmp_path):
 
 
 def commands(place: Path) -> dict[str, list[str]]:
-    """A call of each command that computes next to nothing."""
+    """Return the arguments of a cheap call of each command."""
     file = str(place / "lattice.nc")
     return {
         "list": [],

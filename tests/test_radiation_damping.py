@@ -1,4 +1,4 @@
-"""Radiation damping: its balance, its limits, its critical stiffness, and a second formulation."""
+"""Tests of radiation damping: force balance, limits and critical stiffness."""
 
 import math
 
@@ -28,7 +28,7 @@ def test_friction_and_radiation_balance_the_spring(
     scene, strength = scene.with_(radiation_damping=damping), build_friction_relation(scene)
     point = equations_between_ruptures(scene, with_time=False).evaluate_point((spring_stress, psi))
     x, friction = point.log_slip_rate, point.frictional_stress
-    # rounding of the stresses, and of x times the slope of radiation in x
+    # Rounding errors of the stresses, and of x times the derivative of the radiated stress.
     radiated = damping * math.expm1(x)
     scale = 1.0 + abs(spring_stress) + abs(psi) + (1.0 + abs(x)) * abs(radiated)
     assert spring_stress - radiated == pytest.approx(friction, abs=1e-14 * scale)

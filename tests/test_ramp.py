@@ -1,5 +1,7 @@
-"""Ramps of imposed normal stress: exact, a step where they are short, and nothing once over; and
-ramps of load point velocity, in stairs.
+"""Tests of ramps of imposed normal stress and load point velocity.
+
+Short ramps equal steps, and a ramp has no effect after its end. Velocity ramps are
+approximated by stairs.
 """
 
 import math
@@ -27,8 +29,11 @@ RAMP = {"normal_stress_ramp": 0.1, "ramp_duration": 4.0}
 @pytest.mark.parametrize("engine", ENGINES)
 @pytest.mark.parametrize("over", [0.3, 1.0, 1.7])
 def test_where_stability_limits_steps_a_motion_ends_as_accurately_as_steps_do(over, engine):
-    """A spring sixty times stiffer than critical: what dense output tells within such steps is off
-    by a hundred times the accuracy, and a ramp handed that on to the rest of the motion.
+    """The end of a ramp is as accurate as the end of a step.
+
+    The spring is sixty times stiffer than critical, so stability limits the steps. Dense
+    output within such steps has 100 times the requested error and must not be used at the
+    end of the ramp.
     """
     scene = Scene(law="slip", a=0.005, b_over_a=2.4, normal_stress="imposed", alpha=0.2,
                   load_velocity_ratio=1.1, stiffness=0.36, normal_stress_ramp=0.33,
@@ -42,7 +47,7 @@ def test_where_stability_limits_steps_a_motion_ends_as_accurately_as_steps_do(ov
         return end.point.log_slip_rate, end.point.spring_stress / scene.a
 
     exact = at_end(1e-11, COMPILED)
-    # three times the accuracy asked for: local errors add up
+    # The tolerance is three times the requested accuracy, because local errors accumulate.
     for rtol in (1e-5, 1e-7, 1e-9):
         assert at_end(rtol, engine) == pytest.approx(exact, abs=3.0 * rtol)
 
@@ -84,7 +89,10 @@ PLAIN = {"law": "slowness", "normal_stress": "constant", "stiffness_ratio": 3.0}
 
 @pytest.mark.parametrize("change", [-0.8, 4.0])
 def test_stairs_tend_to_a_ramp_of_velocity_as_the_square_of_their_number(change):
-    """By equations in time, up to the end of the ramp and beyond it."""
+    """The error of stairs is inversely proportional to their number squared.
+
+    The reference is an independent integration in time to a point after the ramp.
+    """
     scene = Scene(**PLAIN, velocity_ramp=change, velocity_ramp_duration=4.0)
     known, off = (
         TimeDomainMotion(Scene(**PLAIN), velocity_ramp=change).solve([5.0])[0][0].spring_stress,

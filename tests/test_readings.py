@@ -1,5 +1,7 @@
-"""What an experimenter reads off a velocity step and a hold: identities, then closed forms and how
-they are approached, then a second formulation.
+"""Tests of the measures of velocity steps and holds.
+
+The references are identities, closed forms and the approach to them, and a second
+formulation.
 """
 
 import math
@@ -29,7 +31,10 @@ def read(measure, scene: Scene, rtol: float = 1e-7, **options) -> dict:
 
 @pytest.mark.parametrize("law", LAWS)
 def test_a_step_back_is_the_step_down_from_there(law):
-    """Friction has no velocity of its own: from 5 V_* to V_* is from V_* to V_*/5, once settled."""
+    """A step from 5 V_* to V_* equals a step from V_* to V_*/5.
+
+    Friction has no intrinsic velocity scale once the slider is in steady state.
+    """
     stepped = Scene(
         law=law, **PLAIN, velocity_steps=2, velocity_ratio=5.0, displacement_between_steps=25.0
     )
@@ -38,12 +43,12 @@ def test_a_step_back_is_the_step_down_from_there(law):
         VelocityStep(phases=2), Scene(law=law, **PLAIN, velocity_steps=1, velocity_ratio=0.2)
     )
     for name in ("apparent_a", "apparent_b", "apparent_a_minus_b", "corrected_slip_distance"):
-        # exp(-25) of the first evolution is left
+        # A fraction of exp(-25) of the first evolution remains.
         assert back[name] == pytest.approx(down[name], rel=2e-7), name
     assert back["friction_before"] - stepped.mu_star == pytest.approx(
         (stepped.a - stepped.b) * math.log(5.0), rel=1e-7
     )
-    # the record begins with the step, where slip rate is highest
+    # The record begins with the step, at the maximum of slip rate.
     assert back["slip"][0] == 0.0
     assert back["log10_slip_rate"].argmax() == 0
 
@@ -51,7 +56,10 @@ def test_a_step_back_is_the_step_down_from_there(law):
 @pytest.mark.parametrize("law", LAWS)
 @pytest.mark.parametrize("normal_stress", ["constant", "variable"])
 def test_what_is_read_adds_up_and_a_minus_b_is_true(law, normal_stress):
-    """mu_ss = mu_* + (a - b) ln V, however normal stress follows shear stress."""
+    """The measured friction changes by (a - b) ln V between steady states.
+
+    The change is the same for constant and variable normal stress.
+    """
     scene = Scene(law=law, normal_stress=normal_stress, stiffness_ratio=4.0, load_velocity_ratio=2)
     found = read(VelocityStep(record=25.0, phases=50), scene)
     assert found["apparent_a_minus_b"] == pytest.approx(scene.a - scene.b, rel=1e-6)
@@ -65,7 +73,10 @@ def test_what_is_read_adds_up_and_a_minus_b_is_true(law, normal_stress):
 
 
 def late(law: str, rate: float) -> float:
-    """As in the study velocity_steps: first order in a/K, in units of b a/K."""
+    """Return the first-order deviation in a/K, in units of b a/K.
+
+    The function repeats the definition of the study velocity_steps.
+    """
     if law == "slowness":
         return rate * math.exp(-rate) - math.expm1(-rate)
     return quad(lambda y: y / math.expm1(y) if y else 1.0, 0.0, rate)[0] + rate
@@ -74,8 +85,9 @@ def late(law: str, rate: float) -> float:
 @pytest.mark.parametrize("law", LAWS)
 @pytest.mark.parametrize("ratio", [0.2, 5.0])
 def test_a_stiff_slider_comes_close_to_a_rigid_one(law, ratio):
-    """Friction departs from the closed form by what first order says, and what that leaves out
-    falls in proportion to 1/K.
+    """The deviation from the closed form agrees with its first order.
+
+    The remaining difference is proportional to 1/K.
     """
     left = []
     for stiffness in (100.0, 1000.0):
@@ -113,7 +125,7 @@ def test_where_there_is_no_closed_form_there_is_no_departure(number, fields, kno
 
 
 DILATANT = {"normal_stress": "constant", "fluid": "dilatant", "dilatancy": 0.02, "drainage": 1.0}
-#: Where the extremum of spring stress is not that of the friction coefficient that is read.
+#: Scenes in which the extrema of spring stress and apparent friction differ.
 APART = [
     {**DILATANT, "stiffness": 0.5},
     {**DILATANT, "stiffness": 0.05, "drainage": 10.0},
@@ -124,8 +136,9 @@ APART = [
 
 
 def recorded(scene: Scene, begins: float, lasts: float) -> tuple:
-    """Extremes of friction after an instant, from what `simulate` keeps: a spline, its highest and
-    its lowest point.
+    """Return the extrema of apparent friction of a simulated motion.
+
+    The function returns a spline of friction, and the times of its maximum and minimum.
     """
     motion = simulate(scene, duration=begins + lasts, rtol=1e-11, engine=COMPILED)
     since, kept = np.unique(motion.time.values - begins, return_index=True)
@@ -138,7 +151,7 @@ def recorded(scene: Scene, begins: float, lasts: float) -> tuple:
 @pytest.mark.parametrize("ratio", [0.2, 10.0])
 @pytest.mark.parametrize("fields", APART)
 def test_a_step_is_read_off_friction_not_off_the_spring(fields, ratio):
-    """Its extremum, and where 1/e of the evolution is left, are those of what is recorded."""
+    """Peak and slip distance of a step agree with the apparent friction."""
     scene = Scene(law="slowness", b_over_a=1.5, load_velocity_ratio=ratio, **fields)
     friction, highest, lowest = recorded(scene, 0.0, 20.0 / ratio)
     peak, end = (highest if ratio > 1.0 else lowest), 20.0 / ratio
@@ -160,7 +173,10 @@ def test_healing_is_read_off_friction_not_off_the_spring(fields):
 
 
 def test_a_hold_of_a_longer_protocol_is_read_from_where_it_begins():
-    """After a step that has settled: the hold from 2 V_*, twice as long in its own time."""
+    """A hold after a velocity step equals a hold from steady sliding.
+
+    The hold starts from 2 V_*, so it is twice as long in its own time scale.
+    """
     rows = [
         {"velocity": 2.0, "distance": 30.0},
         {"velocity": 0.0, "duration": 50.0},
@@ -177,7 +193,10 @@ def test_a_hold_of_a_longer_protocol_is_read_from_where_it_begins():
 
 @pytest.mark.parametrize("displaced", [0, 1])
 def test_a_displacement_is_no_part_of_a_hold(displaced):
-    """Spring stress would jump where relaxation and healing are read."""
+    """A hold with a displacement step is not applicable.
+
+    Spring stress would jump at the measured points.
+    """
     rows = [{"velocity": 0.0, "duration": 10.0}, {"velocity": 1.0}]
     rows[displaced]["step"] = -0.5
     scene = Scene(law="slowness", **PLAIN, loading=protocol(rows))
@@ -190,7 +209,7 @@ def test_a_displacement_is_no_part_of_a_hold(displaced):
 
 
 def test_friction_that_still_changes_has_not_settled():
-    """However few steps the integrator took."""
+    """The flag ``settled`` is independent of the number of steps."""
     scene = Scene(law="slip", **PLAIN, velocity_steps=1, velocity_ratio=1.5)
     for record, settled in ((1.0, 0.0), (2.0, 0.0), (25.0, 1.0)):
         found = read(VelocityStep(record=record, phases=2), scene, 1e-4)
@@ -198,8 +217,9 @@ def test_friction_that_still_changes_has_not_settled():
 
 
 def with_mass(hold: float, scene: Scene) -> float:
-    """Friction that a rig reads after a hold, less mu_*: the full equations against time, by the
-    state variable itself.
+    """Return the apparent friction after a hold, minus mu_*.
+
+    The full equations with inertia are integrated in time, with the state variable itself.
     """
     a, b, mu, stiffness = scene.a, scene.b, scene.mu_star, scene.stiffness
     cot, alpha, inertia = scene.parts.normal_stress.cot_phi, scene.alpha, scene.inertial_time
@@ -221,7 +241,10 @@ def with_mass(hold: float, scene: Scene) -> float:
 
 
 def test_friction_of_a_mass_is_read_the_instant_before_the_load_point_changes():
-    """What mass takes of spring stress is then still that of the load point before."""
+    """Friction with inertia is measured just before the velocity changes.
+
+    The inertial stress still belongs to the previous velocity.
+    """
     plain = {"law": "slowness", "normal_stress": "variable", "a": 0.01, "b_over_a": 1.2}
     plain |= {"mu_star": 0.6, "stiffness": 0.05, "alpha": 0.3, "inertia": True}
     scene = Scene(**plain, reference_rate=1e-3, period=2.0 * math.pi)
@@ -229,10 +252,11 @@ def test_friction_of_a_mass_is_read_the_instant_before_the_load_point_changes():
     assert step["friction_before"] == pytest.approx(0.6, abs=1e-15)
     held = scene.with_(hold_time=5.0, load_velocity_ratio=10.0)
     hold = read(Healing(phases=2), held)
-    # an error of a reading after the hold has begun would be 1e-7
+    # A measurement after the start of the hold would have an error of 1e-7.
     assert hold["relaxation"] == pytest.approx(with_mass(5.0, held), abs=1e-9)
     rows = [{"velocity": 2.0, "distance": 30.0}, {"velocity": 20.0}]
     later = read(VelocityStep(step_number=2, phases=2), scene.with_(loading=protocol(rows)))
     steady = 0.6 + (scene.a - scene.b) * math.log(2.0)
-    # three times its error estimate; exp(-30) of the evolution before is left
+    # The tolerance is three times the error estimate, and a fraction of exp(-30) of the earlier
+    # evolution remains.
     assert later["friction_before"] == pytest.approx(steady, abs=2e-9)

@@ -1,5 +1,7 @@
-"""The README and its pages tell the truth: their Python runs as it stands, their commands exist,
-their numbers are ours.
+"""Tests of the README and the documentation pages.
+
+The Python examples run without changes, the commands exist, and the printed numbers agree
+with computed values.
 """
 
 import ast
@@ -21,16 +23,19 @@ from rsfstudy.slider import laws
 from rsfstudy.slider.parts import field_names
 
 ROOT = Path(__file__).parent.parent
-#: The README, and the pages that go on from it.
+#: The README, and the pages to which it links.
 FILES = [ROOT / "README.md", *sorted((ROOT / "studies" / "pages").glob("*.md"))]
 TEXT = "\n".join(file.read_text() for file in FILES)
 BLOCKS = re.findall(r"```python\n(.*?)```", TEXT, re.DOTALL)
-#: The block that is a file of its own, run by its path.
+#: Index of the code block that is a study file.
 FILE = next(i for i, block in enumerate(BLOCKS) if "study = Study(" in block)
 
 
 def test_the_readme_is_read_in_a_few_minutes():
-    """Sentences too: of what is neither code, nor a table, nor a place to go to."""
+    """The README has at most 150 lines, and sentences of at most 25 words.
+
+    Code, tables and links are excluded.
+    """
     text = FILES[0].read_text()
     assert len(text.splitlines()) <= 150
     prose = re.sub(r"(?ms)^```.*?^```$|^\|.*?$|^#.*?$|<!--.*?-->", "\n\n", text)
@@ -40,7 +45,10 @@ def test_the_readme_is_read_in_a_few_minutes():
 
 
 def test_the_readme_leads_to_each_of_its_pages():
-    """Whether links lead somewhere is asked of the site."""
+    """The README links to each page.
+
+    The tests of the site check that links have valid targets.
+    """
     named = re.findall(r"\]\((studies/pages/[^)#]+)", FILES[0].read_text())
     assert {ROOT / name for name in named} == set(FILES[1:])
 
@@ -55,7 +63,7 @@ def test_there_are_examples():
 
 
 def lay_record(folder: Path) -> None:
-    """The record of the examples where they look for it: in a checkout, or beside its page."""
+    """Copy the record of the examples to the places where they read it."""
     pages = folder / "studies" / "pages"
     pages.mkdir(parents=True)
     for place in (folder, pages):
@@ -64,8 +72,9 @@ def lay_record(folder: Path) -> None:
 
 @pytest.mark.parametrize("number", range(len(BLOCKS)))
 def test_python_runs_as_it_stands(number, tmp_path, tmp_path_factory, cluster, monkeypatch):
-    """In an empty directory, on workers that are there already; where it uses the results of a
-    study, on those.
+    """Each example runs in an empty directory.
+
+    The examples share workers, and results of named studies are copied.
     """
     monkeypatch.chdir(tmp_path)
     code = BLOCKS[number]
@@ -93,7 +102,10 @@ PRINTS = re.findall(r"```python\n([^`]*)```\n\n```text\n(.*?)```", FILES[0].read
 
 @pytest.mark.parametrize(("code", "told"), PRINTS, ids=["cycle", "fit"])
 def test_the_readme_prints_what_it_says(code, told, tmp_path, monkeypatch, capsys):
-    """On any machine: the numbers are far enough from where their last printed digits change."""
+    """The printed digits are correct on any machine.
+
+    The numbers are not close to a rounding boundary.
+    """
     lay_record(tmp_path)
     monkeypatch.chdir(tmp_path)
     names: dict = {}
@@ -107,12 +119,13 @@ def test_the_readme_prints_what_it_says(code, told, tmp_path, monkeypatch, capsy
         assert_digits_hold(value, text)
 
 
-#: Relative difference between processors, which add and multiply in another order: of fits 6e-7.
+#: Relative difference between processors with different orders of operations, which is up to
+#: 6e-7 for fits.
 BETWEEN_MACHINES = 5e-6
 
 
 def assert_digits_hold(value: float, text: str, differs: float = BETWEEN_MACHINES) -> None:
-    """Assert that a number rounds to a text, and would if it were slightly different."""
+    """Assert that a number and slightly different numbers round to a text."""
     half = 0.5 * 10.0 ** -len(text.split(".")[1])
     assert abs(value - float(text)) + differs * abs(value) <= half, (value, text)
 
@@ -125,7 +138,10 @@ def test_digits_that_another_machine_may_round_otherwise_are_found(text):
 
 
 def test_the_command_of_the_readme_fits_the_record(tmp_path, monkeypatch):
-    """And is that of the page on fits, whose output is checked, but for where the record is."""
+    """The command equals the command of the page on fits.
+
+    Only the path of the record differs. The output of that command is tested elsewhere.
+    """
     texts = (FILES[0].read_text(), (ROOT / "studies" / "pages" / "fits.md").read_text())
     here, there = (re.search(r"^rsfstudy fit .*$", text, re.MULTILINE)[0] for text in texts)
     assert here == there.replace("step.csv", "studies/pages/step.csv")
@@ -161,7 +177,7 @@ def test_commands_and_options_exist():
 
 
 def test_the_table_of_promises_names_tests_that_exist():
-    """And none of the tests of running, files and faults is left out."""
+    """The table names existing test modules, and no module is missing."""
     table = TEXT[TEXT.index("| promise | tests |") : TEXT.index("## Scale")]
     named = set(re.findall(r"`(test_\w+\.py)`", table))
     here = Path(__file__).parent
@@ -192,13 +208,16 @@ def test_the_table_of_zeta_is_ours(tmp_path_factory):
     assert len(rows) == dataset.sizes["case"]
     for case, zeta, error in rows:
         row = dataset.sel(case=case)
-        # of motions, machines change the last digits of doubles only, below the error estimate
+        # Processors change the last digits of motions by less than the error estimate.
         assert_digits_hold(float(row.zeta), zeta, float(row.zeta_error))
         assert_digits_hold(float(row.zeta_stderr), error)
 
 
 def lines_of_code(source: str, nodes: list[ast.stmt]) -> int:
-    """Lines of some statements, without blank ones, comments and docstrings."""
+    """Return the number of code lines of some statements.
+
+    Blank lines, comments and docstrings are excluded.
+    """
     lines = source.splitlines()
     first = [min(d.lineno for d in [*getattr(n, "decorator_list", ()), n]) for n in nodes]
     spans = [range(a, n.end_lineno + 1) for a, n in zip(first, nodes, strict=True)]

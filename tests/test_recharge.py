@@ -1,5 +1,7 @@
-"""Pore pressure that is imposed around a fault that dilates: fluid flows in or out, by
-dP/dt = c* (R - P) - (dphi/dt)/beta; held to closed forms, to other equations and to limits.
+"""Tests of a dilatant fault with imposed external pore pressure.
+
+Fluid flows in or out by dP/dt = c* (R - P) - (dphi/dt)/beta. The references are closed
+forms, an independent integration and limits.
 """
 
 import numpy as np
@@ -10,7 +12,7 @@ from rsfstudy import Scene, history, simulate
 from rsfstudy.errors import InvalidValue
 from rsfstudy.motion.engines import COMPILED, ENGINES
 
-#: A ramp up, a stay, and a ramp down to below where it began.
+#: A pressure ramp up, a constant pressure, and a ramp down to a negative value.
 TIME, PRESSURE = np.array([0.0, 4.0, 7.0, 12.0]), np.array([0.0, 0.2, 0.2, -0.1])
 AT = np.linspace(0.5, 20.0, 40)
 INJECTED = history({"time": TIME, "pore_pressure": PRESSURE})
@@ -24,7 +26,10 @@ def at_times(engine=COMPILED, **fields):
 
 @pytest.mark.parametrize("engine", ENGINES)
 def test_pressure_diffuses_into_the_fault(engine):
-    """Without dilatancy: an exponential mean of that around it, ramp by ramp in closed form."""
+    """Without dilatancy, the pressure has a closed form.
+
+    The pressure is an exponential mean of the external pressure, computed for each ramp.
+    """
     motion = at_times(engine, loading=INJECTED, **DILATANT, dilatancy=0.0)
 
     def mean(time, begin, slope):
@@ -36,14 +41,17 @@ def test_pressure_diffuses_into_the_fault(engine):
     expected = sum(mean(AT, begin, change) for begin, change in zip(TIME, changes, strict=True))
     assert np.allclose(motion.pore_pressure, expected, rtol=0.0, atol=1e-8)
     assert np.allclose(motion.normal_stress_ratio, 1.0 - expected, rtol=0.0, atol=1e-8)
-    around = np.interp(AT, TIME, PRESSURE)  # what a rig knows of
+    around = np.interp(AT, TIME, PRESSURE)  # A rig measures the external pressure.
     read = motion.shear_stress.values / (1.0 - around)
     assert np.allclose(motion.friction_coefficient, read, rtol=0.0, atol=1e-8)
 
 
 @pytest.mark.parametrize("engine", ENGINES)
 def test_all_of_it_by_other_equations(engine):
-    """Slowness law, quasi-static, against time, by an integrator of SciPy's."""
+    """Stress and pressure agree with an independent integration in time.
+
+    The reference uses the slowness law without inertia.
+    """
     scene = Scene(**FAULT, loading=INJECTED, **DILATANT, dilatancy=0.02)
     motion = at_times(engine, loading=INJECTED, **DILATANT, dilatancy=0.02)
     a, b, mu, alpha, stiffness = scene.a, scene.b, scene.mu_star, scene.alpha, scene.stiffness
@@ -75,7 +83,11 @@ def test_all_of_it_by_other_equations(engine):
     [("slip", {"inertia": True}), ("two_slowness_states", {"radiation_damping": 1e-3})],
 )
 def test_fast_drainage_is_the_drained_fault(law, dynamics):
-    """Pressure lags by 1/c*, and shear stress by mu_* times its rate over that."""
+    """With fast drainage, the motion approaches the drained motion.
+
+    The pressure lags by 1/c*, and the shear stress differs by mu_* times the pressure rate
+    times this lag.
+    """
     of_law = {"b1_over_a": 1.5} if law.startswith("two") else {}
     fields = {**dynamics, **of_law, "law": law, "loading": INJECTED}
     scenes = (
@@ -89,7 +101,7 @@ def test_fast_drainage_is_the_drained_fault(law, dynamics):
 
 
 def test_dilatancy_of_a_still_record_is_that_without_one():
-    """A record that changes nothing changes nothing; the load point steps."""
+    """A record with constant pressure does not change the motion."""
     still = history({"time": [0.0, 10.0], "pore_pressure": [0.0, 0.0], "velocity": [2.0, 2.0]})
     fields = {**DILATANT, "dilatancy": 0.02}
     with_one = at_times(loading=still, **fields)
@@ -99,7 +111,7 @@ def test_dilatancy_of_a_still_record_is_that_without_one():
 
 
 def test_a_step_of_pressure_around_the_fault_is_none_within_it():
-    """Where the record begins with it, and drains in then."""
+    """A step of external pressure drains into the fault gradually."""
     begun = history({"time": [0.0, 1.0], "pore_pressure": [0.1, 0.1]})
     motion = at_times(loading=begun, **DILATANT, dilatancy=0.0)
     expected = 0.1 * (1.0 - np.exp(-0.5 * AT))
@@ -107,7 +119,10 @@ def test_a_step_of_pressure_around_the_fault_is_none_within_it():
 
 
 def test_normal_stress_beside_a_fluid_is_refused():
-    """Its own change is no pressure that drains."""
+    """A record of normal stress is rejected for a dilatant fault.
+
+    A change of normal stress is not a pressure that drains.
+    """
     for columns in ({}, {"pore_pressure": [0.0, 0.1]}):
         record = history({"time": [0.0, 1.0], "normal_stress": [1.0, 1.1], **columns})
         with pytest.raises(InvalidValue, match="no meaning for fluid='dilatant'"):

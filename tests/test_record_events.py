@@ -1,4 +1,4 @@
-"""Events of records against catalogues whose drops are known."""
+"""Tests of events of synthetic records with known drops."""
 
 from __future__ import annotations
 
@@ -12,7 +12,10 @@ from rsfstudy.errors import InvalidValue, NoResultWarning
 
 @pytest.mark.parametrize("kind", synthetic.KINDS)
 def test_drops_are_found_with_errors_that_cover(kind: str) -> None:
-    """Of 18 drops at 95 %, three outside of their errors have a chance of 6 %."""
+    """All large drops are found, and most errors cover.
+
+    With a coverage of 95 %, the probability that at least three of 18 errors fail is 6 %.
+    """
     found = synthetic.score_record(
         synthetic.KINDS[kind](np.random.default_rng([1, *kind.encode()]))
     )
@@ -26,7 +29,7 @@ def test_a_drop_at_the_end_of_the_record_is_cut() -> None:
     made = synthetic.cut_record(np.random.default_rng(3))
     found = rsfstudy.events(time=made.time, shear_stress=made.stress)
     assert found["cut"].values.tolist() == [0] * (len(made.begins) - 1) + [2]
-    # up to the middle of the third drop, and from there on
+    # The record is split in the middle of the third drop.
     middle = made.begins[2] + 0.5 * made.durations[2]
     later = made.time >= middle
     begins = rsfstudy.events(time=made.time[later], shear_stress=made.stress[later])
@@ -35,7 +38,10 @@ def test_a_drop_at_the_end_of_the_record_is_cut() -> None:
 
 
 def test_a_short_drop_is_not_averaged_away() -> None:
-    """The mean of many drops over five samples is right to within its error."""
+    """The mean size of short drops is correct within its error.
+
+    The drops last five samples.
+    """
     rng = np.random.default_rng(4)
     made = synthetic.draw_record(rng, 0.01 * np.arange(8_000), size=(0.4, 0.4), lasts=(0.05, 0.05))
     found = rsfstudy.events(time=made.time, shear_stress=made.stress)
@@ -50,7 +56,7 @@ def test_the_sign_of_shear_stress() -> None:
     negative = rsfstudy.events(time=made.time, shear_stress=-made.stress)
     assert negative.attrs["sign_of_shear_stress"] == -1
     np.testing.assert_array_equal(negative.stress_before, positive.stress_before)
-    shifted = made.stress - 5.0  # of both signs
+    shifted = made.stress - 5.0  # The shifted stress has both signs.
     centred = rsfstudy.events(time=made.time, shear_stress=-shifted, sign=-1)
     np.testing.assert_allclose(centred.time, positive.time, atol=1e-9)
     assert rsfstudy.events(time=made.time, shear_stress=shifted).sizes["event"] == len(made.begins)
@@ -74,7 +80,7 @@ def test_events_of_a_record_as_fits_read_it() -> None:
     record = rsfstudy.read_record(columns, normal_stress="8 MPa")
     with pytest.warns(
         NoResultWarning, match="no faster"
-    ):  # the displacement is that of the load point
+    ):  # The displacement is the load point displacement.
         found = rsfstudy.events(record)
     plain = rsfstudy.events(time=made.time, shear_stress=made.stress)
     np.testing.assert_allclose(found.static_stress_drop, plain.static_stress_drop, rtol=1e-6)

@@ -1,5 +1,7 @@
-"""What is recorded of a motion: at times asked for, those times exactly, and what a motion that
-ends there does; between steps, as accurately as at their ends, and so along a phase.
+"""Tests of the recording of motions.
+
+Samples are recorded at the exact requested times and agree with motions that end there.
+Values between the steps are as accurate as values at the end of steps.
 """
 
 from __future__ import annotations
@@ -22,7 +24,8 @@ from rsfstudy.responses.step_response import StepResponse
 from rsfstudy.status import Status
 
 RTOL = 1e-6
-#: A load point that starts, rests, is displaced as it goes on, and changes its velocity.
+#: A protocol in which the load point moves, is held, is displaced while it moves again, and
+#: changes its velocity.
 PROTOCOL = protocol(
     [
         {"velocity": 2.0, "duration": 3.0},
@@ -33,7 +36,7 @@ PROTOCOL = protocol(
 )
 SCENES = {
     "one segment": Scene(stiffness_ratio=1.5, load_velocity_ratio=1.5),
-    # where stability limits steps
+    # Stability limits the steps.
     "stiff": Scene(stiffness_ratio=30.0, load_velocity_ratio=3.0),
     "protocol": Scene(loading=PROTOCOL, stiffness_ratio=2.0),
     "protocol with mass": Scene(loading=PROTOCOL, stiffness_ratio=1.6, inertia=True),
@@ -41,13 +44,13 @@ SCENES = {
                   normal_stress_ramp=0.1, ramp_duration=4.0),
     "dilatant": Scene(fluid="dilatant", loading=PROTOCOL, stiffness_ratio=2.0),
 }  # fmt: skip
-#: From the beginning on; two within a step, the end of one segment and the beginning of another,
-#: and the time at which the motion ends.
+#: Times that include the start, two samples within one step, the end of a segment, the beginning
+#: of a segment, and the end of the motion.
 TIMES = np.array([0.0, 1e-9, 0.7, 0.7000001, 3.0, 3.5, 8.0, 8.0 + 1e-9, 10.0, 12.0, 13.7, 15.0])
 
 
 def recorded(scene: Scene, engine: str, times: np.ndarray, until: float = math.inf):
-    """What is recorded, and the events of the motion until it is, or ends."""
+    """Return the recorded table and the events of a motion."""
     recording, events = Recording(sample_times=times), list[Event]()
     meter, accuracy = WorkMeter(10**6, engine=engine), Accuracy(RTOL, engine=engine)
     motion = integrate_events(
@@ -61,7 +64,7 @@ def recorded(scene: Scene, engine: str, times: np.ndarray, until: float = math.i
 
 
 def row_of(scene: Scene, event: Event) -> list[float]:
-    """What is recorded of an event, from slip on."""
+    """Return the recorded variables of an event, starting with slip."""
     point = event.point
     stresses = (
         scene.mu_star + point.spring_stress,
@@ -75,7 +78,11 @@ def row_of(scene: Scene, event: Event) -> list[float]:
 @pytest.mark.parametrize("engine", ENGINES)
 @pytest.mark.parametrize("name", SCENES)
 def test_values_are_those_of_motions_that_end_there(name, engine):
-    """Times to the bit. Both runs are right to the tolerance, one by dense output: 30 of it."""
+    """Samples agree with motions that end at the same times.
+
+    The times are bitwise equal. Both motions meet the tolerance, and one of them uses dense
+    output, so 30 times the tolerance is allowed.
+    """
     scene = SCENES[name]
     table, events = recorded(scene, engine, TIMES, until=15.0)
     assert table[:, 0].tolist() == TIMES.tolist()
@@ -87,7 +94,8 @@ def test_values_are_those_of_motions_that_end_there(name, engine):
         assert (end.kind, end.time) == (EventKind.END, time)
         states = list(end.point.psis[: len(row) - FIRST_STATE_COLUMN])
         expected = [*row_of(scene, end), *states]
-        # relative to changes of one in ln V, and of a in stress and states; slip by that of stress
+        # Scales that correspond to a change of 1 in ln V: a for stress and states. The scale of
+        # slip follows from stress.
         scales = [1.0 + scene.a / scene.stiffness, 1.0, *[scene.a] * (len(expected) - 2)]
         apart = (
             np.abs(
@@ -100,8 +108,10 @@ def test_values_are_those_of_motions_that_end_there(name, engine):
 
 @pytest.mark.parametrize("engine", ENGINES)
 def test_the_end_of_a_segment_is_recorded_and_not_the_beginning_of_the_next(engine):
-    """Where the spring jumps with the load point; and what is asked for there once more is told as
-    often.
+    """A sample at a boundary belongs to the earlier segment.
+
+    The spring stress jumps with the load point. A time that is requested twice is recorded
+    twice.
     """
     scene = SCENES["protocol"]
     table, events = recorded(scene, engine, np.array([8.0, 8.0, 8.0 + 1e-12, 8.5]))
@@ -126,18 +136,18 @@ def test_what_lies_beyond_the_end_is_not_recorded(engine):
 
 # ---- between the steps ---------------------------------------------------------------------------
 
-#: What values may be off by, in the accuracy asked for, times what weighs as much as 1 in ln V.
+#: Tolerance in units of rtol and of the change that corresponds to 1 in ln V.
 ALLOWED = 30.0
 
 
 def weights(scene: Scene) -> dict[str, float]:
-    """What weighs as much as 1 in ln V."""
+    """Return the changes of the variables that correspond to 1 in ln V."""
     stresses = ("shear_stress", "frictional_stress", "state_variable")
     return {"log10_slip_rate": np.log10(np.e), "slip": 1.0} | dict.fromkeys(stresses, scene.a)
 
 
 def exactly(scene: Scene, times: np.ndarray) -> dict[str, np.ndarray]:
-    """The motion at times, a hundred times more accurate than any below."""
+    """Return the motion at given times with a much smaller tolerance."""
     recording, accuracy = Recording(sample_times=times), Accuracy(1e-11, 10**7, engine=COMPILED)
     meter = WorkMeter(10**7, engine=COMPILED)
     list(integrate_events(scene, accuracy, meter, until=float(times[-1]), recording=recording))
@@ -148,7 +158,11 @@ def exactly(scene: Scene, times: np.ndarray) -> dict[str, np.ndarray]:
 @pytest.mark.parametrize("engine", ENGINES)
 @pytest.mark.parametrize("stiff", [3.0, 17.0])
 def test_rows_between_the_steps_of_a_stiff_slider(stiff, engine, rtol):
-    """Stability limits its steps, and dense output was off by 720 times the accuracy."""
+    """Rows within the steps of a stiff slider meet the tolerance.
+
+    Stability limits the steps, and plain dense output would have 720 times the requested
+    error.
+    """
     scene = Scene(normal_stress="constant", stiffness_ratio=stiff, load_velocity_ratio=10.0)
     rows = simulate(scene, duration=3.0, rtol=rtol, engine=engine)
     exact = exactly(scene, rows.time.values)
@@ -159,7 +173,10 @@ def test_rows_between_the_steps_of_a_stiff_slider(stiff, engine, rtol):
 
 @pytest.mark.parametrize("law", ["slip", "slowness"])
 def test_points_along_a_response_are_those_of_the_motion(law):
-    """Between rows, not on straight lines through them: those were off by 1e-3."""
+    """Points along a response lie on the motion.
+
+    Linear interpolation between rows would have an error of 1e-3.
+    """
     scene, rtol = Scene(law=law, stiffness_ratio=1.1, load_velocity_ratio=1.3), 1e-7
     found = StepResponse(phases=150)(scene, Accuracy(rtol, engine=COMPILED))
     assert found.status is Status.OK
@@ -174,7 +191,7 @@ def test_points_along_a_response_are_those_of_the_motion(law):
 @pytest.mark.parametrize("fields", [{"inertia": True}, {"radiation_damping": 1e-6}])
 @pytest.mark.parametrize("law", ["slip", "slowness"])
 def test_the_extremes_of_a_cycle_are_points_of_its_orbit(law, fields):
-    """Within what errors of the headline are told."""
+    """The extrema of an orbit agree with the outputs within their errors."""
     scene = Scene(law=law, stiffness_ratio=0.8, load_velocity_ratio=2.0, **fields)
     found = LimitCycle(phases=80)(scene, Accuracy(1e-6, engine=COMPILED)).values
     orbit, stress = found["log10_slip_rate"], found["shear_stress"]
@@ -185,14 +202,16 @@ def test_the_extremes_of_a_cycle_are_points_of_its_orbit(law, fields):
         ("dynamic_stress_drop", stress.max() - stress[orbit.argmax()]),
     ):
         assert extreme == pytest.approx(found[name], abs=2.0 * found[f"{name}_error"]), name
-    # the spring has all that the load point moved and the slider did not
+    # The spring stress follows from the difference between load point displacement and slip.
     moved = scene.load_velocity * found["time"] - found["slip"]
     assert stress - stress[0] == pytest.approx(scene.stiffness * moved, abs=1e-9 * scene.a)
 
 
 def test_points_along_a_path_are_those_of_the_compiled_loop():
-    """Along a rupture and what leads to it. Rounding decides where a flat extreme is, of which the
-    nearest point takes the place: all others are the same to rounding.
+    """Both engines select the same points along a path.
+
+    The path contains a rupture. Rounding errors may move a flat extremum to a neighbouring
+    point, and all other points agree to rounding.
     """
     scene = Scene(law="slip", stiffness_ratio=0.8, load_velocity_ratio=2.0, inertia=True)
     recording, changes = Recording(), 0

@@ -1,4 +1,4 @@
-"""Records from text files, from arrays, and from binary files of xlook written by its layout."""
+"""Tests of reading records from text files, arrays and binary xlook files."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ FRICTION = SHEAR / NORMAL
 
 
 def written(path: Path, headings: list[str], columns: list[np.ndarray], between: str) -> Path:
-    """A text file of columns."""
+    """Write a text file with columns, and return its path."""
     lines = [between.join(headings)]
     lines += [between.join(f"{v:.12g}" for v in row) for row in zip(*columns, strict=True)]
     path.write_text("\n".join(lines) + "\n")
@@ -29,7 +29,10 @@ def written(path: Path, headings: list[str], columns: list[np.ndarray], between:
 
 @pytest.mark.parametrize("between", [",", ";", "\t"])
 def test_units_of_headings(between: str, tmp_path: Path) -> None:
-    """Millimetres, minutes and kilopascals: each column of another power, none by chance right."""
+    """Each column is converted from the unit in its heading.
+
+    All units differ, so a wrong conversion cannot go unnoticed.
+    """
     headings = ["Time (min)", "LP [mm]", "tau [kPa]", "Normal stress [MPa]"]
     columns = [TIME / 60.0, MOVED * 1e-3, SHEAR * 1e3, NORMAL]
     record = rsfstudy.read_record(written(tmp_path / "a run-2.csv", headings, columns, between))
@@ -48,14 +51,17 @@ def test_units_beside_headings_and_a_stated_normal_stress(tmp_path: Path) -> Non
     assert record.name == "mine"
     np.testing.assert_allclose(record.columns["displacement"], MOVED, rtol=1e-11)
     np.testing.assert_allclose(record.columns["friction"], SHEAR / 20.0, rtol=1e-11)
-    # a normal stress that was recorded is not replaced by the one stated
+    # A recorded normal stress takes precedence over the argument.
     arrays = {"time": TIME, "displacement": MOVED, "shear_stress": SHEAR, "normal_stress": NORMAL}
     both = rsfstudy.read_record(arrays, normal_stress="10 MPa")
     np.testing.assert_allclose(both.columns["friction"], FRICTION, rtol=1e-15)
 
 
 def test_one_column_is_named_and_the_others_are_known() -> None:
-    """Those that a record needs; normal stress that was recorded too is not asked for here."""
+    """Columns that are not named are identified by their headings.
+
+    Only the required columns are read.
+    """
     arrays = {"Time (s)": TIME, "ram (um)": MOVED, "Disp (um)": 2.0 * MOVED, "mu": FRICTION}
     arrays["Normal stress (MPa)"] = NORMAL
     told = rsfstudy.read_record(arrays, {"displacement": "ram (um)"}).columns
@@ -74,7 +80,11 @@ def test_one_column_is_named_and_the_others_are_known() -> None:
     ],
 )
 def test_headings_that_may_mean_the_same_are_refused(key: str, other: str, one: str) -> None:
-    """Unless units tell them apart, one has the very name, or the call says which."""
+    """Ambiguous headings are rejected.
+
+    Two similar headings are accepted if their units differ, if one heading is the exact
+    name, or if the call selects a column.
+    """
     arrays = {"Time (s)": TIME, "Disp (um)": MOVED, "tau (MPa)": SHEAR, "sigma (MPa)": NORMAL}
     del arrays["Disp (um)" if key == "displacement" else "sigma (MPa)"]
     right = MOVED if key == "displacement" else NORMAL
@@ -96,9 +106,10 @@ def test_headings_that_may_mean_the_same_are_refused(key: str, other: str, one: 
 
 
 def test_types_of_arrays_tell_what_they_are() -> None:
-    """Dates and intervals are times, to their nanosecond, and what is masked is missing."""
+    """Dates and time intervals are times, and masked values are missing."""
     plain = {"Time (min)": TIME / 60.0, "LP (um)": MOVED, "mu": FRICTION}
-    first = pd.Timestamp("2026-03-29 01:59:59", tz="Europe/Berlin")  # clocks go on to 3 at 2
+    # The clocks change from 2 to 3 at this time.
+    first = pd.Timestamp("2026-03-29 01:59:59", tz="Europe/Berlin")
     intervals = pd.to_timedelta(TIME, unit="s")
     for times in (intervals, intervals.to_numpy(), first + intervals):
         record = rsfstudy.read_record(pd.DataFrame({**plain, "Time (min)": times}))
@@ -132,14 +143,15 @@ def test_raw_numbers_have_a_scale_and_an_offset(tmp_path: Path) -> None:
     path = written(tmp_path / "raw.csv", ["t", "lp * 2", "mu"], [TIME, MOVED, FRICTION], ",")
     named = {"time": "t (min)", "displacement": "lp * 2 (um)", "friction": "mu*-2.0+1.5"}
     told = rsfstudy.read_record(path, named).columns
-    np.testing.assert_allclose(told["displacement"], MOVED, rtol=1e-11)  # a heading as it stands
+    # This heading contains the asterisk.
+    np.testing.assert_allclose(told["displacement"], MOVED, rtol=1e-11)
     np.testing.assert_allclose(told["friction"], 1.5 - 2.0 * FRICTION, rtol=1e-11)
     with pytest.raises(InvalidValue, match="mu"):
         rsfstudy.read_record(path, {**named, "friction": "mu * 1e-e"})
 
 
 def xlook(path: Path, columns: list[tuple[str, str, np.ndarray]]) -> Path:
-    """A binary file of xlook: texts end at a NUL, and rubbish follows them."""
+    """Write a binary xlook file, with random bytes after each NUL."""
 
     def text(told: str, size: int) -> bytes:
         return (told.encode() + b"\0").ljust(size, b"\x7f")
@@ -158,7 +170,11 @@ def xlook(path: Path, columns: list[tuple[str, str, np.ndarray]]) -> Path:
 
 
 def test_a_binary_file_of_xlook(tmp_path: Path) -> None:
-    """Time by differences in ms, raw bits of two columns, and one of a sample more."""
+    """The columns of a binary xlook file are read and converted.
+
+    The file contains time differences in ms, raw bits, and a column with an additional
+    sample.
+    """
     bits = np.array([100.0, 250.0, 400.0, 3700.0])
     columns = [
         ("Time", "ms", np.array([250.0, 500.0, 500.0, 1000.0])),
@@ -173,7 +189,7 @@ def test_a_binary_file_of_xlook(tmp_path: Path) -> None:
         "friction": ("3", "1"),
     }
     told = rsfstudy.read_record(path, chosen).columns
-    # numbers of 32 bits have 7 digits
+    # Numbers of 32 bits have 7 digits.
     np.testing.assert_allclose(told["time"], TIME + 0.25, rtol=1e-6)
     np.testing.assert_allclose(told["displacement"], 0.01 * bits - 1.0, rtol=1e-6)
     np.testing.assert_allclose(told["friction"], FRICTION, rtol=1e-6)

@@ -1,4 +1,4 @@
-"""Reductions and claims on made-up datasets, where the right answer is known."""
+"""Tests of reductions and claims on synthetic datasets with known results."""
 
 from dataclasses import dataclass
 
@@ -53,7 +53,7 @@ def lattice(values, status=None) -> xr.Dataset:
 @settings(max_examples=30)
 @given(st.lists(st.floats(-0.1, 0.1), min_size=5, max_size=5))
 def test_fit_agrees_with_numpy(noise):
-    """Slope and standard error against numpy's least squares with one column."""
+    """Slope and standard error agree with the least squares of NumPy."""
     values = 1.0 + 0.7 * X + np.array(noise)
     result = apply_reductions(lattice(values), (FIT,))
     x, y = X[:3], values[:3] - 1.0
@@ -66,7 +66,10 @@ def test_fit_agrees_with_numpy(noise):
 
 
 def test_a_slope_per_decade_is_that_over_the_logarithm():
-    """And a point at 0, which has none, is left out."""
+    """The slope per decade equals a linear fit against log10(x).
+
+    A point at x = 0 is omitted.
+    """
     noise = np.array([0.02, -0.03, 0.01, 0.04, -0.02])
     values = 2.0 + 0.3 * np.log10(X) + noise
     fit = SemilogFit(name="rate", of="critical_velocity_ratio", on="a_over_b_minus_a")
@@ -80,8 +83,9 @@ def test_a_slope_per_decade_is_that_over_the_logarithm():
 
 
 def test_the_exponent_of_a_power_law_is_the_slope_of_its_logarithms():
-    """Exact of an exact one; and that of a `Logarithm`, to natural logarithms. What is not positive
-    has none.
+    """The exponent equals a linear fit of the logarithms.
+
+    Exact power laws have exact exponents, and values that are not positive are omitted.
     """
     noise = np.array([1.02, 0.97, 1.01, 1.04, 0.98])
     fit = PowerLaw(name="n", of="critical_velocity_ratio", on="a_over_b_minus_a")
@@ -111,7 +115,10 @@ CHAIN = (
 )
 @pytest.mark.parametrize("failure", [Status.UNVERIFIED, Status.INTEGRATION_FAILED])
 def test_numbers_that_failures_leave_behind_reach_no_result(failure, place):
-    """Through any number of reductions; what does not draw on them stays."""
+    """Values of failed cells do not affect any reduction.
+
+    Results that do not depend on the failed cells are unchanged.
+    """
     values = np.array([1.0 + X, 1.0 + 2.0 * X])
     row = ["reference", "other"].index(place[0])
     clean = apply_reductions(lattice(values), CHAIN)
@@ -165,11 +172,11 @@ def test_a_range_without_points_gives_nothing():
 @given(st.floats(-2.0, 2.0), st.lists(st.floats(-0.1, 0.1), min_size=5, max_size=5))
 def test_linear_fit_agrees_with_scipy(slope, noise):
     values = 0.3 + slope * X + np.array(noise)
-    assume(np.ptp(values) > 1e-6)  # the correlation of a constant is undefined
+    assume(np.ptp(values) > 1e-6)  # The correlation of a constant is undefined.
     fit = LinearFit(name="slope", of="critical_velocity_ratio", on="a_over_b_minus_a")
     result, theirs = apply_reductions(lattice(values), (fit,)), linregress(X, values)
     assert float(result.slope) == pytest.approx(theirs.slope, rel=1e-9, abs=1e-14)
-    # theirs comes from 1 - r**2, which loses half of the digits
+    # SciPy computes the standard error from 1 - r**2, which loses half of the digits.
     assert float(result.slope_stderr) == pytest.approx(theirs.stderr, rel=1e-6, abs=3e-8)
 
 
@@ -216,7 +223,7 @@ PENDING = lattice(np.full(5, 2.0), np.full(5, Status.PENDING))
         (PENDING, {"variable": "status", "where": {"b_over_a": 2.0}}, {}, "undecided"),
         (apply_reductions(lattice(1.0 + X), (FIT,)),
          {"variable": "zeta", "where": {}, "published": 1.0}, {}, "reproduced"),
-        # it was reduced along an axis that is another
+        # The fit used another axis.
         (apply_reductions(lattice(1.0 + X), (FIT,)),
          {"variable": "zeta", "where": {}, "published": 1.0},
          {"b_over_a": [2.0]}, "not applicable"),
@@ -286,7 +293,7 @@ def test_cells_without_an_answer_widen_the_bracket_and_failed_ones_refuse_it():
 @settings(max_examples=30)
 @given(st.floats(0.2, 3.0), st.floats(1.2, 8.0))
 def test_a_level_of_a_power_law_is_inverted(power, level):
-    """In logarithms a power law is a straight line, which the interpolant keeps."""
+    """A power law is inverted exactly, because it is linear in logarithms."""
     x = np.geomspace(1.0, 100.0, 9)
     dataset = xr.Dataset(
         {"y": ("x", x**power), "status": ("x", np.zeros(9, np.int8))}, coords={"x": x}
@@ -299,7 +306,7 @@ def test_a_level_of_a_power_law_is_inverted(power, level):
     assert float(found["at_error"]) == pytest.approx(float(found["at"]) * 0.01 / power, rel=0.02)
 
 
-#: Smooth, monotone, and curved in logarithms; with their inverses.
+#: Smooth monotonic functions that are curved in logarithms, and their inverses.
 CURVED = {
     "expm1": (np.expm1, np.log1p),
     "sinh": (np.sinh, np.arcsinh),
@@ -334,20 +341,22 @@ def test_the_error_of_an_inverse_covers(name, ratios, share):
     x = 0.1 * np.cumprod(ratios)
     truth = x[0] * (x[-1] / x[0]) ** share
     at, error = inverted(x, function(x), float(function(truth)))
-    # beside that, only rounding
+    # The additional tolerance covers rounding only.
     assert abs(at - float(inverse(function(truth)))) <= error + 1e-12 * truth
 
 
 def test_an_inverse_whose_bracket_stays_is_not_taken_for_exact():
     x = np.array([0.1, 0.2, 0.4, 0.8, 1.2, 2.4])
     at, error = inverted(x, np.expm1(x), 5.0)
-    assert abs(at - np.log(6.0)) <= error < 0.3  # a quarter of the bracket
+    assert abs(at - np.log(6.0)) <= error < 0.3  # The limit is a quarter of the bracket.
 
 
 @pytest.mark.parametrize("name", sorted(CURVED))
 def test_a_level_that_a_cell_has_is_reached_at_that_cell(name):
-    """At each of them, and a rounding error beside it, where two pieces of the interpolant meet.
-    Where the slope is 0 there, a rounding error of the level moves the place by its root.
+    """The inverse at the value of a cell is the position of the cell.
+
+    The level is also changed by a rounding error, where two pieces of the interpolant meet.
+    If the slope is 0 there, the position changes by the square root of the rounding error.
     """
     x = np.array([0.3, 0.5, 1.1, 1.3, 2.9, 4.0])
     values = CURVED[name][0](x)
@@ -405,8 +414,10 @@ def test_differences_and_spreads():
 
 
 def loops(tilt: float) -> xr.Dataset:
-    """Two paths up to 10^6 and 10^5 V_* and down again: the second leaves the first at 10^4 and
-    comes back, `tilt` higher, from 10^3 on.
+    """Return two paths up to 10^6 and 10^5 V_* and back.
+
+    The second path leaves the first path at 10^4 V_*, and returns to it at 10^3 V_* with an
+    offset of ``tilt``.
     """
     up = np.linspace(0.0, 6.0, 300)
     first = np.concatenate([up, up[::-1][1:]]), np.concatenate([2.0 - 0.1 * up, 0.2 + 0 * up[1:]])
@@ -454,8 +465,9 @@ STIFFNESS = np.array([0.6, 0.8, 0.9, 0.97, 1.1])
 
 
 def cycling(answers) -> xr.Dataset:
-    """Cells along stiffness at V_0 = 1.01, 10 and 1000 V_*, variable normal stress: k_cr(V_0) is
-    0.99976, 0.946 and 0.851 of k_cr(V_*).
+    """Return cells along stiffness for V_0 = 1.01, 10 and 1000 V_*.
+
+    At variable normal stress, k_cr(V_0) is 0.99976, 0.946 and 0.851 times k_cr(V_*).
     """
     cycles = np.asarray(answers, dtype=bool)
     codes = np.where(cycles, int(Status.OK), int(Status.NO_LIMIT_CYCLE))
@@ -492,7 +504,10 @@ def test_the_edge_of_cycling_is_bracketed_beside_the_linear_boundary():
     ("row", "crossings"), [([1, 1, 1, 1, 0], 1), ([1, 0, 0, 0, 0], 1), ([1, 1, 0, 1, 0], 3)]
 )
 def test_cells_on_the_wrong_side_of_the_linear_boundary_are_counted(row, crossings):
-    """Above it, below it, and where the answer changes more than once, which is no edge."""
+    """Cells that contradict the linear boundary are counted.
+
+    If the result changes more than once along the axis, there is no edge.
+    """
     result = apply_reductions(cycling([row] * 3), (EDGE,))
     below = [critical > STIFFNESS for critical in (0.9998, 0.946, 0.851)]
     expected = int((np.array(below) != np.array(row, dtype=bool)).sum())

@@ -1,4 +1,4 @@
-"""The referee: its answers by their second way, what it says of other codes, and of ours."""
+"""Tests of the referee: its answers, and its judgement of other codes."""
 
 from __future__ import annotations
 
@@ -49,11 +49,12 @@ def second_way(number: int) -> list[dict]:
 
 
 # ---- answers -------------------------------------------------------------------------------------
-
-
 @pytest.mark.parametrize("number", NUMBERS)
 def test_answers_are_those_of_a_second_way(number):
-    """To their last digit; and each digit of each column, changed by two, is not."""
+    """The answers agree with an independent method to the last digit.
+
+    If any digit of a column changes by two, the agreement is lost.
+    """
     problem, rows, others = of(number), answer_of(number), second_way(number)
     assert (
         [*rows[0]]
@@ -67,7 +68,7 @@ def test_answers_are_those_of_a_second_way(number):
         places = [i for i, x in enumerate(text.partition("e")[0]) if x.isdigit()]
         assert len(places) == problem.digits
         for place in places:
-            # by two: the last digit may be off by a half as it is
+            # The change is two because the last digit may have an error of one half.
             changed = text[:place] + str((int(text[place]) + 2) % 10) + text[place + 1 :]
             assert not rounds_to(changed, value)
 
@@ -80,14 +81,12 @@ def test_files_of_problems_hold_all_that_they_are_asked_for(number):
     assert problem.equations
     assert problem.conventions
     assert [f"{name} ({UNITS[name]})" for name in problem.column_names] == problem.column_headings
-    # in SI units, as the example takes them
+    # The example requires SI units.
     units = re.findall(r'"[-+.e\d]+ ([^"]+)"', text)
     assert {*units} <= {"Pa", "m/s", "m", "s", "Pa/m", "Pa s/m", "1/s"}
 
 
 # ---- ours ----------------------------------------------------------------------------------------
-
-
 def told_of(table: reference_answers.AnswerTable) -> dict[str, external_answers.ReportedQuantity]:
     return {name: external_answers.ReportedQuantity(values, 0.0) for name, values in table.items()}
 
@@ -101,7 +100,10 @@ def digits_of_ours(number: int, rtol: float, engine: str) -> AnswerComparison:
 @pytest.mark.parametrize("number", NUMBERS)
 @pytest.mark.parametrize("rtol", [1e-5, 1e-7, 1e-9, 1e-11])
 def test_ours_has_the_digits_it_promises(number, rtol):
-    """`rtol` is the accuracy of ln V, which these problems amplify by up to 2.5."""
+    """The digits of rsfstudy agree with rtol.
+
+    The tolerance ``rtol`` is the accuracy of ln V, which these problems amplify by up to 2.5.
+    """
     assert digits_of_ours(number, rtol, COMPILED).agreeing_digits >= -math.log10(4.0 * rtol)
 
 
@@ -113,8 +115,6 @@ def test_every_engine_does(engine, number):
 
 
 # ---- other codes ---------------------------------------------------------------------------------
-
-
 def write(path: Path, header: list[str], columns: list) -> Path:
     with path.open("w", newline="") as file:
         table = csv.writer(file)
@@ -129,12 +129,12 @@ def told_by_second_way(number: int) -> dict[str, np.ndarray]:
 
 
 def filed(path: Path, number: int, **changes: np.ndarray) -> Path:
-    """What the second way tells, with changes, as a file of another code."""
+    """Write the results of the second method, with changes, to a file."""
     told = told_by_second_way(number) | changes
     return write(path, of(number).column_headings, [told[name] for name in of(number).column_names])
 
 
-#: Published curves by the problem that they answer, and what their columns are.
+#: Published curves by problem number, with their column descriptions.
 _USUAL = "time=time (s), friction=friction, slip_rate=slider_velocity (um/s), "
 PUBLISHED = {
     1: ("TestDeiterichOneStateVar.csv", _USUAL + "theta=state (s)"),
@@ -146,7 +146,7 @@ PUBLISHED = {
 
 @pytest.mark.parametrize("number", PUBLISHED)
 def test_published_curves_pass_to_the_last_place_that_is_written(number):
-    """Eight decimals, of a file as it stands."""
+    """Published curves agree to all eight printed decimals."""
     name, columns = PUBLISHED[number]
     ran = call_main("verify", RSFMODEL / name, "--problem", number, "--columns", columns)
     assert (ran.returncode, ran.stderr) == (0, "")
@@ -217,7 +217,7 @@ def test_conventions_of_the_problem_explain_a_difference(number, changes, explan
     [
         (lambda rate: -rate, "growth_rate has the opposite sign. With that undone, 12.0 digits"),
         (lambda rate: rate / (2.0 * math.pi), "growth_rate is 1/(2 pi) times the known answer"),
-        # a factor and a shift would explain any value
+        # A factor combined with an offset would explain any value.
         (lambda rate: 1.7 * rate, "no usual difference of conventions explains it"),
         (lambda rate: -1.3 * rate, "no usual difference of conventions explains it"),
     ],
@@ -241,7 +241,7 @@ def test_a_factor_near_one_is_worded_by_its_difference_from_one(off, tmp_path):
 
 
 def test_digits_that_do_not_pass_are_not_rounded_up(tmp_path):
-    """A relative difference of 1.05e-6 is 5.98 digits."""
+    """A relative difference of 1.05e-6 is reported as 5.9 digits."""
     told = told_by_second_way(2)
     ran = call_main(
         "verify", filed(tmp_path / "02.csv", 2, slip_rate=told["slip_rate"] * (1 + 1.05e-6))
@@ -251,7 +251,10 @@ def test_digits_that_do_not_pass_are_not_rounded_up(tmp_path):
 
 
 def test_the_number_of_rows_is_checked_before_columns_are_converted(tmp_path):
-    """Shear stress is divided by normal stress at the times of the problem."""
+    """The number of rows is checked before shear stress is converted.
+
+    The conversion needs the normal stress at the times of the problem.
+    """
     told = told_by_second_way(15)
     header = [h.replace("friction (1)", "shear_stress (Pa)") for h in of(15).column_headings]
     columns = [told[name][:-1] for name in of(15).column_names]
@@ -290,8 +293,9 @@ def test_other_units_and_other_quantities_are_converted(tmp_path):
 
 @pytest.mark.parametrize("number", [15, 16, 17, 18])
 def test_shear_stress_tells_friction_where_normal_stress_changes(number, tmp_path):
-    """Normal stress as the files of the problems state it; 11 digits, for it and friction are
-    rounded to 12.
+    """Shear stress is divided by the normal stress of the problem.
+
+    The result has 11 digits, because normal stress and friction are rounded to 12 digits.
     """
     problem, told = of(number), told_by_second_way(number)
     time, sigma = told["time"], problem.rig.normal_stress
@@ -311,7 +315,7 @@ def test_shear_stress_tells_friction_where_normal_stress_changes(number, tmp_pat
 
 
 def test_shear_stress_beside_what_is_asked_for_is_left_alone(tmp_path):
-    """Of peaks, which know no friction."""
+    """An unnecessary column of shear stress is ignored."""
     told = told_by_second_way(13)
     header = [*of(13).column_headings, "shear_stress (Pa)"]
     columns = [*(told[name] for name in of(13).column_names), told["slip_rate"]]
@@ -355,7 +359,7 @@ def test_what_is_no_answer_is_refused(spoil, error, tmp_path):
 
 
 def test_files_and_problems_that_are_not_there_are_said_so():
-    """With the status of each: a file that cannot be read, and words that name no problem."""
+    """Missing files and unknown problems have different exit statuses."""
     ran = call_main("verify", "nowhere.csv", "--problem", "1", "--columns", "time=t (s)")
     assert (ran.returncode, "cannot be read" in ran.stderr) == (1, True)
     ran = call_main("verify", "nowhere.csv")
@@ -363,8 +367,7 @@ def test_files_and_problems_that_are_not_there_are_said_so():
 
 
 # ---- problems of one's own -----------------------------------------------------------------------
-
-#: A scene of another code, which states all of this in SI.
+#: A scene of another code, with all values in SI units.
 STEP = """
 title = "Velocity step of another code"
 law = "slowness"
@@ -393,7 +396,7 @@ TWO_STATES = (
 )
 
 
-#: Where stress takes from each of two states its share; and peaks with mass.
+#: Two states that share the effect of stress.
 _UNDAMPED = TWO_STATES.replace('radiation_damping = "4.41e6 Pa s/m"\n', "")
 NAGATA = _UNDAMPED.replace("mu_star", "stress_dependence = 0.5\nmu_star")
 STRESSED = _UNDAMPED.replace("mu_star", "alpha = 0.2\nmu_star") + 'normal_stress = "5.2 MPa"'
@@ -403,7 +406,7 @@ STRESSED = _UNDAMPED.replace("mu_star", "alpha = 0.2\nmu_star") + 'normal_stress
     "text", [STEP, TWO_STATES, NAGATA, STRESSED, shipped_problem_files()[14].read_text()]
 )
 def test_a_problem_of_ones_own(text, tmp_path):
-    """Held against another formulation, which knows of nothing but SI units."""
+    """A user-defined problem agrees with an independent method in SI units."""
     path = tmp_path / "mine.toml"
     path.write_text(text)
     plain = text.replace('"20 um"', '"2e-5 m"').replace('"60 um"', '"6e-5 m"')
@@ -474,16 +477,17 @@ def test_the_number_of_peaks_is_bounded(tmp_path):
 
 
 # ---- what is written -----------------------------------------------------------------------------
-
-
 def test_the_example_passes_a_third_with_plain_scipy(tmp_path):
-    """Run as a stranger runs it; and all answers pass, with a figure."""
+    """The example solves at least a third of the problems with SciPy only.
+
+    The example runs in a new process, and all its answers pass with a figure.
+    """
     place = tmp_path / "referee"
     assert call_main("problems", place).returncode == 0
     text = (place / "example.py").read_text()
     assert "rsfstudy" not in text
     lines = [line for line in text.splitlines() if line and "import" not in line]
-    assert len(lines) - 1 <= 30  # and one that says what it is
+    assert len(lines) - 1 <= 30  # The additional line is the docstring.
     ran = subprocess.run([sys.executable, "example.py"], cwd=place, capture_output=True, text=True)
     assert (ran.returncode, ran.stderr) == (0, "")
     mine = sorted(place.glob("*.csv"))

@@ -1,4 +1,7 @@
-"""Former names of public functions, classes, members and keywords work, with a warning."""
+"""Tests of former names of functions, classes, members and keywords.
+
+Former names work, with a deprecation warning.
+"""
 
 import importlib
 import inspect
@@ -32,7 +35,7 @@ from rsfstudy.slider.scene_assembly import SceneBase
 from rsfstudy.status import Status
 
 NAMES = [(place, former) for place, table in RENAMED.items() for former in table]
-#: Members of parts that only some slots have.
+#: Members that only some kinds of parts have.
 OF_SOME_SLOTS = {"steady_states", "relaxation", "auxiliary_rates", "auxiliary_steady_states"}
 
 
@@ -46,7 +49,7 @@ def find_owner(place: str) -> object:
 
 
 def member_names(kind: type) -> set[str]:
-    """Return the names of the members of a class, and of the fields of its instances."""
+    """Return the names of the members and instance fields of a class."""
     names = {*dir(kind), *(name for base in kind.__mro__ for name in inspect.get_annotations(base))}
     names |= set(dir(Scene)) if kind is SceneBase else set()
     names |= set(array_layout.MOTION_STATE_DTYPE.names) if kind is PythonMotionState else set()
@@ -70,7 +73,7 @@ def test_former_names_lead_to_new_names(place, former):
 
 
 def test_tables_are_used():
-    """Each class with former names warns if an instance is asked for one of them."""
+    """Access to a former name of an instance raises a warning."""
     scene = Scene(load_velocity_ratio=2.0)
     with pytest.warns(DeprecationWarning, match="'is_disturbed' of SceneBase is now"):
         assert scene.is_disturbed == scene.is_perturbed

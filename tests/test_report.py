@@ -1,4 +1,7 @@
-"""The page of all results in a directory: whole, complete by itself, and the same on any screen."""
+"""Tests of the HTML report of a directory.
+
+The report is self-contained and works on screens of any size.
+"""
 
 import base64
 import json
@@ -21,22 +24,23 @@ from rsfstudy.responses.linear_stability import LinearStability
 from rsfstudy.status import Status
 from rsfstudy.storage import dataset_files
 
-#: The page at some width, in CSS pixels: of a phone and of a desk.
+#: The report in frames of a given width in CSS pixels, for a phone and for a desktop.
 FRAME = '<iframe src="{}" style="width:{}px;height:900px;border:0"></iframe>'
 WIDTHS = (390, 1280)
-#: Of each of them its width, that of what it shows, and those of its images; told on the console.
+#: A script that returns the width of each frame, the width of its content, and the widths of its
+#: images.
 LOOK = """<script>onload = () => {console.log("looked"); document.title = JSON.stringify(
 Array.from(document.querySelectorAll("iframe"), ({contentWindow: w, contentDocument: d}) =>
     [w.innerWidth, d.scrollingElement.scrollWidth, Array.from(d.images, i => i.naturalWidth)]))}
 </script>"""
 BROWSERS = ("chromium", "chromium-browser", "google-chrome")
-#: Elements that have no end.
+#: Elements without an end tag.
 VOID = {"meta", "link", "img", "br"}
 EVIL = "</p><script>alert(1)</script> & \x1b[31m"
 
 
 class Page(HTMLParser):
-    """Elements of a page; each that begins, ends where it should."""
+    """HTML parser that asserts that elements are nested correctly."""
 
     def __init__(self, text):
         super().__init__()
@@ -62,7 +66,7 @@ class Page(HTMLParser):
 
 @pytest.fixture(scope="module")
 def written(tmp_path_factory):
-    """A directory with all kinds of files, and what the command said of it."""
+    """Create a directory with files of all kinds, and write the report."""
     place = tmp_path_factory.mktemp("results")
     claim = example_claim(statement=f"k {EVIL}", variable="critical_stiffness", tolerance=0.5,
                     relation="below", where={"law": "slip", "b_over_a": 2.0})  # fmt: skip
@@ -72,7 +76,7 @@ def written(tmp_path_factory):
     fine = run(study, output=place)
     other = fine.copy(deep=True)
     other["status"][0, 1], other["message"][0, 1] = int(Status.INTEGRATION_FAILED), EVIL
-    other["critical_stiffness"][0, 1] = 7.0  # the claim moves
+    other["critical_stiffness"][0, 1] = 7.0  # This value changes the verdict of the claim.
     dataset_files.write_dataset(other, place / "failed here.nc")
     motion = rsfstudy.simulate(
         Scene(load_velocity_ratio=2.0, normal_stress="constant"), duration=0.1
@@ -105,7 +109,7 @@ def test_it_is_well_formed_and_has_a_section_for_every_file(written):
 
 
 def test_it_needs_nothing_else(written):
-    """Figures are in it, and nothing is asked of anywhere."""
+    """The report contains its figures and refers to no other resources."""
     place, _ran, text = written
     page = Page(text)
     for _tag, about in page.found:
@@ -116,10 +120,11 @@ def test_it_needs_nothing_else(written):
     assert "url(" not in text
     assert "@import" not in text
     images = [about["src"].removeprefix("data:image/png;base64,") for about in page.all("img")]
-    assert len(images) == 4  # of three studies and a motion
+    assert len(images) == 4  # Figures of three studies and a motion.
     shown = [base64.b64decode(image) for image in images]
     assert all(image.startswith(b"\x89PNG") for image in shown)
-    assert (place / "fine.png").read_bytes() in shown  # which is there, and newer than its results
+    # The existing figure is used, because it is newer than the results.
+    assert (place / "fine.png").read_bytes() in shown
 
 
 def test_it_tells_verdicts_failures_and_what_cannot_be_read(written):
@@ -129,7 +134,7 @@ def test_it_tells_verdicts_failures_and_what_cannot_be_read(written):
     assert "1 integration_failed, C1 moved" in said
     assert "differs, expected reproduced" in said
     assert "rsfstudy rerun 'failed here.nc' --cell law=slip --cell b_over_a=2.0" in said
-    assert r"</p><script>alert(1)</script> & \x1b[31m" in said  # to read, and not to run
+    assert r"</p><script>alert(1)</script> & \x1b[31m" in said  # Markup in messages is escaped.
     critical = rsfstudy.open(place / "fine.nc")["critical_stiffness"].sel(law="slip", b_over_a=1.5)
     assert f" {float(critical):.8g} " in said
     assert "< 1" in said
@@ -152,7 +157,7 @@ def test_python_names_the_page_and_refuses_what_is_none(tmp_path):
     assert 'href="in/one.nc"' in page.read_text()
     with pytest.raises(InvalidValue, match=r"ends in \.html"):
         rsfstudy.report(tmp_path / "in", tmp_path / "all.txt")
-    assert rsfstudy.report(tmp_path / "in", page) == page  # again
+    assert rsfstudy.report(tmp_path / "in", page) == page  # A report can be overwritten.
     page.write_text("<!DOCTYPE html><p>mine</p>")
     with pytest.raises(InvalidValue, match="is there already, and no report"):
         rsfstudy.report(tmp_path / "in", page)
@@ -162,7 +167,10 @@ def test_python_names_the_page_and_refuses_what_is_none(tmp_path):
 
 
 def test_it_tells_answers_that_are_none_and_draws_what_is_in_other_units(tmp_path):
-    """Cycles, too; figures are as wide as on paper, so that letters of all are of one size."""
+    """The report shows statuses, cycles, and results in other units.
+
+    Figures have their printed width, so the text has the same size in all figures.
+    """
     axes = [Axis("b_over_a", [1.5, 2.0, 3.0])]
     study = Study(name="one", title="One", base=Scene(), axes=axes, measure=LinearStability())
     found = run(study)
@@ -186,7 +194,10 @@ def test_it_tells_answers_that_are_none_and_draws_what_is_in_other_units(tmp_pat
 
 
 def test_a_browser_shows_it_on_a_phone_and_on_a_desk(written, tmp_path):
-    """Nothing is wider than the screen, every figure is there, and nothing is complained of."""
+    """A browser shows the report without errors on small and large screens.
+
+    No element is wider than the screen, and every figure is loaded.
+    """
     browser = next(filter(None, map(shutil.which, BROWSERS)), None)
     if browser is None:
         missing = f"the report was NOT opened in a browser: none of {BROWSERS} is installed"
@@ -205,7 +216,8 @@ def test_a_browser_shows_it_on_a_phone_and_on_a_desk(written, tmp_path):
         check=True,
         timeout=HANG_TIMEOUT,
     )
-    (said,) = re.findall("CONSOLE.*", ran.stderr)  # of the frames; errors of the page would be more
+    # The script logs one line, and errors of the page would add lines.
+    (said,) = re.findall("CONSOLE.*", ran.stderr)
     assert "looked" in said
     looks = json.loads(re.search("<title>(.*?)</title>", ran.stdout)[1])
     assert [inner for inner, _scroll, _images in looks] == [*WIDTHS]

@@ -1,5 +1,7 @@
-"""Interrupted anywhere, a run goes on from there and ends with the same bytes; nothing computed is
-lost, nothing of another kind is mixed in.
+"""Tests of interrupted runs.
+
+A run that was interrupted at any point resumes and produces bitwise identical results.
+Finished cells are kept, and results of other code are not mixed in.
 """
 
 import contextlib
@@ -42,7 +44,7 @@ def uninterrupted():
 
 
 class Held:
-    """A run that has kept some of its cells, while the others wait until they are let through."""
+    """A run that has stored some cells, while other cells wait at a gate."""
 
     def __init__(self, output, gate, *options):
         self.output, self.gate, self.journal = output, gate, output / "faulty.cells.sqlite"
@@ -59,7 +61,7 @@ class Held:
 
 
 def children(process):
-    """Processes that one has started, by their command lines."""
+    """Return the child processes of a process by their command lines."""
     found = {}
     for child in psutil.Process(process.pid).children(recursive=True):
         with contextlib.suppress(psutil.NoSuchProcess):
@@ -69,7 +71,7 @@ def children(process):
 
 @pytest.fixture
 def held(tmp_path):
-    """Makes such runs, and ends them whatever becomes of the test."""
+    """Return a function that starts such runs, and kill them afterwards."""
     started = []
 
     def start(*options):
@@ -85,7 +87,10 @@ def held(tmp_path):
 
 
 def goes_on(output, already):
-    """The same command again: only what is missing is computed, and the numbers are the same."""
+    """Resume a run, and assert that only missing cells are computed.
+
+    The results must be bitwise identical to an uninterrupted run.
+    """
     with record_computed_cells() as asked:
         resumed = run(faulty_study(cells=CELLS), output=output)
     assert len(asked) == CELLS - already
@@ -95,10 +100,11 @@ def goes_on(output, already):
 
 
 def test_the_driver_is_killed(held):
-    """kill -9: what a worker has finished is kept before its batch is done, and the processes it
-    leaves behind end by themselves.
+    """Finished cells survive SIGKILL of the driver, and its workers end.
+
+    A finished cell is stored before its batch is complete.
     """
-    # the cells after the first of each batch wait, and the first is kept meanwhile
+    # The first cell of each batch is stored while the other cells wait.
     run = held("--workers", "1")
     left = list(children(run.process).values())
     run.process.kill()
@@ -112,7 +118,7 @@ def test_the_driver_is_killed(held):
 
 
 def test_a_worker_is_killed(held):
-    """kill -9 of a worker: the run itself goes on, and no cell is blamed."""
+    """A run continues without failed cells after SIGKILL of a worker."""
     run = held("--workers", "1")
     run.workers()[0].kill()
     run.let_through()
@@ -132,7 +138,10 @@ def test_a_worker_is_killed(held):
     ],
 )
 def test_a_signal_ends_a_run_in_order(options, number, status, why, held):
-    """A real one to the command and, as a terminal or a batch system sends it, to its workers."""
+    """A signal to the process group ends a run in an orderly way.
+
+    Terminals and batch systems send the signal to the command and its workers.
+    """
     run = held(*options)
     left = list(children(run.process).values())
     os.killpg(run.process.pid, number)
@@ -152,8 +161,9 @@ def test_a_signal_ends_a_run_in_order(options, number, status, why, held):
 
 
 def test_a_signal_ends_a_motion_with_one_line(tmp_path):
-    """Sent once the command has said that the rig is unusual, and is at work; twice, as `timeout`
-    does.
+    """A signal ends a simulation with a one-line message.
+
+    The signal is sent after the warning about the rig, and sent twice, as ``timeout`` does.
     """
     rig = ("--normal-stress", "1 Pa", "--slip-distance", "10 um", "--reference-velocity", "1 um/s")
     cycles = ("--set", "stiffness_ratio=0.8", "--set", "inertia=true", "--set", "hold_time=1 s")
@@ -170,7 +180,10 @@ def test_a_signal_ends_a_motion_with_one_line(tmp_path):
 
 
 def test_ctrl_c_while_the_workers_start(tmp_path):
-    """They never see it, and the run ends in order once they are there."""
+    """SIGINT during the start of workers ends the run in an orderly way.
+
+    The workers do not receive the signal.
+    """
     words = ("run", FAULTY_STUDY_FILE, "--workers", "1", "--output", tmp_path)
     process = start_command(*words, FAULT="hangs")
     wait_until(lambda: any("spawn_main" in words for words in children(process)), process)
@@ -182,7 +195,7 @@ def test_ctrl_c_while_the_workers_start(tmp_path):
 
 
 def test_workers_that_cannot_start(tmp_path):
-    """The run ends with the reason."""
+    """The run ends with an error if a worker process cannot start."""
     import dask
 
     with (
@@ -194,7 +207,10 @@ def test_workers_that_cannot_start(tmp_path):
 
 
 def test_ctrl_c_in_the_middle_of_writing(tmp_path, monkeypatch):
-    """The old file stays, nothing is left beside it, and no cell is computed again."""
+    """SIGINT during writing leaves the old file and no temporary files.
+
+    No cell is computed again.
+    """
     study = faulty_study(cells=CELLS)
     run(study, output=tmp_path)
     old = (tmp_path / "faulty.nc").read_bytes()
@@ -212,7 +228,7 @@ def test_ctrl_c_in_the_middle_of_writing(tmp_path, monkeypatch):
 
 
 def test_what_a_killed_write_left_is_no_result(tmp_path):
-    """It is not taken for one, and goes with the next."""
+    """A temporary file of a killed run is ignored and removed."""
     run(faulty_study(cells=CELLS), output=tmp_path)
     (tmp_path / ".faulty.nc.new").write_bytes(b"what a killed run left")
     have_same_numbers(rsfstudy.open("faulty", tmp_path), uninterrupted())
@@ -220,7 +236,10 @@ def test_what_a_killed_write_left_is_no_result(tmp_path):
 
 
 def test_fresh_leaves_no_half_transaction_behind(tmp_path):
-    """SQLite would roll the old file's journal back into the new file."""
+    """The option ``fresh`` also removes the rollback journal of SQLite.
+
+    Otherwise, SQLite would apply the rollback journal to the new file.
+    """
     (tmp_path / "faulty.cells.sqlite").write_bytes(b"")
     (tmp_path / "faulty.cells.sqlite-journal").write_bytes(b"what a killed run left")
     have_same_numbers(run(faulty_study(cells=CELLS), output=tmp_path, fresh=True), uninterrupted())
@@ -228,7 +247,7 @@ def test_fresh_leaves_no_half_transaction_behind(tmp_path):
 
 @contextlib.contextmanager
 def limited(size):
-    """No file may grow beyond a size: writing fails as on a full disk."""
+    """Limit the size of files, so that writing fails as on a full disk."""
     inherited = resource.getrlimit(resource.RLIMIT_FSIZE)
     resource.setrlimit(resource.RLIMIT_FSIZE, (size, inherited[1]))
     try:
@@ -238,7 +257,7 @@ def limited(size):
 
 
 def test_a_full_disk_while_cells_are_computed(tmp_path, monkeypatch):
-    """The journal takes no more: the run ends with the reason, and goes on once there is room."""
+    """A full disk ends the run with an error, and the run can be resumed."""
     monkeypatch.setenv("FAULT_CELLS", "2000")
     with limited(100_000):
         ran = call_main("run", FAULTY_STUDY_FILE, "--serial", "--output", tmp_path)
@@ -254,7 +273,7 @@ def test_a_full_disk_while_cells_are_computed(tmp_path, monkeypatch):
 
 
 def test_a_full_disk_while_the_result_is_written(tmp_path, monkeypatch):
-    """The old result stays whole, and every cell is kept."""
+    """A full disk leaves the old results, and all cells are kept."""
     run(faulty_study(cells=4), output=tmp_path)
     old = (tmp_path / "faulty.nc").read_bytes()
     study = faulty_study(cells=CELLS)
@@ -283,7 +302,10 @@ def test_a_longer_and_denser_axis_computes_only_new_cells(tmp_path):
 
 
 def test_two_runs_at_a_time_are_refused(tmp_path, monkeypatch):
-    """The second, begun while the first computes a cell, is told; the first is not disturbed."""
+    """A second run on the same journal raises an error.
+
+    The first run is not affected.
+    """
     monkeypatch.setattr(cell_journal, "_LOCK_TIMEOUT", 0.1)
     study, computed, refused = (
         faulty_study(cells=CELLS),
@@ -316,7 +338,7 @@ def test_other_physics_or_versions_are_not_mixed(name, tmp_path, monkeypatch):
 
 
 def test_failures_are_tried_again(tmp_path):
-    """A cell that failed has no answer: the next run computes it, and only it."""
+    """The next run computes failed cells again, but no other cells."""
     failing = faulty_study("raises", at=(2.5,))
     status = run_with_failures(failing, output=tmp_path).status
     assert status.values.tolist() == [0, Status.CELL_RAISED, 0, 0]
@@ -327,8 +349,6 @@ def test_failures_are_tried_again(tmp_path):
 
 
 # ---- more work ----------------------------------------------------------------------------------
-
-
 def test_where_more_work_is_allowed_answers_are_kept_and_the_rest_is_tried_again(tmp_path):
     few = {"b_over_a": [2.0], "output": tmp_path}
     spent = run_with_failures(SMALL_STUDY, budget=300, **few)
@@ -338,7 +358,7 @@ def test_where_more_work_is_allowed_answers_are_kept_and_the_rest_is_tried_again
     assert (answered.status == int(Status.OK)).all()
     again = run(SMALL_STUDY, budget=200_000, **few)
     have_same_numbers(again, answered)
-    assert (again.wall_time == answered.wall_time).all()  # not computed anew
+    assert (again.wall_time == answered.wall_time).all()  # The cells were not computed again.
     with pytest.raises(DataError, match="budget: 200000 there, 300 now"):
         run(SMALL_STUDY, budget=300, **few)
     with pytest.raises(DataError, match="rtol: 1e-07 there, 1e-06 now"):

@@ -1,4 +1,4 @@
-"""The regularised form of friction, in which slip reverses with shear stress."""
+"""Tests of the regularised form of friction, for which slip may reverse."""
 
 import math
 
@@ -24,7 +24,10 @@ CONSTANT, VARIABLE = {"normal_stress": "constant"}, {"normal_stress": "variable"
 
 @pytest.mark.parametrize("stress", [CONSTANT, VARIABLE])
 def test_slip_forward_is_what_it_is_without(stress):
-    """The forms differ by exp(-2 mu/a); what is left is rounding."""
+    """For forward slip, the regularised form has a negligible effect.
+
+    The forms differ by exp(-2 mu/a), so the tolerance is the rounding error.
+    """
     plain = Scene(stiffness_ratio=1.5, **stress)
     both_ways = plain.with_(regularised=True)
     for friction in (-0.2, 0.0, 0.1):
@@ -45,14 +48,14 @@ def test_slip_forward_is_what_it_is_without(stress):
 
 
 def test_friction_is_odd_in_slip_rate():
-    """Where stress is mirrored about zero, so is friction: same magnitude of slip rate."""
+    """Friction is an odd function of slip rate."""
     scene = Scene(regularised=True, **CONSTANT)
     for above in (1e-6, 0.01, 0.3):
         there, slope, *_ = build_friction_relation(scene)(above - scene.mu_star)
         mirrored, other_slope, *_ = build_friction_relation(scene)(-above - scene.mu_star)
         assert mirrored == pytest.approx(there, rel=1e-12)
         assert other_slope == pytest.approx(-slope, rel=1e-12)
-    # close to zero stress the fault is viscous: V = 2 V_* exp(-mu_*/a) tau/(a sigma)
+    # Near zero stress, the fault is viscous: V = 2 V_* exp(-mu_*/a) tau/(a sigma).
     value = build_friction_relation(scene)(1e-9 - scene.mu_star)[0]
     linear = math.log(2e-9 / scene.a) - scene.mu_star / scene.a
     assert value / scene.a == pytest.approx(linear, rel=1e-9)
@@ -61,7 +64,10 @@ def test_friction_is_odd_in_slip_rate():
 @pytest.mark.parametrize("load", [1.0, 10.0, 100.0, 1e4])
 @pytest.mark.parametrize("stress", [CONSTANT, {**VARIABLE, "alpha": 0.0}])
 def test_steady_friction_stays_positive(stress, load):
-    """``a arcsinh{exp[(mu_* + Theta_ss)/a] V/(2 V_*)}``, where mu_* + (a - b) ln V < 0 too."""
+    """Steady friction is ``a arcsinh{exp[(mu_* + Theta_ss)/a] V/(2 V_*)}``.
+
+    Steady friction is positive even if mu_* + (a - b) ln V is negative.
+    """
     scene = Scene(
         law="slip", b_over_a=2.0, mu_star=0.05, regularised=True, stiffness=0.01,
         load_velocity_ratio=load, **stress,
@@ -71,20 +77,22 @@ def test_steady_friction_stays_positive(stress, load):
     values = LinearStability()(scene, Accuracy()).values
     assert values["steady_friction"] == pytest.approx(exact, rel=1e-11)
     if stress == CONSTANT:
-        # weakening of the arcsinh form: a factor tanh(mu_ss/a)
+        # The weakening of the arcsinh form contains a factor of tanh(mu_ss/a).
         weakens = (scene.b - scene.a) * math.tanh(exact / scene.a)
         assert stability.critical_stiffness(scene, math.log(load)) == pytest.approx(
             weakens, rel=1e-9
         )
 
 
-#: Friction without a state, which turns within a few D_c.
+#: Friction without state evolution, for which slip reverses within a few D_c.
 TURNS = {"law": "slip", "a": 0.01, "b_over_a": 0.0, "mu_star": 0.1, "stiffness": 0.02}
 
 
 def unloaded(time, back):
-    """Shear stress under a load point that moves back, from steady sliding at V_* on, without a
-    state: ``dtau/dt = -K [r + 2 exp(-mu_*/a) sinh(tau/a)]`` is a Riccati equation of exp(tau/a).
+    """Return the shear stress for a load point that moves back.
+
+    The motion starts from steady sliding at V_* and has no state evolution. The equation
+    ``dtau/dt = -K [r + 2 exp(-mu_*/a) sinh(tau/a)]`` is a Riccati equation of exp(tau/a).
     """
     a, weak = TURNS["a"], 2.0 * math.exp(-TURNS["mu_star"] / TURNS["a"])
     root = math.hypot(back, weak)
@@ -97,7 +105,10 @@ def unloaded(time, back):
 @pytest.mark.parametrize("engine", ENGINES)
 @pytest.mark.parametrize("of", ["displacement", "velocity", "protocol"])
 def test_a_load_point_that_moves_back_unloads_and_reverses(of, engine):
-    """From forward slip through none to steady slip back, by records and by a protocol."""
+    """The stress agrees with the closed form while slip reverses.
+
+    The loading is a record or a protocol.
+    """
     time, rate = np.linspace(0.5, 20.0, 40), 1.5
     sampled = {"displacement": [0.0, -45.0], "velocity": [-rate, -rate]}
     back = protocol([{"velocity": -rate}])
@@ -105,7 +116,7 @@ def test_a_load_point_that_moves_back_unloads_and_reverses(of, engine):
         back = history({"time": [0.0, 30.0], of: sampled[of]})
     scene = Scene(**TURNS, **CONSTANT, regularised=True, loading=back)
     ran = simulate(scene, times=time, rtol=1e-9, engine=engine)
-    # measured 1e-11, which is the accuracy of ln V times a
+    # The measured error of 1e-11 is the accuracy of ln V times a.
     assert ran.shear_stress.values == pytest.approx(unloaded(time, rate), abs=1e-10)
     assert ran.load_point_displacement.values == pytest.approx(-rate * time, abs=1e-9)
     assert ran.log10_slip_rate[-1] == pytest.approx(math.log10(rate), abs=1e-5)
@@ -114,8 +125,9 @@ def test_a_load_point_that_moves_back_unloads_and_reverses(of, engine):
 
 @pytest.mark.parametrize("law", ["slowness", "slip"])
 def test_slip_back_is_a_mirror_of_slip_forward(law):
-    """Steady sliding back, and a step of its velocity. Between both the fault is locked, and the
-    spring unloads linearly.
+    """Backward slip mirrors forward slip, including a velocity step.
+
+    While the direction changes, the fault is locked and the spring unloads linearly.
     """
     fields = {"law": law, "a": 0.01, "b_over_a": 1.4, "stiffness": 0.02, **CONSTANT}
     on = Scene(**fields, loading=protocol([{"velocity": 3.0}]))

@@ -1,4 +1,4 @@
-"""Studies of a rig: axes in units, the scene of each cell, files, and units of results."""
+"""Tests of studies of a rig: axes, scenes, files and results with units."""
 
 import itertools
 import json
@@ -25,7 +25,7 @@ STATED = {
 }
 RIG = Rig(**STATED)
 LAW = {"law": "slowness", "normal_stress": "constant", "a": 0.01, "b_over_a": 1.4}
-#: Two roundings of each of a few factors.
+#: Tolerance of two rounding errors for each of a few factors.
 EXACT = 1e-14
 
 
@@ -52,7 +52,10 @@ AXES = {
 
 @pytest.mark.parametrize("varied", list(AXES))
 def test_a_quantity_varies_and_all_others_are_held(varied):
-    """Each cell is the scene of a rig that states its value, with fields in units as they were."""
+    """Each cell equals the scene of a rig with the value of the axis.
+
+    Fields with units keep their values.
+    """
     fields = {"hold_time": "100 s", "initial_stress": "50 kPa", "load_velocity_ratio": 3.0}
     scenes = list(study(RIG.axis(varied, AXES[varied]), **fields).scenes())
     for value, scene in zip(AXES[varied], scenes, strict=True):
@@ -68,7 +71,7 @@ def test_a_stiffness_in_friction_over_displacement_goes_with_the_normal_stress()
         RIG.axis("stiffness", ["0.002 1/um", "0.004 1/um"]),
         RIG.axis("normal_stress", ["1 MPa", "20 MPa"]),
     )
-    # k D_c/sigma = 0.002/um 10 um, whatever sigma is
+    # k D_c/sigma = 0.002/um 10 um, independent of sigma.
     found = [scene.stiffness for scene in made.scenes()]
     assert found == pytest.approx([0.02, 0.02, 0.04, 0.04], rel=EXACT)
 
@@ -80,7 +83,7 @@ def test_fields_of_scenes_in_units():
     assert [axis.units for axis in made.axes] == [{"hold_time": "s"}, {"load_velocity": "um/s"}]
     assert made.axes[0].point_names == ["10 s", "120 s"]
     at = [(scene.hold_time, scene.load_velocity_ratio) for scene in made.scenes()]
-    # D_c/V_* is 10 s
+    # D_c/V_* is 10 s.
     expected = list(itertools.product([1.0, 12.0], [1.0, 10.0, 100.0]))
     assert np.array(at) == pytest.approx(np.array(expected), rel=EXACT)
 
@@ -101,8 +104,6 @@ LATTICE = (
 
 
 # ---- files ---------------------------------------------------------------------------------------
-
-
 def test_coordinates_are_in_the_units_stated_and_dimensionless_ones_stand_beside(tmp_path):
     results = run(study(*LATTICE), output=tmp_path)
     assert results["sigma_star"].dims == ("sigma_star",)
@@ -111,7 +112,7 @@ def test_coordinates_are_in_the_units_stated_and_dimensionless_ones_stand_beside
     assert results["stiffness"].attrs["units"] == "MPa/um"
     beside = results["dimensionless_stiffness"]
     assert beside.dims == ("sigma_star", "stiffness")
-    # k D_c/sigma: 0.01 MPa/um 10 um over 1, 5 and 20 MPa, and three times that
+    # k D_c/sigma is 0.01 MPa/um 10 um divided by 1, 5 and 20 MPa, and three times this value.
     expected = np.array([[0.1, 0.3], [0.02, 0.06], [0.005, 0.015]])
     assert beside.values == pytest.approx(expected, rel=EXACT)
     assert results["dimensionless_hold_time"].dims == ("hold_time",)
@@ -137,12 +138,10 @@ def test_results_survive_their_file(tmp_path):
 
 
 # ---- other values ----------------------------------------------------------------------------
-
-
 def test_overrides_in_units():
     made = study(*LATTICE, initial_stress="50 kPa")
     assert made.with_(hold_time=["10 s", "1 min"]).axes[3].point_names == ["10 s", "60 s"]
-    # plain numbers are in the units of their axis
+    # Plain numbers have the units of their axis.
     assert made.with_(stiffness=[0.02]).axes[2].point_names == ["0.02 MPa/um"]
     assert made.with_(slip_distance=["1 um", "2 um"]).dimensions[0] == "slip_distance"
     assert made.with_(normal_stress=["2 MPa", "5 MPa"]).axes[0].point_names == ["2 MPa", "5 MPa"]
@@ -158,7 +157,10 @@ def test_overrides_in_units():
 
 
 def test_what_states_the_same_takes_the_place_of_an_axis():
-    """A velocity of a ratio, a stiffness of its ratio, and back; with a rig and without."""
+    """An override of an equivalent field replaces the axis.
+
+    Velocities replace velocity ratios, stiffness replaces its ratio, and vice versa.
+    """
     ratios = study(Axis("load_velocity_ratio", [2.0, 3.0]))
     for given, points in (("10 um/s", [10.0]), (["1 um/s", "5 um/s"], [1.0, 5.0])):
         (axis,) = ratios.with_(load_velocity=given).axes
@@ -179,15 +181,13 @@ def test_what_states_the_same_takes_the_place_of_an_axis():
 
 
 # ---- results in units ----------------------------------------------------------------------------
-
-
-#: Softer than the fault at 5 MPa and 10 um: (b-a) sigma/D_c is 0.002 MPa/um.
+#: A rig with a stiffness below the critical stiffness, which is 0.002 MPa/um at 5 MPa and 10 um.
 SOFT = STATED | {"stiffness": "0.001 MPa/um"}
 
 
 @pytest.fixture(scope="module")
 def cycles():
-    """Two normal stresses, two slip distances: all of them stick and slip."""
+    """Run limit cycles at two normal stresses and two slip distances."""
     axes = (
         RIG.axis("normal_stress", ["5 MPa", "20 MPa"]),
         RIG.axis("slip_distance", ["5 um", "10 um"]),
@@ -199,7 +199,7 @@ def cycles():
 
 
 def test_each_cell_is_converted_by_its_own_scales(cycles):
-    """What the accessor makes of the file is what the rig of each cell makes of its numbers."""
+    """The accessor converts each cell with the scales of its rig."""
     assert (cycles["status"] == 0).all()
     found = cycles.rsf.in_units(stress="kPa", length="mm", time="min")
     for sigma, slip in itertools.product(["5 MPa", "20 MPa"], ["5 um", "10 um"]):
@@ -213,7 +213,7 @@ def test_each_cell_is_converted_by_its_own_scales(cycles):
             ours, theirs = found[name].sel(at), cycles[name].sel(at)
             assert ours.values == pytest.approx(theirs.values * factor, rel=EXACT), name
     assert found["recurrence_interval"].attrs["units"] == "min"
-    # the axes stay in the units stated, and what stood beside them without dimension is left out
+    # The axes keep their units, and the dimensionless coordinates are dropped.
     assert found["load_velocity"].attrs["units"] == "um/s"
     assert "load_velocity_ratio" not in found
     rates = 1e-3 * 60.0 * 10.0 ** cycles["max_log10_slip_rate"]
@@ -221,7 +221,10 @@ def test_each_cell_is_converted_by_its_own_scales(cycles):
 
 
 def test_a_slip_rate_in_units_tells_slow_slip_from_stick_slip(cycles):
-    """By the peak in um/s of each cell, from results as they are and in other units."""
+    """A slip rate with units separates slow slip from stick-slip.
+
+    The peak of each cell in um/s decides, for results in any units.
+    """
     peaks = cycles.rsf.in_units()["max_slip_rate"].values
     between = float(np.sqrt(peaks.min() * peaks.max()))
     for results in (cycles, cycles.rsf.in_units(length="mm")):
@@ -275,13 +278,14 @@ def test_figures_and_tables_show_units(cycles, capsys):
 
 
 def test_results_say_what_they_are_of(cycles):
-    """What their study holds fixed, and what the rig states: as the study itself is shown. What an
-    axis varies is not among them.
+    """The description contains fixed fields and the quantities of the rig.
+
+    Quantities that vary along an axis are omitted.
     """
 
     of = summaries.describe_dataset_origin(cycles)
     assert {"a = 0.01", "b_over_a = 1.4"} <= set(of["fixed"].split(", "))
-    # in units of the slider the stiffness goes with D_c and sigma_*
+    # In units of the slider, the stiffness depends on D_c and sigma_*.
     assert not {"stiffness", "load_velocity_ratio"} & set(of["fixed"].replace(",", "").split())
     assert of["laboratory"].split(", ")[0] == "reference_velocity = 1 um/s"
     assert "slip_distance" not in of["laboratory"]
@@ -295,7 +299,6 @@ def test_results_say_what_they_are_of(cycles):
 
 
 # ---- the command line ----------------------------------------------------------------------------
-
 OPTIONS = [
     *("--normal-stress", "5 MPa"),
     *("--slip-distance", "10 um"),
@@ -304,12 +307,15 @@ OPTIONS = [
 
 
 def test_a_study_of_no_rig_is_put_on_one(tmp_path):
-    """Axes are in units then, what they hold is what they held; new values are in units."""
+    """A study without a rig can be converted to a rig.
+
+    The axes then have units, the scenes are unchanged, and new values may have units.
+    """
     studied = study_loader.load_study("slide_hold_slide")
     rig = Rig(**{n: v for n, v in STATED.items() if n != "stiffness"})
     there = studies_on_rig.convert_study_to_rig_units(studied, rig)
     assert [axis.units for axis in there.axes[1:]] == [{"stiffness": "MPa/um"}, {"hold_time": "s"}]
-    # what is fitted is what was: D_c/V_* is 10 s
+    # The range of the fit is unchanged, because D_c/V_* is 10 s.
     assert [fit.within for fit in there.reductions] == [(1e5, 1e9)] * 2
     for one, other in zip(studied.scenes(), there.scenes(), strict=True):
         ours, theirs = numbers(one), numbers(other)
@@ -328,7 +334,10 @@ def test_a_study_of_no_rig_is_put_on_one(tmp_path):
 
 
 def test_what_a_rig_states_of_its_dynamics_takes_the_place_of_that_of_a_study():
-    """Of a study with mass on a rig that radiates, and of one that radiates on a rig with mass."""
+    """The dynamics of a rig replace the dynamics of a study.
+
+    Radiation damping replaces inertia, and vice versa.
+    """
     scales = {n: v for n, v in STATED.items() if n != "stiffness"}
     radiates = Rig(**scales, shear_modulus="30 GPa", density="2700 kg/m^3")
     swings = Rig(**scales, period="10 ms")

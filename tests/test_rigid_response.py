@@ -1,5 +1,7 @@
-"""Rigid responses: closed forms at constant normal stress, and what variable normal stress
-changes.
+"""Tests of the response of a rigid slider to a velocity step.
+
+The tests cover closed forms at constant normal stress, and the effect of variable normal
+stress.
 """
 
 import math
@@ -28,8 +30,10 @@ CONSTANT = {"normal_stress": "constant"}
 @pytest.mark.parametrize("rate", [1e-4, 0.1, 10.0, 200.0, 1e4])
 @pytest.mark.parametrize("law", ["slowness", "slip"])
 def test_stress_at_constant_normal_stress_is_eqs_17(law, rate):
-    """tau less mu_* sigma + a sigma ln V: -b ln V + b ln[1 + (V - 1) exp(-slip)], and
-    -b ln V [1 - exp(-slip)] by the slip law.
+    """The stress agrees with eqs. 17a and 17b.
+
+    Relative to mu_* sigma + a sigma ln V, the stress is -b ln V + b ln[1 + (V - 1)
+    exp(-slip)] for the slowness law and -b ln V [1 - exp(-slip)] for the slip law.
     """
     scene = Scene()
     left = math.log(rate) * np.exp(-SLIP)
@@ -43,7 +47,7 @@ def test_stress_at_constant_normal_stress_is_eqs_17(law, rate):
 
 @pytest.mark.parametrize("rate", [1e-4, 0.1, 10.0, 1e4])
 def test_slip_law_at_constant_normal_stress_decays_over_one_slip_distance(rate):
-    """Eq. 17b is exact for the slip law: 1/e after D_c, whatever the step."""
+    """The evolution of the slip law falls to 1/e after D_c (eq. 17b)."""
     found = response(rate, law="slip", **CONSTANT)
     assert found["evolution_distance"] == pytest.approx(1.0, abs=1e-7)
     assert found["evolution_distance_error"] < 1e-6
@@ -52,7 +56,8 @@ def test_slip_law_at_constant_normal_stress_decays_over_one_slip_distance(rate):
 
 def test_small_steps_of_the_slowness_law_are_eq_17b():
     found = response(1.0 + 1e-4, law="slowness", **CONSTANT)
-    assert found["evolution_distance"] == pytest.approx(1.0, abs=1e-4)  # ln(1 + x) = x, x < 1e-4
+    # ln(1 + x) = x for x < 1e-4.
+    assert found["evolution_distance"] == pytest.approx(1.0, abs=1e-4)
 
 
 def test_slip_of_3p5_of_the_paper():
@@ -79,7 +84,7 @@ def test_ends_of_a_response_are_the_direct_effect_and_the_steady_state(law, rate
 def test_variable_normal_stress_makes_up_and_down_steps_unequal():
     assert response(1e-3, **CONSTANT)["direct_asymmetry"] == pytest.approx(0.0, abs=1e-12)
     assert response(1e-3, **CONSTANT)["evolution_asymmetry"] == pytest.approx(0.0, abs=1e-12)
-    # the jump is smaller downward, what evolves after it is larger
+    # For downward steps, the direct effect is smaller and the evolution is larger.
     assert response(1e-3)["direct_asymmetry"] < -0.05
     assert response(1e-3)["evolution_asymmetry"] > 0.05
 
@@ -92,7 +97,11 @@ def test_the_closed_form_keeps_its_digits(rate):
 @pytest.mark.parametrize("step", [0.5, -0.4])
 @pytest.mark.parametrize("law", ["two_slip_states", "two_slowness_states"])
 def test_two_states_each_lose_their_share_to_a_step_of_normal_stress(law, step):
-    """Both by their closed forms, from b_i ln V less its share of alpha ln r: to 1/e of the sum."""
+    """The evolution distance follows from the closed forms of both states.
+
+    Each state starts at b_i ln V minus its share of alpha ln r. The evolution distance ends
+    at 1/e of the sum.
+    """
     b, lengths = np.array([0.01, 0.008]), np.array([1.0, 10.0])
     begins = b * math.log(10.0) - b / b.sum() * 0.5 * math.log1p(step)
 

@@ -1,4 +1,4 @@
-"""Running: the same numbers in this process, on workers and in any grouping."""
+"""Tests of runs in this process and on workers, with any grouping of cells."""
 
 import contextlib
 import os
@@ -32,7 +32,10 @@ def test_serial_workers_and_any_grouping_give_identical_bits(cluster, monkeypatc
 
 
 def test_equal_scenes_are_computed_once():
-    """phi means nothing at constant normal stress: the cells along it are one scene."""
+    """Cells with equal scenes are computed once.
+
+    The angle phi is not applicable at constant normal stress.
+    """
     doubled = SMALL_STUDY.with_(phi=[55.0, 60.0], b_over_a=[2.0])
     dataset = run(doubled)
     assert dataset.sizes == {"phi": 2, "case": 2, "b_over_a": 1}
@@ -43,7 +46,7 @@ def test_equal_scenes_are_computed_once():
 
 @dataclass(frozen=True)
 class Profile(Measure):
-    """A measure with an inner dimension."""
+    """Measure with an inner dimension."""
 
     name = "profile"
     primary_output = "total"
@@ -103,7 +106,7 @@ def main():
 
 @pytest.mark.parametrize("call", ["main()", "for _ in range(1):\n    main()"])
 def test_a_script_that_workers_would_run_again_is_told_what_to_write(call, tmp_path):
-    """Before any of them is started."""
+    """A script without a main guard raises an error before workers start."""
     script = tmp_path / "script.py"
     script.write_text(UNGUARDED + call)
     words = [sys.executable, str(script)]
@@ -137,7 +140,11 @@ if __name__ == "__main__":
 
 
 def test_a_lost_resource_tracker_causes_no_traceback(tmp_path):
-    """Python starts another one, which does not know the semaphores that are released later."""
+    """A lost resource tracker causes no traceback.
+
+    Python starts a new resource tracker, which does not know the semaphores of the lost
+    tracker.
+    """
     script = tmp_path / "script.py"
     script.write_text(LOSES_TRACKER)
     words = [sys.executable, str(script), str(tmp_path / "workers.log")]
@@ -153,7 +160,10 @@ def test_accuracy_reaches_the_cells():
 
 
 def test_runs_share_processes_that_are_started_once(monkeypatch, tmp_path):
-    """When the first cell is needed; a worker that dies is started again among them."""
+    """Several runs share worker processes.
+
+    The processes start with the first cell, and a worker that dies is restarted.
+    """
     started, start = [], worker_pool.start_local_cluster
     monkeypatch.setattr(
         worker_pool,
@@ -171,7 +181,7 @@ def test_runs_share_processes_that_are_started_once(monkeypatch, tmp_path):
 
         assert not started
         assert ran("one") == 4 * ["OK"]
-        assert ran("one") == 4 * ["OK"]  # from its journal
+        assert ran("one") == 4 * ["OK"]  # The cells are read from the journal.
         ended, failed = (pytest.warns(match=text) for text in ("a worker ended", "cell .* failed"))
         with ended, failed:
             assert ran("two", "dies") == ["OK", "OK", "WORKER_LOST", "OK"]
@@ -180,7 +190,10 @@ def test_runs_share_processes_that_are_started_once(monkeypatch, tmp_path):
 
 
 def test_processes_that_are_lost_are_started_anew(monkeypatch, tmp_path):
-    """For the next run; here they compute in this process."""
+    """Lost worker processes are started again for the next run.
+
+    In this test, the cells are computed in the same process.
+    """
     started, lost = [], [True]
 
     def mapper(task, batches):

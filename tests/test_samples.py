@@ -1,4 +1,7 @@
-"""Samples and tables of cases as one dimension over several fields, and what is made of them."""
+"""Tests of random samples and tables of cases as an axis over several fields.
+
+The tests also cover statistics of the results.
+"""
 
 import json
 from pathlib import Path
@@ -55,8 +58,10 @@ def study(*axes, base=BASE, **more):
 
 
 def test_fields_are_functions_of_what_is_drawn():
-    """A lattice with an ordinary axis beside: each cell has the fields of its sample, which are
-    coordinates of the file; the declaration brings them back.
+    """Fields of the scenes are functions of the sampled variables.
+
+    Each cell of the lattice has the fields of its sample, which are coordinates of the
+    file. The declaration restores the axis.
     """
     samples = Axis.samples(LOGS, 8, 3, fields=FIELDS)
     found = run(study(Axis("law", ["slip", "slowness"]), samples))
@@ -64,7 +69,8 @@ def test_fields_are_functions_of_what_is_drawn():
     assert found["sample"].values.tolist() == list(range(8))
     assert found["a"].dims == found["b_over_a"].dims == ("sample",)
     critical = (found["a"] * (found["b_over_a"] - 1.0)).values
-    # the closed form, (b - a) sigma/D_c, to rounding and the width of a root
+    # The closed form is (b - a) sigma/D_c, and the tolerance covers rounding and the width of a
+    # root.
     for law in found["critical_stiffness"].values:
         np.testing.assert_allclose(law, critical, rtol=1e-7)
     how = json.loads(found["sample"].attrs["drawn"])
@@ -92,8 +98,10 @@ def test_the_first_samples_are_a_sample_still():
 
 @pytest.mark.parametrize("method", ["sobol", "latin_hypercube", "random"])
 def test_estimates_with_their_covariance(method):
-    """Moments of normal samples are those asked for: within five standard errors of independent
-    samples, than which the others err less. The sign of the correlation shows at 45 of them.
+    """Normal samples have the requested means and covariances.
+
+    The tolerance is five standard errors of independent samples, and other methods have
+    smaller errors. The correlation differs from 0 by 45 standard errors.
     """
     covariance = np.array([[4e-6, -3.6e-6], [-3.6e-6, 9e-6]])
     axis = Axis.samples({"a": 0.1, "mu_star": 0.6}, 4096, 1, method=method, covariance=covariance)
@@ -109,15 +117,15 @@ def test_distributions_keep_their_own_quantiles_where_they_are_correlated():
     axis = Axis.samples(drawn, 1024, 2, covariance=[[1.0, 0.9], [0.9, 1.0]])
     for name, of in drawn.items():
         values = np.sort([row[name] for row in axis.rows])
-        # the distance of Kolmogorov that one in 1e5 independent samples is beyond
+        # Only one in 1e5 independent samples exceeds this Kolmogorov distance.
         assert abs(of.cdf(values) - (np.arange(1024) + 0.5) / 1024).max() < 2.5 / 32.0
     ranks = pd.DataFrame(axis.rows).corr("spearman").iloc[0, 1]
-    # of normal scores that are correlated by .9: 6/pi asin(.45)
+    # The rank correlation of normal scores with a correlation of 0.9 is 6/pi asin(0.45).
     assert ranks == pytest.approx(6.0 / np.pi * np.arcsin(0.45), abs=0.03)
 
 
 def test_samples_for_sobol_indices_share_coordinates():
-    """Of each point A, B, and A with one coordinate of B after the other."""
+    """The samples are A, B, and A with one coordinate of B at a time."""
     axis = Axis.samples({"a": norm(0.01, 1e-3), "mu_star": norm(0.6, 0.1)}, 4, 1, method="saltelli")
     blocks = np.array([list(row.values()) for row in axis.rows]).reshape(4, 4, 2)
     a, b, first, second = blocks.transpose(1, 0, 2)
@@ -143,7 +151,7 @@ def test_the_rows_of_a_table_are_cases(table):
 
 
 def _with_units(tmp_path):
-    """One table, stated in each of the ways there are."""
+    """Return the same table from all supported sources of units."""
     (tmp_path / "cases.csv").write_text("a (1), slip_distance (um)\n.01, 5\n.012, 10\n")
     columns = {"a": [0.01, 0.012], "slip_distance": [5.0, 10.0]}
     dataset = xr.Dataset({n: ("draw", v) for n, v in columns.items()})
@@ -158,7 +166,7 @@ def _with_units(tmp_path):
 
 
 def test_a_table_in_units_of_a_rig(tmp_path):
-    """K = k D_c/sigma_*, whatever the units are stated by."""
+    """The stiffness K = k D_c/sigma_* is the same for all sources of units."""
     base = RIG.scene(a=0.01, b_over_a=1.5, normal_stress="constant")
     for axis in _with_units(tmp_path):
         declared = study(axis, base=base, rig=RIG)
@@ -175,13 +183,17 @@ def test_a_table_in_units_of_a_rig(tmp_path):
 
 @pytest.fixture(scope="module")
 def fitted():
-    """The fit that uncertain_recurrence names, of the record that is shipped."""
+    """Return the fit of the shipped record that uncertain_recurrence uses."""
     record = rsfstudy.read_record(RECORDS / "basalt.txt")
     return rsfstudy.fit(record, stiffness="0.0013 1/um", laws=["slowness"])
 
 
 def test_the_estimates_that_uncertain_recurrence_states(fitted):
-    """To half of the last of four digits; at a tenth of the tolerance six digits are the same."""
+    """The four-digit constants of the study agree with the fit.
+
+    The tolerance is half of the last digit. A tolerance of the fit that is ten times
+    smaller changes no digit up to the sixth.
+    """
     stated = uncertain_recurrence
     names = list(stated.ESTIMATES)
     assert fitted["parameter"].values.tolist()[: len(names)] == names
@@ -215,7 +227,7 @@ RANDOM = np.random.default_rng(37)
 
 
 def measured(values, status=0, **attrs) -> xr.Dataset:
-    """Samples of some number, each with an error of 1e-6."""
+    """Return a dataset of samples whose errors are 1e-6."""
     values = np.asarray(values, dtype=float)
     dims = ("law", "sample")[2 - values.ndim :]
     return xr.Dataset(
@@ -232,8 +244,10 @@ STATISTICS = (Mean("mean", "y"), StandardDeviation("sd", "y"), Quantile("low", "
 
 
 def test_statistics_with_the_errors_of_sampling():
-    """The statistics of NumPy; their standard errors are the scatter over 500 sets of samples,
-    which is known to 3 % of itself and is met to four times that.
+    """Statistics agree with NumPy, and standard errors with the scatter.
+
+    The scatter over 500 sets of samples has an accuracy of 3 %, and the tolerance is about
+    four times this value.
     """
     values = RANDOM.normal(3.0, 0.5, (500, 200))
     found = apply_reductions(measured(values), STATISTICS)
@@ -244,15 +258,19 @@ def test_statistics_with_the_errors_of_sampling():
         assert float(found[f"{name}_stderr"].mean()) == pytest.approx(
             float(found[name].std()), rel=0.13
         )
-        # that of the cells is told apart: a mean of them, and of a quantile at most theirs
+        # The numerical error is reported separately. The error of a mean is a mean of the
+        # errors, and the error of a quantile is at most the largest error.
         assert float(found[f"{name}_error"].max()) <= 1.0001e-6
         assert found[f"{name}_points"].values.tolist() == [200] * 500
 
 
 @pytest.mark.parametrize("n", [3, 5, 12])
 def test_the_error_of_a_standard_deviation_is_honest_of_few_samples(n):
-    """Of normal samples the scatter is known: sigma (1 - c4^2)^1/2. A jackknife
-    tells more than that of few, never less: up to a sixth more of three; 20,000 sets tell 2 %.
+    """The standard error is not too small for a few samples.
+
+    For normal samples, the exact scatter is sigma (1 - c4^2)^1/2. The jackknife
+    overestimates it by up to a sixth for three samples. The scatter over 20,000 sets has an
+    accuracy of 2 %.
     """
     values = np.random.default_rng(5).normal(0.0, 1.0, (20_000, n))
     found = apply_reductions(measured(values), (StandardDeviation("sd", "y"),))
@@ -305,7 +323,7 @@ def test_too_few_samples_for_a_quantile():
 
 
 def test_a_mean_over_other_scales_is_refused_and_told_in_units():
-    """Times in D_c/V_* have no mean where D_c is sampled; those in s have."""
+    """Times in D_c/V_* have no mean if D_c varies, but times in s do."""
     lattice = measured([2.0, 2.0, 2.0], long_name="time", scale="D_c/V_*").assign_coords(
         slip_distance=("sample", [5.0, 10.0, 30.0], {"units": "um"}),
         sigma_star=((), 5.0, {"units": "MPa"}),
@@ -323,7 +341,10 @@ def test_a_mean_over_other_scales_is_refused_and_told_in_units():
 
 
 def saltelli(function, n, count=3, **more) -> xr.Dataset:
-    """A function of independent numbers that are even between -pi and pi."""
+    """Return a function of independent uniform variables.
+
+    The variables are between -pi and pi.
+    """
     names = [f"x{i}" for i in range(count)]
     even = uniform(-np.pi, 2.0 * np.pi)
     axis = Axis.samples(dict.fromkeys(names, even), n, 5, method="saltelli", dimension="draw")
@@ -334,8 +355,11 @@ def saltelli(function, n, count=3, **more) -> xr.Dataset:
 
 
 def test_sobol_indices_of_a_function_that_has_them_in_closed_form():
-    """Ishigami and Homma (1990): sin x1 + 7 sin(x2)^2 + .1 x3^4 sin x1. An interval of 95 % holds
-    the closed form: of the six intervals all do with this seed, and none is wide.
+    """The confidence intervals contain the closed forms.
+
+    The function is sin x1 + 7 sin(x2)^2 + 0.1 x3^4 sin x1 of Ishigami and Homma (1990).
+    With this seed, all six 95 % intervals contain the exact values, and all intervals are
+    narrow.
     """
     lattice = saltelli(
         lambda x, y, z: np.sin(x) + 7.0 * np.sin(y) ** 2 + 0.1 * z**4 * np.sin(x), 1024
@@ -368,7 +392,7 @@ def test_sobol_indices_are_refused():
     for part in (whole.isel(draw=slice(0, 310)), whole.isel(draw=slice(0, 15))):
         with pytest.raises(InvalidValue, match="over = 'draw': was not drawn for Sobol indices"):
             apply_reductions(part, of)
-    apply_reductions(whole.isel(draw=slice(0, 160)), of)  # 32 points are a sample still
+    apply_reductions(whole.isel(draw=slice(0, 160)), of)  # 32 points are a valid sample.
     with pytest.raises(InvalidValue, match="over = 'sample': is no dimension of y"):
         apply_reductions(whole, (SobolIndices("share", "y"),))
 
@@ -377,8 +401,9 @@ def test_sobol_indices_are_refused():
 
 
 def test_samples_are_drawn_as_histograms_and_scatters():
-    """A square of what was measured and of the fields, with few ticks however many samples: never a
-    name for each.
+    """Samples are plotted as a matrix of histograms and scatter plots.
+
+    The matrix contains the output and the fields, with few ticks for any number of samples.
     """
     laws = Axis("law", ["slip", "slowness"])
     found = run(study(laws, Axis.samples(LOGS, 256, 3, fields=FIELDS)), engine="compiled")

@@ -1,4 +1,4 @@
-"""Large lattices: little memory and few messages a cell, and stores that are written in pieces."""
+"""Tests of large lattices: memory, messages and chunked Zarr stores."""
 
 import functools
 import json
@@ -20,18 +20,25 @@ from rsfstudy.storage import zarr_store
 
 @functools.cache
 def in_memory() -> xr.Dataset:
-    """What the stores of the small lattice are held against."""
+    """Return the reference results of the small lattice, cached."""
     return run(SMALL_STUDY)
 
 
 @pytest.mark.parametrize("format", ["netcdf", "zarr"])
 def test_the_driver_needs_less_than_a_kilobyte_a_cell(format):
-    """Peak memory of a process that runs 15,000 cells, beyond that of one that has run 100."""
+    """The memory per cell is below 1 kB.
+
+    The memory is the additional peak memory of a process that runs 15,000 cells after a run
+    of 100 cells.
+    """
     assert measure_in_subprocess(15_000, 0, format)["bytes"] < 1000
 
 
 def test_few_batches_wait_on_the_scheduler(cluster, monkeypatch):
-    """However many cells: what waits there fills its memory."""
+    """The number of waiting batches is bounded for any number of cells.
+
+    Waiting batches use memory of the scheduler.
+    """
     monkeypatch.setattr(cell_plan.CellBatchIterator, "compute_next_batch_size", lambda _self: 1)
     waiting, most = set(), []
     submit = cluster.submit
@@ -53,7 +60,7 @@ def test_few_batches_wait_on_the_scheduler(cluster, monkeypatch):
     [(0.1, 3), (60.0, 1), (1e-6, cell_plan.MAX_BATCH_SIZE), (np.nan, 1), (0.0, 1)],
 )
 def test_batches_are_sized_by_what_finished_cells_took(seconds, size):
-    """A fraction of a second each, and small enough to lose."""
+    """A batch takes a fraction of a second, so little work can be lost."""
     batches = cell_plan.CellBatchIterator(None, np.arange(100_000), worker_count=2)
     assert batches.compute_next_batch_size() == 1
     batches.record_time(seconds)
@@ -62,7 +69,7 @@ def test_batches_are_sized_by_what_finished_cells_took(seconds, size):
 
 @pytest.mark.parametrize("count", [0, 1, 2, 10, 999, 1000])
 def test_the_first_cells_are_a_sample_of_all(count):
-    """Every cell once, and no two neighbours one after the other in a long list."""
+    """Each cell occurs once, and neighbours are not computed in succession."""
     order = cell_plan.order_cells_by_golden_section(np.arange(count))
     assert sorted(order) == list(range(count))
     if count >= 10:
@@ -70,11 +77,12 @@ def test_the_first_cells_are_a_sample_of_all(count):
 
 
 # ---- Zarr ---------------------------------------------------------------------------------------
-
-
 @pytest.mark.parametrize("numbers", [3, 10**6])
 def test_a_zarr_store_holds_the_same_as_the_file(numbers, tmp_path, monkeypatch):
-    """In pieces of one row, and in one; nothing but the store is left."""
+    """A store equals the file for any chunk size.
+
+    No temporary files remain.
+    """
     monkeypatch.setattr(zarr_store, "_NUMBERS_PER_SLAB", numbers)
     in_pieces = run(SMALL_STUDY, output=tmp_path, format="zarr")
     have_same_numbers(in_pieces.load().map(plain), in_memory())
@@ -87,7 +95,7 @@ def test_a_zarr_store_holds_the_same_as_the_file(numbers, tmp_path, monkeypatch)
 
 
 def plain(values: xr.DataArray) -> xr.DataArray:
-    """Text as NetCDF reads it."""
+    """Convert strings to the type that NetCDF uses."""
     return values.astype(object) if values.dtype.kind == "T" else values
 
 
@@ -109,7 +117,7 @@ def test_a_store_that_is_there_is_not_replaced(tmp_path):
 
 
 def test_a_store_cut_short_is_not_taken_for_one(tmp_path, monkeypatch):
-    """Interrupted between two pieces: nothing stays but the journal, and the command goes on."""
+    """An interrupted write leaves the journal only, and the run resumes."""
     monkeypatch.setattr(zarr_store, "_NUMBERS_PER_SLAB", 3)
     original, written = zarr_store.build_lattice_variables, []
 
@@ -131,7 +139,7 @@ def test_a_store_cut_short_is_not_taken_for_one(tmp_path, monkeypatch):
 
 @pytest.mark.parametrize("codec", ["numcodecs.pickle", "gzip"])
 def test_a_store_is_not_decoded_by_what_ours_are_not(codec, tmp_path):
-    """It may run code of its own."""
+    """A store with an unknown codec is rejected, because it may run code."""
     run(SMALL_STUDY, output=tmp_path, format="zarr")
     file = tmp_path / "small.zarr" / "message" / "zarr.json"
     about = json.loads(file.read_text())
@@ -161,7 +169,7 @@ def test_a_chunk_that_is_damaged_or_lost_is_noticed(tmp_path):
     (tmp_path / "small.zarr" / "status" / "c" / "0" / "0").unlink(missing_ok=True)
     with pytest.raises(DataError, match=r"small\.zarr is damaged"):
         rsfstudy.open(tmp_path / "small.zarr")
-    # and whoever opens it without rsfstudy reads "pending", not "ok"
+    # Without rsfstudy, the missing values have the status "pending", not "ok".
     bare = xr.open_dataset(tmp_path / "small.zarr", engine="zarr", consolidated=False)
     assert int(bare.status[0, 0]) == rsfstudy.status.Status.PENDING
     assert np.isnan(bare.critical_velocity_ratio[0, 0])

@@ -1,4 +1,7 @@
-"""A scene that exists is meaningful; what is refused is for `test_wordings`."""
+"""Tests of valid scenes.
+
+The module ``test_wordings`` tests the errors of invalid scenes.
+"""
 
 import dataclasses
 import inspect
@@ -43,7 +46,7 @@ def test_table_1_is_the_default():
     scene = Scene()
     assert (scene.a, scene.mu_star, scene.phi, scene.alpha) == (0.0145, 0.76, 60.0, 0.56)
     assert (scene.period, scene.reference_rate) == (5.0, 1.17e-8)
-    # T V_*/(2 pi D_c) of Table 1
+    # T V_*/(2 pi D_c) for the values of Table 1.
     assert scene.inertial_time == pytest.approx(9.31e-9, rel=1e-3)
 
 

@@ -1,4 +1,4 @@
-"""Motions settle to steady sliding only where small changes of it decay."""
+"""Tests of settling: a motion settles only if small perturbations decay."""
 
 import math
 import re
@@ -39,7 +39,7 @@ DECAYS = {**SLIDER, "stiffness_ratio": 1.1, "load_velocity_ratio": 300.0}
 
 
 def auxiliary_rates(log_slip_rate, states, fraction, p):
-    """dE/dt = V**2 - c E, which acts on nothing, and no change of pore pressure."""
+    """Return dE/dt = V**2 - c E of a passive unknown, and a pressure decay."""
     energy, pressure = states
     time = fraction * math.exp(min(-log_slip_rate, LARGEST_LOG_SLOWNESS))
     return fraction * math.exp(log_slip_rate) - p[FLUID] * time * energy, -time * pressure
@@ -51,7 +51,7 @@ def auxiliary_steady_states(log_slip_rate, p):
 
 @dataclass(frozen=True, kw_only=True)
 class Dissipation(Fluid):
-    """A passive unknown whose steady value is 1e10 at the slip rate of a rupture."""
+    """A passive unknown whose steady value in a rupture is 1e10."""
 
     energy_loss: float = number(0.3, "$c$", "1", "decay rate of energy", "V_*/D_c", rule=POSITIVE)
 
@@ -90,20 +90,25 @@ def test_a_passive_unknown_does_not_change_the_limit_cycle(fluid, loss):
 
 @pytest.mark.parametrize("engine", [SCIPY, PYTHON, COMPILED])
 def test_a_passive_unknown_does_not_end_a_damped_oscillation(engine):
-    """Motions used to end after the first peak, where the unknown had decayed to 1e-6 of its
-    maximum; later peaks were missing.
+    """A passive unknown does not end the motion too early.
+
+    In an earlier version, the motion ended after the first peak, when the unknown had
+    decayed to 1e-6 of its maximum.
     """
     measure = StepResponse(peaks=4, phases=2)
     drained = measure(Scene(**DECAYS), Accuracy(1e-5))
     passive = measure(Scene(**DECAYS, fluid=Dissipation), Accuracy(1e-5, engine=engine))
     peaks = drained.values["peak_log10_slip_rate"]
     assert np.isfinite(peaks).all()
-    # later peaks carry the errors of all oscillations before
+    # Later peaks contain the errors of all earlier oscillations.
     assert passive.values["peak_log10_slip_rate"] == pytest.approx(peaks, abs=1e-3)
 
 
 def test_no_motion_settles_where_small_changes_grow():
-    """The distance from steady sliding falls by far more than the level after each rupture."""
+    """A motion around unstable steady sliding does not settle.
+
+    The distance from steady sliding falls far below the level after each rupture.
+    """
     scene, accuracy = Scene(**CYCLES, fluid=Dissipation), Accuracy(1e-4)
     growth = largest_linear_growth_rate(scene, scene.log_load_velocity)
     assert growth is not None
@@ -145,7 +150,11 @@ def test_only_unknowns_can_be_excluded(excluded, said):
 
 
 def test_a_small_oscillation_that_grows_becomes_a_limit_cycle():
-    """Slip rate swings by less than 1e-3 in ln V at first, which used to count as settled."""
+    """A growing oscillation with a small amplitude has not settled.
+
+    The amplitude is below 1e-3 in ln V at first, which an earlier version accepted as
+    settled.
+    """
     unstable = {**SLIDER, "stiffness_ratio": 0.95, "load_velocity_ratio": 1.0}
     small, large = (
         LimitCycle(phases=2)(Scene(**unstable, displacement_step=step), Accuracy(1e-4))

@@ -1,5 +1,7 @@
-"""The site is built strictly, leads nowhere that is not there, asks for nothing on the net, and
-names all that there is to name.
+"""Tests of the documentation site.
+
+The site is built with warnings as errors, has no broken links, loads no files from the
+network, and lists all public names.
 """
 
 from __future__ import annotations
@@ -33,7 +35,7 @@ SLOTS = ("laws", "normal_stress", "fluid", "dynamics", "loading")
 
 
 class Page(HTMLParser):
-    """Links, anchors and loaded files of a page, and its text."""
+    """Links, anchors, loaded files and text of a page."""
 
     def __init__(self, file: Path) -> None:
         super().__init__()
@@ -57,7 +59,7 @@ class Page(HTMLParser):
 
 @pytest.fixture(scope="module")
 def site(tmp_path_factory) -> Path:
-    """The site, built with no proxy that leads anywhere: what it needs is here."""
+    """Build the site without access to the network."""
     made = tmp_path_factory.mktemp("site")
     command = [sys.executable, "-m", "sphinx", "-q", "-W", "--keep-going", "-c", "studies/pages"]
     nowhere = dict.fromkeys(("http_proxy", "https_proxy"), "http://127.0.0.1:9")
@@ -134,15 +136,17 @@ def test_examples_that_no_study_states_can_be_called(examples):
 
 
 def test_no_symbol_is_taken_for_emphasis(pages):
-    """As of ``sigma_*, slip rate in V_*``, where asterisks are to be escaped."""
+    """Asterisks in symbols such as ``sigma_*`` are escaped."""
     for file in pages:
         taken = re.findall(r"<em>([^<]*_)</em>", file.read_text())
         assert not taken, (file.name, taken)
 
 
 def names() -> Iterator[tuple[str, list[str]]]:
-    """What must stand on the page of names: from the signature that editors complete, the folders,
-    and what the code declares.
+    """Yield the names that the page of names must contain.
+
+    The names come from the signature of a scene, the folders of parts, and declarations in
+    the code.
     """
     yield "fields", [*rsfstudy.Scene().as_dict()]
     kept = [file.stem for slot in SLOTS for file in (SLIDER / slot).glob("[!_]*.py")]

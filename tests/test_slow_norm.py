@@ -1,4 +1,4 @@
-"""The instability norm of a rig: stated as a slip rate, and told where it is slow."""
+"""Tests of the instability norm of a rig, and of warnings about slow norms."""
 
 import math
 import re
@@ -33,7 +33,11 @@ SLOW = "the instability norm 0.0005 is a slip rate of 3.14 V_*, only 3.14 times 
 
 
 def test_a_norm_may_be_a_slip_rate():
-    """V T/(2 pi D_c), whoever states the period; a study of a rig takes one in place of its own."""
+    """A norm may be given as a slip rate, because it is V T/(2 pi D_c).
+
+    The period may belong to the rig or to the scene. A study of a rig accepts such an
+    override.
+    """
     expected = 10e-3 * 5e-3 / (2.0 * math.pi * 5e-6)
     scene = SHORT.scene(instability_norm="10 mm/s", **FALLS)
     assert scene.instability_norm == pytest.approx(expected, rel=1e-14)
@@ -48,7 +52,11 @@ def test_a_norm_may_be_a_slip_rate():
 
 
 def test_a_norm_near_the_load_point_is_told_once(capsys):
-    """Of a step, and of all cells of a study; not of a norm that is faster, nor of no rig."""
+    """A norm close to the load velocity causes a single warning.
+
+    The warning covers a step, or all cells of a study. A faster norm or a scene without a
+    rig causes no warning.
+    """
     with pytest.warns(UserWarning, match=re.escape(SLOW)) as told:
         found = rsfstudy.critical_step(
             SHORT.scene(**FALLS), "normal_stress_step", "down", rtol=1e-3
@@ -64,7 +72,7 @@ def test_a_norm_near_the_load_point_is_told_once(capsys):
         results = rsfstudy.run(STUDY, **quiet)
     assert len(told) == 1
     assert results.unstable.values.tolist() == [1.0, 1.0]
-    # the smaller of them triggers nothing
+    # The smaller step does not trigger instability.
     results = rsfstudy.run(STUDY, instability_norm="10 mm/s", **quiet)
     assert results.unstable.values.tolist() == [1.0, 0.0]
     rsfstudy.critical_step(Scene(period=1e4, b_over_a=1.5), rtol=1e-3)

@@ -1,4 +1,7 @@
-"""Every measure answers for every law; and names what has no number, or could not be found out."""
+"""Tests of the statuses of all measures.
+
+Each measure has a result for every law, or a status that explains the missing result.
+"""
 
 from __future__ import annotations
 
@@ -37,23 +40,26 @@ STEP = {**IMPOSED, "normal_stress_step": 0.1, "load_velocity_ratio": 1.0, "stiff
 HELD, TWO = {"displacement_step": 0.3}, {"law": "two_slip_states"}
 LOAD_HELD = {"load_velocity_ratio": 0.0}
 
-#: A measure, a scene, how it ends, and what is said of it.
+#: Measures and scenes, with the expected status and message.
 ENDS = [
     (UP, {"instability_norm": 5e-9}, Status.NORM_BELOW_LOADING_RATE,
      "whose norm is 9.31e-09: give instability_norm="),
     (UP, {"stiffness_ratio": 0.8}, Status.UNSTABLE_AT_ANY_STEP, ""),
     (UP, {"inertia": True, "instability_norm": 1e3}, Status.NORM_UNREACHABLE, ""),
     (CriticalStep(of="displacement_step", direction="down"), {}, Status.STABLE_FOR_ALL_STEPS, ""),
-    # a critical path exists for a large step, but steady sliding is unstable already
+    # A large step has a critical path, but steady sliding is already unstable.
     (UP, {**SLOWNESS, "b_over_a": 5.0, "stiffness_ratio": 0.8}, Status.UNSTABLE_AT_ANY_STEP, ""),
-    # every orbit closes at k = k_cr: what rounding makes of a deep down-swing does not count
+    # At k = k_cr, every orbit is closed, and the rounding errors of a large decrease are
+    # irrelevant.
     (DOWN, CONSTANT, Status.STABLE_FOR_ALL_STEPS, ""),
     (DOWN, {**SLOWNESS, **CONSTANT}, Status.STABLE_FOR_ALL_STEPS, ""),
-    # phi close to atan(mu_*): normal stress outgrows strength
+    # The angle phi is close to atan(mu_*), so the normal stress grows faster than the shear
+    # stress.
     (UP, {**SLOWNESS, "a": 0.066, "b_over_a": 8.1, "mu_star": 0.6, "phi": 33.0, "alpha": 0.0,
           "stiffness_ratio": 0.37}, Status.LOCKED, ""),
     (LimitCycle(), {**CYCLES, "stiffness_ratio": 1.2}, Status.NO_LIMIT_CYCLE, "settles to steady"),
-    # k_cr falls with V_0: what is soft at V_* is stiff at 1000 V_*
+    # The critical stiffness decreases with V_0, so a spring that is soft at V_* is stiff at 1000
+    # V_*.
     (LimitCycle(), {**CYCLES, "load_velocity_ratio": 1000.0, "phi": 50.0}, Status.NO_LIMIT_CYCLE,
      "settles to steady sliding"),
     (LimitCycle(), {**CYCLES, **LOAD_HELD}, Status.NO_LIMIT_CYCLE, "held"),
@@ -124,7 +130,7 @@ def test_what_has_no_number_is_named(measure, fields, status, message):
 
 # ---- every law -----------------------------------------------------------------------------------
 
-#: What is asked of a slider, and of which one.
+#: Measures and scenes of each question.
 QUESTIONS = {
     "rate step": (CriticalStep(), {"stiffness_ratio": 1.25}),
     "displacement step": (CriticalStep(of="displacement_step"), {"stiffness_ratio": 1.25}),
@@ -138,15 +144,16 @@ SLIDERS = [
     {"normal_stress": "variable", "stress_dependence": 1.0, "radiation_damping": 1e-9},
     {"normal_stress": "variable", "inertia": True},
 ]
-#: Each law; and those of two states where one strengthens.
+#: All laws, and laws with two states one of which strengthens friction.
 LAWS = [{"law": law} for law in sorted(laws.BUILT_IN_PARTS)]
 LAWS += [
     {"law": law, "a": 0.01, "b1_over_a": 1.4, "b2_over_a": -0.6, "length_ratio": 50.0}
     for law in ("two_slip_states", "two_slowness_states")
 ]
-#: Without mass or damping, cycles of most laws run away in a rupture.
+#: Without inertia or damping, the slip rate of most laws becomes unbounded in a rupture.
 CYCLES_END = (Status.OK, Status.SLIP_RATE_UNBOUNDED)
-#: Each question of each law; every two of question, law and slider meet.
+#: All combinations of questions and laws. Each pair of question, law and slider occurs at least
+#: once.
 ASKED = [
     (question, law, SLIDERS[(row + column) % len(SLIDERS)])
     for row, question in enumerate(QUESTIONS)
@@ -158,7 +165,7 @@ ASKED = [
 def test_every_measure_answers_for_every_law(question, law, slider):
     measure, fields = QUESTIONS[question]
     scene = Scene(**law, **slider, **fields)
-    # events of several states take their time
+    # Scenes with several states need many events.
     engine = COMPILED if question == "cycle" and scene.state_count > 1 else SCIPY
     found = measure(scene, Accuracy(1e-4, engine=engine))
     quasi_static = slider is SLIDERS[0]

@@ -1,5 +1,6 @@
-"""Steady sliding and its stability, as they follow from the friction relation: against the closed
-forms, the geometry, and the growth of the assembled equations.
+"""Tests of steady sliding and its stability.
+
+The references are closed forms, the geometry, and growth rates of the assembled equations.
 """
 
 import math
@@ -16,7 +17,7 @@ from rsfstudy.slider import closed_forms, laws, stability, steady_state
 from rsfstudy.slider.equations import effective_normal_stress_at, equations_against_displacement
 from rsfstudy.slider.laws.composite import lambert_w
 
-#: Laws with one b, by which steady friction is mu_* + (a - b) ln(V/V_*), as closed forms have it.
+#: Laws with a single b, whose steady friction is mu_* + (a - b) ln(V/V_*).
 WITH_ONE_B = {name: law for name, law in laws.BUILT_IN_PARTS.items() if issubclass(law, laws.Law)}
 PLAIN = sorted(name for name, law in WITH_ONE_B.items() if law.steady_states is None)
 LAWS = st.sampled_from(PLAIN)
@@ -24,7 +25,10 @@ RATES, ANGLES, ALPHAS = st.floats(-30, 12), st.floats(50, 85), st.floats(0, 1)
 
 
 def eq_7(scene: Scene, log_slip_rate: float) -> float:
-    """``(b - a) sigma_ss / [1 - cot(phi) (mu_ss - alpha)]``, with sigma_ss in closed form."""
+    """Return ``(b - a) sigma_ss / [1 - cot(phi) (mu_ss - alpha)]``.
+
+    The normal stress sigma_ss is computed in closed form.
+    """
     cot = cot_phi(scene)
     mu_ss = scene.mu_star - (scene.b - scene.a) * log_slip_rate
     assume(mu_ss * cot < 0.99)
@@ -40,7 +44,7 @@ def test_critical_stiffness_is_eq_7_and_eq_8(log_slip_rate, phi, alpha, law):
         log_slip_rate, scene.mu_star, scene.a, scene.b, cot_phi(scene), alpha
     )
     assert explicit == pytest.approx(closed, rel=1e-12)
-    # digits are lost where normal stress grows or vanishes, and in the arguments of the law
+    # Digits are lost if normal stress grows or vanishes, and in the arguments of the law.
     ours = stability.critical_stiffness(scene, log_slip_rate)
     assert ours == pytest.approx(closed, rel=1e-12 * (1.0 + abs(log_slip_rate)))
 
@@ -55,8 +59,10 @@ def test_constant_normal_stress_has_b_minus_a(law):
 
 @given(st.floats(-6, -0.2), st.floats(-3, 3), ANGLES, ALPHAS, LAWS)
 def test_the_rise_by_mass_is_that_of_the_cubic(log_norm, log_slip_rate, phi, alpha, law):
-    """E M p**3 + (D M + a sigma) p**2 + [E K - (b-a) sigma] p + D K = 0 with M = K w**2 has purely
-    imaginary roots at K = K_cr/(1 - q), q = K_cr D w**2/(a sigma).
+    """The effect of inertia agrees with the cubic equation.
+
+    The equation E M p**3 + (D M + a sigma) p**2 + [E K - (b-a) sigma] p + D K = 0 with M =
+    K w**2 has imaginary roots at K = K_cr/(1 - q) with q = K_cr D w**2/(a sigma).
     """
     rate = math.exp(log_slip_rate)
     period = 2.0 * math.pi * 10.0**log_norm / (rate * 1.17e-8)
@@ -78,8 +84,10 @@ def test_the_rise_by_mass_is_that_of_the_cubic(log_norm, log_slip_rate, phi, alp
 
 @given(st.floats(-25, -4), st.floats(-3, 3), ANGLES, ALPHAS, LAWS)
 def test_damping_lowers_it_as_the_quadratic_says(log_damping, log_slip_rate, phi, alpha, law):
-    """(a sigma + eta V E) p**2 + [E K + eta V D - (b-a) sigma] p + D K = 0 is neutral at K = K_cr -
-    eta V D/E.
+    """The effect of damping agrees with the quadratic equation.
+
+    The equation (a sigma + eta V E) p**2 + [E K + eta V D - (b-a) sigma] p + D K = 0 is
+    neutral at K = K_cr - eta V D/E.
     """
     damping = math.exp(log_damping)
     scene = Scene(law=law, phi=phi, alpha=alpha, radiation_damping=damping)
@@ -117,7 +125,10 @@ def test_no_steady_state_below_the_slowest_rate():
 
 @pytest.mark.parametrize("period", [1e-3, 5.0, 1e4])
 def test_a_small_mass_takes_no_digits_of_the_growth_rates(period):
-    """But for its own root, 1e9 to 1e24 of the others, they are those without it."""
+    """Growth rates are unaffected by a small mass.
+
+    The mass adds a single root, which is 1e9 to 1e24 times larger than the other roots.
+    """
     scene = Scene(law="slip", fluid="dilatant", drainage=1e-3, dilatancy=1e-3, stiffness=0.003)
     heavy = stability.linear_growth_rates(scene.with_(inertia=True, period=period), 0.0)
     assert heavy[-1].real < -1e9
@@ -129,39 +140,43 @@ def test_a_small_mass_takes_no_digits_of_the_growth_rates(period):
 @pytest.mark.parametrize("off", [-1e-3, -1e-8, 1e-8, 1e-3])
 @pytest.mark.parametrize("effects", [{"normal_stress": "constant"}, {"alpha": 0.56}])
 def test_growth_close_to_critical_stiffness(off, effects):
-    """At K = K_cr (1 + d), a p**2 + (E K - (b-a)) p + D K = 0 per time D_c/V_*: twice the growth
-    rate is -(b-a) d/a, and a half of that per slip and load point displacement.
+    """The growth rate near the critical stiffness agrees with its expansion.
+
+    At K = K_cr (1 + d), the roots of a p**2 + (E K - (b-a)) p + D K = 0 per D_c/V_* have a
+    real part of -(b-a) d/(2 a). The rate per slip and load point displacement is half of
+    this value.
     """
     scene = Scene(stiffness_ratio=1.0 + off, **effects)
     expected = -0.25 * (scene.b_over_a - 1.0) * off
-    # central differences are right to 6e-10 of rates of order one
+    # Central differences have an error of 6e-10 for rates of order one.
     grows = max_growth_rate(compute_jacobian(equations_against_displacement(scene), (0.0, 0.0)))
     assert grows == pytest.approx(expected, rel=1e-5, abs=1e-9)
     assert grows * off < 0.0
 
 
 # ---- laws with a rate of their own ---------------------------------------------------------------
-
 CONSTANT = {"normal_stress": "constant"}
 CUT_OFFS = ("composite", "cut_off")
 
 
 def composite(scene: Scene, log_slip_rate: float) -> float:
-    """(1 + w)(b - a) + b w V/V_c, w exp(w) = exp(-V/V_c)."""
+    """Return (1 + w)(b - a) + b w V/V_c with w exp(w) = exp(-V/V_c)."""
     relative = math.exp(log_slip_rate) / scene.cutoff_velocity_ratio
     w = lambert_w(math.exp(-relative))
     return (1.0 + w) * (scene.b - scene.a) + scene.b * w * relative
 
 
 def cut_off(scene: Scene, log_slip_rate: float) -> float:
-    """b/(1 + V/V_c) - a."""
+    """Return b/(1 + V/V_c) - a."""
     return scene.b / (1.0 + math.exp(log_slip_rate) / scene.cutoff_velocity_ratio) - scene.a
 
 
 @given(st.floats(-12, 12), st.floats(-4, 12), st.floats(1.05, 4.0))
 def test_critical_stiffness_of_cut_offs(log_slip_rate, log_cutoff, b_over_a):
-    """Slopes of the law are differences of order eight; those of exp(-V/V_c), whose ninth
-    derivative reaches 1e4, are exact to 1e-9 or so.
+    """The critical stiffness of laws with a cut-off agrees to 1e-8 b.
+
+    The slopes of the law are differences of order eight. The ninth derivative of
+    exp(-V/V_c) reaches 1e4, so the slopes have an error of about 1e-9.
     """
     for law, formula in (("composite", composite), ("cut_off", cut_off)):
         cutoff = math.exp(log_cutoff)
@@ -183,7 +198,10 @@ def test_no_steady_sliding_below_the_slowest_by_laws_with_a_rate_of_their_own():
 
 @pytest.mark.parametrize("excess", [-0.02, -0.055, -0.1])
 def test_stress_keeps_its_sign_however_weak_a_regularised_fault_becomes(excess):
-    """Strength ``mu_* + excess = a ln(2 sinh(mu/a))`` has a root of either sign."""
+    """The stress solves ``mu_* + excess = a ln(2 sinh(mu/a))``.
+
+    The root is positive for positive and negative strengths.
+    """
     scene = Scene(regularised=True, mu_star=0.05, normal_stress="constant")
     mu = scene.a * math.asinh(0.5 * math.exp((scene.mu_star + excess) / scene.a))
     assert steady_state.frictional_stress_after_jump(

@@ -1,4 +1,8 @@
-"""The motion after a step: closed peaks, decay and repetition, mass, and slip that runs away."""
+"""Tests of the motion after a step of load velocity.
+
+The tests cover conserved peaks, error estimates, the effect of inertia, and unbounded slip
+rates.
+"""
 
 import math
 
@@ -19,10 +23,11 @@ def response(peaks: int = 3, rtol: float = 1e-7, **fields):
 
 
 def closed_peak(weakening: float, load: float) -> float:
-    """log10 of the peak slip rate, slowness law at k = k_cr and constant normal stress.
+    """Return log10 of the peak slip rate from the conserved quantity.
 
-    H = Omega - ln Omega + lambda (w - ln w) is conserved, with Omega = V theta/D_c and w = V_0
-    theta/D_c; at a peak lambda (w - Omega) = (1 + lambda)(1 - Omega).
+    For the slowness law at k = k_cr and constant normal stress, H = Omega - ln Omega +
+    lambda (w - ln w) is conserved, with Omega = V theta/D_c and w = V_0 theta/D_c. At a
+    peak, lambda (w - Omega) = (1 + lambda)(1 - Omega).
     """
     conserved = 1.0 + weakening * (load - math.log(load))
 
@@ -38,20 +43,25 @@ def closed_peak(weakening: float, load: float) -> float:
 
 @pytest.mark.parametrize(("weakening", "load"), [(1.0, 2.0), (0.5, 20.0), (3.0, 5.0), (1.0, 200.0)])
 def test_peaks_of_the_slowness_law_are_those_of_its_conserved_quantity(weakening, load):
-    """To the accuracy asked for, up to the peak of 10^87 V_* after a 200-fold step."""
+    """Peaks agree with the conserved quantity to the requested accuracy.
+
+    The peak after a 200-fold step is 10^87 V_*.
+    """
     found = response(b_over_a=1.0 + weakening, load_velocity_ratio=load, **SLOWNESS)
     assert found.status is Status.OK
     np.testing.assert_allclose(
         found.values["peak_log10_slip_rate"], closed_peak(weakening, load), rtol=1e-6
     )
-    # neutral orbits pass errors on from peak to peak: hence ten times rtol
+    # Neutral orbits propagate errors from peak to peak, so the tolerance is ten times rtol.
     assert found.values["peak_ratio"] == pytest.approx(1.0, abs=1e-6)
 
 
 @pytest.mark.parametrize("rtol", [1e-4, 1e-6, 1e-8])
 def test_the_error_estimate_covers_the_error_and_is_smooth(rtol):
-    """Over the next floating-point neighbours of the load point velocity, which change where steps
-    are rejected: the estimate covers the error at each, and never changes by a factor of ten.
+    """The error estimate covers the error and varies smoothly.
+
+    The load velocities are successive floats, for which different steps are rejected. The
+    estimates differ by less than a factor of ten.
     """
     load, errors = 20.0, []
     for _ in range(8):
@@ -59,7 +69,7 @@ def test_the_error_estimate_covers_the_error_and_is_smooth(rtol):
         found = response(peaks=2, b_over_a=2.0, load_velocity_ratio=load, rtol=rtol, **SLOWNESS)
         error = abs(found.values["max_log10_slip_rate"] - closed_peak(1.0, load))
         errors.append(found.values["max_log10_slip_rate_error"])
-        # the closed form is known to 13 digits
+        # The closed form has 13 digits.
         assert error <= errors[-1] + 1e-12
     assert max(errors) < 10.0 * min(errors)
 

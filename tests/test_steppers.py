@@ -1,5 +1,7 @@
-"""Steppers: a step of order eight against SciPy's, engines against one another, and what a stepper
-owes the loop.
+"""Tests of steppers.
+
+A step of order eight is compared with SciPy, the engines are compared with each other, and
+each stepper must meet the requirements of the loop.
 """
 
 from __future__ import annotations
@@ -39,7 +41,7 @@ from rsfstudy.status import Status
 
 SLOW = Scene(stiffness_ratio=1.5, load_velocity_ratio=1.5)
 CYCLE = {"stiffness_ratio": 0.8, "load_velocity_ratio": 2.0, "inertia": True}
-#: Systems of equations of one to five unknowns, each with a state somewhere within its domain.
+#: Systems of one to five equations, each with a state inside its domain.
 SYSTEMS = [
     (equations_at_imposed_slip_rate(Scene(), 2.0), (0.05,)),
     (equations_between_ruptures(SLOW, with_time=False), (0.01, 0.004)),
@@ -50,10 +52,11 @@ SYSTEMS = [
 
 
 # ---- a step of order eight -----------------------------------------------------------------------
-
-
 def weighted(weights, rates):
-    """A sum in the order of the stages, without those that do not count."""
+    """Return a weighted sum in the order of the stages.
+
+    Terms with zero weight are omitted.
+    """
     total = 0.0
     for weight, rate in zip(weights, rates, strict=False):
         if weight != 0.0:
@@ -62,7 +65,10 @@ def weighted(weights, rates):
 
 
 def plain_step(equations: Equations, y, length: float, tolerance: float):
-    """Stages, unknowns at the end, and local error, by loops over the tableau of SciPy."""
+    """Return stages, new unknowns and local error of a step.
+
+    The function uses loops over the tableau of SciPy.
+    """
     n, stages = range(len(y)), [equations.evaluate_rates(y)]
     for s in range(1, DOP853.n_stages + 1):
         weights = DOP853.A[s, :s] if s < DOP853.n_stages else DOP853.B
@@ -98,7 +104,7 @@ def test_the_unrolled_step_is_that_of_plain_loops_to_the_bit(equations, y, lengt
 
 
 def scipy_solver(method, equations: Equations, y, tolerance: float, **options):
-    """SciPy's integrator itself."""
+    """Return a solver of SciPy for the equations."""
     return method(
         lambda _clock, state: equations.evaluate_rates(tuple(state.tolist())),
         0.0,
@@ -112,7 +118,10 @@ def scipy_solver(method, equations: Equations, y, tolerance: float, **options):
 
 @pytest.mark.parametrize(("equations", "y"), SYSTEMS)
 def test_a_step_is_scipys(equations, y):
-    """A step that it accepts: it sums in another order, over stages of order one."""
+    """An accepted step agrees with SciPy to rounding error.
+
+    The order of the sums differs, and the stages are of order one.
+    """
     solver = scipy_solver(DOP853, equations, y, 1e-3, first_step=0.01)
     solver.step()
     assert solver.t == 0.01
@@ -121,7 +130,10 @@ def test_a_step_is_scipys(equations, y):
 
 
 def ends_of_steps(equations: Equations, y, by: str, steps: int, **options):
-    """Clocks at the ends of steps, and the meter."""
+    """Return the independent variable at the end of each step.
+
+    The second return value is the work meter.
+    """
     meter = WorkMeter(10**5, engine=by)
     path = iterate_events_of_equations(equations, y, 1e-3, meter, [STEP_END_EVENT], **options)
     return [event.clock for event in itertools.islice(path, steps + 1)], meter
@@ -132,8 +144,11 @@ def ends_of_steps(equations: Equations, y, by: str, steps: int, **options):
     ("equations", "y", "steps"), [(*SYSTEMS[1], 20), *((*s, 5) for s in SYSTEMS)]
 )
 def test_plain_python_takes_the_steps_of_scipy(equations, y, steps, backward):
-    """Rounding is some 1e-13 of what decides the length of a step. A slider that weakens makes more
-    of it, and one that has come to rest has no error but rounding: few steps there.
+    """The engine ``python`` takes the same steps as SciPy.
+
+    The rounding error of the step size is about 1e-13. A weakening slider amplifies it, and
+    the error estimate of a slider at rest consists of rounding errors only, so only a few
+    steps are compared.
     """
     ours, theirs = (
         ends_of_steps(equations, y, by, steps, backward=backward) for by in (PYTHON, SCIPY)
@@ -145,12 +160,10 @@ def test_plain_python_takes_the_steps_of_scipy(equations, y, steps, backward):
 
 
 # ---- what a stepper owes the loop ----------------------------------------------------------------
-
-
 def begun(
     equations: Equations, y, tolerance: float, kind: type[Stepper], method: str = "DOP853"
 ) -> tuple[Stepper, SimpleNamespace, Workspace]:
-    """A stepper that stands at the beginning of a path, with all that it knows of it."""
+    """Return a stepper at the start of a path, with motion and workspace."""
     stepper = kind((equations,), {equations.regime: method})
     n, states = len(y), equations.state_count
     given = {"tolerance": tolerance, "budget": 10**6, "direction": 1.0, "end_time": math.inf}
@@ -174,7 +187,10 @@ KINDS = [
 @pytest.mark.parametrize(("kind", "method"), KINDS)
 @pytest.mark.parametrize("part", [1e-3, 0.4, 1.0])
 def test_a_step_taken_anew_ends_at_the_clock_asked_for(kind, method, part):
-    """To the bit, and there it is as right as a step: to a hundred times the tolerance."""
+    """A truncated step ends exactly at the requested value.
+
+    The result has an error of at most 100 times the tolerance, as other steps.
+    """
     equations, y = SYSTEMS[1]
     stepper, motion, space = begun(equations, y, 1e-6, kind, method)
     for number in range(6):
@@ -195,7 +211,7 @@ def test_a_step_taken_anew_ends_at_the_clock_asked_for(kind, method, part):
     for ours, theirs, scale in zip(new, exact, equations.unknown_scales, strict=True):
         assert ours == pytest.approx(theirs, abs=1e-4 * scale)
     assert tuple(space.rates_at_end[:2]) == pytest.approx(equations.evaluate_rates(new), rel=1e-12)
-    # dense output of the step as it is now
+    # Dense output of the truncated step.
     stepper.interpolate_unknowns(motion, space, clock)
     assert tuple(space.y_within[:2]) == pytest.approx(new, rel=1e-12)
     stepper.interpolate_unknowns(motion, space, began)
@@ -204,7 +220,7 @@ def test_a_step_taken_anew_ends_at_the_clock_asked_for(kind, method, part):
 
 @pytest.mark.parametrize("method", [DOP853, RK45, Radau])
 def test_values_within_a_step_are_those_of_scipy(method):
-    """Dense output of order eight is read on floats: operation by operation what SciPy does."""
+    """Dense output on floats agrees with SciPy to rounding error."""
 
     def rate(_t, y):
         return np.array([y[1], -y[0] * y[0], np.cos(y[2])])
@@ -220,18 +236,21 @@ def test_values_within_a_step_are_those_of_scipy(method):
 
 @pytest.mark.parametrize("method", sorted(SCIPY_SOLVER_BY_METHOD_NAME))
 def test_a_budget_ends_within_a_step(method):
-    """LSODA may go on for ever within one; what follows is not disturbed."""
+    """The work budget is checked within each step.
+
+    LSODA may continue for ever within one step. Later motions are not affected.
+    """
     regime = SYSTEMS[1][0].regime
     for budget in range(21, 30):
         meter = WorkMeter(budget, {regime: method})
         with pytest.raises(MotionStopped) as halt:
             list(integrate_events(SLOW, Accuracy(1e-6, budget), meter))
         assert halt.value.status is Status.WORK_BUDGET_SPENT
-        # the rates at the end of a step belong to it, whoever computes them
+        # The rates at the end of a step belong to the step.
         assert budget < meter.evaluations <= budget + 2
     ends = []
     for by in (method, "DOP853"):
         *_, end = integrate_events(SLOW, Accuracy(1e-6), WorkMeter(10**5, {regime: by}), until=8.0)
         ends.append(end.point.log_slip_rate)
-    # multistep methods keep less of a tolerance
+    # Multistep methods lose more of the requested accuracy.
     assert ends[0] == pytest.approx(ends[1], abs=1e-4)

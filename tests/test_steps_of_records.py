@@ -1,4 +1,4 @@
-"""Steps of load point velocity as records show them."""
+"""Tests of the detection of velocity steps in records."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ MANY = ((0.0, 1.0), (60.0, 10.0), (70.0, 1.0), (130.0, 0.0), (200.0, 1.0), (260.
 def noisy(
     loading: Sequence[tuple[float, float]], ends: float, apart: float, rho: float, size: float
 ) -> tuple[np.ndarray, np.ndarray]:
-    """A record of a load point, with noise in um."""
+    """Return times in s and noisy displacements of a load point in um."""
     time = np.arange(0.0, ends, apart) + 0.3 * apart
     moved = synthetic.load_point_displacement(loading, time)
     return time, moved + synthetic.correlated_noise(len(time), rho, size, seed=7)
@@ -32,7 +32,8 @@ def test_steps_are_found(loading: Sequence[tuple[float, float]], rho: float, siz
     found = detect_velocity_steps(*noisy(loading, ends, 0.05, rho, size))
     assert len(found) == len(loading) - 1
     for step, (one, other) in zip(found, itertools.pairwise(loading), strict=True):
-        # lines through hundreds of rows meet within two or so, at this much noise
+        # With this noise, lines through hundreds of rows intersect within about two rows of the
+        # step.
         assert step.start == pytest.approx(other[0], abs=1e-6 if not size else 0.15)
         assert step.end == step.start
         assert step.velocity_before == pytest.approx(one[1], rel=0.03)
@@ -56,7 +57,8 @@ def test_a_ramp_over_samples_is_a_ramp() -> None:
     )
     assert (step.velocity_before, step.velocity_after) == pytest.approx((1.0, 10.0), rel=0.01)
     assert 59.9 < step.start < step.end < 60.5
-    # displacement behind it is right: the lines before and behind meet in its middle
+    # The displacement after the ramp is correct, because the lines before and after it intersect
+    # in its middle.
     meet = (moved[-1] - 10.0 * time[-1]) / (1.0 - 10.0)
     assert 0.5 * (step.start + step.end) == pytest.approx(meet, abs=1e-3)
 
@@ -87,7 +89,10 @@ def test_a_load_point_that_rests_or_keeps_moving(moved: np.ndarray) -> None:
 
 
 def test_an_overshoot_is_one_step_through_its_pieces() -> None:
-    """From 2 to 12 um/s by way of 17 um/s within half a second; friction follows the pieces."""
+    """An overshoot belongs to a single step with a velocity profile.
+
+    The velocity changes from 2 to 12 um/s via 17 um/s within half a second.
+    """
     time = 0.05 * np.arange(4_000)
     speeds = np.interp(time, [80.0, 80.15, 80.2, 80.45, 80.5], [2.0, 2.0, 17.0, 17.0, 12.0])
     moved = np.concatenate([[0.0], np.cumsum(0.05 * speeds[:-1])])
@@ -97,7 +102,7 @@ def test_an_overshoot_is_one_step_through_its_pieces() -> None:
     assert (step.velocity_before, step.velocity_after) == pytest.approx((2.0, 12.0), rel=0.01)
     assert 79.8 < step.start < step.end < 80.7
     assert max(speed for _begins, speed in step.velocity_profile) > 14.0
-    # displacement by the pieces of loading is the recorded one
+    # The pieces of the loading reproduce the recorded displacement.
     pieces = stepwise_loading(0.0, [step])
     speeds_of = pieces[:, 1]
     by_pieces = np.sum(np.diff(np.append(pieces[:, 0], time[-1])) * speeds_of)

@@ -1,5 +1,6 @@
-"""The spring, by its stiffness or by its ratio to the critical one; and sliders without rate
-weakening, which have no critical stiffness.
+"""Tests of the stiffness, its ratio, and rate-strengthening sliders.
+
+Rate-strengthening sliders have no critical stiffness.
 """
 
 import math
@@ -60,8 +61,10 @@ def test_without_rate_weakening_nothing_grows(law, b_over_a, effects):
 
 
 def test_a_soft_spring_overshoots_all_the_same():
-    """Without rate weakening too: a fault that has healed at V_* weakens while a much faster load
-    point drags it, and the spring gives way. Hardly any weakening holds every step below the norm.
+    """A soft spring without rate weakening may exceed the norm.
+
+    A fault that has healed at V_* weakens when a much faster load point drives it, and the
+    spring releases stress. With very little weakening, every step stays below the norm.
     """
     soft = CriticalStep()(Scene(b_over_a=0.8, stiffness=0.01), Accuracy(1e-4))
     assert soft.status is Status.OK

@@ -1,4 +1,7 @@
-"""Shear stress that lowers the state variable (Nagata et al. 2012), on top of any law."""
+"""Tests of stress-dependent state evolution (Nagata et al. 2012).
+
+The stress dependence can be combined with any law.
+"""
 
 import math
 
@@ -36,7 +39,7 @@ def test_at_constant_normal_stress_the_state_loses_c_times_the_change_of_frictio
 
 @given(SHEAR, C, st.floats(50.0, 87.0))
 def test_it_is_the_integral_of_c_dtau_over_sigma(g, c, phi):
-    """c/cot ln(1 + cot g), on top of what changes of normal stress take."""
+    """The shift is c/cot ln(1 + cot g), in addition to the effect of alpha."""
     with_, without = (
         build_friction_relation(Scene(stress_dependence=x, phi=phi, alpha=0.3))(g) for x in (c, 0.0)
     )
@@ -48,7 +51,11 @@ def test_it_is_the_integral_of_c_dtau_over_sigma(g, c, phi):
 
 @given(SHEAR, st.floats(1e-15, 1e-3))
 def test_no_digits_are_lost_where_normal_stress_hardly_varies(g, tilt):
-    """phi close to 90 degrees: c g (1 - cot g/2 + (cot g)**2/3), to the cube of 2e-3."""
+    """The shift is accurate for phi close to 90 degrees.
+
+    The reference is the series c g (1 - cot g/2 + (cot g)**2/3), whose error is the cube of
+    cot g.
+    """
     scene = Scene(stress_dependence=1.0, alpha=0.0, phi=90.0 - math.degrees(tilt))
     shift, small = build_friction_relation(scene)(g)[2], cot_phi(scene) * g
     series = g * (1.0 - small / 2.0 + small**2 / 3.0)
@@ -61,7 +68,7 @@ def test_no_digits_are_lost_where_normal_stress_hardly_varies(g, tilt):
 @pytest.mark.parametrize("law", sorted(WITH_ONE_B))
 @pytest.mark.parametrize("c", [0.5, 2.0])
 def test_critical_stiffness_is_that_over_one_plus_c(law, c):
-    """At constant normal stress; steady friction is as it was."""
+    """The critical stiffness is divided by 1 + c at constant normal stress."""
     scene = Scene(law=law, **CONSTANT)
     for log_slip_rate in (-5.0, 0.0, 2.0):
         ours = stability.critical_stiffness(scene.with_(stress_dependence=c), log_slip_rate)
@@ -71,7 +78,10 @@ def test_critical_stiffness_is_that_over_one_plus_c(law, c):
 
 @given(C, st.floats(50, 85), st.floats(0, 1), st.floats(-5, 5), st.sampled_from(PLAIN))
 def test_critical_stiffness_with_variable_normal_stress(c, phi, alpha, log_slip_rate, law):
-    """(b - a) sigma_ss/[1 + c - cot(phi) (mu_ss - alpha)], of which c = 0 is eq. 7."""
+    """The critical stiffness is a generalisation of eq. 7.
+
+    The closed form is (b - a) sigma_ss/[1 + c - cot(phi) (mu_ss - alpha)].
+    """
     scene = Scene(law=law, stress_dependence=c, phi=phi, alpha=alpha)
     cot, mu_ss = cot_phi(scene), scene.mu_star - (scene.b - scene.a) * log_slip_rate
     sigma = (1.0 - scene.mu_star * cot) / (1.0 - mu_ss * cot)
@@ -80,8 +90,10 @@ def test_critical_stiffness_with_variable_normal_stress(c, phi, alpha, log_slip_
 
 
 def equivalent(scene: Scene) -> Scene:
-    """The slider without the effect, at constant normal stress: a/(1 + c), b - a c/(1 + c) and
-    (1 + c) D_c, which is what slip, time and norm are told in.
+    """Return the equivalent scene without stress dependence.
+
+    At constant normal stress, the parameters are a/(1 + c), b - a c/(1 + c) and (1 + c)
+    D_c. The change of D_c also changes the units of slip and time, and the norm.
     """
     c = scene.stress_dependence
     a, b, longer = scene.a / (1.0 + c), scene.b - scene.a * c / (1.0 + c), 1.0 + c
@@ -99,14 +111,17 @@ def equivalent(scene: Scene) -> Scene:
 @pytest.mark.parametrize("c", [0.3, 2.0])
 @pytest.mark.parametrize("ratio", [0.7, 1.4])
 def test_small_steps_look_like_another_slider_without_it(law, c, ratio):
-    """Growth rates per D_c are those per (1 + c) D_c, over 1 + c."""
+    """Growth rates equal the rates of the equivalent scene over 1 + c."""
     scene = Scene(law=law, stress_dependence=c, stiffness_ratio=ratio, **CONSTANT)
     ours, theirs = (stability.linear_growth_rates(one, 0.0) for one in (scene, equivalent(scene)))
     assert (1.0 + c) * ours == pytest.approx(theirs, rel=1e-10)
 
 
 def test_by_the_slip_law_all_motions_are_those_of_that_slider():
-    """The law is linear: critical steps and cycles with mass agree too, to the accuracy asked."""
+    """For the linear slip law, all motions agree with the equivalent scene.
+
+    The test compares critical steps and limit cycles with inertia.
+    """
     scene = Scene(stress_dependence=1.5, stiffness_ratio=1.3, **CONSTANT)
     other, accuracy = equivalent(scene), Accuracy(1e-8)
     for of, longer in (("load_velocity_ratio", 1.0), ("displacement_step", 2.5)):
@@ -135,7 +150,10 @@ def test_closed_forms_that_do_not_hold_with_it_are_not_told():
 
 
 def test_critical_stiffness_itself_is_left_open():
-    """Orbits need not close there: neither growth nor decay can be told."""
+    """The critical step at k = k_cr is not verified.
+
+    Orbits need not be closed there, so neither growth nor decay can be shown.
+    """
     for law in ("slip", "slowness"):
         scene = Scene(law=law, stress_dependence=1.0, **CONSTANT)
         assert CriticalStep()(scene, Accuracy(1e-5)).status is Status.UNVERIFIED

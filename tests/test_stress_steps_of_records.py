@@ -1,4 +1,4 @@
-"""Steps of normal stress in records: detection, and fits of the response to them."""
+"""Tests of normal stress steps in records: detection and fits."""
 
 from __future__ import annotations
 
@@ -16,10 +16,10 @@ from rsfstudy.fitting.record import Record
 from rsfstudy.fitting.stress_steps import find_stress_steps
 from rsfstudy.status import STATUS_LABELS
 
-#: Parameters in um and s; the stiffness is that of the machine in MPa/um.
+#: Parameters in um and s. The stiffness of the machine is in MPa/um.
 TRUTH = {"a": 0.009, "b": 0.012, "slip_distance": 15.0, "alpha": 0.3, "mu_star": 0.55}
 MACHINE, VELOCITY, FIRST, SECOND = 0.03, 5.0, 6.0, 7.5
-#: Times in s between which normal stress rises.
+#: Times in s at which the rise of normal stress begins and ends.
 BEGINS, ENDS = 30.0, 30.6
 FREE = ("a", "b", "slip_distance", "alpha", "mu_star")
 OPTIONS: dict[str, Any] = {
@@ -32,10 +32,10 @@ OPTIONS: dict[str, Any] = {
 
 
 def stressed(seed: int = 1, size: float = 2e-5) -> Record:
-    """Make a record of a step of normal stress at constant velocity (ageing law).
+    """Return a record of a normal stress step at constant velocity.
 
-    With tau the shear stress and sigma the normal stress, Linker and Dieterich's law is
-    psi' = (V/D_c) [exp(-psi - w) - 1] - (alpha/b) sigma'/sigma.
+    With the shear stress tau and the normal stress sigma, the ageing law with the effect of
+    Linker and Dieterich is psi' = (V/D_c) [exp(-psi - w) - 1] - (alpha/b) sigma'/sigma.
     """
     a, b, distance, alpha, mu_star = TRUTH.values()
     rate = (SECOND - FIRST) / (ENDS - BEGINS)

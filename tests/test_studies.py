@@ -1,4 +1,6 @@
-"""Contract of every named study found: it runs, its file stands alone, its figure is drawn, its
+"""Tests of all named studies.
+
+Each study runs, its file can be used without rsfstudy, its figure can be drawn, and its
 claims are sound.
 """
 
@@ -26,7 +28,7 @@ FLAGS = {"slip_mode", "status", "regime", "inertia", "regularised"}
 
 @pytest.fixture(scope="module", params=study_index.study_names())
 def result(request, tmp_path_factory):
-    """What is enough of each study, and where its file is."""
+    """Return the results of a reduced study, and the path of its file."""
     return named_results(request.param, tmp_path_factory)
 
 
@@ -48,7 +50,7 @@ def test_every_verdict_is_the_expected_one(result):
     assert not (table.verdict == "not applicable").any()
 
 
-#: Claims that are given more room than `called_for`, and why.
+#: Claims with a tolerance larger than ``called_for``, and the reasons.
 WIDE = {
     "accuracy_cost A1": "what a user can plan with, not what integrators happen to do",
     "coverage T3": "two standard errors of a median",
@@ -83,8 +85,10 @@ WIDE = {
 
 
 def called_for(claim, study, dataset) -> float:
-    """The tolerance that is called for by ten times the difference seen, ten times the numerical
-    error of ours, the accuracy asked for, or rounding.
+    """Return the largest justified tolerance of a claim.
+
+    The tolerance is the maximum of ten times the difference, ten times the numerical error,
+    the requested accuracy, and the rounding error.
     """
     second = claim.minus_variable or claim.variable
     places = [(claim.variable, claim.where), *([(second, claim.minus)] if claim.minus else [])]
@@ -94,14 +98,17 @@ def called_for(claim, study, dataset) -> float:
     ]
     return max(
         10.0 * abs(claim.verdict(dataset)[0] - claim.published),
-        10.0 * float(np.nansum(errors)),  # NaN where there is no estimate
+        10.0 * float(np.nansum(errors)),  # The error is NaN if there is no estimate.
         study.accuracy.rtol * abs(claim.published),
         16.0 * sys.float_info.epsilon * max(1.0, abs(claim.published)),
     )
 
 
 def test_claims_could_fail(result):
-    """A claim with a tolerance larger than necessary must give the reason in `WIDE`."""
+    """A claim with an unnecessarily large tolerance has a reason.
+
+    The reasons are listed in ``WIDE``.
+    """
     study = reduced_study(result[1].stem)
     for claim in study.claims:
         named = f"{study.name} {claim.id}"
@@ -110,7 +117,7 @@ def test_claims_could_fail(result):
         assert claim.tolerance <= most or named in WIDE, told
 
 
-#: Opens the files it is told of with xarray alone, as where rsfstudy is not installed.
+#: Source of a process that opens files with xarray in an environment without rsfstudy.
 _READER = """
 import json, sys, warnings
 import xarray
@@ -134,7 +141,7 @@ for line in sys.stdin:
 
 @pytest.fixture(scope="module")
 def reader():
-    """A process that has xarray and nothing of ours."""
+    """Start a process that can import xarray, but not rsfstudy."""
     with subprocess.Popen(
         [sys.executable, "-c", _READER], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True
     ) as process:
@@ -143,9 +150,7 @@ def reader():
 
 
 def test_the_file_stands_alone(result, reader):
-    """Opened without rsfstudy, it shows units and long names on every variable, and where it comes
-    from.
-    """
+    """Without rsfstudy, each variable has units and a long name."""
     print(result[1], file=reader.stdin, flush=True)
     for name, about in json.loads(reader.stdout.readline()).items():
         assert about["long_name"], name
@@ -153,8 +158,8 @@ def test_the_file_stands_alone(result, reader):
         assert bool(about["units"]) is not text, name
 
 
-#: ACDD attributes without a meaning for a slider that is nowhere and at no time, publishes nothing
-#: and has quantities that no standard names exist for.
+#: ACDD attributes that do not apply, because a slider has no position and no date, publishes
+#: nothing, and has quantities without standard names.
 MEANINGLESS = re.compile(
     "geospatial_|time_coverage_|publisher_|creator_url|standard_name|acknowledgment/"
 )
@@ -163,18 +168,21 @@ MEANINGLESS = re.compile(
 @pytest.fixture(scope="module")
 def checkers():
     with warnings.catch_warnings():
-        warnings.simplefilter("ignore")  # of their own
+        warnings.simplefilter("ignore")  # Warnings of the checkers.
         CheckSuite.load_all_available_checkers()
 
 
 def test_the_compliance_checker_reports_no_error(result, tmp_path, monkeypatch, checkers):
-    """And no attribute for discovery is missing that has a meaning here."""
+    """The file follows the CF conventions.
+
+    All applicable discovery attributes are present.
+    """
     report = tmp_path / "report.json"
-    # it asks for these a thousand times, in a file that stays as it is
+    # The checker calls these functions a thousand times for the same file.
     for name in ("get_geophysical_variables", "get_auxiliary_coordinate_variables"):
         monkeypatch.setattr(cfutil, name, functools.cache(getattr(cfutil, name)))
     with warnings.catch_warnings():
-        warnings.simplefilter("ignore")  # of the checker's own
+        warnings.simplefilter("ignore")  # Warnings of the checker.
         ComplianceChecker.run_checker(
             str(result[1]),
             ["cf:1.11", "acdd:1.3"],
@@ -211,12 +219,12 @@ def test_every_number_carries_status_error_and_work(result):
 
 
 def test_what_is_reduced_carries_the_errors_of_its_cells(result):
-    """A number has an error wherever what it was made of has."""
+    """A reduced value has an error if its variable has errors."""
     dataset, path = result
     for reduction in study_loader.load_study(path.stem).reductions:
         if reduction.name not in dataset or f"{reduction.of}_error" not in dataset:
             continue
-        if reduction.uses_failed_cells:  # a count of statuses
+        if reduction.uses_failed_cells:  # The result counts statuses.
             continue
         error = dataset[f"{reduction.name}_error"]
         assert (error >= 0.0).where(dataset[reduction.name].notnull(), True).all(), reduction.name
@@ -231,7 +239,7 @@ def test_the_plain_plot_draws_any_lattice(result):
 
 
 def test_the_plain_lattice_agrees_with_the_critical_steps_within_its_bracket(tmp_path_factory):
-    """Cells followed forward in time against critical paths followed back, for every row."""
+    """Forward motions agree with critical paths for every row."""
     cells, _path = named_results("rate_step_lattice", tmp_path_factory)
     steps, _path = named_results("rate_step_stiffness", tmp_path_factory)
     critical = steps.critical_velocity_ratio.sel(

@@ -1,6 +1,4 @@
-"""Declarations: axes, zipped axes, overrides, and everything that is refused before any work
-starts.
-"""
+"""Tests of study declarations: axes, zipped axes, overrides and errors."""
 
 import pickle
 from dataclasses import dataclass
@@ -70,7 +68,11 @@ def test_override_along_a_zipped_axis_touches_only_the_points_that_use_it():
 
 
 def test_an_override_that_other_points_take_from_the_base_is_refused():
-    """They would stay as they are, though it is listed as applied; points are selected first."""
+    """An override must not apply to some points of a zipped axis only.
+
+    The other points would keep the base value, although the override is listed as applied.
+    A selection of points takes precedence.
+    """
     points = {"two laws": {"law": "slip"}, "neutral": {"law": "slowness", "b_over_a": 1.0}}
     laws = declared(base=Scene(stiffness=0.01), axes=[Axis("case", points)])
     with pytest.raises(InvalidValue, match="some points of case alone .neutral.*two laws is 2"):
@@ -109,7 +111,7 @@ def test_a_zipped_axis_bears_its_own_values_whatever_the_first_cell_needs(order)
 
 
 def test_claims_on_a_point_apply_if_its_value_is_given_again():
-    """A claim that names a point by its label is checked whatever list contains its value."""
+    """A claim on a labelled point is checked for any list with its value."""
     place = {"case": "alpha = 0.5", "b_over_a": 2.0}
     claim = Claim(
         id="C1",
@@ -157,7 +159,10 @@ def test_labels_of_existing_points_do_not_depend_on_the_list_of_values(values):
 
 @pytest.mark.parametrize("given", [0.1, [0.1, 1.0], [1, 0.1], [0.1, 0.1 + 1e-12]])
 def test_new_labels_identify_their_points(given):
-    """Also if a value alone does not, because other fields differ between the points."""
+    """New labels are unique even if several points have the same value.
+
+    The points differ in other fields.
+    """
     points = {
         "held, alpha = 0": {"normal_stress": "imposed", "alpha": 0.0},
         "held, alpha = 0.5": {"normal_stress": "imposed", "alpha": 0.5},
@@ -181,7 +186,7 @@ def test_new_labels_identify_their_points(given):
 
 @dataclass(frozen=True, kw_only=True)
 class Twofold(SlipLaw):
-    """A law that makes something of its number when it is made."""
+    """A law that changes its field in ``__post_init__``."""
 
     given: float = number(1.0, "", "1", "a number")
 
@@ -215,8 +220,9 @@ MIXED = Study(
 
 @pytest.mark.parametrize("name", ["mixed", *study_index.study_names()])
 def test_a_worker_computes_the_cells_of_the_declaration(name, monkeypatch):
-    """What is sent are the name of each cell and what it changes of scene and measure; of large
-    lattices, a sample of the cells.
+    """A worker reconstructs each cell from its key and its changes.
+
+    Large lattices are sampled.
     """
     study = MIXED if name == "mixed" else study_loader.load_study(name)
     plan = CellPlan(study)

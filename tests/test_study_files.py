@@ -1,4 +1,4 @@
-"""A study in a file of the user's own: it runs by its path, and what is wrong with it is told."""
+"""Tests of user-defined study files and of their error messages."""
 
 from dataclasses import dataclass
 from typing import ClassVar
@@ -79,7 +79,10 @@ class Failing(Reduction):
 
 
 def test_cells_that_cannot_be_reduced_are_kept(tmp_path):
-    """A reduction that fits the empty lattice and fails on the numbers loses nothing."""
+    """The cells are kept if a reduction fails after the run.
+
+    The reduction succeeds for the empty lattice of the dry run.
+    """
     measure = CriticalStep(of="displacement_step")
     failing = [Failing("s", "critical_displacement")]
     study = study_of("mine", measure, Axis("phi", [55, 65]), reductions=failing)

@@ -1,4 +1,4 @@
-"""Surfaces of packages: their exports, imports that use them, and import cycles."""
+"""Tests of the public names of packages: exports, imports and cycles."""
 
 import ast
 import importlib
@@ -29,7 +29,10 @@ PACKAGES = sorted(path.parent.name for path in ROOT.glob("*/__init__.py"))
 
 
 def package_of(module: str) -> str:
-    """Return the top-level package of a module, or an empty string for modules of ``rsfstudy``."""
+    """Return the top-level package of a module.
+
+    The result is an empty string for modules of ``rsfstudy`` itself.
+    """
     first = module.removeprefix("rsfstudy").lstrip(".").partition(".")[0]
     return first if first in PACKAGES else ""
 
@@ -64,7 +67,10 @@ def test_imports_of_other_packages_use_their_surfaces():
 
 
 def test_modules_never_import_in_a_cycle():
-    """Imports for type annotations count, and so do imports of modules by their names."""
+    """There are no import cycles.
+
+    Imports for type annotations and imports by name are included.
+    """
     imports: dict[str, set[str]] = {}
     for module, path in MODULES.items():
         full = {(source, f"{source}.{name}") for source, name in imported_names(path)}
@@ -102,7 +108,7 @@ def test_a_surface_says_what_the_package_never_does(package):
 
 
 def test_surfaces_load_no_module():
-    """Importing all packages loads neither NumPy nor any other large library."""
+    """Importing all packages loads neither NumPy nor other large libraries."""
     source = (
         f"import importlib, sys\nfor name in {[p for p in PACKAGES if p != 'api']}:\n"
         "    importlib.import_module(f'rsfstudy.{name}')\n"

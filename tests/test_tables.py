@@ -1,4 +1,7 @@
-"""Tables that commands print break no number, name or heading, however narrow the terminal."""
+"""Tests of printed tables.
+
+Tables keep numbers, names and headings in one piece at any terminal width.
+"""
 
 import numpy as np
 import pytest
@@ -22,7 +25,10 @@ WIDTHS = (40, 80)
 
 @pytest.fixture
 def printed(monkeypatch, capsys):
-    """What is printed at some width, none of whose lines is longer."""
+    """Return a function that prints at a given width and returns the lines.
+
+    The function asserts that no line exceeds the width.
+    """
 
     def at(width, say, *what) -> list[str]:
         monkeypatch.setenv("COLUMNS", str(width))
@@ -36,7 +42,10 @@ def printed(monkeypatch, capsys):
 
 
 def pieces(table: TextTable) -> set[str]:
-    """What a reader must find in one piece: each text, but words of sentences and headings."""
+    """Return the texts that a table must not break.
+
+    Sentences and headings may be broken between words.
+    """
     found = {word for head in table.rows[0] for word in head.split()}
     for row in table.rows:
         for head, text in row.items():
@@ -45,7 +54,7 @@ def pieces(table: TextTable) -> set[str]:
 
 
 def in_one_piece(piece: str, lines: list[str]) -> bool:
-    """Whether it stands on a line, and is no part of a longer word."""
+    """Return True if a text occurs as a whole word on a line."""
     return any(f" {piece} " in f" {line} " for line in lines)
 
 
@@ -66,7 +75,7 @@ def test_results_of_every_study(name, printed, tmp_path_factory):
 
 @pytest.mark.parametrize("width", WIDTHS)
 def test_declarations_of_every_study(width, printed, tmp_path):
-    """The points of their axes are there, each in one piece."""
+    """The points of all axes are printed in one piece."""
     for name in study_index.study_names():
         study = study_loader.load_study(name)
         lines = printed(width, printed_reports.print_study_declaration, study, tmp_path)
@@ -114,7 +123,7 @@ def test_a_column_of_numbers_ends_at_one_place(printed):
         TextTable([{"a": "x", "n": "1"}, {"a": "yy", "n": "-10.5"}]),
     )
     found = [line.rstrip() for line in lines[2:4]]
-    width = len(found[0])  # which depends on the version of rich
+    width = len(found[0])  # The width depends on the version of rich.
     assert found == ["x" + "1".rjust(width - 1), "yy" + "-10.5".rjust(width - 2)]
 
 
@@ -138,7 +147,7 @@ def test_a_cell_is_told_in_a_line_for_each_number_beside_that_of_its_file(printe
 
 
 def test_overrides_are_told_with_the_digits_a_reader_wants():
-    """Labels and names with digits stay as they are."""
+    """Numbers are rounded, and labels with digits are unchanged."""
     given = {"hold_time": ["464.15888336127773 s", "1e4 s"], "case": "alpha = 0.56", "a": 0.01}
     told = "hold_time=464.159 s,1e4 s, case=alpha = 0.56, a=0.01"
     assert format_overrides(given) == told

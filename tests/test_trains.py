@@ -1,5 +1,7 @@
-"""Trains of waves: oscillations of normal stress and of the load point that begin, have a phase,
-and end; held to their sine, to linear theory and to what a record of them does.
+"""Tests of oscillations of finite duration (wave trains).
+
+Oscillations of normal stress and load point have a start, a phase and an end. The
+references are their sine function, linear theory, and records of the same oscillations.
 """
 
 import math
@@ -18,7 +20,7 @@ from rsfstudy.motion.work_meter import WorkMeter
 from rsfstudy.slider.laws import BUILT_IN_PARTS as LAWS
 
 IMPOSED = {"normal_stress": "imposed", "alpha": 0.3}
-#: A train that begins later, with a jump, and ends with another.
+#: A train that starts later with a jump, and ends with a jump.
 BEGIN, PERIOD, CYCLES, PHASE = 3.0, 8.0, 2.25, 30.0
 TRAIN = {
     "oscillation_begin": BEGIN,
@@ -31,13 +33,13 @@ STABLE = {"law": "slowness", "stiffness_ratio": 2.0}
 
 
 def wave(time, phase=PHASE):
-    """The sine, and nothing before and after it."""
+    """Return the sine function of the train, which is zero outside of it."""
     angle = 2.0 * np.pi * (time - BEGIN) / PERIOD + math.radians(phase)
     return np.where((time > BEGIN) & (time < END), np.sin(angle), 0.0)
 
 
 def all_laws():
-    """Scenes of all laws, all dynamics, and normal stress that follows shear stress or does not."""
+    """Yield scenes of all laws, dynamics and normal stress conditions."""
     for law in LAWS:
         of_law = {"b1_over_a": 1.5} if law.startswith("two") else {}
         yield {"law": law, "stiffness_ratio": 2.0, **of_law, **IMPOSED}
@@ -48,7 +50,11 @@ def all_laws():
 
 @pytest.mark.parametrize("slider", [*all_laws()], ids=lambda s: "-".join(map(str, s.values())))
 def test_normal_stress_is_on_its_sine(slider):
-    """Where it begins and ends two rows of one time hold what is before and behind the jump."""
+    """The normal stress follows the sine function of the train.
+
+    At the start and the end, two rows with equal times contain the values before and after
+    the jump.
+    """
     motion = simulate(Scene(**slider, oscillation_amplitude=0.02, **TRAIN), engine=COMPILED)
     time = motion.time.values
     within = np.minimum(abs(time - BEGIN), abs(time - END)) > 1e-9
@@ -57,7 +63,7 @@ def test_normal_stress_is_on_its_sine(slider):
         cot_phi = 1.0 / math.tan(math.radians(60.0))
         expected += cot_phi * (motion.frictional_stress.values - 0.76)
     off = abs(motion.normal_stress_ratio.values - expected)
-    assert off[within].max() < 1e-8  # ten times the accuracy of the amplitude
+    assert off[within].max() < 1e-8  # The tolerance is ten times the accuracy of the amplitude.
     assert time[-1] > END
     assert (~within).sum() == 4
 
@@ -68,7 +74,11 @@ SMALL = 1e-5
 
 @pytest.mark.parametrize("engine", ENGINES)
 def test_the_load_point_is_on_the_integral_of_its_sine(engine):
-    """``A P/(2 pi) [cos(phase) - cos(2 pi t/P + phase)]`` beyond V_* t, to rounding of 40 D_c."""
+    """The load point displacement is the integral of the sine function.
+
+    In addition to V_* t, it is ``A P/(2 pi) [cos(phase) - cos(2 pi t/P + phase)]``. The
+    tolerance is the rounding error of 40 D_c.
+    """
     scene = Scene(**STABLE, normal_stress="constant", velocity_oscillation=SMALL, **TRAIN)
     motion = simulate(scene, times=TIMES, rtol=1e-10, engine=engine)
     moved = motion.load_point_displacement.values - TIMES
@@ -84,7 +94,11 @@ VARIABLE = {"normal_stress": "variable", "alpha": 0.3, "inertia": True}
 @pytest.mark.parametrize("dynamics", [{"inertia": True}, {"radiation_damping": 1e-6}, VARIABLE])
 @pytest.mark.parametrize(("of", "law"), [("normal_stress", "slip"), ("velocity", "slowness")])
 def test_a_record_of_whole_cycles_moves_the_slider_alike(of, law, dynamics):
-    """Ruptures included. Linear between n samples a cycle, it is off by (pi/n)**2/2 of itself."""
+    """A sampled record of a train leads to the same motion.
+
+    The motion contains ruptures. Linear interpolation between n samples per cycle has a
+    relative error of (pi/n)**2/2.
+    """
     n, lasts, begin = 400, 2.0 * PERIOD, {"oscillation_begin": BEGIN, "oscillation_cycles": 2.0}
     slider = {"law": law, "stiffness_ratio": 0.7, "normal_stress": "constant"} | dynamics
     time = np.append(0.0, BEGIN + np.linspace(0.0, lasts, 2 * n + 1))
@@ -105,14 +119,17 @@ def test_a_record_of_whole_cycles_moves_the_slider_alike(of, law, dynamics):
         simulate(s, times=at, rtol=1e-9, engine=COMPILED).shear_stress.values for s in (one, other)
     )
     assert np.ptp(one) > 0.01
-    # what is off in stress moves a rupture in time, by as much of a cycle: times its slope; 1.2 was
-    # measured for the 2, and that it falls by the square of n
+    # An error of stress shifts a rupture by the same fraction of a cycle, multiplied by the
+    # slope. The measured factor is 1.2 instead of 2, and the error is inversely proportional to
+    # the square of n.
     assert np.median(abs(one - other)) < 2.0 * (math.pi / n) ** 2 * np.ptp(one)
 
 
 @pytest.mark.parametrize("amplitude", [0.9, 4.0])
 def test_records_come_to_an_oscillation_of_the_load_point(amplitude):
-    """With the square of their samples, and so where it moves back in each cycle, and shear stress
+    """The error of a sampled record is of second order in the spacing.
+
+    In one of the cases, the load point moves back in each cycle and the shear stress
     reverses.
     """
     slider = {"law": "slowness", "a": 0.01, "b_over_a": 1.4, "mu_star": 0.1, "stiffness": 0.02,
@@ -127,12 +144,15 @@ def test_records_come_to_an_oscillation_of_the_load_point(amplitude):
         other = Scene(**slider, loading=history({"time": time, "displacement": moved}))
         stress = simulate(other, times=at, rtol=1e-9, engine=COMPILED).shear_stress.values
         off.append(abs(stress - exact).max())
-    # higher orders are left; measured 1.99 to 2.00
+    # Higher orders remain, and the measured values are 1.99 to 2.00.
     assert np.log2(np.divide(off[:-1], off[1:])) == pytest.approx(2.0, abs=0.1)
 
 
 def test_what_is_not_stated_is_no_part_of_names_and_declarations():
-    """Keys of cells are those of before there were trains."""
+    """Fields without a value do not affect the keys of cells.
+
+    The keys equal the keys of versions without wave trains.
+    """
     kept = {
         "d644d6e6df1d801716788fc7cf8a13d5": Scene(),
         "850bc7cf204aeac15dcd085aa806c153": Scene(
@@ -149,7 +169,7 @@ def test_what_is_not_stated_is_no_part_of_names_and_declarations():
 
 # ---- oscillations without end --------------------------------------------------------------------
 
-#: Each dynamics with one of them: that those are bound alike is for other tests.
+#: One scene for each kind of dynamics. Other tests cover the remaining combinations.
 SLIDERS = {
     "imposed": {"law": "slowness", **IMPOSED},
     "inclined, waves": {
@@ -161,13 +181,16 @@ SLIDERS = {
     },
     "imposed, mass": {"law": "slowness", **IMPOSED, "inertia": True},
 }
-#: An oscillation, on a slider that it does not make stick and slip.
+#: An oscillation that does not cause stick-slip.
 OSCILLATES = {"oscillation_amplitude": 0.02, "oscillation_period": 8.0, "stiffness_ratio": 2.0}
 
 
 @pytest.mark.parametrize("rtol", [1e-3, 1e-7])
 def test_the_amplitude_does_not_drift(rtol):
-    """After 300 periods it is off by less than the accuracy, and no more than after 30."""
+    """The amplitude is accurate after 300 periods.
+
+    The error after 300 periods is similar to the error after 30 periods.
+    """
     scene, off = Scene(**SLIDERS["imposed"], **OSCILLATES), []
     for periods in (30, 300):
         meter = WorkMeter(10**6, engine=COMPILED)
@@ -175,7 +198,7 @@ def test_the_amplitude_does_not_drift(rtol):
         *_earlier, end = integrate_events(scene, accuracy, meter, until=8.0 * periods)
         _psi, ahead, relief = end.point.psis
         off.append(abs(math.hypot(ahead, relief) / 0.02 - 1.0))
-        # the clock itself drifts by the accuracy in each period at most
+        # Time has an error of at most rtol per period.
         assert abs(relief / 0.02) < 2.0 * math.pi * periods * rtol
     assert max(off) < 0.5 * rtol
     assert off[1] < 3.0 * off[0] + 1e-12

@@ -1,4 +1,4 @@
-"""One motion as a labelled trajectory."""
+"""Tests of simulated motions as labelled datasets."""
 
 import math
 
@@ -13,7 +13,7 @@ from rsfstudy.motion.engines import COMPILED, ENGINES
 
 
 def test_steady_sliding_stays_steady():
-    """Without a step, slip is load point displacement and everything else rests."""
+    """Without a step, slip equals load point displacement."""
     with pytest.warns(NoResultWarning, match=r"nothing is stepped.*load_velocity_ratio"):
         motion = rsfstudy.simulate(Scene(), duration=20.0)
     np.testing.assert_allclose(motion.slip, motion.time, atol=1e-12)
@@ -25,7 +25,10 @@ def test_steady_sliding_stays_steady():
 
 @pytest.mark.parametrize("inertia", [False, True])
 def test_a_stable_step_ends_in_the_new_steady_state(inertia):
-    """tau_ss and sigma_ss at V_0, from the steady-state friction and the inclined geometry."""
+    """The final stresses agree with the steady state at V_0.
+
+    The steady state follows from steady friction and the inclined geometry.
+    """
     scene = Scene(load_velocity_ratio=1.5, stiffness_ratio=2.0, inertia=inertia)
     motion = rsfstudy.simulate(scene, duration=300.0, rtol=1e-9)
     mu_ss = scene.mu_star - (scene.b - scene.a) * math.log(1.5)
@@ -38,7 +41,10 @@ def test_a_stable_step_ends_in_the_new_steady_state(inertia):
 
 
 def test_time_is_an_index_though_stress_jumps():
-    """Held, pushed by 0.5 D_c at time 2, and let go on: spring stress jumps at once."""
+    """Times increase strictly even if spring stress jumps.
+
+    The load point is held, displaced by 0.5 D_c at time 2, and moves on.
+    """
     segments = [{"velocity": 0.0, "duration": 2.0}, {"velocity": 1.0, "duration": 1.0, "step": 0.5}]
     scene = Scene(stiffness=0.1, normal_stress="constant", loading=rsfstudy.protocol(segments))
     motion = rsfstudy.simulate(scene, rtol=1e-5)
@@ -67,19 +73,24 @@ def test_a_motion_that_cannot_go_on_says_why_and_keeps_what_it_has():
     assert opened.sizes["time"] == 0
 
 
-#: A pulse of 10^40 V_* after a hold; it comes to rest, and nothing ends it.
+#: A hold followed by a pulse of 10^40 V_*, which comes to rest without ending the motion.
 PULSE = {"law": "slowness", "normal_stress": "constant", "b_over_a": 1.5, "hold_time": 100.0}
 
 
 @pytest.mark.parametrize("engine", ENGINES)
 def test_beyond_the_norm_without_mass_or_damping_it_is_no_physics(engine):
-    """From where slip rate passes 5e-4 over T V_*/(2 pi D_c) on; in all units."""
+    """The time at which the norm is exceeded is reported in all units.
+
+    Without inertia and damping, the motion is not physical beyond 5e-4 over T V_*/(2 pi
+    D_c).
+    """
     with pytest.warns(NoResultWarning, match="beyond the instability norm from .*neither mass nor"):
         motion = rsfstudy.simulate(Scene(**PULSE), duration=150.0, engine=engine)
     assert motion.attrs["status"] == "ok"
     since = float(motion.instability_time)
     norm = math.log10(5e-4 / (5.0 * 1.17e-8 / (2.0 * math.pi)))
-    # slip rate grows by a power of ten within some 1e-6 D_c/V_* there, and is recorded more often
+    # The slip rate grows by a factor of 10 within about 1e-6 D_c/V_*, and the recording is
+    # denser.
     assert since == pytest.approx(114.540722, abs=1e-4)
     rate = motion.log10_slip_rate
     assert float(rate.where(motion.time < since).max()) < norm
@@ -95,12 +106,15 @@ def test_beyond_the_norm_without_mass_or_damping_it_is_no_physics(engine):
     [
         {"inertia": True},
         {"radiation_damping": 1e-5},
-        # with this period the load point itself is beyond the norm, and the pulse is one of 40 V_0
+        # With this period, the load velocity exceeds the norm, and the pulse is 40 V_0.
         {"reference_rate": 0.1, "stiffness_ratio": 1.4},
     ],
 )
 def test_there_is_physics_beyond_the_norm_with_mass_or_damping(fields):
-    """And it says nothing of itself where the load point alone passes it."""
+    """With inertia or damping, no warning is given beyond the norm.
+
+    No warning is given either if the load velocity itself exceeds the norm.
+    """
     motion = rsfstudy.simulate(Scene(**PULSE, **fields), duration=150.0, engine=COMPILED)
     assert float(motion.log10_slip_rate.max()) > 0.5
     assert "instability_time" not in motion
@@ -108,13 +122,17 @@ def test_there_is_physics_beyond_the_norm_with_mass_or_damping(fields):
 
 
 def test_a_motion_that_begins_beyond_the_norm_says_so():
-    """And where the load point alone passes it, what is a million times faster is beyond it."""
-    # ln V jumps by K d/a = 15, and K > b takes it down again
+    """A motion that starts beyond the norm causes a warning.
+
+    If the load velocity exceeds the norm, only slip rates a million times faster cause a
+    warning.
+    """
+    # ln V jumps by K d/a = 15, and decreases again because K > b.
     jump = Scene(**PULSE | {"hold_time": 0.0}, displacement_step=3.0, stiffness_ratio=10.0)
     with pytest.warns(NoResultWarning, match="from 0 D_c"):
         rsfstudy.simulate(jump, duration=1.0, rtol=1e-3)
     with pytest.warns(NoResultWarning, match="from 114"):
         motion = rsfstudy.simulate(Scene(**PULSE, reference_rate=0.1), duration=150.0)
     at = motion.sel(time=float(motion.instability_time), method="nearest")
-    # samples are a few tenths of a power of ten apart
+    # The sampling intervals are a few tenths of a decade.
     assert float(at.log10_slip_rate) == pytest.approx(6.0, abs=0.5)

@@ -1,6 +1,4 @@
-"""Triggers: whether a step is one, each with its own answer; and fast load points that waves hold a
-slider back from.
-"""
+"""Tests of triggers with separate statuses, and of strongly damped sliders."""
 
 from __future__ import annotations
 
@@ -21,8 +19,8 @@ from rsfstudy.motion.events import EventKind, approach_to_steady_state, maximum
 from rsfstudy.motion.work_meter import WorkMeter
 from rsfstudy.status import Status
 
-#: Waves carry away all that the spring gives: to follow V up to V_0 takes 4,000,000 right-hand
-#: sides, by steps of D_c.
+#: A slider whose radiation damping balances the spring. An integration until V reaches V_0 would
+#: need 4,000,000 evaluations with steps of D_c.
 DAMPED = {
     "law": "slip",
     "a": 0.0127,
@@ -46,7 +44,10 @@ def test_velocity_steps_of_a_damped_slider_are_cheap(law, damping):
 @pytest.mark.parametrize("law", ["slip", "slowness", "perrin_rice_zheng"])
 @pytest.mark.parametrize("ratio", [0.3, 1.5])
 def test_what_is_said_to_rise_to_the_load_point_does(law, normal_stress, ratio):
-    """Followed on, it has no maximum before it has come there, to a thousandth."""
+    """A slip rate that rises monotonically has no maximum.
+
+    The motion is integrated until the distance from steady sliding is 0.001.
+    """
     effect = {} if normal_stress == "constant" else {"alpha": 0.4}
     slope = {"phi": 70.0} if normal_stress == "variable" else {}
     damped = {"radiation_damping": 1e-3, "load_velocity_ratio": 2e3, "stiffness_ratio": ratio}
@@ -64,7 +65,7 @@ def test_what_is_said_to_rise_to_the_load_point_does(law, normal_stress, ratio):
         if event.kind is EventKind.SETTLED:
             break
     assert told[-1]
-    # and most of the way is left then
+    # The final slip rate is close to the load velocity.
     assert event.point.log_slip_rate > scene.log_load_velocity - 0.1
 
 
@@ -74,7 +75,7 @@ def test_a_slider_that_waves_do_not_hold_back_is_not_asked():
 
 
 def test_oscillations_do_not_rise_to_the_load_point():
-    """Near critical stiffness they overshoot it."""
+    """Near the critical stiffness, the slip rate exceeds the load velocity."""
     scene = Scene(stiffness_ratio=1.1, load_velocity_ratio=1.1, radiation_damping=1e-12)
     start = next(integrate_events(scene, Accuracy(1e-6), WorkMeter(10**5)))
     assert start.point.log_slip_rate < scene.log_load_velocity
@@ -83,7 +84,10 @@ def test_oscillations_do_not_rise_to_the_load_point():
 
 @pytest.mark.parametrize("engine", ENGINES)
 def test_each_trigger_keeps_its_own_answer(engine):
-    """The velocity step spends the budget; what was found of the others stays, with its status."""
+    """Results of other triggers are kept if one exhausts the budget.
+
+    The velocity step exhausts the budget in this test.
+    """
     scene = Scene(**{**DAMPED, "stiffness_ratio": 1.5}, radiation_damping=1e-9)
     accuracy = Accuracy(1e-6, engine=engine)
     costs = [trigger(scene, accuracy).rhs_evaluations for trigger in TRIGGERS]
@@ -111,7 +115,10 @@ def answer(**fields) -> tuple[float, float]:
 
 @pytest.mark.parametrize("b_over_a", [2.0, 3.0, 5.0])
 def test_either_side_of_the_closed_form(b_over_a):
-    """V_0/V_* = 1 + a/(b-a) at constant normal stress and k = k_cr."""
+    """The critical step is 1 + a/(b-a) at constant normal stress.
+
+    The stiffness is k = k_cr.
+    """
     critical = 1.0 + 1.0 / (b_over_a - 1.0)
     fields = {"normal_stress": "constant", "b_over_a": b_over_a}
     assert answer(load_velocity_ratio=critical * 0.999, **fields) == (0.0, 0.0)
@@ -124,8 +131,10 @@ def test_displacement_steps_too():
 
 
 def test_an_answer_the_tolerance_decides_says_so():
-    """Within a loose tolerance of the boundary, a tighter and a looser one disagree somewhere;
-    closer to critical stiffness than the tolerance, growth cannot be told from decay.
+    """A result that depends on the tolerance is not verified.
+
+    Near the boundary, runs with different tolerances disagree. Near the critical stiffness,
+    growth cannot be distinguished from decay.
     """
     statuses = [
         Triggered()(Scene(load_velocity_ratio=1.66025 + 4e-6 * i), Accuracy(1e-3)).status

@@ -1,5 +1,6 @@
-"""The laws of two states: closed forms, the one state they are where lengths are equal, and motions
-that grow as eigenvalues say.
+"""Tests of laws with two states.
+
+The references are closed forms, laws with a single state, and growth rates.
 """
 
 import math
@@ -31,8 +32,10 @@ STRENGTHENING = {"a": 0.01, "b1_over_a": 1.4, "b2_over_a": -0.6, "length_ratio":
 
 
 def closed_form(first: float, second: float, over: float) -> float:
-    """Critical k L_1/(a sigma) at constant normal stress, where L_1/L_2 = `over`: the cubic of
-    Routh and Hurwitz (Gu et al. 1984).
+    """Return the critical k L_1/(a sigma) at constant normal stress.
+
+    The argument ``over`` is L_1/L_2. The result is the Routh-Hurwitz criterion of a cubic
+    equation (Gu et al. 1984).
     """
     half = first - 1.0 + over * (2.0 * first + (second - 1.0) * (2.0 + over))
     product = over * (1.0 + over) * (first + second - 1.0) * (1.0 + over - first - second * over)
@@ -51,14 +54,14 @@ def test_critical_stiffness_is_the_closed_form(law, first, second, over):
     )
     found = LinearStability()(scene, Accuracy())
     assert found.status is Status.OK
-    # growth is from differences on the scale of a
+    # The growth rate is computed from differences on the scale of a.
     assert found.values["critical_stiffness_error"] < 1e-5 * scene.critical_stiffness
 
 
 @pytest.mark.parametrize(("law", "of_two"), LAWS.items())
 @pytest.mark.parametrize("second", [1e-4, 1e-7])
 def test_a_state_that_hardly_acts_is_one_that_is_not_there(law, of_two, second):
-    """Growth differs by the part b_2/a, times a number of order one."""
+    """A very small b_2 changes the growth rate by about b_2/a."""
     one = Scene(law=law, b_over_a=1.5, stiffness=1e-3, **CONSTANT)
     parts = {"b1_over_a": 1.5, "b2_over_a": second, "length_ratio": 3.0}
     two = Scene(law=of_two, stiffness=1e-3, **parts, **CONSTANT)
@@ -67,13 +70,13 @@ def test_a_state_that_hardly_acts_is_one_that_is_not_there(law, of_two, second):
 
 
 def both(law: str, **fields) -> tuple[Scene, Scene]:
-    """One state, and two of the same length."""
+    """Return a scene with one state, and a scene with two equal lengths."""
     one = Scene(law=law, b_over_a=2.0, **fields)
     return one, Scene(law=LAWS[law], b1_over_a=0.6, b2_over_a=1.4, length_ratio=1.0, **fields)
 
 
 def agree(measure, one: Scene, two: Scene, rtol: float = 1e-7) -> None:
-    """Headline numbers of both within the sum of their error estimates."""
+    """Assert that two scenes agree within the sum of their error estimates."""
     found, again = (measure(scene, Accuracy(rtol, 2_000_000)) for scene in (one, two))
     assert again.status is found.status is Status.OK
     for name in (n for n in found.values if f"{n}_error" in found.values):
@@ -90,7 +93,7 @@ def test_two_of_one_length_are_one(law, stress):
     agree(LimitCycle(phases=2), *both(law, inertia=True, **soft), rtol=1e-6)
     agree(StepResponse(peaks=2, phases=2), *both(law, **stiff), rtol=1e-6)
     agree(RigidResponse(points=5), *both(law, **stiff))
-    # one state has its critical path, and two go the general way
+    # A single state has a critical path, and two states use the general method.
     for of in ("load_velocity_ratio", "displacement_step"):
         agree(CriticalStep(of=of), *both(law, stiffness_ratio=1.3, **stress), 1e-4)
     agree(Triggered(), *both(law, stiffness_ratio=1.3, load_velocity_ratio=30.0, **stress), 1e-4)
@@ -99,7 +102,10 @@ def test_two_of_one_length_are_one(law, stress):
 @pytest.mark.parametrize("law", LAWS.values())
 @pytest.mark.parametrize("effect", [{}, {"stress_dependence": 2.0, **CONSTANT}])
 def test_what_stress_takes_is_shared_within_bounds(law, effect):
-    """Shares stay below 1 and pass smoothly where b_1 + b_2 goes through 0, with the threshold."""
+    """The shares of two states are below 1 and continuous.
+
+    The shares and the critical stiffness are continuous at b_1 + b_2 = 0.
+    """
     critical = []
     for second in (-1.5 + 1e-9, -1.5, -1.5 - 1e-9):
         scene = Scene(
@@ -120,7 +126,7 @@ def test_b_follows_from_its_parts():
     assert scene.with_(law="slip").b == 2.0 * scene.a
 
 
-#: Unstable between two stiffnesses only, the first of them 0.66 of the second.
+#: A scene that is unstable between two stiffnesses, with a ratio of 0.66.
 WINDOW = {"b1_over_a": 1.136, "b2_over_a": -0.5, "length_ratio": 10.0, **CONSTANT}
 
 
@@ -155,7 +161,10 @@ def test_below_a_window_of_instability_motions_settle(ratio, margin):
 
 
 def evolutions(log_slip_rate, psis, shift, fraction, p):
-    """Three states, each with its share of b; the second and third over lengths of their own."""
+    """Return the rates of three states with different lengths.
+
+    Each state has a share of b.
+    """
     b = p[LAW]
     return (
         -fraction * (psis[0] - 0.5 * shift + 0.5 * b * log_slip_rate),
@@ -171,7 +180,7 @@ def steady_states(log_slip_rate, shift, p):
 
 @dataclass(frozen=True, kw_only=True)
 class ThreeSlipStates(laws.Law):
-    """The slip law with three states, of which b is divided."""
+    """The slip law with three states that share b."""
 
     second: float = number(1.0, "", "1", "first over second slip distance")
     third: float = number(1.0, "", "1", "first over third slip distance")
@@ -187,7 +196,7 @@ class ThreeSlipStates(laws.Law):
 
 @pytest.mark.parametrize("engine", [SCIPY, COMPILED])
 def test_two_of_three_lengths_alike_are_two(engine):
-    """Three states of which two have one length are two."""
+    """Three states with two equal lengths equal two states."""
     two = Scene(law="two_slip_states", b1_over_a=1.4, b2_over_a=0.6, length_ratio=4.0, **CONSTANT)
     three = Scene(law=ThreeSlipStates, b_over_a=2.0, second=1.0, third=0.25, **CONSTANT)
     assert three.critical_stiffness == pytest.approx(two.critical_stiffness, rel=1e-12)
@@ -202,8 +211,11 @@ def test_two_of_three_lengths_alike_are_two(engine):
 
 @pytest.mark.parametrize("law", LAWS.values())
 def test_a_motion_tells_each_state(law):
-    """They add up to the state variable, to rounding, because stress takes nothing from them; and
-    come to rest at -b_i ln(V_0/V_*) each: the slower one to exp(-20) after 40 D_c, of length 2 D_c.
+    """The dataset of a motion contains each state.
+
+    The sum is the state variable to rounding error, because stress does not affect the
+    states. The final values are -b_i ln(V_0/V_*), and after 40 D_c the slower state with a
+    length of 2 D_c deviates by a fraction of exp(-20).
     """
     scene = Scene(
         law=law, b1_over_a=1.4, b2_over_a=-0.6, length_ratio=2.0, stiffness=1.0,

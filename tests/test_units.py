@@ -1,4 +1,7 @@
-"""A quantity is one number and one unit, with or without pint: any other text is refused."""
+"""Tests of quantities, which consist of a number and a unit.
+
+The results are the same with and without pint, and all other texts are rejected.
+"""
 
 import math
 import re
@@ -55,10 +58,10 @@ def test_quantities_of_pint():
         convert_to_si("x", "3 bananas", "m")
 
 
-#: Units of stress, of those known here and of those that pint knows.
+#: Units of stress that rsfstudy supports, and units that need pint.
 STRESSES = ("Pa", "kPa", "MPa", "bar", "kg/m/s^2", "kg*m**-1*s-2", "MPa m/mm", "MPa s / s")
 OF_PINT = ("psi", "inHg", "lbf/m^2", "percent MPa", "mPa", "psi um/um")
-#: What has been read as a product of its numbers, ended in a traceback, or never ended.
+#: Texts that earlier versions read incorrectly, or that caused exceptions or endless loops.
 WRONG = (
     "2,5 MPa", "2 5 MPa", "25 MPa 3", "2 MPa!", "2*3 MPa", "1 kPa^999", "5 9**9**9**9",
     "5 MPa^(9**9**9)", "5 MPa**9**9", "1_000 Pa", "0x1F Pa", "0b1 Pa", "0xF Pa", "\u0665 Pa",
@@ -69,7 +72,7 @@ WRONG = (
 
 
 def read(text):
-    """What a text of stress is in Pa, or None where it is refused."""
+    """Return the value of a text in Pa, or None if it is rejected."""
     try:
         return convert_to_si("x", text, "Pa")
     except InvalidValue:
@@ -88,7 +91,10 @@ def test_what_is_not_one_number_and_one_unit_is_refused(text):
 
 @pytest.mark.parametrize("name", sorted(_KNOWN_UNITS))
 def test_units_that_both_know_are_the_same(name):
-    """But for the roundings of pint on its way to base units, a few of 1.1e-16."""
+    """The conversion factors agree with pint to rounding error.
+
+    The rounding error of pint is a few times 1.1e-16.
+    """
     registry = pint.get_application_registry()
     quantity = registry.Quantity(1.0, registry.parse_units(name)).to_base_units()
     size, exponents = _KNOWN_UNITS[name]
@@ -105,7 +111,10 @@ NUMBERS = st.one_of(
 
 
 def product(number, unit):
-    """A number of units in Pa, of exact factors: rounded once, and without bound where it is."""
+    """Return a number times the factor of a unit in Pa, rounded once.
+
+    The result is infinity in case of overflow.
+    """
     try:
         return float(Fraction(repr(float(number))) * unit_factor("x", unit, "Pa"))
     except OverflowError:
@@ -114,7 +123,7 @@ def product(number, unit):
 
 @given(NUMBERS, st.sampled_from(["", " ", "  ", "\t", "\u00a0"]), st.sampled_from(STRESSES))
 def test_a_number_times_the_factor_of_the_unit(number, between, unit):
-    """To the last bit, with pint and without."""
+    """The result is exact to the last bit, with and without pint."""
     expected = product(number, unit)
     text = f" {number}{between}{unit} "
     wanted = expected if math.isfinite(expected) else None
@@ -129,7 +138,7 @@ def test_of_units_that_pint_alone_knows_too(number, unit):
     assert read_without_pint(text) is None
 
 
-#: Nearly quantities, and anything at all.
+#: Nearly valid quantities, and random texts.
 ODD = ("**", "1e3", "nan", "inf", "per", "0x", "e-3", "dB", "degC", "s-1", "m", "um")
 PIECES = st.sampled_from(
     [*STRESSES, *OF_PINT, *ODD, *"0123456789.,:;_+-*/^!()[]%e xE\t\u00b2\u0665\u22c5\u00b7"]
@@ -140,7 +149,7 @@ TEXTS = st.one_of(
     st.builds("{}{} {}".format, NUMBERS, PIECES, st.sampled_from(STRESSES + OF_PINT)),
     st.text(max_size=12),
 )
-#: Numbers in the text of a unit: none but one at the beginning that is divided, and whole powers.
+#: Numbers in the text of a unit: only a leading number that is divided, and integer powers.
 _PLAIN_POWERS = re.compile(r"(?<=[A-Za-z\u00b5\u03bc])(\^|\*\*)?[-+]?[1-9](?![0-9.])")
 
 
@@ -172,7 +181,10 @@ def _is_number(text):
 
 
 def test_long_texts_are_read_in_linear_time(tmp_path):
-    """Cubic time would be 10^14 steps, and never end."""
+    """Reading takes linear time.
+
+    Cubic time would need 10^14 steps.
+    """
     path, blanks = tmp_path / "test.csv", " " * 50_000
     for header in (f"velocity ({blanks}x", f"velocity{blanks}x", f"{blanks}velocity (um/s{blanks}"):
         path.write_text(f"{header}\n1\n")

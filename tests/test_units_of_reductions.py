@@ -1,4 +1,4 @@
-"""What is made of a lattice is in units of what it is made of, whatever it is called."""
+"""Tests of the units of reductions."""
 
 import numpy as np
 import pytest
@@ -32,8 +32,10 @@ X = np.geomspace(1.0, 30.0, 12)
 
 
 def lattice(**scales) -> xr.Dataset:
-    """Times in D_c/V_* of a rig of 5 MPa, 10 um and 2 um/s, unless stated otherwise: along a length
-    in D_c, a velocity in um/s, and a number.
+    """Return times in D_c/V_* along a length, a velocity and a number.
+
+    The rig has 5 MPa, 10 um and 2 um/s by default. The length is in D_c, and the velocity
+    is in um/s.
     """
     random = np.random.default_rng(12)
     times = 40.0 * X**-0.9 * random.uniform(0.95, 1.05, (2, X.size))
@@ -60,7 +62,7 @@ def lattice(**scales) -> xr.Dataset:
 
 
 OF, ALONG = "time_to", {"along": "law", "reference": "slip"}
-#: Each with the units that it has on a rig: named as if it were another, or by what it is.
+#: Reductions with their units on a rig. The names do not determine the units.
 KINDS = {
     LinearFit("static_slope", OF, on="number"): "s",
     LinearFit("zeta", OF, on="length"): "s (um)-1",
@@ -84,8 +86,10 @@ KINDS = {
 
 
 def test_what_is_made_of_a_lattice_in_units_is_that_of_numbers_in_units():
-    """To rounding: each kind is homogeneous in its variable and its coordinate. So are the errors
-    and misfits that come with it.
+    """Reductions commute with unit conversion, to rounding error.
+
+    Each reduction is homogeneous in its variable and its coordinate, including errors and
+    misfits.
     """
     made, dataset = apply_reductions(lattice(), tuple(KINDS)), lattice().assign_coords(a=0.01)
     ours, theirs = (
@@ -98,7 +102,7 @@ def test_what_is_made_of_a_lattice_in_units_is_that_of_numbers_in_units():
     for name in set(theirs) - set(dataset):
         assert ours[name].attrs["units"] == theirs[name].attrs["units"], name
         np.testing.assert_allclose(ours[name], theirs[name], rtol=1e-10, err_msg=str(name))
-    # the names of others do not lend their words
+    # Similar names do not affect the description.
     assert made["static_slope"].attrs["long_name"] == "static slope"
     assert read_undocumented_quantities(made)["static_slope"].scale == "D_c/V_*"
     assert ours["zeta_misfit"].attrs["units"] == "s"
@@ -107,12 +111,15 @@ def test_what_is_made_of_a_lattice_in_units_is_that_of_numbers_in_units():
 def test_a_slope_is_told_in_units_of_the_rig_beside_its_name():
     with_units = (InUnits("slope_in_min", "static_slope", units="min"),)
     made = apply_reductions(lattice(), (LinearFit("static_slope", OF, on="number"), *with_units))
-    expected = made["static_slope"] * 5.0 / 60.0  # D_c/V_* is 5 s
+    expected = made["static_slope"] * 5.0 / 60.0  # D_c/V_* is 5 s.
     np.testing.assert_allclose(made["slope_in_min"], expected, rtol=1e-14)
 
 
 def test_a_law_that_holds_a_number_stays_one_of_numbers():
-    """As V_0/V_* = 1 + zeta a/(b - a)."""
+    """A fit with a dimensionless offset has a dimensionless result.
+
+    An example is V_0/V_* = 1 + zeta a/(b - a).
+    """
     made = apply_reductions(lattice(), (ProportionalFit("zeta", OF, on="number", minus=1.0),))
     assert "scale" not in made["zeta"].attrs | made["zeta_misfit"].attrs
     np.testing.assert_array_equal(convert_to_display_units(made)["zeta"], made["zeta"])
@@ -138,7 +145,7 @@ def test_cells_of_several_scales_make_a_number_that_says_so(kind, across):
     assert "scale" not in made["r"].attrs
     assert made["r"].attrs["comment"].endswith("; of cells in units of D_c, which varies")
     np.testing.assert_array_equal(convert_to_display_units(made)["r"], made["r"])
-    # along the other dimension each result has one scale
+    # Along the other dimension, each result has a single scale.
     other = {"law": "x", "x": "law"}[across]
     kept = Range("r", OF, over=other) if other == "x" else Difference("r", OF, "law", "slip")
     assert apply_reductions(lattice(**scales), (kept,))["r"].attrs["scale"] == "D_c/V_*"

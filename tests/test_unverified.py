@@ -1,4 +1,7 @@
-"""A number whose estimate stays a hundred times above what was asked for is no success."""
+"""Tests of results whose error estimate exceeds 100 times the accuracy.
+
+Results with such a large error do not have the status OK.
+"""
 
 from __future__ import annotations
 
@@ -24,7 +27,7 @@ from rsfstudy.responses.velocity_step import VelocityStep
 from rsfstudy.status import Status
 
 IMPOSED = {"normal_stress": "imposed", "alpha": 0.3}
-#: A scene of each measure that errs by what the accuracy leaves.
+#: Scenes of each measure whose error depends on the requested accuracy.
 ASKED = [
     (CriticalStep(), Scene()),
     (CriticalStep(of="displacement_step"), Scene()),
@@ -42,13 +45,17 @@ ASKED = [
     (StepResponse(peaks=2, phases=2), Scene(load_velocity_ratio=1.2, stiffness_ratio=1.3)),
     (VelocityStep(phases=2), Scene(load_velocity_ratio=10.0, stiffness_ratio=30.0)),
 ]
-#: What the samples resolve, and not the accuracy.
+#: Outputs whose error depends on the number of samples.
 RESOLVED_OTHERWISE = {"distortion"}
 
 
 @dataclass(frozen=True)
 class Known(Measure):
-    """A number known to one part in a hundred, and another to all digits, with a scale or none."""
+    """Measure with an output whose error estimate is 0.01.
+
+    The field ``relative_to`` is the scale of this error, or 0 for an output without a
+    scale.
+    """
 
     relative_to: float = 1.0
     name: ClassVar[str] = "known_to_a_hundredth"
@@ -86,7 +93,10 @@ def test_an_error_is_held_to_a_hundred_times_what_was_asked(rtol, relative_to, s
 
 @pytest.mark.parametrize(("measure", "scene"), ASKED, ids=lambda x: getattr(x, "name", ""))
 def test_every_number_with_a_numerical_error_is_held_to_what_was_asked(measure, scene):
-    """And is as good as that, where nothing is hard; at a looser accuracy it errs by more."""
+    """Every output with an error estimate meets the requested accuracy.
+
+    The scenes are easy, and the error grows with rtol.
+    """
     names = {name.removesuffix("_error") for name in measure.variables if name.endswith("_error")}
     for rtol in (1e-4, 1e-7):
         outcome = measure(scene, Accuracy(rtol, engine=COMPILED))
@@ -95,7 +105,7 @@ def test_every_number_with_a_numerical_error_is_held_to_what_was_asked(measure, 
         assert set(scales) == names - RESOLVED_OTHERWISE
         for name, scale in scales.items():
             assert math.isfinite(scale)
-            # no laxer than the number, and a, 1/ln r or D_c beside it, ask for
+            # The scale is at most the value plus a, 1/ln r or D_c.
             assert 0.0 < scale < 100.0 * (1.0 + abs(outcome.values[name])), name
             assert outcome.values[f"{name}_error"] < 30.0 * rtol * scale, name
 
@@ -106,7 +116,7 @@ WAVES = {**IMPOSED, "oscillation_period": 7.0, "stiffness_ratio": 3.0}
 RISES = {**IMPOSED, "law": "slowness", "normal_stress_step": 0.1, "load_velocity_ratio": 1.0}
 SLOW = {"law": "two_slip_states", "a": 0.01, "load_velocity_ratio": 1.0, "displacement_step": 2.0}
 CONSTANT = {"normal_stress": "constant"}
-#: And of scenes that are harder.
+#: Scenes that are more difficult.
 HARDER = [
     (Healing(phases=2), Scene(law="slip", **HOLD | {"hold_time": 300.0})),
     (Healing(phases=2), Scene(law="slowness", **HOLD | {"hold_time": 1e5}, alpha=0.56)),
@@ -124,7 +134,7 @@ HARDER = [
         (NormalStressTransient(phases=20), Scene(**RISES, stiffness_ratio=20.0, inertia=inertia))
         for inertia in (False, True)
     ),
-    # of one event, and of two
+    # Limit cycles of one event and of two events.
     *((LimitCycle(phases=2), Scene(**SLOW, **CONSTANT, stiffness_ratio=r)) for r in (0.9, 0.86)),
     (LimitCycle(phases=2), Scene(**SLOW | {"a": 0.0145}, stiffness_ratio=0.9, inertia=True)),
 ]
@@ -134,7 +144,10 @@ HARDER = [
     ("measure", "scene"), [*ASKED, *HARDER], ids=lambda x: getattr(x, "name", "")
 )
 def test_errors_cover_and_engines_agree(measure, scene):
-    """Held to a run that is a hundred times as accurate, or more."""
+    """The error estimates cover the deviation from a more accurate run.
+
+    The reference has a tolerance that is at least 100 times smaller.
+    """
     exact, rough, other = (
         measure(scene, Accuracy(rtol, 2_000_000, engine=engine))
         for rtol, engine in ((1e-9, COMPILED), (1e-4, COMPILED), (1e-6, SCIPY))

@@ -1,5 +1,6 @@
-"""User-defined reductions, laws with parameters, and measures that follow a motion, as the page on
-own studies describes them.
+"""Tests of user-defined reductions, laws and measures.
+
+The examples follow the documentation.
 """
 
 import json
@@ -27,16 +28,15 @@ from rsfstudy.slider.parameter_layout import LAW
 from rsfstudy.slider.parts import collect_parameter_values, number
 from rsfstudy.status import Status
 
+
 # ---- reductions ---------------------------------------------------------------------------------
-
-
 class Largest(Reduction):
     def __call__(self, dataset):
         return xr.Dataset({self.name: dataset[self.of].max("b_over_a")})
 
 
 class HalfSlope(LinearFit):
-    """Inherits all but its result from a reduction that files know by another name."""
+    """User-defined subclass of a built-in reduction with another result."""
 
     def __call__(self, dataset):
         return 0.5 * super().__call__(dataset)
@@ -73,8 +73,6 @@ def test_a_reduction_that_returns_no_dataset_is_refused():
 
 
 # ---- keywords -----------------------------------------------------------------------------------
-
-
 @pytest.mark.parametrize(
     ("kind", "wrong", "meant"),
     [
@@ -110,10 +108,11 @@ def test_a_velocity_step_is_a_step_of_the_load_velocity_ratio():
 
 
 # ---- laws ---------------------------------------------------------------------------------------
-
-
 def two_parameters(log_slip_rate, state, p):
-    """Return the rate of a slip law that p[LAW + 1] speeds up and p[LAW + 2] slows down."""
+    """Return the rate of a slip law with two additional parameters.
+
+    The parameter p[LAW + 1] increases the rate, and p[LAW + 2] decreases it.
+    """
     return -(state + p[LAW] * log_slip_rate) * p[LAW + 1] / p[LAW + 2]
 
 
@@ -127,7 +126,7 @@ class Declared(Law):
 
 @dataclass(frozen=True, kw_only=True)
 class Overridden(Declared):
-    """Reads other numbers than its fields, and a field of a further class after them."""
+    """Law that overrides ``numbers`` and is extended by a further subclass."""
 
     name = "overridden"
 
@@ -146,7 +145,8 @@ def test_fields_of_a_law_follow_b_in_the_order_of_their_declaration():
     common = {"a": 0.01, "b_over_a": 2.0, "normal_stress": "constant", "stiffness": 0.01}
     scene = Scene(law=Declared, speed=3.0, slowness=1.5, **common)
     assert scene.parameter_values[LAW:] == pytest.approx((0.02, 3.0, 1.5), rel=1e-15)
-    # the evolution is twice as fast as that of the slip law: so is D_c, and with it k_cr
+    # The evolution is twice as fast as for the slip law, so D_c and k_cr also change by a factor
+    # of 2.
     slip = Scene(law="slip", **common)
     assert scene.critical_stiffness == pytest.approx(2.0 * slip.critical_stiffness, rel=1e-5)
 
@@ -171,16 +171,14 @@ def test_fields_of_other_parts_are_passed_too():
 
     scene = Scene()
     assert collect_parameter_values(Stress(), scene) == (0.5,)
-    # not the fields of all laws, which have places of their own
+    # The fields of a law have fixed positions and are not included.
     assert collect_parameter_values(States(), scene) == (0.25,)
 
 
 # ---- measures that follow a motion --------------------------------------------------------------
-
-
 @dataclass(frozen=True)
 class PeakFriction(Measure):
-    """Largest friction after a step, as the page on own studies reads it."""
+    """Measure of the maximum of friction, as in the documentation."""
 
     name: ClassVar[str] = "peak_friction"
     primary_output, typical_work = "peak_friction", 500
@@ -228,7 +226,7 @@ def test_a_motion_with_radiation_damping_says_what_its_stress_leaves_out():
     for name in ("shear_stress", "friction_coefficient"):
         assert "less the radiation damping stress at V_star" in damped[name].attrs["long_name"]
         assert "damping" not in plain[name].attrs["long_name"]
-    # in steady sliding at V_star, both are friction; at other rates they differ by eta (V - V_*)
+    # Both stresses are equal in steady sliding at V_*, and differ by eta (V - V_*) otherwise.
     rate = 10.0**damped.log10_slip_rate
     radiated = damped.shear_stress - damped.frictional_stress
     xr.testing.assert_allclose(radiated, 0.01 * (rate - 1.0), atol=1e-9)

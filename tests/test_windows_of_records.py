@@ -1,4 +1,4 @@
-"""Windows of steps: where they begin, and what a fit reports when they are cut."""
+"""Tests of the windows of steps, and of reports on shortened windows."""
 
 from __future__ import annotations
 
@@ -26,7 +26,10 @@ OPTIONS: dict[str, Any] = {
 
 
 def run_in(seed: int = 1, depth: float = 0.5) -> Record:
-    """Make a record in which friction rises by `depth` over some 25 um before a velocity step."""
+    """Return a record whose friction rises before a velocity step.
+
+    The rise has a size of ``depth`` and a length scale of 25 um.
+    """
     times = np.append(np.arange(0.0, 150.0, 0.5), np.arange(150.0, 159.0, 0.05))
     moved = synthetic.load_point_displacement(LOADING, times)
     friction = synthetic.friction_and_sensitivities("slowness", times, LOADING)[0] - depth * np.exp(

@@ -1,6 +1,8 @@
-"""What is refused, and in which words. Each field is held to its rule by what declares it; the
-messages that a person should read once stand in `wordings.txt`, each below the call or the command
-that it answers (`python tests/test_wordings.py` writes it anew: read the difference).
+"""Tests of the error messages of invalid input.
+
+Each field is tested against the rule in its declaration. The file ``wordings.txt`` contains
+messages that a person should read, each below the call or command that causes it. Run
+``python tests/test_wordings.py`` to update the file, and read the differences.
 """
 
 from __future__ import annotations
@@ -45,9 +47,9 @@ from rsfstudy.study.study_index import study_names
 
 WORDINGS = Path(__file__).with_name("wordings.txt")
 
-# ---- each field by its declaration ---------------------------------------------------------------
 
-#: Numbers that break a rule.
+# ---- each field by its declaration ---------------------------------------------------------------
+#: Numbers that violate each rule.
 BREAKING = {
     "": (),
     "must be greater than 0": (0.0, -1.0),
@@ -58,13 +60,13 @@ BREAKING = {
     "must be -1 or greater": (-1.5,),
     "must lie between 0 and 1": (-0.1, 1.1),
 }
-#: What is no number at all.
+#: Values that are not numbers.
 NO_NUMBERS = {"0.01": "must be a number", True: "must be a number", math.nan: "must be finite",
               math.inf: "must be finite"}  # fmt: skip
 
 
 def calling(part: type) -> dict[str, Any]:
-    """Fields that call a part into a scene."""
+    """Return the fields that select a part."""
     if part is SliderParameters:
         return {}
     if part.selected_by:
@@ -78,7 +80,7 @@ def calling(part: type) -> dict[str, Any]:
 
 
 def broken() -> Iterator[tuple[dict[str, Any], str, str]]:
-    """A scene with one wrong value, the field, and the rule that it breaks."""
+    """Yield scenes with a single invalid value, the field, and the rule."""
     for name, part in PART_CLASS_BY_FIELD_NAME.items():
         wrong = {"yes": "must be true or false"}
         if not is_boolean_field(part, name):
@@ -102,7 +104,7 @@ def test_each_field_is_held_to_its_rule(fields, name, rule):
 
 
 def foreign() -> Iterator[tuple[dict[str, Any], str]]:
-    """A field that another part of its slot brings, beside one that does without."""
+    """Yield fields of a part together with another part of the same slot."""
     for slot in SLOTS:
         for part in slot.built_in_parts.values():
             for other in slot.built_in_parts.values():
@@ -119,15 +121,13 @@ def test_no_field_is_taken_for_nothing(fields, name):
 
 
 # ---- wordings ------------------------------------------------------------------------------------
-
-
 def study(*axes, **fields) -> rsfstudy.Study:
     parts = {"base": Scene(), "axes": axes, "measure": CriticalStep()}
     return rsfstudy.Study(**{"name": "trial", "title": "Trial", **parts, **fields})
 
 
 def csv(text: str) -> str:
-    """A record in the directory of the test."""
+    """Write a record to the working directory, and return its file name."""
     Path("record.csv").write_text(text, encoding="utf-8")
     return "record.csv"
 
@@ -138,7 +138,7 @@ def claim(**fields) -> Claim:
 
 
 def fitted(**options) -> xr.Dataset:
-    """A fit of 40 rows around one step."""
+    """Return a fit of 40 rows around one step."""
     time = np.arange(40.0)
     moved = np.where(time < 20.0, time, 10.0 * time - 180.0)
     friction = 0.6 + np.where(time < 20.0, 0.0, 0.01 * np.exp(20.0 - time))
@@ -147,7 +147,7 @@ def fitted(**options) -> xr.Dataset:
 
 
 def own(**declared) -> Measure:
-    """A measure of a user's own, that declares something else."""
+    """Return a user-defined measure with other declarations."""
     usual = {
         "name": "own",
         "primary_output": "total",
@@ -158,7 +158,7 @@ def own(**declared) -> Measure:
 
 
 def measuring(**declared) -> rsfstudy.Study:
-    """A study of such a measure."""
+    """Return a study of a user-defined measure."""
     return study(Axis("b_over_a", [2.0]), measure=own(**declared))
 
 
@@ -168,13 +168,15 @@ def members(base: type) -> Iterator[type]:
         yield from members(kind)
 
 
-#: A rig.
 RIG = Rig(normal_stress="5 MPa", slip_distance="10 um", reference_velocity="1 um/s")
 
 
 @functools.cache
 def known() -> dict[str, Any]:
-    """What calls are made of: what is public, every measure and reduction, and a few words."""
+    """Return the names that the calls may use.
+
+    The names are the public names, all measures and reductions, and some helper functions.
+    """
     for name in study_names():
         study_loader.load_study(name)
     kinds = [*members(Measure), *members(Reduction)]
@@ -198,9 +200,12 @@ def known() -> dict[str, Any]:
 
 
 def answered(asked: str) -> str:
-    """The message with which a call, or a command, is refused: before anything is written."""
+    """Return the error message of a call or command.
+
+    The error must be raised before any file is written.
+    """
     with contextlib.ExitStack() as stack:
-        for slot in SLOTS:  # other tests have named parts of their own
+        for slot in SLOTS:  # Other tests register user-defined parts.
             stack.enter_context(mock.patch.dict(slot.user_parts, clear=True))
         if asked.startswith("rsfstudy "):
             ended = call_main(*shlex.split(asked)[1:])
@@ -212,7 +217,7 @@ def answered(asked: str) -> str:
 
 
 def kept() -> dict[str, str]:
-    """Messages by call."""
+    """Return the expected messages by call."""
     blocks = WORDINGS.read_text(encoding="utf-8").strip().split("\n\n")
     parts = (block.partition("\n    ") for block in blocks if not block.startswith("#"))
     return {asked: message for asked, _between, message in parts}
@@ -221,7 +226,8 @@ def kept() -> dict[str, str]:
 @pytest.mark.parametrize(("asked", "message"), kept().items())
 def test_a_message_is_worded_as_it_was_read(asked, message, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr(engines, "_USER_STEPPERS", {})  # steppers that other tests have made known
+    # Other tests register user-defined steppers.
+    monkeypatch.setattr(engines, "_USER_STEPPERS", {})
     assert answered(asked) == message
     assert set(os.listdir(tmp_path)) <= {"record.csv"}
 

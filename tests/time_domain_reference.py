@@ -1,12 +1,16 @@
-"""Motions by equations written once more, in time, with slip rate and state variable themselves:
-nothing of the package but the fields of a scene, and SciPy's `solve_ivp`.
+"""Independent implementation of the motions in the time domain.
 
-With g the frictional and e the imposed normal stress, c = cot(phi), p pore pressure, and N the
-stress dependence:
+The reference solutions are computed with SciPy's ``solve_ivp``.
+
+The unknowns are the slip rate and the state variables, without transformations. The module
+uses the fields of a scene but no other code of the package.
+
+With frictional stress g, imposed normal stress e, c = cot(phi), pore pressure p and stress
+dependence N, the equations are
 
     (mu_* + g) = s mu,  mu = mu_* + a ln V + Theta,  s = 1 + e(t) + c g - p
     df = K (V_0 - V) dt
-    f = g + eta (V - 1), or K eps**2 V d(ln V) = (f - g) dt with mass
+    f = g + eta (V - 1), or K eps**2 V d(ln V) = (f - g) dt with inertia
     dTheta = V b h(u) dt - (alpha ds + N dg)/s,  u = Theta/b + ln V
     dphi = V (dilatancy ln V - phi) dt,  dp = -drainage p dt - dphi
 """
@@ -24,7 +28,8 @@ from scipy.optimize import brentq
 
 from rsfstudy import Scene
 
-#: h(u) of d(Theta)/d(slip) = b h(u), by law, the exponent of the family beside it.
+#: h(u) of d(Theta)/d(slip) = b h(u) for each law. The second argument is the exponent of the law
+#: ``family``.
 EVOLUTION_FUNCTIONS: Mapping[str, Callable[[float, float], float]] = {
     "slip": lambda u, _eps: -u,
     "slowness": lambda u, _eps: math.expm1(-u),
@@ -32,13 +37,16 @@ EVOLUTION_FUNCTIONS: Mapping[str, Callable[[float, float], float]] = {
     "family": lambda u, eps: math.expm1(-eps * u) / eps,
 }
 
-#: Trial steps go beyond all numbers; ln V stays below this.
+#: Upper bound of ln V, because trial steps of the solver can overflow.
 MAX_LOG_SLIP_RATE = 300.0
 
 
 class InstantState(NamedTuple):
-    """What there is to know at an instant: V with its sign, ln |V| and its rate, spring stress,
-    frictional stress, normal stress, and the state variable (the sum, of several).
+    """State of a slider at one time.
+
+    The attributes are V with its sign, ln |V| and its rate, spring stress, frictional
+    stress, normal stress, and the state variable (the sum of all state variables if there
+    are several).
     """
 
     velocity: float
@@ -51,17 +59,17 @@ class InstantState(NamedTuple):
 
 
 class TimeDomainMotion:
-    """The motion of a scene in time.
+    """Motion of a scene in time.
 
-    Unknowns are f, the states, porosity and pressure of a dilatant fault, and last ln V where waves
-    or mass make it one.
+    The unknowns are f, the state variables, porosity and pore pressure of a dilatant fault,
+    and ln V if the scene has radiation damping or inertia.
 
     Parameters
     ----------
     scene : Scene
-        Of a law in `EVOLUTION_FUNCTIONS`, or of two states of which each evolves by one.
+        Scene whose law is in ``EVOLUTION_FUNCTIONS``, or has two states that evolve by such a law.
     velocity_ramp : float, optional
-        What the load velocity gains in a time of 4: the limit of stairs.
+        Increase of the load velocity over a time of 4. This ramp is the limit of many stairs.
     """
 
     def __init__(self, scene: Scene, velocity_ramp: float = 0.0) -> None:
@@ -83,21 +91,22 @@ class TimeDomainMotion:
         self.wet, self.has_rate = scene.fluid == "dilatant", self.mass or self.damping > 0.0
         stiff = self.has_rate or bool(of["regularised"])
         self.method = "LSODA" if stiff else "DOP853"
-        # what shear and normal stress take is shared by several states in ways not written here
+        # This module does not implement the partition of stress effects among several states.
         assert len(self.bs) == 1 or not (self.alpha or of["stress_dependence"])
 
     # ---- loading ---------------------------------------------------------------------------------
 
     @property
     def loading_breaks(self) -> list[float]:
-        """Instants at which the load changes other than smoothly."""
+        """Times at which the loading is not smooth."""
         found = [self.of["ramp_duration"]] if self.of["normal_stress_ramp"] else []
         found += [self.of["hold_time"]] if self.of["hold_time"] else []
         return found + ([4.0] if self.velocity_ramp else [])
 
     def loading_at(self, time: float, middle: float) -> tuple[float, float, float]:
-        """Load velocity, imposed change of normal stress and its rate; `middle` is a time between
-        the same two breaks.
+        """Return the load velocity, the normal stress change and its rate.
+
+        ``middle`` is a time between the two breaks that enclose ``time``.
         """
         of, velocity = self.of, self.of["load_velocity_ratio"]
         e, change = of["normal_stress_step"], 0.0
@@ -116,7 +125,10 @@ class TimeDomainMotion:
         return velocity, e, change
 
     def initial_unknowns(self) -> list[float]:
-        """The unknowns after steps at time 0, of which the state feels those of normal stress."""
+        """Return the unknowns after the steps at time 0.
+
+        The state variable responds to the step of normal stress.
+        """
         of, (_velocity, e, _change) = self.of, self.loading_at(0.0, 0.0)
         f, theta = of["initial_stress"], of["initial_state"]
         before = 1.0 + self.cot * f
@@ -126,7 +138,7 @@ class TimeDomainMotion:
         def missing(x: float) -> float:
             g = f - self.damping * math.expm1(x)
             s = 1.0 + e + self.cot * g
-            if s <= 0.0:  # far too fast
+            if s <= 0.0:  # The slip rate is too large.
                 return -1.0
             state = theta - self.alpha * math.log(s / before)
             return self.mu + g - s * (self.mu + self.a * x + state)
@@ -142,7 +154,7 @@ class TimeDomainMotion:
     def rates_and_state(
         self, time: float, y: Sequence[float], middle: float
     ) -> tuple[list[float], InstantState]:
-        """The rates of the unknowns, and what follows from them."""
+        """Return the rates of the unknowns, and the state of the slider."""
         of, a, mu, cot, count = self.of, self.a, self.mu, self.cot, len(self.bs)
         velocity, e, change = self.loading_at(time, middle)
         f, states, theta = y[0], y[1 : 1 + count], sum(y[1 : 1 + count])
@@ -193,8 +205,10 @@ class TimeDomainMotion:
         events: Sequence[Callable[[InstantState], float]] = (),
         directions: Sequence[float] = (),
     ) -> tuple[list[InstantState], list[list[tuple[float, InstantState]]]]:
-        """The motion at increasing times up to the last, and where functions vanish in a direction,
-        but for the beginning.
+        """Integrate the motion to the last of the increasing times.
+
+        The function returns the states at these times, and the zero crossings of each event
+        function in its direction. Zero crossings at time 0 are omitted.
         """
         rows, told, y = [], [[] for _ in events], self.initial_unknowns()
         cuts = [0.0, *(cut for cut in self.loading_breaks if cut < times[-1]), times[-1]]
@@ -224,5 +238,5 @@ class TimeDomainMotion:
 
 
 def rows_to_columns(rows: Sequence[InstantState]) -> dict[str, np.ndarray]:
-    """Rows by name."""
+    """Return the states as a dictionary of arrays."""
     return dict(zip(InstantState._fields, np.array(rows).T, strict=True))

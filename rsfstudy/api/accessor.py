@@ -343,7 +343,10 @@ class Accessor:
         axes = [axis["dimension"] for axis in read_declaration(self._dataset).axes]
         selected = [name for name in axes if name not in self._dataset["status"].dims]
         if selected:
-            text = f"{requested_action} all results of a study, and of these {', '.join(selected)} is selected"
+            text = (
+                f"{requested_action} all results of a study, and of these {', '.join(selected)} "
+                "is selected"
+            )
             raise DataError(f"{text}. Ask the dataset as it was opened.")
 
     def _require_study(self) -> None:

@@ -185,8 +185,8 @@ def print_short_run_report(
 ) -> None:
     """Print a short report of one of several runs.
 
-    The report has one line for each table of ``print_run_report``. It lists changed verdicts and failed
-    cells in full.
+    The report has one line for each table of ``print_run_report``. It lists changed verdicts and
+    failed cells in full.
     """
     stdout_console.print(
         f"{summary_of_run.study}: {dataset.attrs['title']}", style="bold", soft_wrap=True

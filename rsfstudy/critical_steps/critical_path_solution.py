@@ -1,7 +1,8 @@
 """Boundary between stable and unstable steps, with its numerical error.
 
-The function ``find_boundary_by_critical_path`` computes the boundary from the critical path. The function
-``find_boundary_by_limit_cycle`` computes the boundary at which a limit cycle touches the norm.
+The function ``find_boundary_by_critical_path`` computes the boundary from the critical path. The
+function ``find_boundary_by_limit_cycle`` computes the boundary at which a limit cycle touches the
+norm.
 """
 
 from __future__ import annotations

@@ -371,7 +371,8 @@ class CriticalStep(Measure):
                 self._output_values(
                     step_family, unstable_value=step_family.user_value_of_step(step_family.min_size)
                 ),
-                f"already a step to {step_family.user_value_of_step(step_family.min_size):.6g} is unstable",
+                "already a step to "
+                f"{step_family.user_value_of_step(step_family.min_size):.6g} is unstable",
             )
         return self._refine_size_bracket(step_family, (stable, unstable), accuracy, work_meter)
 
@@ -458,7 +459,8 @@ class CriticalStep(Measure):
             self._output_values(
                 step_family, stable_value=step_family.user_value_of_step(largest_size)
             ),
-            f"stable for every step up to {step_family.user_value_of_step(largest_size):.6g}{reason}",
+            "stable for every step up to "
+            f"{step_family.user_value_of_step(largest_size):.6g}{reason}",
         )
 
 

@@ -1,8 +1,8 @@
 """Peak slip rate of a motion with a held load point.
 
-The main function is ``peak_log_rate_excess_over_norm``. Spring stress can only decrease while the load point is held.
-With one state, the first peak of ln V is also the last peak. At the peak, friction weakens with
-slip. The weakening decreases after the peak, so ln V has no minimum.
+The main function is ``peak_log_rate_excess_over_norm``. Spring stress can only decrease while the
+load point is held. With one state, the first peak of ln V is also the last peak. At the peak,
+friction weakens with slip. The weakening decreases after the peak, so ln V has no minimum.
 
 With several states, friction may weaken repeatedly. States with b < 0, and pore pressure that
 dilatancy has lowered, weaken friction when the slip rate decreases. The motion is therefore

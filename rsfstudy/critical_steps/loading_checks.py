@@ -89,8 +89,10 @@ def slow_norm_warning(scene: Scene, load_velocity: float) -> str:
     ):
         return ""
     return (
-        f"{SLOW_NORM_WARNING_PREFIX}{scene.instability_norm:g} is a slip rate of {rate:.3g} V_*, only "
+        f"{SLOW_NORM_WARNING_PREFIX}{scene.instability_norm:g} is a slip rate of "
+        f"{rate:.3g} V_*, only "
         f"{rate / load:.3g} times that of the load point: what reaches it may be no instability. "
-        f"Give one above {_MIN_NORM_OVER_LOAD_VELOCITY * load:.3g} V_*, of a rig as a slip rate, as in "
+        f"Give one above {_MIN_NORM_OVER_LOAD_VELOCITY * load:.3g} V_*, of a rig as a "
+        "slip rate, as in "
         "rig.scene(instability_norm='10 mm/s')"
     )

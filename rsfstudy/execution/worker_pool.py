@@ -228,7 +228,8 @@ def make_dask_batch_mapper(
 def _timeout_outcome(task: CellTask) -> Outcome:
     """The outcome of a cell that took too long."""
     text = (
-        f"no answer within {task.time_limit:g} s of CPU time, or {WALL_OVER_CPU_TIME_LIMIT:g} times "
+        f"no answer within {task.time_limit:g} s of CPU time, or "
+        f"{WALL_OVER_CPU_TIME_LIMIT:g} times "
         "as long on the clock; the worker's log shows where it was, and --time-limit (time_limit=) "
         "allows more"
     )
@@ -238,7 +239,8 @@ def _timeout_outcome(task: CellTask) -> Outcome:
 def _worker_lost_outcome() -> Outcome:
     """The outcome of a cell that killed its worker."""
     text = (
-        f"its worker died {_MAX_WORKER_DEATHS_PER_CELL} times while it computed nothing else: a crash, "
+        f"its worker died {_MAX_WORKER_DEATHS_PER_CELL} times while it computed nothing "
+        "else: a crash, "
         "or more memory than a worker may use"
     )
     return Outcome(Status.WORKER_LOST, message=text)
@@ -280,12 +282,14 @@ def _wait_for_finished_futures(dask_client: Any, running_futures: Iterable[Any])
             elif waited > WARN_AFTER_SECONDS_WITHOUT_WORKER and not warned:
                 warned = True
                 warnings.warn(
-                    f"the Dask cluster has no worker: waiting {GIVE_UP_AFTER_SECONDS_WITHOUT_WORKER:g} s for one",
+                    "the Dask cluster has no worker: waiting "
+                    f"{GIVE_UP_AFTER_SECONDS_WITHOUT_WORKER:g} s for one",
                     stacklevel=2,
                 )
             elif waited > GIVE_UP_AFTER_SECONDS_WITHOUT_WORKER:
                 raise RunError(
-                    f"the Dask cluster has had no worker for {GIVE_UP_AFTER_SECONDS_WITHOUT_WORKER:g} s: start some"
+                    "the Dask cluster has had no worker for "
+                    f"{GIVE_UP_AFTER_SECONDS_WITHOUT_WORKER:g} s: start some"
                 ) from None
         except CancelledError as error:
             raise RunError(_SCHEDULER_LOST_MESSAGE) from error

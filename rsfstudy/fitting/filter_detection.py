@@ -1,9 +1,9 @@
 """Detection of friction that was filtered before it was recorded.
 
 A filter smooths the friction peak after a velocity step, and correlates the noise. A running mean
-over m rows also causes notches in the noise spectrum. The function ``detect_unspecified_filter`` compares
-linearised models with and without a filter. If a filter improves the AIC and changes a parameter
-noticeably, friction was probably filtered.
+over m rows also causes notches in the noise spectrum. The function ``detect_unspecified_filter``
+compares linearised models with and without a filter. If a filter improves the AIC and changes a
+parameter noticeably, friction was probably filtered.
 """
 
 from __future__ import annotations

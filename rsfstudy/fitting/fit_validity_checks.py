@@ -143,7 +143,8 @@ def _check_rounding_is_below_noise(solution: FitSolution) -> Iterator[str]:
     """Yield a reason if the rounding of friction is too coarse."""
     if is_rounding_too_coarse(solution):
         yield (
-            f"friction is rounded to {solution.friction_rounding_quantum:.2g}, more than 2.5 times the noise, so "
+            f"friction is rounded to {solution.friction_rounding_quantum:.2g}, more "
+            "than 2.5 times the noise, so "
             "rounding errors are not random: export the record with more digits"
         )
 
@@ -236,7 +237,8 @@ def describe_load_point_noise(
     ):
         return ""
     return (
-        f"noise of the recorded load point, {displacement_noise_sd:.2g} um, moves slip_distance by some "
+        f"noise of the recorded load point, {displacement_noise_sd:.2g} um, moves "
+        "slip_distance by some "
         f"{100.0 * shift:.2g} %, more than its standard error: see loading='steps'"
     )
 

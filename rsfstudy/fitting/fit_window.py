@@ -365,7 +365,8 @@ class FitWindow:
             text = (
                 f"normal stress varies from {stress.min():.4g} to {stress.max():.4g} MPa within "
                 f"the window, and is {before * 1e-6:.4g} MPa before the step; the model accounts "
-                f"for changes of {100.0 * MIN_RELATIVE_NORMAL_STRESS_CHANGE:g} % at most. Shorten the window "
+                f"for changes of {100.0 * MIN_RELATIVE_NORMAL_STRESS_CHANGE:g} % at "
+                "most. Shorten the window "
                 "with --before and --after (before=, after=), or model the normal stress: --set "
                 "normal_stress=imposed (normal_stress=) for its steps, with --loading recorded "
                 "(loading=) row by row; alpha is then free or stated"

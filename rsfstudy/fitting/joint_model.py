@@ -307,7 +307,8 @@ class JointModel:
         free_parameters : sequence of str
             Names of the free parameters, with window numbers.
         difference_scheme : (float, int), optional
-            Step size and order of the finite differences. The default is ``ACCURATE_DIFFERENCE_SCHEME``.
+            Step size and order of the finite differences. The default is
+            ``ACCURATE_DIFFERENCE_SCHEME``.
 
         Returns
         -------

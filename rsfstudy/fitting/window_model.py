@@ -468,8 +468,8 @@ class WindowModel:
     ) -> np.ndarray:
         """Compute a second-order finite difference.
 
-        The difference is one-sided if the parameter is within ``steps_from_domain_end`` steps of the end of
-        its domain.
+        The difference is one-sided if the parameter is within ``steps_from_domain_end`` steps of
+        the end of its domain.
         """
         low, high = _PARAMETER_DOMAINS.get(parameter_name, (-math.inf, math.inf))
         weights = {1.0: 0.5, -1.0: -0.5}

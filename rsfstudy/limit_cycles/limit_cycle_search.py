@@ -5,8 +5,8 @@ determines the subsequent motion, so two successive cycles determine the derivat
 map. If the cycles converge slowly, the search leaps to a fixed point that is extrapolated from the
 derivative.
 
-If a scene has several states, use ``follow_to_periodic_orbit``. The function follows the motion cycle by
-cycle, and compares the cycles to find the number of cycles after which the motion repeats.
+If a scene has several states, use ``follow_to_periodic_orbit``. The function follows the motion
+cycle by cycle, and compares the cycles to find the number of cycles after which the motion repeats.
 
 Notes
 -----
@@ -91,7 +91,8 @@ class LimitCycleSearch:
     Attributes
     ----------
     cycles : list of Cycle
-        Cycles that were computed. If ``follow_until_converged`` has returned True, the last cycle is the limit cycle.
+        Cycles that were computed. If ``follow_until_converged`` has returned True, the last cycle
+        is the limit cycle.
     """
 
     def __init__(self, scene: Scene, accuracy: Accuracy, work_meter: WorkMeter) -> None:

@@ -302,9 +302,9 @@ class ReturnMap:
         Returns
         -------
         list of Cycle
-            Successive cycles. The list is shorter than ``cycle_count`` if the motion settles, stays close
-            to unstable steady sliding, or cannot continue. Unstable steady sliding is a fixed point
-            of the map, but not a cycle.
+            Successive cycles. The list is shorter than ``cycle_count`` if the motion settles, stays
+            close to unstable steady sliding, or cannot continue. Unstable steady sliding is a fixed
+            point of the map, but not a cycle.
         """
         seen = list[Cycle]()
         try:
@@ -359,8 +359,8 @@ class ReturnMap:
         Returns
         -------
         tuple of ndarray
-            Derivatives of each cycle. The tuple is shorter than ``cycle_count`` if the motion does not
-            complete all cycles.
+            Derivatives of each cycle. The tuple is shorter than ``cycle_count`` if the motion does
+            not complete all cycles.
         """
         found, step = (
             list[np.ndarray](),
@@ -449,7 +449,8 @@ class ReturnMap:
         log_slip_rate_range : float
             Range of ln V.
         max_distance : float, default: 0.1
-            Largest distance of the orbit from ``start_section``, relative to ``a`` times the range of ln V.
+            Largest distance of the orbit from ``start_section``, relative to ``a`` times the range
+            of ln V.
 
         Returns
         -------

@@ -13,9 +13,9 @@ each with its time, slip and point. A measure can request the following events:
                                 in the last segment of loading, unless normal stress still changes
                                 or steady sliding is unstable.
 
-Each requested event may end the motion. The available quantities are the attributes of a ``MotionPoint``.
-The attribute ``apparent_friction`` is the friction coefficient that a rig measures. Extrema are
-available for ``log_slip_rate``, ``spring_stress`` and ``apparent_friction``.
+Each requested event may end the motion. The available quantities are the attributes of a
+``MotionPoint``. The attribute ``apparent_friction`` is the friction coefficient that a rig
+measures. Extrema are available for ``log_slip_rate``, ``spring_stress`` and ``apparent_friction``.
 
 In addition to the requested events, the table lists the start of the motion, each change of regime,
 the beginning of each segment of loading, the end of the motion, and the end of the step in which

@@ -7,10 +7,10 @@ To follow a rupture with a debugger, simulate a scene with ``inertia=True``, bec
 there is one regime only; with ``engine="scipy"``, or ``engine="python"`` to see inside of steps.
 Each step passes `truncate_step` once: a breakpoint there with the condition ``motion.regime == 1``
 (`FAST_REGIME`) stops at each step of a rupture, of which ``workspace.point_at_begin`` and
-``workspace.point_at_end`` are the points at both ends (columns in the order of `layout.LOG_SLIP_RATE`
-and so on). The line ``return REGIME_ENDED`` of `follow_regime` is its end with the same condition,
-and its beginning with ``motion.regime == 0`` (`SLOW_REGIME`). `layout` says who writes which field
-of ``motion``.
+``workspace.point_at_end`` are the points at both ends (columns in the order of
+`layout.LOG_SLIP_RATE` and so on). The line ``return REGIME_ENDED`` of `follow_regime` is its end
+with the same condition, and its beginning with ``motion.regime == 0`` (`SLOW_REGIME`). `layout`
+says who writes which field of ``motion``.
 """
 
 from __future__ import annotations

@@ -136,8 +136,8 @@ def draw_figure(
     Raises
     ------
     InvalidValue
-        If the declaration of the study contains an unknown figure, if ``user_figure`` cannot draw, if the
-        variable is missing or not numeric, or if a style is invalid.
+        If the declaration of the study contains an unknown figure, if ``user_figure`` cannot draw,
+        if the variable is missing or not numeric, or if a style is invalid.
     DataError
         If the dataset has no declaration, or if x and y of a curve have different sizes.
 

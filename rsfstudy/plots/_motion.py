@@ -187,7 +187,8 @@ def _draw_slip_rate(displayed_motion: xr.Dataset, axes: Axes, abscissa: str) -> 
             axes.set_ylim(0.5 * ends[0], 2.0 * ends[1])
         set_log_scale(axes, "y")
         axes.set_ylabel(
-            f"Slip rate ({_format_units(str(displayed_motion['slip_rate'].attrs.get('units', '1')))})"
+            "Slip rate "
+            f"({_format_units(str(displayed_motion['slip_rate'].attrs.get('units', '1')))})"
         )
     else:
         axes.plot(displayed_motion[abscissa], displayed_motion["log10_slip_rate"])

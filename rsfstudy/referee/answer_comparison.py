@@ -129,7 +129,10 @@ class AnswerComparison:
         """
         problem, lines = self.problem, []
         for agreement in self.quantity_agreements:
-            text = f"  {agreement.quantity_name:20s} {round_digits_down(agreement.agreeing_digits):4.1f} digits"
+            text = (
+                f"  {agreement.quantity_name:20s} "
+                f"{round_digits_down(agreement.agreeing_digits):4.1f} digits"
+            )
             if agreement.agrees_to_written_digits:
                 text += ", to the last place that is written"
             elif agreement.agreeing_digits == problem.digits:

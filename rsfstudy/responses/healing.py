@@ -302,8 +302,8 @@ def _record_hold_and_reloading(
     """Record a motion from the state before the hold to the peak of friction.
 
     If there is no peak, the record ends when friction has settled or when the next segment begins.
-    If ``end_time`` is finite, the record ends at this time, or earlier if the motion cannot continue
-    after the peak.
+    If ``end_time`` is finite, the record ends at this time, or earlier if the motion cannot
+    continue after the peak.
     """
     peak, settled = (
         maximum(friction_quantity_for_events(scene)[0]),

@@ -275,7 +275,10 @@ def _find_usual_heading(
     ] or meant
     meant = [text for text in meant if parts[text][1] == column_name] or meant
     if len(meant) > 1:
-        remedy = f"Say which, as in --columns '{column_name}={meant[-1]}' (columns={{'{column_name}': ...}})."
+        remedy = (
+            f"Say which, as in --columns '{column_name}={meant[-1]}' "
+            f"(columns={{'{column_name}': ...}})."
+        )
         rule = "may be any of several columns"
         raise InvalidValue("column", column_name, rule, choices=meant, remedy=remedy).with_location(
             file_description
@@ -298,7 +301,10 @@ def _parse_column_selection(
     found = parse_column_spec(column_specification, headings)
     if not found.units and column_name != "friction" and isinstance(column_specification, str):
         whole = f"{found.heading} ({_USUAL_UNITS_OF_RECORD_COLUMNS.get(column_name, 'MPa')})"
-        remedy = f"Write them in the file, as in {whole}, or here: --columns '{column_name}={whole},...' "
+        remedy = (
+            f"Write them in the file, as in {whole}, or here: --columns "
+            f"'{column_name}={whole},...' "
+        )
         remedy += f"(columns={{'{column_name}': '{whole}', ...}})."
         raise InvalidValue("heading", column_specification, "states no units", remedy=remedy)
     return found

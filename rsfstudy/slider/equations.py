@@ -38,8 +38,8 @@ class Equations(NamedTuple):
     state_count : int
         How many states the scene has.
     force_balance_function : callable or None
-        ``force_balance_function(spring, psis, p)``: ln(V/V_*), frictional stress and the state lost to
-        stress; between ruptures only.
+        ``force_balance_function(spring, psis, p)``: ln(V/V_*), frictional stress and the state lost
+        to stress; between ruptures only.
     """
 
     regime: str

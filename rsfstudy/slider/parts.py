@@ -89,8 +89,8 @@ class Part:
     #: because their steady values are extremely large at the slip rate of a rupture. The criteria
     #: for settled motions and for limit cycles ignore these unknowns.
     excluded_from_distance: ClassVar[tuple[str, ...]] = ()
-    #: Names of the quantities in ``requirements.QUANTITIES_A_PART_MAY_NEED`` that the rates of the part need.
-    #: A scene rejects the part if it cannot provide a quantity.
+    #: Names of the quantities in ``requirements.QUANTITIES_A_PART_MAY_NEED`` that the rates of the
+    #: part need. A scene rejects the part if it cannot provide a quantity.
     needs: ClassVar[Collection[str]] = frozenset()
     #: Names of the quantities that the functions of the slot receive.
     received_quantities: ClassVar[frozenset[str]] = frozenset()

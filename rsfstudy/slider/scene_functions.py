@@ -204,9 +204,9 @@ def build_rigid_rate_function(friction_functions: FrictionFunctions) -> Function
 
 
 def build_point_assembling_function(friction_functions: FrictionFunctions) -> Function:
-    """``(x, growth, forces, states, changes, shift, p) -> MotionPoint`` at x = ln(V/V_*), which grows so:
-    of forces, f and its change, g and its change; the states, their changes, and what stress has
-    taken from them.
+    """``(x, growth, forces, states, changes, shift, p) -> MotionPoint`` at x = ln(V/V_*), which
+    grows so: of forces, f and its change, g and its change; the states, their changes, and what
+    stress has taken from them.
 
     A rig reads the friction coefficient ``(mu_* + f)/s``, s outside the fault.
     """

@@ -114,6 +114,9 @@ def with_stiffness_default(field_values: dict[str, Any]) -> dict[str, Any]:
     """
     given = [name for name in STIFFNESS_FIELDS if name in field_values]
     if len(given) == 2:
-        rule = f"give stiffness or stiffness_ratio (here {field_values['stiffness_ratio']:g}), not both"
+        rule = (
+            f"give stiffness or stiffness_ratio (here {field_values['stiffness_ratio']:g}), not "
+            "both"
+        )
         raise InvalidValue("stiffness", field_values["stiffness"], rule)
     return field_values if given else {**field_values, "stiffness_ratio": 1.0}

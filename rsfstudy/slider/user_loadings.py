@@ -187,8 +187,8 @@ def protocol(segments: Sequence[Segment | Mapping[str, float]], name: str = "pro
 def _parse_segment(declared_segment: Any, previous_normal_stress: float, location: str) -> Segment:
     """Convert an input segment to a validated ``Segment``.
 
-    The argument ``previous_normal_stress`` is the value of the previous segment, and ``location`` is the
-    position of the segment in error messages.
+    The argument ``previous_normal_stress`` is the value of the previous segment, and ``location``
+    is the position of the segment in error messages.
     """
     try:
         if isinstance(declared_segment, Segment):

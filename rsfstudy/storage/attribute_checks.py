@@ -54,18 +54,21 @@ def check_motion_variables(dataset: xr.Dataset) -> None:
     for name, values in dataset.variables.items():
         if along and values.dims == along and values.dtype.kind not in "fiub":
             raise DataError(
-                f"{shorten_text(name)} is {values.dtype}, and must be numbers. {_INVALID_ATTRIBUTE_REMEDY}"
+                f"{shorten_text(name)} is {values.dtype}, and must be numbers. "
+                f"{_INVALID_ATTRIBUTE_REMEDY}"
             )
 
 
 def _check_text_attribute(attribute_path: str, value: object, max_characters: int) -> None:
     if not isinstance(value, str):
         raise DataError(
-            f"{attribute_path} is {shorten_text(value)}, and must be a text. {_INVALID_ATTRIBUTE_REMEDY}"
+            f"{attribute_path} is {shorten_text(value)}, and must be a text. "
+            f"{_INVALID_ATTRIBUTE_REMEDY}"
         )
     if len(value) > max_characters:
         raise DataError(
-            f"{attribute_path} has {len(value):,} characters, at most {max_characters:,}. {_INVALID_ATTRIBUTE_REMEDY}"
+            f"{attribute_path} has {len(value):,} characters, at most "
+            f"{max_characters:,}. {_INVALID_ATTRIBUTE_REMEDY}"
         )
 
 
@@ -76,6 +79,7 @@ def _check_flags(variable_name: str, attributes: Mapping[Any, Any]) -> None:
     meanings = str(attributes.get("flag_meanings", "")).split()
     if values.dtype.kind not in "iuf" or len(values) != len(meanings):
         raise DataError(
-            f"{shorten_text(variable_name)}.flag_values must be numbers, one for each of the {len(meanings)} "
+            f"{shorten_text(variable_name)}.flag_values must be numbers, one for each "
+            f"of the {len(meanings)} "
             f"flag_meanings (got {shorten_text(values.tolist())}). {_INVALID_ATTRIBUTE_REMEDY}"
         )

@@ -161,7 +161,8 @@ class CellJournal:
     def _read_stored_fingerprint(self, run_fingerprint: str) -> Any:
         """Return the fingerprint stored in the journal.
 
-        If the journal is new, the function stores ``run_fingerprint`` and returns ``run_fingerprint``.
+        If the journal is new, the function stores ``run_fingerprint`` and returns
+        ``run_fingerprint``.
         """
         with self._db:
             self._db.executescript(_CREATE_TABLES)
@@ -251,7 +252,8 @@ class CellJournal:
                 _fill_cell_columns(columns, places, rows)
             except (KeyError, OverflowError, TypeError, ValueError) as error:
                 raise DataError(
-                    f"{self._path} is damaged: a cell is not what was written. {_UNUSABLE_JOURNAL_REMEDY}"
+                    f"{self._path} is damaged: a cell is not what was written. "
+                    f"{_UNUSABLE_JOURNAL_REMEDY}"
                 ) from error
         return columns
 

@@ -64,7 +64,8 @@ def check_content(dataset: xr.Dataset, path: str) -> None:
 
 def _build_damaged_file_error(path: str, part_name: str) -> DataError:
     return DataError(
-        f"{path} is damaged, or was edited: {shorten_text(part_name)} is not what was written. Run the study "
+        f"{path} is damaged, or was edited: {shorten_text(part_name)} is not what was "
+        "written. Run the study "
         f"again. If you changed it on purpose, delete the attribute {DIGEST_ATTRIBUTE} and save "
         "the file again."
     )

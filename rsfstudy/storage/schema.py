@@ -211,7 +211,8 @@ def check_is_of_study(dataset: xr.Dataset, file_description: str) -> None:
     if is_of_single_scene(dataset):
         title = shorten_text(dataset.attrs.get("title", "untitled"))
         raise DataError(
-            f"{file_description} is of one scene ({title}), not the results of a study. Open its file with "
+            f"{file_description} is of one scene ({title}), not the results of a study. "
+            "Open its file with "
             "xarray.open_dataset; rsfstudy.plot_motion(dataset), or dataset.rsf.plot(), "
             "draws a motion."
         )
@@ -349,7 +350,8 @@ def _check_dtype_kind(variable_name: str, values: xr.Variable) -> None:
 def invalid_part_error(path_in_file: str, reason: str) -> DataError:
     """The error for a part that is not as rsfstudy writes it."""
     return DataError(
-        f"{shorten_text(path_in_file).lstrip('.')} {reason}. It was not written by this version of rsfstudy, or "
+        f"{shorten_text(path_in_file).lstrip('.')} {reason}. It was not written by this "
+        "version of rsfstudy, or "
         "was edited: run the study again."
     )
 

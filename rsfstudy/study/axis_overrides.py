@@ -102,7 +102,8 @@ def _label_after_override(
     ``"alpha = 0.3"``. In all other cases ``"alpha = 0.3"`` is appended to the label.
     """
     text = f"{field_name} = {_format_with_all_digits(new_value)}"
-    stated = rf"(?<!\w){re.escape(field_name)} = {re.escape(_format_with_all_digits(old_value))}(?![\w.])"
+    old_text = re.escape(_format_with_all_digits(old_value))
+    stated = rf"(?<!\w){re.escape(field_name)} = {old_text}(?![\w.])"
     replaced, count = re.subn(stated, lambda _found: text, label)
     if count:
         return replaced

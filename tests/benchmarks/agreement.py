@@ -1,11 +1,11 @@
-"""Both engines, measured against one another: every hard case, named studies, and random scenes.
+"""Comparison of both engines for hard cases, named studies and random scenes.
 
     python tests/benchmarks/agreement.py              # hard cases, 300 random, 50 dilatant scenes
     python tests/benchmarks/agreement.py --scenes 1000
     python tests/benchmarks/agreement.py --studies    # named studies too, as they are declared
 
-They integrate the same functions by the same method, so they must end alike, and their numbers must
-agree within the sum of their error estimates.
+Both engines integrate the same functions with the same method. Therefore, the statuses must
+be equal, and the numbers must agree within the sum of the error estimates.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ from rsfstudy.measures import Measure, Outcome
 from rsfstudy.motion.accuracy import Accuracy
 from rsfstudy.study import study_loader
 
-#: What random scenes are like.
+#: Scenes whose fields are varied at random.
 RANDOM_SCENE_TEMPLATES = [
     Scene(law=law, **stress, **dynamics)
     for law in ("slip", "slowness")
@@ -36,7 +36,7 @@ RANDOM_SCENE_TEMPLATES = [
 DILATANT_TEMPLATES = [
     like.with_(fluid="dilatant", dilatancy=0.001) for like in RANDOM_SCENE_TEMPLATES
 ]
-#: Studies whose cells are neither timed nor compared with other integrators.
+#: Studies that neither measure times nor compare integrators.
 STUDIES = (
     "rate_step_boundary",
     "rate_step_stiffness",
@@ -52,18 +52,19 @@ STUDIES = (
 
 
 class EngineComparison(NamedTuple):
-    """Two outcomes of one scene.
+    """Comparison of the outcomes of both engines for one scene.
 
     Attributes
     ----------
     same_end : bool
-        Whether both have the same status.
-    worst : float
-        Largest difference of a number over the sum of both error estimates; NaN where there is
-        none.
-    more_work : float
-        Right-hand sides of the compiled engine over those of SciPy.
-    what : str
+        True if both outcomes have the same status.
+    largest_error_ratio : float
+        Largest difference of a number, divided by the sum of both error estimates, or NaN if there
+        are no numbers.
+    work_ratio : float
+        Right-hand-side evaluations of the compiled engine, divided by the evaluations with SciPy.
+    description : str
+        Measure, statuses and scene.
     """
 
     same_end: bool
@@ -73,7 +74,7 @@ class EngineComparison(NamedTuple):
 
 
 def compare_engines(measure: Measure, scene: Scene, accuracy: Accuracy) -> EngineComparison:
-    """Measure one scene with both engines."""
+    """Compute one scene with both engines and compare the outcomes."""
     plain, compiled = (
         measure(scene, replace(accuracy, engine=engine)) for engine in ("scipy", "compiled")
     )
@@ -99,7 +100,10 @@ def _largest_error_ratio(plain: Outcome, compiled: Outcome) -> float:
 def random_scenes(
     count: int, likes: list[Scene] = RANDOM_SCENE_TEMPLATES
 ) -> Iterator[tuple[Measure, Scene, Accuracy]]:
-    """So many random scenes, over all questions, kinds of scenes and three accuracies."""
+    """Yield random scenes for all questions and templates.
+
+    The requested accuracies alternate between three values.
+    """
     kinds = [(question, like) for question in MOTION_QUESTIONS for like in likes]
     for number in range(count):
         question, like = kinds[number % len(kinds)]
@@ -109,21 +113,21 @@ def random_scenes(
 
 
 def cells_of(name: str) -> Iterator[tuple[Measure, Scene, Accuracy]]:
-    """The cells of a named study."""
+    """Yield the cells of a named study."""
     study = study_loader.load_study(name)
     for scene, changes in study.cells():
         yield study.measure.with_(**changes), scene, study.accuracy
 
 
 def hard_cases() -> Iterator[tuple[Measure, Scene, Accuracy]]:
-    """The scenes of the study of hard cases, each with the measure it is hard for."""
+    """Yield the scenes of the study of hard cases, each with its measure."""
     study: Any = study_loader.load_study("hard_cases")
     for problem in study.measure.problems:
         yield problem.measure, problem.scene, study.accuracy
 
 
 def main() -> None:
-    """Compare, and print what came out."""
+    """Compare the engines and print a table."""
     parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
     parser.add_argument("--scenes", type=int, default=300)
     parser.add_argument("--studies", action="store_true")

@@ -1,8 +1,10 @@
-"""What surrounds compiled motions, measured: ``python tests/benchmarks/compiled_motion_overhead.py
-[rounds]``.
+"""Benchmark of the overhead of measures around the compiled loop.
 
-A measure takes so many times what its calls of the compiled loop take, which are run again from
-copies of their arguments, in turns with the measure: the shortest of the rounds of both.
+Run ``python tests/benchmarks/compiled_motion_overhead.py [rounds]``.
+
+The ratio in the table is the time of a measure divided by the time of its calls of the
+compiled loop. The calls are repeated with copies of their arguments. Measure and calls are
+timed alternately, and the shortest times count.
 """
 
 from __future__ import annotations
@@ -25,7 +27,7 @@ ACCURACY = Accuracy(1e-7, engine="compiled")
 
 
 def cases() -> dict[str, tuple[Measure, Scene]]:
-    """Measures and scenes, by name."""
+    """Return measures and scenes by name."""
     steps, soft = {"b_over_a": 2.0, "stiffness_ratio": 1.3}, {"b_over_a": 2.0}
     soft |= {"stiffness_ratio": 0.8, "load_velocity_ratio": 2.0, "inertia": True}
     found: dict[str, tuple[Measure, Scene]] = {}
@@ -40,7 +42,7 @@ def cases() -> dict[str, tuple[Measure, Scene]]:
 
 
 def record_calls(measure: Measure, scene: Scene) -> list[tuple[Any, ...]]:
-    """Copies of the arguments of all calls of the loop in a measurement."""
+    """Return copies of the arguments of all calls of the compiled loop."""
     run, kept = numba_backend.get_compiled_loop(), list[tuple[Any, ...]]()
 
     def noting(*arguments: Any) -> Any:
@@ -53,14 +55,14 @@ def record_calls(measure: Measure, scene: Scene) -> list[tuple[Any, ...]]:
 
 
 def copy_arguments(value: Any) -> Any:
-    """Arguments that a call of the loop may change without a trace."""
+    """Return a deep copy of arguments, because the loop works in place."""
     if isinstance(value, tuple):
         return tuple(map(copy_arguments, value))
     return value.copy() if isinstance(value, np.ndarray) else value
 
 
 def measurement_time(measure: Measure, scene: Scene) -> float:
-    """How long a measurement takes, of a scene that is made anew."""
+    """Return the time of one measurement of a scene without cached values."""
     fresh = Scene(**scene.as_dict())
     began = time.perf_counter()
     measure(fresh, ACCURACY)
@@ -68,7 +70,10 @@ def measurement_time(measure: Measure, scene: Scene) -> float:
 
 
 def repeated_call_time(calls: list[tuple[Any, ...]]) -> float:
-    """How long the calls of the loop take, without the copies."""
+    """Return the total time of the calls of the loop.
+
+    The time of the copies is excluded.
+    """
     run = numba_backend.get_compiled_loop()
     arguments = [copy_arguments(each) for each in calls]
     began = time.perf_counter()
@@ -78,7 +83,7 @@ def repeated_call_time(calls: list[tuple[Any, ...]]) -> float:
 
 
 def main(rounds: int) -> None:
-    """Print a table."""
+    """Print the table of times and ratios."""
     print(f"{'':44}{'measure':>10}{'motions':>10}{'ratio':>7}{'calls':>7}{'sides':>7}")
     for name, (measure, scene) in cases().items():
         calls = record_calls(measure, scene)

@@ -1,16 +1,19 @@
-"""The compiled engine against the SciPy engine and against peers.
+"""Benchmark of the compiled engine, the SciPy engine and other solvers.
 
     python tests/benchmarks/engine_benchmark.py
 
-Needs the extra ``peers``. All contestants take turns in one process; times are the shortest of
-rounds, and ratios are to the compiled engine. Errors are measured: the larger relative error of
-recurrence interval and static stress drop, against the package at its smallest tolerance. Each
-contestant is given the loosest tolerance, by factors of 10^(1/2), that meets the error asked for;
-who meets it at none, or cannot be installed or made to run, is shown failing.
+The benchmark needs the extra ``peers``. All contestants are timed alternately in one
+process. The times are the shortest of several rounds, and the ratios are relative to the
+compiled engine. The error is the larger relative error of the recurrence interval and the
+static stress drop. The reference values are computed with the package at its smallest
+tolerance. Each contestant uses the loosest tolerance, in steps of a factor of 10^(1/2),
+that meets the requested error. A contestant fails if no tolerance meets the error, or if
+the contestant cannot be installed or run.
 
-A peer integrates one cycle from a point on the limit cycle, between marks that it is told; the
-engines find events of their own. The Numba loop by hand, of the same method, is the limit.
-numbalsoda has no wheel for Python 3.11 and later, and builds only where a Fortran compiler is.
+The other solvers integrate one cycle from a point on the limit cycle, between given marks.
+The engines of rsfstudy detect the events themselves. The Numba loop by hand uses the same
+method and is the lower limit of the time. The package numbalsoda has no wheel for Python
+3.11 or newer and needs a Fortran compiler.
 
 ``--quick`` runs one law, one normal stress and one error.
 """
@@ -38,31 +41,37 @@ from contest.rsfstudy_engines import RsfstudyEngine
 from rich.console import Console
 from rich.table import Table
 
-#: Rungs of the ladder of tolerances, in half decades.
+#: Smallest tolerances, in half decades.
 _LAST_RUNG, _TIGHTEST_RSFSTUDY_RUNG = 26, 22
-#: Rungs by which a search begins at a tolerance looser than the error asked for.
+#: Half decades between the requested error and the first, looser tolerance of a search.
 _START_RUNGS_LOOSER = 3
-#: Rungs beyond the first that meets it, among which the cheapest is sought.
+#: Half decades between the first tolerance that meets the error and the last tolerance of a
+#: search.
 _EXTRA_RUNGS = 2
-#: Accuracies for which the package would set the marks, the loosest first.
+#: Accuracies at which the package sets the marks, from loose to tight.
 _MARK_RTOLS = (1e-4, 1e-7, 1e-8, 1e-9, 1e-10)
-#: Range of b/a of many scenes: where mass acts in a rupture, whatever the accuracy.
+#: Range of b/a of many scenes, in which inertia affects the rupture at every accuracy.
 _B_OVER_A = 1.5, 3.0
-#: Shortest time to measure, in seconds.
+#: Minimum measured time in s.
 _MIN_MEASURED_TIME = 0.01
-#: Whose tolerance a slow contestant's search begins with: that of the same steps.
+#: Contestants whose search starts at the tolerance of another contestant with the same steps.
 _TOLERANCE_SOURCE = {
     "rsfstudy, scipy": "rsfstudy, compiled",
     "SciPy loop by hand": "Numba loop by hand",
 }
-#: Seconds after which a failing contestant is given up, and beyond which a run is slow.
+#: Time in s after which a failing contestant is stopped, and time in s above which a run is
+#: slow.
 _FAILURE_TIMEOUT, _SLOW_RUN_TIME = 60.0, 2.0
 console = Console(width=120)
 
 
 @dataclass
 class Entry:
-    """A contestant in one case: with which tolerance, with which error, how fast, or why not."""
+    """Result of a contestant in one case.
+
+    The result contains the tolerance, the measured error and the time, or the reason for
+    the failure.
+    """
 
     contestant: Any
     problems: list[Problem]
@@ -74,12 +83,14 @@ class Entry:
 
     @property
     def tolerance(self) -> float:
-        """The tolerance of the rung."""
+        """Tolerance of the result."""
         return float(10.0 ** (-self.rung / 2.0))
 
     def choose_tolerance(self, first: int, target: float, more: int) -> None:
-        """Find the cheapest tolerance that meets the target: of the loosest that does, and some
-        more, because too loose a tolerance may cost more steps.
+        """Find the cheapest tolerance that meets the target.
+
+        The search continues beyond the loosest suitable tolerance, because a tolerance that
+        is too loose may need more steps.
         """
         last = (
             _TIGHTEST_RSFSTUDY_RUNG if isinstance(self.contestant, RsfstudyEngine) else _LAST_RUNG
@@ -100,7 +111,7 @@ class Entry:
             self.failed = self.failed or f"no tolerance meets {target:g}"
 
     def try_rung(self, rung: int) -> tuple[float, float]:
-        """Error at a rung, and the seconds of a second run."""
+        """Return the error at a tolerance, and the time of a second run."""
         tolerance = 10.0 ** (-rung / 2.0)
         try:
             found = self.contestant.run(self.problems, tolerance)
@@ -113,7 +124,7 @@ class Entry:
         return error, time.perf_counter() - began
 
     def time_again(self) -> None:
-        """Time it once more."""
+        """Repeat the time measurement and keep the shortest time."""
         times, began = 0, time.perf_counter()
         while times == 0 or time.perf_counter() - began < _MIN_MEASURED_TIME:
             self.contestant.run(self.problems, self.tolerance)
@@ -124,7 +135,7 @@ class Entry:
 
 @contextlib.contextmanager
 def silence_c_output() -> Iterator[None]:
-    """Nothing of what libraries in C print, which warn of tolerances that are too loose."""
+    """Suppress the output of C libraries, which warn of loose tolerances."""
     flush = ctypes.CDLL(None).fflush
     kept, nowhere = [os.dup(1), os.dup(2)], os.open(os.devnull, os.O_WRONLY)
     flush(None)
@@ -141,7 +152,7 @@ def silence_c_output() -> Iterator[None]:
 
 
 def prepare_contestants(contestants: list[Any], law: str, variable: bool) -> dict[str, str]:
-    """Have contestants prepare; why those that cannot, cannot."""
+    """Prepare all contestants, and return the error messages of failures."""
     failed = {}
     for contestant in contestants:
         try:
@@ -152,8 +163,9 @@ def prepare_contestants(contestants: list[Any], law: str, variable: bool) -> dic
 
 
 def with_best_marks(problems: list[Problem], judge: Any, target: float) -> list[Problem]:
-    """Problems, each with the loosest marks that leave an error well below the target, or with the
-    best of all.
+    """Return each problem with the loosest marks that are accurate enough.
+
+    If no marks leave an error well below the target, the most accurate marks are used.
     """
 
     def ready(it: Problem) -> Problem:
@@ -176,14 +188,14 @@ def race(
     target: float,
     rounds: int,
 ) -> list[Entry]:
-    """Entries of all contestants, timed in turns."""
+    """Return the results of all contestants, timed alternately."""
     entries: dict[str, Entry] = {}
     for contestant in contestants:
         entry = Entry(contestant, problems, failed=failed.get(contestant.name, ""))
         if not entry.failed:
             like = entries.get(_TOLERANCE_SOURCE.get(contestant.name, ""))
             with silence_c_output():
-                # the same steps are cheapest for both
+                # The cheapest tolerance is the same for both, because both take the same steps.
                 first = (
                     like.rung if like else round(-2.0 * math.log10(target)) - _START_RUNGS_LOOSER
                 )
@@ -197,7 +209,7 @@ def race(
 
 
 def print_case(case: str, one: list[Entry], many: list[Entry]) -> None:
-    """Print the table of a case, and why contestants fail."""
+    """Print the table of a case, and the reasons for failures."""
     head = ("tolerance", "error", "ms", "ratio")
     scenes = len(many[0].problems)
     table = Table(
@@ -222,7 +234,7 @@ def print_case(case: str, one: list[Entry], many: list[Entry]) -> None:
 
 
 def main() -> None:
-    """Print the tables."""
+    """Run the benchmark and print the tables."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--quick", action="store_true", help="one law and one error")
     parser.add_argument("--rounds", type=int, default=5)

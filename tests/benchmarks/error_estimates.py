@@ -1,11 +1,11 @@
 """Comparison of error estimates with the errors relative to reference values.
 
 Usage: ``python tests/benchmarks/error_estimates.py KIND COUNT SEED``, where KIND is
-`elasticities`, `inertia`, `inverse` or `all`. COUNT is the number of random cases. The reference
-values of elasticities are extrapolated differences, computed with rtol = 1e-11. The reference
-values of motions with inertia are computed with tolerances a thousand times smaller. The exact
-curves are known for `Inverse`. The script prints each error that exceeds its estimate. The exit
-status is 1 if the estimates cover too few of the errors.
+``elasticities``, ``inertia``, ``inverse`` or ``all``. COUNT is the number of random cases.
+The reference values of elasticities are extrapolated differences, computed with rtol =
+1e-11. The reference values of motions with inertia are computed with tolerances a thousand
+times smaller. The exact curves are known for ``Inverse``. The script prints each error that
+exceeds its estimate. The exit status is 1 if the estimates cover too few of the errors.
 """
 
 from __future__ import annotations
@@ -38,7 +38,10 @@ CURVES = {"smooth": 0.0, "kinked": 0.2, "oscillating": 0.2}
 
 
 class Number(NamedTuple):
-    """Computed value with its error estimate, and reference value with its uncertainty."""
+    """Computed value and reference value of an output.
+
+    The computed value has an error estimate, and the reference value has an uncertainty.
+    """
 
     label: str
     value: float
@@ -49,7 +52,7 @@ class Number(NamedTuple):
 
     @property
     def error(self) -> float:
-        """Absolute error that exceeds rounding and the uncertainty of the reference value."""
+        """Absolute error in excess of rounding and reference uncertainty."""
         rounding = 1e-12 * abs(self.reference)
         return max(abs(self.value - self.reference) - self.uncertainty - rounding, 0.0)
 
@@ -79,7 +82,10 @@ def random_slider(random: Random) -> dict[str, Any]:
 
 
 def elasticity_number(random: Random) -> Iterator[Number]:
-    """Compute an elasticity of a random critical step or limit cycle, and its reference value."""
+    """Compute an elasticity of a random scene, and its reference value.
+
+    The measure is a critical step or a limit cycle.
+    """
     fields = random_slider(random)
     measure: Measure = CriticalStep(
         str(random.choice(["load_velocity_ratio", "displacement_step"]))
@@ -106,7 +112,10 @@ def elasticity_number(random: Random) -> Iterator[Number]:
 
 
 def extrapolated_elasticity(measure: Measure, scene: Scene, name: str) -> tuple[float, float]:
-    """Extrapolate central differences of ln|y| to zero step, and estimate the uncertainty."""
+    """Extrapolate central differences of ln|y| to step 0.
+
+    The second return value is the uncertainty of the extrapolation.
+    """
     accuracy = Accuracy(MIN_RTOL, engine="compiled", budget=20_000_000)
 
     def level(by: float) -> float:
@@ -129,7 +138,10 @@ def extrapolated_elasticity(measure: Measure, scene: Scene, name: str) -> tuple[
 
 
 def inertia_numbers(random: Random) -> Iterator[Number]:
-    """Measure a random hold or velocity step with inertia, and yield all values."""
+    """Measure a random hold or velocity step with inertia.
+
+    The function yields all values and their error estimates.
+    """
     fields = random_slider(random) | {"inertia": True, "reference_rate": 1e-3}
     fields["stiffness_ratio"] = decades(random, 1.1, 100.0)
     fields["period"] = 2.0 * math.pi * decades(random, 1e-5, 0.3) / fields["reference_rate"]
@@ -158,7 +170,7 @@ def inertia_numbers(random: Random) -> Iterator[Number]:
 
 
 def draw_curve(kind: str, random: Random, length: float, cells: int) -> Callable[[Any], Any]:
-    """Draw an increasing curve of ln y as a function of ln x between 0 and `length`."""
+    """Draw an increasing curve of ln y against ln x, from 0 to ``length``."""
     slope, bend = random.uniform(0.3, 3.0), random.uniform(-0.4, 0.5)
     if kind == "smooth" and random.uniform() < 0.5:
         rate = random.uniform(0.3, 4.0) / length
@@ -177,7 +189,7 @@ def draw_curve(kind: str, random: Random, length: float, cells: int) -> Callable
 
 
 def inverse_numbers(kind: str, random: Random) -> tuple[list[Number], int]:
-    """Apply `Inverse` to a random curve, and compare the result with each exact crossing.
+    """Apply ``Inverse`` to a random curve, and compare the exact crossings.
 
     The second return value is the status of the result.
     """
@@ -207,7 +219,10 @@ def inverse_numbers(kind: str, random: Random) -> tuple[list[Number], int]:
 
 
 def print_coverage(title: str, numbers: list[Number], least: float) -> bool:
-    """Print the coverage of the error estimates, and return True if it is at least `least`."""
+    """Print the coverage of error estimates.
+
+    The return value is True if the coverage is at least ``least``.
+    """
     missed = [number for number in numbers if number.error > number.estimate]
     for number in missed:
         print(f"  {number.error / number.estimate:.3g} times its estimate: {number.label}")
@@ -220,12 +235,15 @@ def print_coverage(title: str, numbers: list[Number], least: float) -> bool:
 
 
 def check_inverse(count: int, random: Random) -> bool:
-    """Check `Inverse` for each kind of curve, counting flagged results as covered."""
+    """Check ``Inverse`` for each kind of curve.
+
+    Flagged results count as covered.
+    """
     passed = True
     for kind, most in CURVES.items():
         numbers, flagged = list[Number](), 0
         for _ in range(count):
-            # if the curve has several crossings, count the largest error
+            # If the curve has several crossings, the largest error is used.
             found, status = inverse_numbers(kind, random)
             flagged += status != 0
             numbers += sorted(found, key=lambda number: number.error)[-1:]

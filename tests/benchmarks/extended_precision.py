@@ -1,13 +1,13 @@
-"""References for what accuracy costs: another formulation, another integrator, 64-bit mantissas.
+"""Reference values with extended precision, independent of the package.
 
-The paper's own unknowns, stress deviation f, x = ln(V/V_*) and Theta, instead of the state freed of
-normal stress; extrapolated modified midpoint steps (Gragg, Bulirsch and Stoer) of order 14 in
-`numpy.longdouble`, instead of SciPy's Runge-Kutta in double. The slow manifold serves up to a slip
-rate norm w, at constant normal stress with an error of the order of w**4 that two values of w
-remove (Richardson).
+The unknowns are those of the paper: the stress deviation f, x = ln(V/V_*) and Theta. The
+integrator uses extrapolated modified midpoint steps (Gragg, Bulirsch and Stoer) of order 14
+in ``numpy.longdouble``, whose mantissa has 64 bits. Below a slip rate norm w, the motion
+follows the slow manifold. At constant normal stress, the error of this approximation is
+proportional to w**4, and Richardson extrapolation with two values of w removes it.
 
-``python tests/benchmarks/extended_precision.py`` prints the references of
-`studies/_reference_values.py` (minutes).
+``python tests/benchmarks/extended_precision.py`` prints the reference values of
+``studies/_reference_values.py``. The computation takes minutes.
 """
 
 from __future__ import annotations
@@ -31,7 +31,10 @@ _SEQUENCE = (2, 4, 6, 8, 10, 12, 14)
 
 @dataclass(frozen=True)
 class Slider:
-    """The slider of the paper; angles as cotangents, laws by name."""
+    """Slider of the paper with extended precision.
+
+    The driving angle is represented by its cotangent.
+    """
 
     law: str
     cot_phi: np.longdouble
@@ -44,18 +47,21 @@ class Slider:
     inertial_time: np.longdouble = _INERTIAL_TIME
 
     def evolution(self, x: np.longdouble, theta: np.longdouble) -> np.longdouble:
-        """Change of the state per unit of slip at constant normal stress."""
+        """Return the rate of the state per slip at constant normal stress."""
         if self.law == "slip":
             return -(theta + self.b * x)
         return self.b * np.expm1(-(theta / self.b + x))
 
     def friction(self, x: np.longdouble, theta: np.longdouble) -> np.longdouble:
-        """Deviation of frictional stress: (a x + Theta)/(1 - F c)."""
+        """Return the frictional stress deviation, (a x + Theta)/(1 - F c)."""
         excess = self.a * x + theta
         return excess / (1 - (self.mu + excess) * self.cot_phi)
 
     def slow(self, state: State) -> State:
-        """(f, Theta, t) per slip and load point displacement, on the slow manifold."""
+        """Return the rates of (f, Theta, t) on the slow manifold.
+
+        The independent variable is the sum of slip and load point displacement.
+        """
         f, theta = state[0], state[1]
         g = self.slow_friction(f, self.rate_at(f, theta), theta)
         x = self.rate_at(g, theta)
@@ -65,18 +71,25 @@ class Slider:
     def slow_friction(
         self, f: np.longdouble, x: np.longdouble, theta: np.longdouble
     ) -> np.longdouble:
-        """Frictional stress on the slow manifold: f - K w (w + w_0) dx/ds."""
+        """Return the frictional stress on the slow manifold.
+
+        The stress is f - K w (w + w_0) dx/ds.
+        """
         growth = self._slow_growth(f, x, theta)[0]
         v, scale = np.exp(x), self.stiffness * self.inertial_time**2
         return f - scale * v * (v + self.load) * growth
 
     def rate_at(self, g: np.longdouble, theta: np.longdouble) -> np.longdouble:
+        """Return ln(V/V_*) at a frictional stress and a state."""
         return (g * (1 - self.mu * self.cot_phi) / (1 + self.cot_phi * g) - theta) / self.a
 
     def _slow_growth(
         self, g: np.longdouble, x: np.longdouble, theta: np.longdouble
     ) -> tuple[np.longdouble, np.longdouble, np.longdouble]:
-        """dx, df and dTheta per slip and load point displacement, quasi-statically."""
+        """Return the quasi-static rates dx, df and dTheta.
+
+        The independent variable is the sum of slip and load point displacement.
+        """
         c, v = self.cot_phi, np.exp(x)
         share, s = v / (v + self.load), 1 + c * g
         loading = self.stiffness * (self.load - v) / (v + self.load)
@@ -84,7 +97,7 @@ class Slider:
         return ((1 - self.mu * c) / s**2 * loading - evolving) / self.a, loading, evolving
 
     def fast(self, state: State) -> State:
-        """(f, x, Theta) per inertial time."""
+        """Return the rates of (f, x, Theta) per inertial time."""
         f, x, theta = state
         w = np.exp(x) * self.inertial_time
         excess = self.a * x + theta
@@ -98,7 +111,7 @@ class Slider:
 def extrapolated_step(
     rates: Rates, state: State, first: State, size: np.longdouble
 ) -> tuple[State, float]:
-    """One extrapolated step, and its error over the scales of the unknowns."""
+    """Return the result of an extrapolated step, and its scaled error."""
     rows: list[State] = []
     table: list[State] = []
     for count in _SEQUENCE:
@@ -117,7 +130,7 @@ def extrapolated_step(
 def integrate_steps(
     rates: Rates, state: State, tolerance: float
 ) -> Iterator[tuple[State, State, np.longdouble]]:
-    """Steps: the states before and after, and the size."""
+    """Yield the states before and after each step, and the step size."""
     size = LongDouble("1e-3")
     while True:
         first = rates(state)
@@ -135,7 +148,11 @@ def integrate_steps(
 def locate_zero(
     rates: Rates, state: State, size: np.longdouble, what: Callable[[State], np.longdouble]
 ) -> tuple[np.longdouble, State]:
-    """Part of a step after which ``what(state)`` vanishes, by the secant method on step sizes."""
+    """Return the fraction of a step after which ``what(state)`` is zero.
+
+    The function applies the secant method to the step size, and also returns the state
+    there.
+    """
     first = rates(state)
     low, high = LongDouble(0), size
     at_low, at_high = what(state), what(extrapolated_step(rates, state, first, size)[0])
@@ -162,7 +179,11 @@ def locate_zero(
 
 
 class Motion:
-    """Cycles of a slider: slow manifold up to a slip rate norm, the full equations above."""
+    """Cycles of a slider with a switch between two forms of the equations.
+
+    Below a slip rate norm, the motion follows the slow manifold. Above the norm, the full
+    equations are integrated.
+    """
 
     def __init__(self, slider: Slider, norm: float, tolerance: float) -> None:
         self.slider, self.tolerance = slider, tolerance
@@ -172,7 +193,10 @@ class Motion:
         self.events = 0
 
     def numbers(self, count: int) -> np.ndarray:
-        """Recurrence interval, static and dynamic drop of the given cycle."""
+        """Return the recurrence interval and the stress drops of a cycle.
+
+        The stress drops are the static and the dynamic stress drop.
+        """
         nudge = self.slider.stiffness / 10 if self.slider.load == 1 else LongDouble(0)
         state = np.array([nudge, LongDouble(0), LongDouble(0)])
         while True:
@@ -220,8 +244,8 @@ class Motion:
             if before[1] > load >= after[1]:
                 turning = locate_zero(slider.fast, before, size, lambda y: y[1] - load)[1]
                 self.lowest = min(self.lowest, turning[0])
-            # at rest: what slip the approach to the slow manifold still takes is below rounding,
-            # and so is what Theta still changes with normal stress
+            # The slider is at rest when the remaining slip to the slow manifold and the
+            # remaining change of Theta with normal stress are below the rounding error.
             below = slider.rate_at(after[0], after[2])
             below = slider.rate_at(slider.slow_friction(after[0], below, after[2]), after[2])
             slip = slider.stiffness * (np.exp(after[1]) * slider.inertial_time) ** 2
@@ -233,7 +257,10 @@ class Motion:
 
 
 def cycle_numbers(slider: Slider, norm: float, count: int) -> dict[str, tuple[str, str]]:
-    """Numbers of a cycle, the error of the switch removed, and by how much that moved them."""
+    """Return the extrapolated values of a cycle, and their uncertainties.
+
+    The uncertainty is the change by the extrapolation.
+    """
     coarse, fine = (Motion(slider, w, 1e-16).numbers(count) for w in (norm, norm / 2))
     best = fine + (fine - coarse) / 15
     names = ("recurrence_interval", "static_stress_drop", "dynamic_stress_drop")
@@ -244,10 +271,10 @@ def cycle_numbers(slider: Slider, norm: float, count: int) -> dict[str, tuple[st
 
 
 def critical_velocity(slider: Slider, norm: float) -> np.longdouble:
-    """Critical V_0/V_* without mass: forward in time, by the height of the only peak.
+    """Return the critical V_0/V_* without inertia.
 
-    Bisection between motions whose first peak passes the norm and motions whose first peak does
-    not.
+    The motions are integrated forward in time. The function bisects between motions whose
+    first peak exceeds the norm and motions whose first peak stays below it.
     """
     log_norm = np.log(LongDouble(norm) / slider.inertial_time)
 
@@ -276,7 +303,10 @@ def critical_velocity(slider: Slider, norm: float) -> np.longdouble:
 
 
 def paper_slider(law: str, *, constant: bool, ratio: str = "0.8", load: str = "2") -> Slider:
-    """The slider of Figs. 9 and 10: b/a = 2, k = 0.8 k_cr, V_0 = 2 V_*."""
+    """Return the slider of Figs. 9 and 10 of the paper.
+
+    Its parameters are b/a = 2, k = 0.8 k_cr and V_0 = 2 V_*.
+    """
     if constant:
         return make_slider(law, ratio=ratio, load=load)
     return make_slider(
@@ -295,7 +325,7 @@ def make_slider(
     b_over_a: str = "2",
     period: str = "5",
 ) -> Slider:
-    """A slider by the parameters its users state."""
+    """Return a slider with the given scene parameters."""
     direct, state = LongDouble(a), LongDouble(alpha)
     critical = direct * (LongDouble(b_over_a) - 1) / (1 - cot_phi * (_MU - state))
     return Slider(
@@ -310,7 +340,8 @@ def make_slider(
     )
 
 
-#: Critical velocities of `hard_cases`: what differs from the slip law at k = k_cr, b/a = 2.
+#: Critical velocities of ``hard_cases``: parameters that differ from the slip law with k = k_cr
+#: and b/a = 2.
 _ANGLE_60 = {"cot_phi": 1 / np.sqrt(LongDouble(3)), "alpha": "0.56"}
 _STEEP_COT_PHI = 1 / np.tan(np.arctan(_MU) + LongDouble("0.01") * np.arccos(LongDouble(-1)) / 180)
 HARD_STEPS = {
@@ -325,16 +356,16 @@ HARD_STEPS = {
     "T = 1e-6 s": {**_ANGLE_60, "period": "1e-6"},
     "T = 1e4 s": {**_ANGLE_60, "period": "1e4"},
 }
-#: Limit cycles of `hard_cases`, slip law, constant normal stress.
+#: Limit cycles of ``hard_cases`` for the slip law at constant normal stress.
 HARD_CYCLES = {
     "k = 0.99 k_cr": {"ratio": "0.99"},
     "V_0 = V_*": {"ratio": "0.8", "load": "1"},
     "T = 1e-6 s": {"ratio": "0.8", "period": "1e-6"},
     "T = 1e4 s": {"ratio": "0.8", "period": "1e4"},
 }
-#: Limit cycles of `hard_cases` at any parameters: what `slider_from_fields` makes a slider of, the
-#: cycle, and two norms at which to switch. With normal stress that varies their error goes with the
-#: square.
+#: Limit cycles of ``hard_cases`` with arbitrary parameters. Each entry contains the number of the
+#: cycle and two switch norms. At variable normal stress, the error of the switch is proportional
+#: to the square of the norm.
 DEEP_CYCLES = {
     "slip law, down to 10^-137 V_*": (4, ("2.5e-4", "1.25e-4")),
     "slowness law, down to 10^-1745 V_*": (9, ("1e-3", "5e-4")),
@@ -342,7 +373,7 @@ DEEP_CYCLES = {
 
 
 def slider_from_fields(fields: Mapping[str, Any]) -> Slider:
-    """The slider that a scene with an angle states."""
+    """Return the slider of a scene with variable normal stress."""
     a, mu, alpha = (LongDouble(fields[name]) for name in ("a", "mu_star", "alpha"))
     cot_phi = 1 / np.tan(LongDouble(fields["phi"]) * np.arccos(LongDouble(-1)) / 180)
     b = a * LongDouble(fields["b_over_a"])
@@ -357,7 +388,7 @@ def slider_from_fields(fields: Mapping[str, Any]) -> Slider:
 
 
 def deep_cycle(fields: Mapping[str, Any], count: int, norms: tuple[str, str]) -> np.longdouble:
-    """Recurrence interval, the error of the switch removed."""
+    """Return the recurrence interval, extrapolated to a switch norm of 0."""
     coarse, fine = (
         Motion(slider_from_fields(fields), float(w), 1e-16).numbers(count)[0] for w in norms
     )

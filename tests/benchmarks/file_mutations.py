@@ -1,4 +1,4 @@
-"""Random changes of bytes, text files and datasets for `fuzz_files`."""
+"""Random changes of bytes, text files and datasets for ``fuzz_files``."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ ODD_STRINGS = (
 
 
 def damage_bytes(content: bytes, chance: random.Random) -> bytes:
-    """Return a randomly damaged copy of `content`, which may be empty."""
+    """Return a randomly damaged copy of ``content``, which may be empty."""
     found = content
     while found == content:
         found = bytes(chance.choice(_BYTE_MUTATIONS)(bytearray(content), chance))

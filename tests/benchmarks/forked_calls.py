@@ -18,7 +18,7 @@ CPU_TIME_LIMIT, WALL_TIME_FACTOR, MEMORY_LIMIT = 20, 15.0, 8 * 2**30
 
 
 def call_in_child(function: Callable[[], Any], place: Path) -> tuple[Any, str]:
-    """Call a function in a forked process with `place` as the working directory.
+    """Call a function in a forked process with ``place`` as its directory.
 
     Parameters
     ----------
@@ -30,7 +30,7 @@ def call_in_child(function: Callable[[], Any], place: Path) -> tuple[Any, str]:
     Returns
     -------
     value : object
-        Return value of the function. None if the process did not return a value.
+        Return value of the function, or None if the process did not return a value.
     how : str
         ``"hangs"`` or ``"dies of signal N"`` if the process did not return a value, otherwise an
         empty string.
@@ -55,7 +55,7 @@ def call_in_child(function: Callable[[], Any], place: Path) -> tuple[Any, str]:
 
 
 def _run(function: Callable[[], Any], place: Path, writes: int) -> None:
-    """Call the function, write its pickled result to a pipe, and end the process."""
+    """Call the function, write its result to a pipe, and end the process."""
     try:
         os.chdir(place)
         os.setsid()
@@ -69,7 +69,7 @@ def _run(function: Callable[[], Any], place: Path, writes: int) -> None:
 
 
 def _receive(reads: int) -> bytes:
-    """Read from a pipe until the other end closes it or the time limit is reached."""
+    """Read from a pipe until it is closed or the time limit is reached."""
     content, end = b"", time.monotonic() + WALL_TIME_FACTOR * CPU_TIME_LIMIT
     while select.select([reads], [], [], max(0.0, end - time.monotonic()))[0]:
         part = os.read(reads, 2**16)

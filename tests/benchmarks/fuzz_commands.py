@@ -284,7 +284,10 @@ def field_names() -> tuple[str, ...]:
 
 
 def draw_value(command: str, param: click.Parameter, chance: random.Random) -> str:
-    """Draw a value of an option or argument that is valid with a probability of at least 0.5."""
+    """Draw a value of an option or argument.
+
+    The value is valid with a probability of at least 0.5.
+    """
     kind, name, drawn = param.type, str(param.name), chance.random()
     if drawn < 0.06:
         return mutate_string(chance.choice(HOSTILE), chance)
@@ -338,14 +341,14 @@ class Line(NamedTuple):
 
 
 def draw_line(seed: int, index: int) -> Line:
-    """Draw the command line that belongs to a seed and an index."""
+    """Draw the command line of a seed and an index."""
     chance = random.Random(f"{seed}:{index}")
     names = sorted(cli.commands)
     if chance.random() < 0.02:
         words = [chance.choice((*HOSTILE, *names, "--version", "--help")) for _ in range(2)]
     else:
         words = _command_line(chance.choice(names), chance)
-    # arguments of a process cannot contain NUL
+    # Arguments of a process cannot contain NUL.
     return Line(tuple(word.replace("\0", "") for word in words), chance.random() < 0.4)
 
 
@@ -481,7 +484,7 @@ SETUP_COMMANDS = (
 
 
 def write_input_files(place: Path) -> None:
-    """Write files of all kinds to `place`, which must be the working directory."""
+    """Write files of all kinds to the working directory ``place``."""
     texts = {
         "tiny.py": TINY_STUDY_SOURCE,
         "own.py": USER_STUDY_SOURCE,
@@ -525,7 +528,7 @@ def write_input_files(place: Path) -> None:
         if ending != ".html":
             os.symlink(f"loop{ending}", f"loop{ending}")
             os.symlink("nowhere/at/all", f"dangling{ending}")
-        # root could replace the device that a link points to
+        # The root user could replace the device to which a link points.
         os.symlink("/dev/null", f"device{ending}") if os.getuid() else os.mknod(
             f"device{ending}", 0o020666, os.makedev(1, 3)
         )
@@ -533,7 +536,7 @@ def write_input_files(place: Path) -> None:
 
 
 def damage_files(words: Sequence[str], chance: random.Random) -> None:
-    """Damage the files that a command line names, and occasionally the journal."""
+    """Damage the files named by a command line, and sometimes the journal."""
     for target, source in (*DAMAGED_FILES.items(), (JOURNAL_FILE, JOURNAL_FILE)):
         named = any(target in word for word in words)
         if named or (target == JOURNAL_FILE and chance.random() < 0.1):
@@ -562,7 +565,7 @@ def _damage_once(data: bytearray, chance: random.Random) -> None:
 
 
 def _write_foreign_files() -> None:
-    """Write a NetCDF file of another program, and a results file with altered attributes."""
+    """Write a NetCDF file of another program, and altered results."""
     import xarray as xr
 
     xr.Dataset({"x": ("t", [1.0, 2.0])}).to_netcdf("plain.nc")
@@ -585,7 +588,10 @@ def _in_process(words: Sequence[str]) -> None:
 
 
 class Answer(NamedTuple):
-    """Exit status (negative for a signal), output and CPU time in s of a command line."""
+    """Exit status, output and CPU time in s of a command line.
+
+    A negative exit status is the number of a signal.
+    """
 
     status: int
     output: str
@@ -619,12 +625,12 @@ class Server:
                 _serve(theirs, write, home, limit)
             os._exit(1)
         theirs.close()
-        os.close(write) if not terminal else None  # a terminal without a writer reports an error
+        os.close(write) if not terminal else None  # A terminal without a writer reports an error.
         os.set_blocking(self._read, False)
-        self._receive(60.0 * limit)  # wait until the process is ready
+        self._receive(60.0 * limit)  # Wait until the process is ready.
 
     def _receive(self, seconds: float) -> tuple[dict[str, Any] | None, bytes]:
-        """Wait for the next message, and return it with the output in the meantime.
+        """Return the next message, and the output in the meantime.
 
         The message is None if the time limit is reached.
         """
@@ -650,7 +656,7 @@ class Server:
         return output
 
     def run(self, words: Sequence[str], place: Path) -> Answer:
-        """Run a command line in the directory `place`."""
+        """Run a command line in the directory ``place``."""
         self._link.sendall(json.dumps([words, str(place)]).encode() + b"\n")
         began, _output = self._receive(60.0 * self.limit)
         assert began is not None
@@ -680,7 +686,7 @@ def _serve(link: socket.socket, output: int, home: Path, limit: float) -> None:
     nothing = os.open(os.devnull, os.O_RDONLY)
     for number, stream in enumerate((nothing, output, output)):
         os.dup2(stream, number)
-    # the standard streams of Python still refer to the old descriptors
+    # The standard streams of Python still refer to the old descriptors.
     sys.stdout = open(1, "w", encoding="utf-8", closefd=False)  # noqa: SIM115
     sys.stderr = open(2, "w", encoding="utf-8", closefd=False, buffering=1)  # noqa: SIM115
     os.environ |= {"MPLBACKEND": "agg", "TERM": "xterm-256color"}
@@ -698,7 +704,7 @@ def _serve(link: socket.socket, output: int, home: Path, limit: float) -> None:
         _in_process(FIT_COMMAND)
     sys.stdout.flush()
     gc.collect()
-    gc.freeze()  # so that forks share memory
+    gc.freeze()  # Freeze the objects, so that forked processes share memory.
     link.sendall(b"{}\n")
     for line in link.makefile():
         words, place = json.loads(line)
@@ -778,7 +784,10 @@ def faults(line: Line, answer: Answer) -> Iterator[str]:
 
 
 def fuzz(seed: int, indices: Sequence[int], limit: float, show: bool) -> int:
-    """Run command lines, print a report of each problem, and return the number of reports."""
+    """Run command lines, and print a report of each problem.
+
+    The return value is the number of reports.
+    """
     reports, kinds, statuses = 0, collections.Counter[str](), collections.Counter[int]()
     slowest, total, began = list[tuple[float, int]](), 0.0, time.monotonic()
     with tempfile.TemporaryDirectory(prefix="fuzz_commands_") as home:

@@ -75,12 +75,10 @@ class Kind(NamedTuple):
 
 
 # ---- readers -------------------------------------------------------------------------------------
-
-
 def command_reader(*words: str) -> Callable[[Path], Any]:
     """Return a reader that runs a command.
 
-    In `words`, ``{0}`` is replaced by the path of the file, and ``{1}`` by its directory.
+    In ``words``, ``{0}`` is replaced by the path of the file, and ``{1}`` by its directory.
     """
 
     def read(path: Path) -> str:
@@ -98,36 +96,44 @@ def command_reader(*words: str) -> Callable[[Path], Any]:
 
 
 def open_results(path: Path) -> xr.Dataset:
+    """Read a results file or a store with ``rsfstudy.open``."""
     return rsfstudy.open(path).load()
 
 
 def open_dataset(path: Path) -> xr.Dataset:
+    """Read the file of any dataset."""
     return dataset_files.read_dataset(path).load()
 
 
 def show_html(path: Path) -> str:
+    """Return the HTML representation of a dataset."""
     return str(dataset_files.read_dataset(path).rsf._repr_html_())
 
 
 def draw_plot(path: Path) -> Any:
+    """Plot a dataset."""
     return dataset_files.read_dataset(path).rsf.plot()
 
 
 def resume_run(path: Path) -> xr.Dataset:
+    """Resume the run of a journal."""
     return rsfstudy.run(STUDY, output=path.parent, workers=0, progress=False)
 
 
 def answer_record(path: Path) -> Any:
+    """Read an answer to a problem of the referee."""
     return external_answers.read_external_answer(
         path, problem_files.read_problem(problem_files.shipped_problem_files()[1])
     )
 
 
 def read_cases(path: Path) -> Any:
+    """Read a table of cases."""
     return rsfstudy.Axis.cases(rsfstudy.read_table(path))
 
 
 def apply_style(path: Path) -> Any:
+    """Plot results with a style sheet."""
     return rsfstudy.plot(path.parent / "whole.nc", style=path)
 
 
@@ -136,8 +142,6 @@ def _reading(function: Callable[..., Any], **options: Any) -> Callable[[Path], A
 
 
 # ---- changes -------------------------------------------------------------------------------------
-
-
 def damage(path: Path, chance: random.Random) -> bool:
     """Damage a file, or one file of a Zarr store, and return True.
 
@@ -154,7 +158,8 @@ def damage(path: Path, chance: random.Random) -> bool:
 
 def rewrite(path: Path, chance: random.Random) -> bool:
     """Replace a results file by a hostile dataset, and return False."""
-    with warnings.catch_warnings(), contextlib.suppress(Exception):  # xarray may refuse it
+    # xarray may reject the dataset.
+    with warnings.catch_warnings(), contextlib.suppress(Exception):
         warnings.simplefilter("ignore")
         dataset = hostile_dataset(xr.load_dataset(path), chance)
         if chance.random() < 0.7:
@@ -188,7 +193,10 @@ def tamper(path: Path, chance: random.Random) -> bool:
 
 
 def rename(path: Path, chance: random.Random) -> bool:
-    """Replace the file by the name of an invalid or missing study file, and return False."""
+    """Replace the file by the name of an invalid study file.
+
+    The return value is False.
+    """
     names = ("a" * 300, "\x1b[31m", "nul\0", "", " ", "..", "a/b", "*", "\udcff", "é" * 200, "-x")
     path.write_text(chance.choice(names) + chance.choice((".py", "", ".PY", ".py.py")), "utf-8",
                     "surrogateescape")  # fmt: skip
@@ -196,6 +204,7 @@ def rename(path: Path, chance: random.Random) -> bool:
 
 
 def read_study_file(path: Path) -> Any:
+    """Run a study file whose name is in the file."""
     name = path.read_text("utf-8", "surrogateescape")
     return rsfstudy.run(name, workers=0, progress=False, output=None)
 
@@ -273,7 +282,7 @@ KINDS = {
 
 
 def write_valid_files(place: Path) -> dict[str, Any]:
-    """Write a valid file of each kind, and return the true datasets by kind."""
+    """Write a valid file of each kind, and return the datasets by kind."""
     results = rsfstudy.run(STUDY, output=place, workers=0, progress=False)
     rsfstudy.run(STUDY, output=place / "zarr", workers=0, progress=False, format="zarr")
     (place / "zarr" / "small.zarr").rename(place / "small.zarr")
@@ -309,10 +318,8 @@ def _xlook(*columns: np.ndarray) -> bytes:
 
 
 # ---- one case ------------------------------------------------------------------------------------
-
-
 class Answer(NamedTuple):
-    """Answer of a reader, with its kind, its text, the output and the first difference."""
+    """Answer of a reader: kind, text, printed output and first difference."""
 
     kind: str
     text: str
@@ -321,7 +328,7 @@ class Answer(NamedTuple):
 
 
 def read(reader: Callable[[Path], Any], path: Path, truth: xr.Dataset | None) -> Answer:
-    """Call a reader in this process, and compare a returned dataset with the truth."""
+    """Call a reader, and compare a returned dataset with the truth."""
     out, differs = io.StringIO(), ""
     with (
         contextlib.redirect_stdout(out),
@@ -343,12 +350,16 @@ def read(reader: Callable[[Path], Any], path: Path, truth: xr.Dataset | None) ->
 
 
 def difference(found: xr.Dataset, truth: xr.Dataset) -> str:
-    """Return the name of the first attribute or variable that differs from the truth."""
+    """Return the name of the first difference from the truth.
+
+    The differences are attributes or variables.
+    """
     for name in ("declaration", "scene"):
         if found.attrs.get(name) != truth.attrs.get(name):
             return f"attribute {name}"
     for name, values in truth.variables.items():
-        if name in ("wall_time", "rhs_evaluations"):  # differ if cells are computed again
+        # These values differ if cells are computed again.
+        if name in ("wall_time", "rhs_evaluations"):
             continue
         if name not in found.variables or not values.equals(found[name].variable):
             return str(name)
@@ -365,6 +376,7 @@ class Case(NamedTuple):
 
     @classmethod
     def draw(cls, seed: int, index: int) -> Case:
+        """Draw the case of a seed and an index."""
         chance = random.Random(f"{seed}:{index}")
         file = chance.choice(list(KINDS))
         return cls(chance, file, chance.choice(KINDS[file].changes),
@@ -375,7 +387,7 @@ class Case(NamedTuple):
 
 
 def run_case(case: Case, whole: Path, truths: dict[str, Any]) -> Answer:
-    """Change a copy of a file, call the reader in a forked process, and return the answer."""
+    """Change a copy of a file, and read it in a forked process."""
     chance, file, change, reader = case
     with tempfile.TemporaryDirectory() as place:
         copy = Path(place)
@@ -389,7 +401,6 @@ def run_case(case: Case, whole: Path, truths: dict[str, Any]) -> Answer:
 
 
 # ---- faults --------------------------------------------------------------------------------------
-
 _CATCH_ALL_MESSAGES = re.compile(
     "cannot be answered|cannot be had of this dataset|as rsfstudy made it|Look at what it names"
 )
@@ -413,7 +424,7 @@ def faults(answer: Answer) -> Iterator[str]:
 
 
 def main() -> int:
-    """Run the cases that the command line selects, and return the exit status."""
+    """Run the selected cases, and return the exit status."""
     options = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     options.add_argument("--seed", type=int, default=1)
     options.add_argument("--count", type=int, default=2000)
@@ -425,7 +436,7 @@ def main() -> int:
     with tempfile.TemporaryDirectory() as place, tempfile.TemporaryDirectory() as warm:
         truths = write_valid_files(Path(place))
         shutil.copytree(place, warm, dirs_exist_ok=True)
-        for file, kind in KINDS.items():  # import and compile the code that all cases need
+        for file, kind in KINDS.items():  # Import and compile the code that all cases need.
             for reader in kind.readers:
                 read(reader, Path(warm, file), None)
         for index in range(asked.count) if asked.case is None else [asked.case]:

@@ -55,7 +55,7 @@ START_TIME_LIMIT = 120.0
 CATCH_ALL = re.compile(r"cannot be answered|not as rsfstudy made it|cannot be had of this dataset")
 #: Parameters without junk, because a random value could start many processes.
 PARAMETERS_WITHOUT_JUNK = ("workers",)
-#: Module of the descriptors of former names, which are the same members as those of the new names.
+#: Module of the descriptors of former names, which refer to the members with the new names.
 FORMER_NAMES = "rsfstudy._deprecation"
 
 
@@ -154,7 +154,7 @@ def record() -> Any:
 
 
 def valid_inputs(place: Path) -> dict[str, Any]:
-    """Create the scenes, studies, datasets, records and files for valid calls."""
+    """Create scenes, studies, datasets, records and files for valid calls."""
     quick = {"rtol": 1e-2, "engine": "scipy"}
     scene = Scene(stiffness_ratio=1.5, load_velocity_ratio=2.0, normal_stress="constant")
     cycling = Scene(stiffness_ratio=0.8, normal_stress="constant")
@@ -190,9 +190,10 @@ RIG_ARGUMENTS = {"normal_stress": "5 MPa", "slip_distance": "10 um", "reference_
 
 
 def call_targets(known: dict[str, Any]) -> dict[str, tuple[Callable[..., Any], dict[str, Any]]]:
-    """Return all public functions, constructors and methods, with the arguments of a valid call.
+    """Return all public functions, constructors and methods.
 
-    If there are no arguments for a required parameter, the fuzzer passes junk.
+    Each target has the arguments of a valid call. If there are no arguments for a required
+    parameter, the fuzzer passes junk.
     """
     quick, place = {"rtol": 1e-2, "engine": "scipy"}, known["place"]
     still = {"workers": 0, "progress": False}
@@ -348,7 +349,7 @@ def composed_functions(
         path.unlink(missing_ok=True)
         try:
             of.to_netcdf(path)
-        except Exception:  # xarray or netCDF4 cannot write the dataset
+        except Exception:  # xarray or netCDF4 cannot write the dataset.
             return None
         return use(path)
 
@@ -474,7 +475,7 @@ def alter_dataset(dataset: xr.Dataset, draw: random.Random) -> xr.Dataset:
         made[name].attrs[attribute] = draw.choice(junk_values())
         return made
     if way == 5:
-        # xarray itself rejects another shape for a coordinate of a dimension
+        # The library xarray rejects another shape for a coordinate of a dimension.
         name = draw.choice([name for name in names if name not in dims] or ["x"])
         return dataset.assign({name: draw.choice([5.0, ("q", [1.0])])})
     if way == 6:
@@ -516,7 +517,10 @@ def call_of(
 
 
 def is_clean(text: str) -> bool:
-    """Return True if a string contains no control characters except newline and tab."""
+    """Return True if a string contains no control characters.
+
+    Newlines and tabs are allowed.
+    """
     return all(c.isprintable() or c in "\n\t" for c in text)
 
 
@@ -530,7 +534,7 @@ def shown(answer: Any) -> Iterator[str]:
 
 
 def outcome(function: Callable[..., Any], args: Any, options: Any) -> tuple[str, str]:
-    """Call a function, and return the kind and the message of the outcome."""
+    """Call a function, and return the kind and message of the outcome."""
     texts: list[str] = []
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always")
@@ -559,6 +563,7 @@ def outcome(function: Callable[..., Any], args: Any, options: Any) -> tuple[str,
 
 
 def text_of(value: Any) -> str:
+    """Return the representation of a value, or its type name."""
     try:
         return repr(value)[:200]
     except Exception:
@@ -566,7 +571,10 @@ def text_of(value: Any) -> str:
 
 
 def make_calls(seed: int, first: int, count: int, step: int) -> None:
-    """Make the selected calls, and print a line of JSON before and after each call."""
+    """Make the selected calls.
+
+    The function prints a line of JSON before and after each call.
+    """
     lines = os.fdopen(os.dup(1), "w")
     os.dup2(os.open(os.devnull, os.O_WRONLY), 1)
     top = Path(tempfile.mkdtemp())
@@ -592,7 +600,10 @@ def make_calls(seed: int, first: int, count: int, step: int) -> None:
 
 
 def supervise_calls(seed: int, first: int, count: int, step: int, found: queue.Queue[Any]) -> None:
-    """Run the calls in a subprocess, and start a new subprocess after a hang or a crash."""
+    """Run the calls in a subprocess.
+
+    A new subprocess is started after a hang or a crash.
+    """
     number = first
     while number < count:
         words = [sys.executable, __file__, "--seed", str(seed), "--first", str(number)]
@@ -632,6 +643,7 @@ def supervise_calls(seed: int, first: int, count: int, step: int, found: queue.Q
 
 
 def main() -> int:
+    """Make the calls in subprocesses, and return the exit status."""
     parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--count", type=int, default=2000)

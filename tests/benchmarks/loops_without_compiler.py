@@ -1,9 +1,10 @@
-"""Engines without compiler beside a SciPy loop by hand, at the same tolerance of each step.
+"""Benchmark of the engines without compiler against a SciPy loop by hand.
 
     python tests/benchmarks/loops_without_compiler.py [rounds]
 
-The loop by hand is told where its stretches end, and finds no events. Times are the shortest of
-rounds in turns, of the processor alone; right-hand sides are counted.
+All integrators use the same tolerance per step. The loop by hand receives the ends of its
+stretches and detects no events. The times are the shortest CPU times of several alternating
+rounds. The number of right-hand-side evaluations is also printed.
 """
 
 from __future__ import annotations
@@ -29,7 +30,7 @@ ENGINES = "scipy", "python"
 
 
 class CountingIntegrator(hand_written_loops.DOP853):  # type: ignore[misc]
-    """SciPy's integrator, which counts all right-hand sides there are."""
+    """SciPy's integrator with a counter of right-hand-side evaluations."""
 
     count = 0
 
@@ -42,7 +43,7 @@ class CountingIntegrator(hand_written_loops.DOP853):  # type: ignore[misc]
 
 
 def evaluations_by_hand(run: Callable[[], Any]) -> int:
-    """Right-hand sides of the loop by hand."""
+    """Return the number of evaluations of the loop by hand."""
     CountingIntegrator.count = 0
     with mock.patch.object(hand_written_loops, "DOP853", CountingIntegrator):
         run()
@@ -50,7 +51,7 @@ def evaluations_by_hand(run: Callable[[], Any]) -> int:
 
 
 def evaluations_of_engines(problems: list[Problem]) -> int:
-    """Right-hand sides of the engines, which are the same for both."""
+    """Return the number of evaluations, which is equal for both engines."""
     counted = meter("scipy")
     with mock.patch.object(rsfstudy_engines, "meter", return_value=counted):
         RsfstudyEngine("scipy").run(problems, RTOL)
@@ -58,7 +59,7 @@ def evaluations_of_engines(problems: list[Problem]) -> int:
 
 
 def shortest_times(runs: dict[str, Callable[[], Any]], rounds: int) -> dict[str, float]:
-    """Times of some runs."""
+    """Return the shortest CPU time of each function, in s."""
     took = dict.fromkeys(runs, float("inf"))
     for _ in range(rounds):
         for name, run in runs.items():
@@ -69,7 +70,7 @@ def shortest_times(runs: dict[str, Callable[[], Any]], rounds: int) -> dict[str,
 
 
 def main(rounds: int) -> None:
-    """Print a table."""
+    """Print the table of times and evaluations."""
     judge, by_hand = HandNumba(), HandScipy()
     tolerance = Accuracy(RTOL).local_tolerance
     print(f"{'':20}{'by hand':>10}{'sides':>7}{'scipy':>8}{'python':>8}{'sides':>7}")

@@ -1,4 +1,4 @@
-"""Test of `rsfstudy.events` with synthetic records of known drops.
+"""Test of ``rsfstudy.events`` with synthetic records of known drops.
 
 Usage: ``python tests/benchmarks/record_events.py``. The script generates 30 records of each kind,
 with seeds from 0 to 29. For each kind, it prints a row of a table with
@@ -23,7 +23,7 @@ import rsfstudy
 
 
 class Catalogue(NamedTuple):
-    """Synthetic record, with the start times, durations and sizes of its drops."""
+    """Synthetic record with start times, durations and sizes of its drops."""
 
     time: np.ndarray
     stress: np.ndarray
@@ -76,6 +76,7 @@ def draw_record(
     Parameters
     ----------
     rng : numpy.random.Generator
+        Random number generator.
     time : ndarray, shape (samples,)
         Sampling times in s.
     size : (float, float), optional
@@ -92,6 +93,7 @@ def draw_record(
     Returns
     -------
     Catalogue
+        Record with its drops.
     """
     count = int((time[-1] - time[0]) / every) - 1
     jitter = rng.uniform(-0.15, 0.15, count) * every
@@ -99,7 +101,7 @@ def draw_record(
     durations, sizes = rng.uniform(*lasts, count), rng.uniform(*size, count)
     share = (time[:, None] - begins) / np.maximum(durations, 1e-9)
     fallen = (np.clip(share, 0.0, 1.0) * sizes).sum(axis=1)
-    # loading compensates the drops, and stops during each drop
+    # The loading compensates the drops, and stops during each drop.
     rests = np.clip(time[:, None] - begins, 0.0, durations).sum(axis=1)
     loading = sizes.sum() / (time[-1] - time[0] - durations.sum())
     white = rng.standard_normal(len(time) + 500)
@@ -115,7 +117,10 @@ def sudden_drops(rng: np.random.Generator, **options: float) -> Catalogue:
 
 
 def triggered_bursts(rng: np.random.Generator) -> Catalogue:
-    """Generate drops of 10 to 50 ms, sampled at 10 Hz with bursts at 1 kHz."""
+    """Generate drops of 10 to 50 ms.
+
+    The record is sampled at 10 Hz, with bursts at 1 kHz around the drops.
+    """
     state = rng.bit_generator.state
     slow = 0.1 * np.arange(2_000)
     begins = draw_record(rng, slow, lasts=(0.01, 0.05)).begins
@@ -152,17 +157,23 @@ def negative_stress(rng: np.random.Generator) -> Catalogue:
 
 
 def small_drops(rng: np.random.Generator) -> Catalogue:
-    """Generate sudden drops of 1.5 to 10 standard deviations of the noise."""
+    """Generate sudden drops of 1.5 to 10 standard deviations of noise."""
     return sudden_drops(rng, size=(0.03, 0.2), noise=0.02)  # type: ignore[arg-type]
 
 
 def correlated_noise(rng: np.random.Generator) -> Catalogue:
-    """Generate short drops in noise with a correlation of 0.5 between successive samples."""
+    """Generate short drops in correlated noise.
+
+    The correlation between successive samples is 0.5.
+    """
     return draw_record(rng, 0.02 * np.arange(10_000), lasts=(0.04, 0.12), correlation=0.5)
 
 
 def uneven_sampling(rng: np.random.Generator) -> Catalogue:
-    """Generate drops of up to 0.3 s with sampling times that vary by 30 % of the interval."""
+    """Generate drops of up to 0.3 s with uneven sampling.
+
+    The sampling times vary by 30 % of the sampling interval.
+    """
     time = 0.02 * (np.arange(10_000) + rng.uniform(-0.3, 0.3, 10_000))
     return draw_record(rng, time, lasts=(0.0, 0.3))
 
@@ -181,7 +192,7 @@ KINDS: dict[str, Callable[[np.random.Generator], Catalogue]] = {
 
 
 def score_record(catalogue: Catalogue) -> Score:
-    """Compare the events that `rsfstudy.events` finds with the drops of a record."""
+    """Compare the events of ``rsfstudy.events`` with the drops of a record."""
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
         found = rsfstudy.events(time=catalogue.time, shear_stress=catalogue.stress)

@@ -1,9 +1,12 @@
-"""``python tests/benchmarks/referee_answers.py [NUMBER ...]`` writes the answers of the referee,
-with the digits that two ways agree on (a quarter of an hour for all).
+"""Answers of the referee, with the digits on which two methods agree.
 
-The first way, here, solves the equations as the problems state them, in SI units: spring stress,
-theta in s and slip, slip rate by the friction law (or the root of it and damping), with 30 digits
-(mpmath), of order 20. The second is `second_referee_way.py`.
+Run ``python tests/benchmarks/referee_answers.py [NUMBER ...]`` to write the answers. All
+answers take a quarter of an hour.
+
+The first method, in this module, solves the equations of the problem statements in SI
+units. The unknowns are spring stress, theta in s, and slip. The slip rate follows from the
+friction law, or from a root search if there is radiation damping. The integrator has order
+20 and works with 30 digits (mpmath). The second method is in ``second_referee_way.py``.
 """
 
 from __future__ import annotations
@@ -37,7 +40,11 @@ from second_referee_way import (
 
 
 class StatedEquations:
-    """Unknowns tau, thetas, slip, phi and p, and slip rate where there is mass, in SI units."""
+    """Equations of the problem statements, in SI units.
+
+    The unknowns are tau, the state variables theta, slip, phi and p, and the slip rate if
+    the slider has a mass.
+    """
 
     def __init__(self, problem: dict[str, Any]) -> None:
         self.s = s = ProblemSlider(problem, mpmath.mp, lambda x: mpmath.mpf(str(x)))
@@ -49,6 +56,7 @@ class StatedEquations:
         self.last = mpmath.mpf(0)
 
     def begin(self) -> State:
+        """Return the initial unknowns."""
         s = self.s
         rate, thetas = s.initial()
         self.last = mpmath.log(rate / s.star)
@@ -88,7 +96,7 @@ class StatedEquations:
         return s.star * mpmath.exp(x)
 
     def stress(self, t: Any, tau: Any, p: Any) -> tuple[Any, Any]:
-        """Effective normal stress, and the rate of what is imposed of it."""
+        """Return the effective normal stress, and its imposed rate."""
         s = self.s
         angle = 2 * mpmath.pi / s.turn
         sigma = self.imposed + s.cot * (tau - s.mu * s.sigma) - p
@@ -98,6 +106,7 @@ class StatedEquations:
         return sigma + wave, s.amplitude * angle * mpmath.cos(angle * t)
 
     def now(self, t: Any, y: State) -> dict[str, Any]:
+        """Return the reported quantities in SI units."""
         s, count = self.s, len(self.s.b)
         tau, thetas, slip, p = y[0], y[1 : 1 + count], y[1 + count], y[3 + count]
         sigma, imposed = self.stress(t, tau, p)
@@ -107,6 +116,7 @@ class StatedEquations:
         return told | {"normal_stress": sigma, "pore_pressure": p, "imposed": imposed}
 
     def rates(self, t: Any, y: State) -> State:
+        """Return the rates of the unknowns."""
         s, count = self.s, len(self.s.b)
         now, thetas = self.now(t, y), y[1 : 1 + count]
         v, sigma = now["slip_rate"], now["normal_stress"]
@@ -128,7 +138,7 @@ class StatedEquations:
         return [loading, *evolving, v, opening, draining, faster]
 
     def growth(self, t: Any, y: State) -> Any:
-        """d ln V/dt; at constant normal stress."""
+        """Return d(ln V)/dt at constant normal stress."""
         s, count = self.s, len(self.s.b)
         if s.mass:
             return self.rates(t, y)[-1] / y[-1]
@@ -138,7 +148,7 @@ class StatedEquations:
         return (slopes[0] - falls) / (s.a * s.sigma + s.eta * v)
 
     def enter(self, y: State, velocity: Any, sigma: Any) -> State:
-        """The state as a segment of loading begins."""
+        """Return the unknowns at the beginning of a segment of loading."""
         s, count = self.s, len(self.s.b)
         ratio, self.load, self.imposed = self.imposed / sigma, velocity, sigma
         parts = zip(y[1 : 1 + count], s.b, s.shares, strict=True)
@@ -147,7 +157,10 @@ class StatedEquations:
 
 
 def two_state_closed_form(problem: dict[str, Any]) -> Numbers:
-    """The root of a quadratic equation: Gu et al. (1984), for the slip law with two states."""
+    """Return the critical stiffness for the slip law with two states.
+
+    The stiffness is the root of a quadratic equation (Gu et al. 1984).
+    """
     s = StatedEquations(problem).s
     (b_1, b_2), rho = (b / s.a for b in s.b), s.lengths[0] / s.lengths[1]
     half = b_1 - 1 + rho * (2 * b_1 + (b_2 - 1) * (2 + rho))
@@ -157,7 +170,10 @@ def two_state_closed_form(problem: dict[str, Any]) -> Numbers:
 
 
 def growth_closed_form(problem: dict[str, Any]) -> Numbers:
-    """Of a quadratic equation, with stress over sigma, time in D_c/V_*."""
+    """Return the growth rate as the root of a quadratic equation.
+
+    The equation is scaled by sigma and D_c/V_*.
+    """
     s = StatedEquations(problem).s
     b, scale = s.b[0], s.sigma / s.lengths[0]
     eta, k = s.eta * s.star / s.sigma, s.k / scale
@@ -169,7 +185,7 @@ def growth_closed_form(problem: dict[str, Any]) -> Numbers:
 
 
 def displacement_excess(problem: dict[str, Any]) -> Callable[[Any], Any]:
-    """``displacement -> excess``, as stated."""
+    """Return the function ``displacement -> excess`` for the equations."""
 
     def excess(displacement: Any) -> Any:
         way = StatedEquations(problem)
@@ -180,7 +196,7 @@ def displacement_excess(problem: dict[str, Any]) -> Callable[[Any], Any]:
 
 
 def solve_by_secant(excess: Callable[[Any], Any], near: Any) -> Any:
-    """Where an excess vanishes, from close by."""
+    """Return the root of a function near a starting value."""
     first, second = near, near * (1 + mpmath.mpf("1e-9"))
     at_first, at_second = excess(first), excess(second)
     for _ in range(12):
@@ -192,7 +208,7 @@ def solve_by_secant(excess: Callable[[Any], Any], near: Any) -> Any:
 
 
 def first_way_numbers(problem: dict[str, Any]) -> Numbers:
-    """Numbers by closed forms, and by the equations as stated."""
+    """Return numbers from closed forms, or from the stated equations."""
     (name, *_others) = problem["quantities"]
     if name == "critical_stiffness":
         two = problem["law"] == "two_slip_states"
@@ -208,7 +224,7 @@ def first_way_numbers(problem: dict[str, Any]) -> Numbers:
 
 
 def first_way_rows(problem: dict[str, Any]) -> list[dict[str, Any]]:
-    """Rows of an answer, with 30 digits."""
+    """Return the rows of an answer, with 30 digits."""
     return (
         [first_way_numbers(problem)]
         if problem["report"] == "numbers"
@@ -217,7 +233,10 @@ def first_way_rows(problem: dict[str, Any]) -> list[dict[str, Any]]:
 
 
 def format_number(name: str, value: Any, problem: dict[str, Any]) -> str:
-    """A number with as many digits as the problem has; what says which row it is, as it is."""
+    """Return a number with the digits of the problem.
+
+    The first column identifies the row and has 12 digits.
+    """
     if name == columns(problem)[0] and problem["report"] != "numbers":
         return f"{float(value):.12g}"
     if value == 0:
@@ -227,6 +246,7 @@ def format_number(name: str, value: Any, problem: dict[str, Any]) -> str:
 
 
 def write_answers(path: Path) -> None:
+    """Write the answers to a problem, and print digits that differ."""
     problem = read_stated_problem(path)
     names = columns(problem)
     first, second = first_way_rows(problem), second_way_rows(problem)

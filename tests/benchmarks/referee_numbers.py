@@ -1,4 +1,7 @@
-"""Numbers that the problems of the referee ask for, and rows of answers; see `referee_ways`."""
+"""Numbers and rows of the answers of the referee.
+
+The module ``second_referee_way`` contains the equations of the second method.
+"""
 
 from __future__ import annotations
 
@@ -25,8 +28,10 @@ UNITS = {
 
 
 def two_states_by_oscillation(problem: dict[str, Any]) -> Numbers:
-    """The stiffness at which an oscillation neither grows nor decays: p = i q in the linearised
-    equations ``k/(sigma p) V + a + sum_i of b_i times -(V/L_i)/(p + V/L_i) = 0``.
+    """Return the stiffness at which an oscillation neither grows nor decays.
+
+    The frequency is the root for p = i q of the linearised equation ``k/(sigma p) V + a +
+    sum_i of b_i times -(V/L_i)/(p + V/L_i) = 0``.
     """
     s = LogarithmicEquations(problem).s
 
@@ -40,7 +45,10 @@ def two_states_by_oscillation(problem: dict[str, Any]) -> Numbers:
 
 
 def growth_by_eigenvalues(problem: dict[str, Any]) -> Numbers:
-    """Of the equations as stated, in tau and theta, linearised by hand."""
+    """Return the growth rate from eigenvalues of the stated equations.
+
+    The equations in tau and theta are linearised by hand.
+    """
     s = LogarithmicEquations(problem).s
     theta, length, b = s.theta_star[0], s.lengths[0], s.b[0]
 
@@ -66,7 +74,7 @@ def growth_by_eigenvalues(problem: dict[str, Any]) -> Numbers:
 
 
 def peak_excess(way: Any, begin: list[Any]) -> Any:
-    """ln of the first maximum of slip rate over the one that counts as unstable."""
+    """Return the logarithm of the first peak over the unstable slip rate."""
     s, zero = way.s, way.s.number(0)
     unit, unstable = getattr(way, "unit", 1), s.number(s.given["V_unstable"])
     walk = way.steps.path(way.rates, zero, begin, s.number("1e9"), s.number("1e-3") / unit)
@@ -82,7 +90,7 @@ def peak_excess(way: Any, begin: list[Any]) -> Any:
 
 
 def velocity_excess(kind: type, problem: dict[str, Any]) -> Callable[[Any], Any]:
-    """``V_0 -> excess`` by one of the two ways."""
+    """Return the function ``V_0 -> excess`` for one of the two methods."""
 
     def excess(velocity: Any) -> Any:
         way = kind(problem)
@@ -93,9 +101,11 @@ def velocity_excess(kind: type, problem: dict[str, Any]) -> Callable[[Any], Any]
 
 
 def displacement_by_quadrature(problem: dict[str, Any]) -> float:
-    """With the load point at rest ``du/d(slip) = h(u) (1 - b/a) - K/a`` is an equation of u =
-    ln(theta V/2 D_c) alone, h = -sinh(u), and ``d ln V/d(slip) = -K/a - (b/a) h``: slip rate is
-    highest where h = -K/b.
+    """Return the critical displacement, from a quadrature.
+
+    If the load point is at rest, ``du/d(slip) = h(u) (1 - b/a) - K/a`` is an equation of u
+    = ln(theta V/2 D_c) only, with h = -sinh(u). The slip rate follows ``d ln V/d(slip) =
+    -K/a - (b/a) h`` and has its maximum at h = -K/b.
     """
     way = LogarithmicEquations(problem)
     s, k = way.s, way.k
@@ -106,7 +116,7 @@ def displacement_by_quadrature(problem: dict[str, Any]) -> float:
 
     def excess(step: float) -> float:
         begin = k * step / a
-        # evenly in the logarithm of how far u is from where it would rest
+        # The pieces are equal in the logarithm of the distance between u and its resting value.
         far, near = math.log(rest - end), math.log(rest - begin)
         pieces = np.linspace(near, far, 21)
         total = begin
@@ -127,7 +137,10 @@ def displacement_by_quadrature(problem: dict[str, Any]) -> float:
 
 
 def damped_cycle(kind: type, problem: dict[str, Any], closes: float) -> Numbers:
-    """Maxima and minima of slip rate of successive events, until they repeat."""
+    """Return the interval and extrema of slip rate of a limit cycle.
+
+    The motion is integrated until successive events repeat.
+    """
     way = kind(problem)
     s, unit = way.s, getattr(way, "unit", 1)
     begin = way.enter(way.begin(), s.number(s.given["load_velocity"]), s.sigma)
@@ -153,7 +166,7 @@ def damped_cycle(kind: type, problem: dict[str, Any], closes: float) -> Numbers:
 
 
 def second_way_numbers(problem: dict[str, Any]) -> Numbers:
-    """The same by other formulations, in double precision."""
+    """Return the numbers from other formulations, in double precision."""
     (name, *_others) = problem["quantities"]
     if name == "critical_stiffness":
         two = problem["law"] == "two_slip_states"
@@ -174,7 +187,7 @@ def second_way_numbers(problem: dict[str, Any]) -> Numbers:
 
 
 def second_way_rows(problem: dict[str, Any]) -> list[dict[str, Any]]:
-    """Rows of an answer, in double precision."""
+    """Return the rows of an answer, in double precision."""
     return (
         [second_way_numbers(problem)]
         if problem["report"] == "numbers"
@@ -183,5 +196,6 @@ def second_way_rows(problem: dict[str, Any]) -> list[dict[str, Any]]:
 
 
 def columns(problem: dict[str, Any]) -> list[str]:
+    """Return the column names of an answer."""
     key = {"series": ["time"], "peaks": ["event"], "numbers": []}[problem["report"]]
     return [*key, *problem["quantities"]]

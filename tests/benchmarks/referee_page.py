@@ -1,4 +1,7 @@
-"""``python tests/benchmarks/referee_page.py`` writes what the page says of each problem."""
+"""Generator of the problem descriptions on the referee page.
+
+Run ``python tests/benchmarks/referee_page.py`` to update the page.
+"""
 
 from __future__ import annotations
 
@@ -12,7 +15,7 @@ PROBLEMS_MARKER = "<!-- problems: written by tests/benchmarks/referee_page.py --
 
 
 def problem_section(number: int, problem: dict[str, Any]) -> str:
-    """What a problem is, as a part of the page."""
+    """Return the section of a problem."""
     initial = problem.get("initial")
     begins = [f"{n}(0) = {_plain(value)}" for n, value in (initial or {}).items()]
     lines = [
@@ -32,7 +35,7 @@ def problem_section(number: int, problem: dict[str, Any]) -> str:
 
 
 def _table(parameters: dict[str, Any]) -> list[str]:
-    """Lines of a table with a column for each parameter."""
+    """Return the lines of a table with one column per parameter."""
     cells = [[f"`{name}`" for name in parameters], ["---"] * len(parameters)]
     cells.append([_plain(value) for value in parameters.values()])
     return [f"| {' | '.join(row)} |" for row in cells]
@@ -60,7 +63,7 @@ def _report(problem: dict[str, Any]) -> str:
 
 
 def all_sections() -> str:
-    """All of them."""
+    """Return the sections of all problems."""
     files = sorted(PROBLEMS.glob("*.toml"))
     return "\n".join(
         problem_section(int(file.name[:2]), read_stated_problem(file)) for file in files

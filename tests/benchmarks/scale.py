@@ -1,8 +1,9 @@
-"""What a cell costs beyond its physics, measured: ``python tests/benchmarks/scale.py [--million]``.
+"""Benchmark of the overhead per cell: run ``scale.py [--million]``.
 
-Trivial cells at 10^3, 10^4, 10^5 and perhaps 10^6, with both engines, each in a process of its own:
-time a cell by phases, CPU time of all processes, driver memory, bytes on disk. Then a real lattice
-on one worker and on two, in turns.
+Trivial cells are computed in studies of 10^3, 10^4, 10^5 and, with ``--million``, 10^6
+cells, with both engines, each in a new process. The table contains the time per cell of
+each phase, the CPU time of all processes, the memory of the driver and the bytes on disk. A
+real lattice is then computed with one worker and with two workers, alternately.
 """
 
 from __future__ import annotations
@@ -35,7 +36,7 @@ from rsfstudy.status import Status
 
 @dataclass(frozen=True)
 class TrivialMeasure(Measure):
-    """Gives b/a, at once: what cells cost beyond their physics is all they cost."""
+    """Measure that returns b/a without computing time."""
 
     name: ClassVar[str] = "free"
     primary_output: ClassVar[str] = "total"
@@ -43,13 +44,13 @@ class TrivialMeasure(Measure):
     typical_work: ClassVar[int] = 1
 
     def compute(self, scene: Scene, accuracy: Accuracy, meter: WorkMeter) -> Outcome:
-        """One right-hand side."""
+        """Return b/a, and charge one right-hand-side evaluation."""
         meter.charge("any", 1)
         return Outcome(Status.OK, {"total": scene.b_over_a})
 
 
 def lattice(cells: int) -> Study:
-    """Ten rows of cells that take no time."""
+    """Return a study of ten rows of trivial cells."""
     return Study(
         name="scale",
         title="Cells that cost nothing",
@@ -63,11 +64,11 @@ def lattice(cells: int) -> Study:
 
 
 def peak_memory() -> int:
-    """Largest memory of this process so far, in bytes."""
+    """Return the peak memory of this process in bytes."""
     return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024
 
 
-#: Steps of a run, by the methods that take them.
+#: Phases of a run, by the methods that execute them.
 PHASE_OF_METHOD = {
     "__init__": "planning",
     "_compute_missing": "computing",
@@ -77,7 +78,7 @@ PHASE_OF_METHOD = {
 
 @contextlib.contextmanager
 def time_phases(seconds: dict[str, float]) -> Iterator[None]:
-    """Note how long each phase of a run takes."""
+    """Measure the time of each phase of a run."""
 
     def noting(method: Callable[..., Any], phase: str) -> Callable[..., Any]:
         def noted(*words: Any, **options: Any) -> Any:
@@ -97,7 +98,7 @@ def time_phases(seconds: dict[str, float]) -> Iterator[None]:
 
 
 def cpu_time() -> float:
-    """CPU time in s of this process and of those it has started and seen end."""
+    """Return the CPU time in s of this process and its finished children."""
     used = [resource.getrusage(who) for who in (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN)]
     return sum(each.ru_utime + each.ru_stime for each in used)
 
@@ -105,7 +106,10 @@ def cpu_time() -> float:
 def measure_run(
     cells: int, workers: int, format: str = "netcdf", engine: str = "scipy"
 ) -> dict[str, float]:
-    """One run, in this process; times in us a cell, without what the measure took itself."""
+    """Run a study in this process and return times in us per cell.
+
+    The phase times include the measure. The time ``beyond`` excludes it.
+    """
     options = {"workers": workers, "progress": False, "format": format, "engine": engine}
     with tempfile.TemporaryDirectory() as output:
         rsfstudy.run(lattice(100), output=output, **options)
@@ -128,7 +132,7 @@ def measure_run(
 
 
 def measure_in_subprocess(*words: int | str) -> dict[str, float]:
-    """What `measure_run` gives for these arguments, in a process of its own."""
+    """Return the result of ``measure_run`` from a new process."""
     command = [sys.executable, __file__, *map(str, words)]
     said = subprocess.run(command, capture_output=True, text=True, check=True)
     found: dict[str, float] = json.loads(said.stdout)
@@ -136,7 +140,10 @@ def measure_in_subprocess(*words: int | str) -> dict[str, float]:
 
 
 def parallel_speedup(repeats: int = 3) -> list[float]:
-    """Time on one worker over time on two, for a lattice of 4,500 rate steps."""
+    """Return the time with one worker divided by the time with two workers.
+
+    The study is a lattice of 4,500 velocity steps.
+    """
     ratios = []
     for _ in range(repeats):
         times = []
@@ -167,7 +174,7 @@ COLUMNS = {
 
 
 def main(largest: int) -> None:
-    """Print the table of studies/pages/running.md."""
+    """Print the table of ``studies/pages/running.md``."""
     print(f"| cells | engine | workers | {' | '.join(COLUMNS.values())} |")
     print("|---" * (3 + len(COLUMNS)) + "|")
     sizes = [size for size in (10**3, 10**4, 10**5, 10**6) if size <= largest]

@@ -1,8 +1,9 @@
-"""Answers to the problems of the referee by a way that shares neither equations nor arithmetic with
-that by which they are written (`referee_answers.py`), and nothing of the package.
+"""Second method for the answers of the referee, independent of the package.
 
-It differentiates friction: ln(V/V_*), logarithms of theta, stress deviation and slip,
-dimensionless, in double precision, by extrapolated modified midpoint steps (Gragg, Bulirsch and
+The method shares neither equations nor arithmetic with the first method in
+``referee_answers.py``. The friction law is differentiated. The unknowns are ln(V/V_*), the
+logarithms of theta, the stress deviation and the slip, all dimensionless and in double
+precision. The integrator uses extrapolated modified midpoint steps (Gragg, Bulirsch and
 Stoer) of order 14.
 """
 
@@ -24,11 +25,12 @@ Rates = Callable[[Any, State], State]
 
 
 def read_stated_problem(path: Path) -> dict[str, Any]:
+    """Return the contents of a problem file."""
     return tomllib.loads(path.read_text())
 
 
 def strip_units(value: Any) -> Any:
-    """A number, without the units that are SI in every problem."""
+    """Return a number without its unit, which is always an SI unit."""
     return value.split()[0] if isinstance(value, str) else value
 
 
@@ -36,14 +38,17 @@ def strip_units(value: Any) -> Any:
 
 
 class ExtrapolatedSteps:
-    """Extrapolated midpoint steps of adaptive length, in any arithmetic."""
+    """Extrapolated midpoint steps of adaptive size, in any arithmetic."""
 
     def __init__(self, order: int, tolerance: Any, scales: Sequence[Any]) -> None:
         self.sequence = tuple(range(2, order + 1, 2))
         self.tolerance, self.scales = tolerance, scales
 
     def step(self, rates: Rates, t: Any, y: State, h: Any, first: State) -> tuple[State, Any]:
-        """The state after a step, and its error over the scales; increments keep more digits."""
+        """Return the state after a step, and its scaled error.
+
+        The sums use increments, because increments keep more digits.
+        """
         table: list[State] = []
 
         def slope(i: Any, moved: State) -> State:
@@ -70,7 +75,10 @@ class ExtrapolatedSteps:
         return after, max(abs(a - b) / c for a, b, c in off)
 
     def path(self, rates: Rates, t: Any, y: State, until: Any, h: Any) -> Iterator[tuple[Any, ...]]:
-        """Steps up to a time: time and state before, and the length; the last is (time, state)."""
+        """Yield the time, the state and the size of each step up to a time.
+
+        The last item contains the final time and state.
+        """
         grows = 1.0 / (2 * len(self.sequence) - 1)
         while t < until:
             first = rates(t, y)
@@ -80,7 +88,7 @@ class ExtrapolatedSteps:
                 try:
                     after, error = self.step(rates, t, y, taken, first)
                     size = float(error / self.tolerance)
-                except (ArithmeticError, ValueError, TypeError):  # beyond all numbers
+                except (ArithmeticError, ValueError, TypeError):  # The trial step overflows.
                     size = math.inf
                 if size <= 1.0:
                     break
@@ -91,6 +99,7 @@ class ExtrapolatedSteps:
         yield t, y, None
 
     def advance_to(self, rates: Rates, t: Any, y: State, until: Any) -> State:
+        """Return the state at a later time."""
         *_others, (_t, y, _h) = self.path(rates, t, y, until, until - t)
         return y
 
@@ -99,7 +108,10 @@ class ExtrapolatedSteps:
 
 
 class ProblemSlider:
-    """The numbers of a problem in an arithmetic: `number` makes them, `m` has exp and log."""
+    """Parameters of a problem in a given arithmetic.
+
+    The function ``number`` creates numbers, and the module ``m`` contains exp and log.
+    """
 
     def __init__(self, problem: dict[str, Any], m: Any, number: Callable[[Any], Any]) -> None:
         self.m, self.problem, self.law = m, problem, problem["law"]
@@ -131,7 +143,7 @@ class ProblemSlider:
         self.number, self.given = number, given
 
     def evolution(self, velocity: Any, theta: Any, length: Any, healing: Any) -> Any:
-        """dtheta/dt as the problems have it."""
+        """Return dtheta/dt as in the problem statements."""
         omega, m = velocity * theta / length, self.m
         if self.law in ("slowness", "two_slowness_states"):
             return 1 - omega
@@ -144,7 +156,7 @@ class ProblemSlider:
         return healing - omega * m.log(omega)
 
     def segments(self) -> list[tuple[Any, Any, Any]]:
-        """Beginning, load point velocity and normal stress of each segment of loading."""
+        """Return start, velocity and normal stress of each loading segment."""
         found, begins, sigma = [], self.number(0), self.sigma
         for segment in self.problem.get("loading") or [{"velocity": self.star}]:
             sigma = self.number(strip_units(segment.get("normal_stress", sigma)))
@@ -153,7 +165,7 @@ class ProblemSlider:
         return found
 
     def initial(self) -> tuple[Any, list[Any]]:
-        """Slip rate and thetas at the beginning."""
+        """Return the initial slip rate and state variables."""
         stated = self.problem.get("initial")
         if not stated:
             return self.star, list(self.theta_star)
@@ -164,7 +176,7 @@ class ProblemSlider:
 
 
 def composite_rest_state(healing: Any, m: Any) -> Any:
-    """u with u exp(u) = healing, by Newton's method."""
+    """Return the solution of u exp(u) = healing, by Newton's method."""
     u = healing / 2
     for _ in range(60):
         u = u - (u * m.exp(u) - healing) / (m.exp(u) * (1 + u))
@@ -175,8 +187,10 @@ def composite_rest_state(healing: Any, m: Any) -> Any:
 
 
 class LogarithmicEquations:
-    """Unknowns ln(V/V_*), Theta of each state, spring stress deviation over sigma_*, slip in D_c,
-    and phi and p over sigma_*; time in D_c/V_*.
+    """Equations in logarithmic variables.
+
+    The unknowns are ln(V/V_*), Theta of each state, the deviation of spring stress over
+    sigma_*, slip in D_c, and phi and p over sigma_*. Time is in D_c/V_*.
     """
 
     def __init__(self, problem: dict[str, Any]) -> None:
@@ -190,6 +204,7 @@ class LogarithmicEquations:
         self.rest = math.log(s.theta_star[0] * s.star / s.lengths[0])
 
     def begin(self) -> State:
+        """Return the initial unknowns."""
         s = self.s
         rate, thetas = s.initial()
         parts = zip(s.b, thetas, s.theta_star, strict=True)
@@ -205,7 +220,11 @@ class LogarithmicEquations:
         return s.mu + s.a * x + state
 
     def _evolution(self, u: float, v: float) -> float:
-        """dTheta/d(slip) over b, with u = ln(theta V/D_c), or (2 D_c)."""
+        """Return dTheta/d(slip) over b.
+
+        The argument u is ln(theta V/D_c), or ln(theta V/(2 D_c)) for the law of Perrin,
+        Rice and Zheng.
+        """
         s = self.s
         if s.law in ("slip", "two_slip_states"):
             return -u
@@ -227,6 +246,7 @@ class LogarithmicEquations:
         return sigma + size * math.sin(angle * t), size * angle * math.cos(angle * t)
 
     def rates(self, t: float, y: State) -> State:
+        """Return the rates of the unknowns."""
         s, count = self.s, len(self.s.b)
         x, states, f, phi, p = y[0], y[1 : 1 + count], y[1 + count], y[3 + count], y[4 + count]
         v = math.exp(x)
@@ -246,13 +266,16 @@ class LogarithmicEquations:
         left = loading - mu * (pressed - draining) - sigma * steep * sum(evolving)
         growth = left / (sigma * steep * s.a + self.eta * v)
         if s.mass:
-            growth = (f - s.a * x - sum(states)) / (self.mass * v)  # at constant normal stress
+            # This equation assumes constant normal stress.
+            growth = (f - s.a * x - sum(states)) / (self.mass * v)
         return [growth, *evolving, loading, v, opening, draining]
 
     def growth(self, t: float, y: State) -> float:
+        """Return d(ln V)/dt."""
         return self.rates(t, y)[0]
 
     def now(self, t: float, y: State) -> dict[str, float]:
+        """Return the reported quantities in SI units."""
         s, count = self.s, len(self.s.b)
         parts = zip(s.theta_star, y[1 : 1 + count], s.b, strict=True)
         thetas = [star * math.exp(state / b) for star, state, b in parts]
@@ -263,12 +286,13 @@ class LogarithmicEquations:
         return told | {"normal_stress": sigma, "pore_pressure": s.sigma * y[4 + count]}
 
     def enter(self, y: State, velocity: float, sigma: float) -> State:
+        """Return the unknowns at the beginning of a segment of loading."""
         s, count = self.s, len(self.s.b)
         ratio = sigma / s.sigma / self.imposed
         self.load, self.imposed = velocity / s.star, sigma / s.sigma
         parts = zip(y[1 : 1 + count], s.shares, strict=True)
         states = [state - share * s.alpha * math.log(ratio) for state, share in parts]
-        # the slip rate with which friction carries the same stress
+        # The slip rate at which friction balances the same stress.
         before = self._friction(y[0], sum(y[1 : 1 + count]))
         x = y[0] if ratio == 1.0 else (before / ratio - s.mu - sum(states)) / s.a
         return [x, *states, *y[1 + count :]]
@@ -278,7 +302,10 @@ class LogarithmicEquations:
 
 
 def time_series(way: Any, unit: Any) -> list[dict[str, Any]]:
-    """What a way tells at the times of a problem; `unit` is its unit of time in s."""
+    """Return the rows of a method at the times of a problem.
+
+    The argument ``unit`` is the unit of time of the method in s.
+    """
     s, t, y, rows = way.s, way.s.number(0), way.begin(), []
     segments = s.segments()
     ends = [begins for begins, *_others in segments[1:]]
@@ -297,7 +324,10 @@ def time_series(way: Any, unit: Any) -> list[dict[str, Any]]:
 
 
 def peaks(way: Any, unit: Any) -> list[dict[str, Any]]:
-    """Maxima of slip rate, located by the secant method on the length of a step."""
+    """Return the maxima of slip rate.
+
+    The secant method locates each maximum within a step.
+    """
     s, y, rows = way.s, way.begin(), []
     ((_begins, velocity, sigma),) = s.segments()
     y = way.enter(y, velocity, sigma)
@@ -315,7 +345,10 @@ def peaks(way: Any, unit: Any) -> list[dict[str, Any]]:
 
 
 def locate_extremum(way: Any, t: Any, y: State, h: Any, sign: int = 1) -> tuple[Any, State]:
-    """Where in a step slip rate is highest, or lowest: part of the step, and the state."""
+    """Return the position of a maximum or minimum of slip rate in a step.
+
+    The second return value is the state there.
+    """
     first = way.rates(t, y)
     low, high, side = h * 0, h, 0
     at_low = sign * way.growth(t, y)
@@ -336,14 +369,17 @@ def locate_extremum(way: Any, t: Any, y: State, h: Any, sign: int = 1) -> tuple[
 
 
 def rows_by_way(way: type, problem: dict[str, Any]) -> list[dict[str, Any]]:
-    """Rows of an answer by one of the two ways."""
+    """Return the rows of an answer for one of the two methods."""
     made = way(problem)
     unit = getattr(made, "unit", 1)
     return (time_series if problem["report"] == "series" else peaks)(made, unit)
 
 
 def rounds_to(text: str, value: Any) -> bool:
-    """True if a number rounds to a text, or would if it were off by a tenth of the last digit."""
+    """Return True if a number rounds to a text.
+
+    The number may be off by a tenth of the last digit.
+    """
     mantissa, _, exponent = text.partition("e")
     place = mpmath.mpf(10) ** (int(exponent or 0) - len(mantissa.partition(".")[2]))
     return bool(abs(mpmath.mpf(value) - mpmath.mpf(text)) <= mpmath.mpf("0.6") * place)

@@ -1,4 +1,4 @@
-"""A loading history, and a measure that reads it: the load point is held, then moves on."""
+"""A user-defined loading that holds the load point, and a measure of it."""
 
 from dataclasses import dataclass
 

@@ -1,4 +1,4 @@
-"""A measure in seconds: how long loading takes to speed slip up by a factor of e."""
+"""A measure in seconds: the e-folding time of the slip rate under loading."""
 
 from dataclasses import dataclass
 from typing import ClassVar

@@ -1,4 +1,7 @@
-"""A stepper: the classical Runge-Kutta method of order four, two halves of a step for its error."""
+"""A user-defined stepper: the classical Runge-Kutta method.
+
+Step doubling provides the error estimate.
+"""
 
 from __future__ import annotations
 
@@ -45,7 +48,7 @@ class OrderFour(Stepper):
         return length
 
     def interpolate_unknowns(self, motion, space, clock):
-        """By the cubic with the values and rates of both ends."""
+        """Interpolate with a cubic Hermite polynomial."""
         n, part = space.unknown_count, (clock - motion.clock) / motion.step_length
         y, new, first, last = (
             np.array(x[:n]) for x in (space.y, space.y_end, space.rates, space.rates_at_end)
@@ -63,7 +66,10 @@ class OrderFour(Stepper):
         space.y_end[:n], space.rates_at_end[:n] = new, self.rates(new)
 
     def halves(self, y, first, length):
-        """The end of two halves of a step, of order five, and the error of order four."""
+        """Return the result of two half steps, and the error estimate.
+
+        The result has order five, and the error estimate has order four.
+        """
         middle = self.step(y, first, 0.5 * length)
         twice = self.step(middle, self.rates(middle), 0.5 * length)
         error = (twice - self.step(y, first, length)) / 15.0

@@ -1,4 +1,4 @@
-"""A figure: a function that draws a dataset."""
+"""A user-defined figure: a function that plots a dataset."""
 
 from rsfstudy import Axis, Scene, Study
 from rsfstudy.measures import LinearStability

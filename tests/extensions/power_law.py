@@ -1,4 +1,7 @@
-"""A reduction: the exponent of a power law between the ends of an axis."""
+"""A user-defined reduction: the exponent of a power law along an axis.
+
+The exponent is computed from the first and the last point of the axis.
+"""
 
 from dataclasses import dataclass
 from typing import ClassVar

@@ -1,5 +1,7 @@
-"""A law with a number of its own: away from steady sliding its evolution saturates, the closer to
-it the larger that number; at 0 it is the slip law.
+"""A user-defined law with one parameter, whose state evolution saturates.
+
+A larger ``sharpness`` moves the saturation closer to steady sliding. A sharpness of 0 is
+the slip law.
 """
 
 import math

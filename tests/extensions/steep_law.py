@@ -1,5 +1,8 @@
-"""A law of state evolution that is symmetric about steady sliding, and steep away from it:
-``dTheta = -(b/2) sinh[2 (Theta/b + ln V)]`` per slip in D_c.
+"""A user-defined law that is steep away from steady sliding.
+
+The law is symmetric about steady sliding.
+
+The state evolves by ``dTheta = -(b/2) sinh[2 (Theta/b + ln V)]`` per slip of D_c.
 """
 
 import math
@@ -9,7 +12,7 @@ from rsfstudy import Axis, Scene, Study
 from rsfstudy.measures import CriticalStep
 from rsfstudy.parts import LAW, Law
 
-#: Only trial steps, which the integrator rejects, go further from steady sliding.
+#: Only trial steps that the integrator rejects are further away from steady sliding.
 FARTHEST = 300.0
 
 

@@ -1,7 +1,10 @@
-"""A state that stress wears away (Nagata et al. 2012), on top of the slowness law.
+"""The slowness law with a state variable that shear stress reduces.
 
-What evolves by the law alone is ``Psi = Theta + c (mu - mu_*)``: the state effect states that shift
-and its slope. (At constant normal stress the field `stress_dependence` of every law does the same.)
+The stress dependence follows Nagata et al. (2012).
+
+The variable ``Psi = Theta + c (mu - mu_*)`` evolves by the slowness law, and the state
+effect defines the shift between Psi and Theta, and the slope of the shift. At constant
+normal stress, the field ``stress_dependence`` of every law has the same effect.
 """
 
 from dataclasses import dataclass

@@ -31,7 +31,10 @@ def check_function_never_raises(
         if instruction.opname == "RAISE_VARARGS":
             code = function.__code__
             where = f"{function.__name__}, {code.co_filename}, line {code.co_firstlineno}"
-            rule = f"cannot compile {_describe_parts_defined_in(code.co_filename)} ({where}): it raises an error"
+            rule = (
+                f"cannot compile {_describe_parts_defined_in(code.co_filename)} ({where}): it "
+                "raises an error"
+            )
             remedy = "Return math.nan instead, which ends the motion; or use the engine scipy."
             raise InvalidValue("engine", "compiled", rule, remedy=remedy)
     named = (function.__globals__.get(name) for name in function.__code__.co_names)

@@ -50,18 +50,18 @@ class Stepper(ABC):
 
     @abstractmethod
     def begin_regime(self, motion: Any, workspace: Any) -> None:
-        """Begin with the unknowns ``workspace.y`` of the regime ``motion.regime``, at clock zero; fill
-        in their rates, ``workspace.rates``. Where the loading has a kink, ``motion.next_step_length``
-        is that of the step it has cut short; elsewhere it is 0.
+        """Begin with the unknowns ``workspace.y`` of the regime ``motion.regime``, at clock zero;
+        fill in their rates, ``workspace.rates``. Where the loading has a kink,
+        ``motion.next_step_length`` is that of the step it has cut short; elsewhere it is 0.
         """
 
     @abstractmethod
     def attempt_step(self, motion: Any, workspace: Any, max_length: float) -> float:
         """Take a step whose local error is allowed, in the direction of ``motion.direction``.
 
-        Fills in ``workspace.y_end`` and ``workspace.rates_at_end``, the unknowns at its end and their
-        rates, and ``motion.end`` and ``motion.step_length``, the clock there and the length. Each
-        right-hand side is charged by ``workspace.count_evaluations``.
+        Fills in ``workspace.y_end`` and ``workspace.rates_at_end``, the unknowns at its end and
+        their rates, and ``motion.end`` and ``motion.step_length``, the clock there and the length.
+        Each right-hand side is charged by ``workspace.count_evaluations``.
 
         Returns
         -------
@@ -77,7 +77,7 @@ class Stepper(ABC):
 
     @abstractmethod
     def interpolate_unknowns(self, motion: Any, workspace: Any, clock: float) -> None:
-        """Fill in ``workspace.y_within``, the unknowns at a clock within the step, by dense output."""
+        """Fill in ``workspace.y_within``, the unknowns at a clock within the step."""
 
     @abstractmethod
     def retake_step(self, motion: Any, workspace: Any, clock: float) -> None:

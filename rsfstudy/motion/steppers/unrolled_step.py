@@ -78,7 +78,8 @@ def _build_step_attempt_factory(unknown_count: int) -> Function:
     lines += [
         f"fifth = {' + '.join(f'fifth{i} * fifth{i}' for i in n)}",
         f"both = fifth + 0.01 * ({' + '.join(f'third{i} * third{i}' for i in n)})",
-        f"error = abs(length) * fifth / math.sqrt(both * {unknown_count}.0) if both != 0.0 else 0.0",
+        f"error = abs(length) * fifth / math.sqrt(both * {unknown_count}.0) if both != "
+        "0.0 else 0.0",
         f"step[{ERROR_INDEX}] = error",
     ]
     inner = "\n        ".join(["def attempt(y, stages, p, step):", *lines])

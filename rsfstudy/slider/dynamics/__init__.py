@@ -24,14 +24,15 @@ class Dynamics(Part):
     The dynamics are defined by functions that receive the friction of a scene, an instance of
     ``rsfstudy.slider.FrictionFunctions``, and return functions of floats:
 
-    - ``build_slip_rate_functions(friction)`` returns two functions. The function ``balance(spring, psis, p)``
-      returns :math:`\ln(V/V_*)`, the frictional stress g and the decrease of the state due to
-      stress. The function ``growth(state, rates, x, g, p)`` returns the derivative of :math:`x =
-      \ln(V/V_*)` along the motion. The argument ``state`` contains the spring stress and the states
-      ``psis``, and ``rates`` contains the derivatives of ``state``.
-    - ``build_rupture_rate_function(friction)`` is optional. It returns a function ``rate(state, p)`` for the full
-      equations of motion during ruptures. This function returns the derivatives of the spring
-      stress f, of x, of g and of all states except the first with respect to inertial time.
+    - ``build_slip_rate_functions(friction)`` returns two functions. The function ``balance(spring,
+      psis, p)`` returns :math:`\ln(V/V_*)`, the frictional stress g and the decrease of the state
+      due to stress. The function ``growth(state, rates, x, g, p)`` returns the derivative of
+      :math:`x = \ln(V/V_*)` along the motion. The argument ``state`` contains the spring stress and
+      the states ``psis``, and ``rates`` contains the derivatives of ``state``.
+    - ``build_rupture_rate_function(friction)`` is optional. It returns a function ``rate(state,
+      p)`` for the full equations of motion during ruptures. This function returns the derivatives
+      of the spring stress f, of x, of g and of all states except the first with respect to inertial
+      time.
 
     Examples
     --------

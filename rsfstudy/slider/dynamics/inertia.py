@@ -1,7 +1,8 @@
 """Inertia of the slider, defined by the period T of free oscillation.
 
-If inertia is weak, the motion follows the slow manifold of the full equations (``build_slip_rate_functions``).
-During ruptures, the full equations are integrated (``build_rupture_rate_function``).
+If inertia is weak, the motion follows the slow manifold of the full equations
+(``build_slip_rate_functions``). During ruptures, the full equations are integrated
+(``build_rupture_rate_function``).
 """
 
 from __future__ import annotations
@@ -221,8 +222,8 @@ def compute_inertia_weight(
     r"""Compute the weight of inertia.
 
     The weight is the lag of :math:`\ln V` behind its quasi-static value, divided by the derivative
-    of :math:`\ln V`. If possible, the function computes the slip rate from the ratio ``load_to_slip_velocity_ratio``,
-    because this saves the evaluation of an exponential function.
+    of :math:`\ln V`. If possible, the function computes the slip rate from the ratio
+    ``load_to_slip_velocity_ratio``, because this saves the evaluation of an exponential function.
 
     Parameters
     ----------

@@ -30,8 +30,8 @@ def auxiliary_rates(
         Porosity :math:`(\varphi - \varphi_0)/(\beta \sigma_*)` and pore pressure :math:`P`.
     slip_fraction : float
         Factor of the result, equal to the slip per unit of the independent variable. When slip
-        stops, the changes per unit slip are infinite, but their product with ``slip_fraction`` remains
-        finite.
+        stops, the changes per unit slip are infinite, but their product with ``slip_fraction``
+        remains finite.
     p : tuple of float
         Parameters of the scene. The function reads the dilatancy :math:`\epsilon/(\beta \sigma_*)`
         from ``p[FLUID]`` and the drainage :math:`c^* D_c/V_*` from ``p[FLUID + 1]``.

@@ -280,12 +280,12 @@ class Law(LawBase):
         numbers(self, scene) -> tuple[float, ...]
         check(self, scene) -> None
 
-    Override ``parameter_values`` if ``evolution`` uses values other than the fields, such as logarithms of
-    the fields. The method must return ``(*super().parameter_values(scene), ...)``. Override ``check`` to
-    raise ``InvalidValue`` if field values contradict each other. The class attribute ``name`` is
-    the name of the law. The attributes ``relaxation``, ``steady_states`` and ``state_effect`` are
-    optional as well. A law with one b can have several states. Such a law defines ``evolutions``
-    and ``steady_states``, as described for ``LawBase``.
+    Override ``parameter_values`` if ``evolution`` uses values other than the fields, such as
+    logarithms of the fields. The method must return ``(*super().parameter_values(scene), ...)``.
+    Override ``check`` to raise ``InvalidValue`` if field values contradict each other. The class
+    attribute ``name`` is the name of the law. The attributes ``relaxation``, ``steady_states`` and
+    ``state_effect`` are optional as well. A law with one b can have several states. Such a law
+    defines ``evolutions`` and ``steady_states``, as described for ``LawBase``.
 
     Parameters
     ----------

@@ -40,7 +40,8 @@ def auxiliary_rates(
     Returns
     -------
     tuple of float
-        Changes of :math:`y` and :math:`P` per unit slip in :math:`D_c`, multiplied by ``slip_fraction``.
+        Changes of :math:`y` and :math:`P` per unit slip in :math:`D_c`, multiplied by
+        ``slip_fraction``.
 
     Notes
     -----

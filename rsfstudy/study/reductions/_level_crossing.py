@@ -159,8 +159,8 @@ def _crossing_bounds(
 ) -> tuple[float, float] | None:
     """Return the first and last possible position of a crossing in an interval.
 
-    Positions are relative to the first sample, and ``level_above_first_sample`` is the level minus the value of the
-    first sample. The result is None if the level cannot be reached.
+    Positions are relative to the first sample, and ``level_above_first_sample`` is the level minus
+    the value of the first sample. The result is None if the level cannot be reached.
     """
     if slope < 0.0:
         slope, level_above_first_sample = -slope, -level_above_first_sample

@@ -134,8 +134,8 @@ def mask_unusable_values(
 ) -> xr.Dataset:
     """Return a copy of the dataset in which values that must not be used are NaN.
 
-    The values of failed cells are replaced by NaN. If ``variable_name`` is a standard error or the bound of a
-    confidence interval, values that are not valid are replaced by NaN as well.
+    The values of failed cells are replaced by NaN. If ``variable_name`` is a standard error or the
+    bound of a confidence interval, values that are not valid are replaced by NaN as well.
 
     Parameters
     ----------

@@ -1,1 +1,1 @@
-"""Who takes part in the benchmark ``tests/benchmarks/engine_benchmark.py``, and in what."""
+"""Participants and problems of the benchmark ``engine_benchmark.py``."""

@@ -1,4 +1,4 @@
-"""What a user calls, at equal measured error; and the first and the second call of a process."""
+"""Times of user-level calls at equal error, and of first calls."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ print(time.perf_counter() - began)
 
 
 def cycling_scene(law: str, normal_stress: str, b_over_a: float = 2.0) -> Scene:
-    """The scene of the benchmark."""
+    """Return the scene of the benchmark."""
     return Scene(
         law=law,
         normal_stress=normal_stress,
@@ -41,7 +41,7 @@ def cycling_scene(law: str, normal_stress: str, b_over_a: float = 2.0) -> Scene:
 
 
 def make_call(call: str, law: str, normal_stress: str) -> Callable[[float, str], list[float]]:
-    """A call as a function of rtol and engine; it gives the numbers whose error counts."""
+    """Return a function of rtol and engine that returns numbers to compare."""
     if call == "limit_cycle":
         scene = cycling_scene(law, normal_stress)
 
@@ -61,8 +61,11 @@ def make_call(call: str, law: str, normal_stress: str) -> Callable[[float, str],
 def compare_at_equal_error(
     numbers: Callable[[float, str], list[float]], target: float, rounds: int
 ) -> Any:
-    """For each engine, the loosest rtol that meets the target, its measured error, and the shortest
-    time of a call in milliseconds; the engines take turns.
+    """Compare the engines at equal measured error.
+
+    For each engine, the result contains the loosest rtol that meets the target, its
+    measured error, and the shortest time of a call in milliseconds. The engines are timed
+    alternately.
     """
     truth = numbers(1e-11, "compiled")
 
@@ -73,7 +76,7 @@ def compare_at_equal_error(
 
     found: dict[str, list[float]] = {}
     for engine in ENGINES:
-        # the engines take the same steps
+        # Both engines take the same steps, so SciPy starts at the rtol of the compiled engine.
         rung = 4 if engine == "compiled" else round(-2.0 * math.log10(found["compiled"][0]))
         while rung < 22 and (reached := error(10.0 ** (-rung / 2.0), engine)) > target:
             rung += 1
@@ -87,7 +90,10 @@ def compare_at_equal_error(
 
 
 def first_use_times(rounds: int) -> dict[str, float]:
-    """Seconds until the first cell of a fresh process, import included: the shortest of rounds."""
+    """Return the time in s until a new process has computed its first cell.
+
+    The time includes the import. The shortest time of all rounds is returned.
+    """
     found: dict[str, list[float]] = {}
 
     def run(name: str, engine: str, folder: str) -> None:

@@ -1,4 +1,4 @@
-"""What somebody would write who has this one problem: loops by hand, in SciPy and in Numba."""
+"""Hand-written loops for this problem, in SciPy and in Numba."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ def _clamped(value: float, low: float, high: float) -> float:
     return max(low, min(value, high))
 
 
-#: Functions of floats that trial steps do not break.
+#: Functions of floats that do not overflow in trial steps.
 FLOATS = SimpleNamespace(
     exp=lambda z: math.exp(min(z, 700.0)),
     expm1=lambda z: math.expm1(min(z, 700.0)),
@@ -27,7 +27,7 @@ FLOATS = SimpleNamespace(
     clamped=_clamped,
     branches=True,
 )
-#: The same as functions that can be compiled.
+#: Functions with the same results that Numba can compile.
 COMPILED = SimpleNamespace(
     exp=lambda z: math.exp(min(z, 700.0)),
     expm1=lambda z: math.expm1(min(z, 700.0)),
@@ -39,12 +39,12 @@ COMPILED = SimpleNamespace(
 
 
 class HandScipy:
-    """A loop around SciPy's DOP853, on floats."""
+    """Loop around SciPy's DOP853 that works on floats."""
 
     name = "SciPy loop by hand"
 
     def prepare(self, law: str, variable: bool) -> None:
-        """Put the equations together."""
+        """Assemble the equations."""
         made = equations(FLOATS, law, variable)
 
         def integrated(rate: Any, y: tuple[float, ...], span: float, tolerance: float, of: Any):
@@ -72,7 +72,7 @@ class HandScipy:
         self._cycle = cycle_function(made.balance, made.strength, slow, fast)
 
     def run(self, problems: list[Problem], tolerance: float) -> CycleNumbers:
-        """One cycle of each problem."""
+        """Integrate one cycle of each problem."""
         return [
             self._cycle(it.begin.spring_stress, it.begin.psis[0], it.p, it.marks, tolerance)
             for it in problems
@@ -80,12 +80,15 @@ class HandScipy:
 
 
 def _linear_combination_source(row: Any, names: str) -> str:
-    """Source of a linear combination of stages."""
+    """Return the source code of a linear combination of stages."""
     return " + ".join(f"{float(c)!r}*{names}{j}" for j, c in enumerate(row) if c) or "0.0"
 
 
 def unrolled_source(rate: str) -> str:
-    """Source of DOP853 for three unknowns, without any loop but that over steps."""
+    """Return the source code of an unrolled DOP853 for three unknowns.
+
+    The only loop in the generated code is the loop over steps.
+    """
     lines = [
         "def integrate(u, v, w, span, p, tolerance, su, sv, sw):",
         f"    du0, dv0, dw0 = {rate}",
@@ -132,12 +135,15 @@ def unrolled_source(rate: str) -> str:
 
 
 class HandNumba:
-    """DOP853 unrolled by hand, with the equations inlined: about as fast as this method can be."""
+    """DOP853 unrolled by hand, with inlined equations.
+
+    The speed is close to the maximum for this method.
+    """
 
     name = "Numba loop by hand"
 
     def prepare(self, law: str, variable: bool) -> None:
-        """Write the loops and compile them."""
+        """Generate the loops and compile them."""
         import numba
 
         ready = numba.njit(error_model="numpy")
@@ -168,12 +174,12 @@ class HandNumba:
         self._all = loop_over_problems(cycle, ready)
 
     def run(self, problems: list[Problem], tolerance: float) -> CycleNumbers:
-        """One cycle of each problem."""
+        """Integrate one cycle of each problem."""
         return call_compiled(self._all, problems, tolerance)
 
 
 def loop_over_problems(cycle: Any, ready: Any) -> Any:
-    """A compiled function that goes through the cycles of all problems."""
+    """Return a compiled function that integrates one cycle per problem."""
 
     @ready
     def every(starts, psis, p, marks, tolerance, result):
@@ -185,7 +191,7 @@ def loop_over_problems(cycle: Any, ready: Any) -> Any:
 
 
 def call_compiled(every: Any, problems: list[Problem], tolerance: float) -> CycleNumbers:
-    """Its result."""
+    """Call a compiled function and return its results as a list."""
     result = np.empty((len(problems), 2))
     every(*problem_arrays(problems), tolerance, result)
     return [tuple(row) for row in result.tolist()]

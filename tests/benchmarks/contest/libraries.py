@@ -1,9 +1,10 @@
-"""Peers from the package registry, each as its documentation says is best.
+"""Solver libraries, used as their documentation recommends.
 
-See `problem.cycle_function`.
+See ``problem.cycle_function``.
 
-All use explicit methods of high order on equations without stiffness; none has to find events.
-Importing what is not installed fails in `prepare`, so that the table can say so.
+All libraries use explicit methods of high order on non-stiff equations, and no library has
+to detect events. If a library is not installed, ``prepare`` raises ImportError, and the
+table shows this.
 """
 
 from __future__ import annotations
@@ -18,13 +19,13 @@ from contest.problem import Problem, cycle_function, equations, problem_arrays, 
 
 
 class Cyrk:
-    """CyRK: its C++ solver called from compiled code, with compiled equations."""
+    """CyRK: its C++ solver, called from compiled code."""
 
     name = "CyRK"
     method = "DOP853"
 
     def prepare(self, law: str, variable: bool) -> None:
-        """Compile the equations and what calls the solver."""
+        """Compile the equations and the function that calls the solver."""
         import numba
         from CyRK import nb_diffeq_addr, nbsolve2_ivp
 
@@ -73,17 +74,17 @@ class Cyrk:
         self._all = loop_over_problems(cycle, ready)
 
     def run(self, problems: list[Problem], tolerance: float) -> CycleNumbers:
-        """One cycle of each problem."""
+        """Integrate one cycle of each problem."""
         return call_compiled(self._all, problems, tolerance)
 
 
 class Numbalsoda:
-    """numbalsoda: its DOP853 called from compiled code, with compiled equations."""
+    """numbalsoda: its DOP853, called from compiled code."""
 
     name = "numbalsoda"
 
     def prepare(self, law: str, variable: bool) -> None:
-        """Compile the equations and what calls the solver."""
+        """Compile the equations and the function that calls the solver."""
         import numba
         from numbalsoda import dop853, lsoda_sig
 
@@ -119,12 +120,15 @@ class Numbalsoda:
         self._all = loop_over_problems(cycle, ready)
 
     def run(self, problems: list[Problem], tolerance: float) -> CycleNumbers:
-        """One cycle of each problem."""
+        """Integrate one cycle of each problem."""
         return call_compiled(self._all, problems, tolerance)
 
 
 class Sundae:
-    """scikit-sundae: CVODE with Adams formulas, for what is not stiff; compiled equations."""
+    """scikit-sundae: CVODE with Adams formulas for non-stiff problems.
+
+    The equations are compiled.
+    """
 
     name = "scikit-sundae"
 
@@ -171,7 +175,7 @@ class Sundae:
         self._cycle = cycle_function(plain.balance, plain.strength, slow, fast)
 
     def run(self, problems: list[Problem], tolerance: float) -> CycleNumbers:
-        """One cycle of each problem."""
+        """Integrate one cycle of each problem."""
         return [
             self._cycle(it.begin.spring_stress, it.begin.psis[0], it.p, it.marks, tolerance)
             for it in problems
@@ -179,14 +183,18 @@ class Sundae:
 
 
 class Heyoka:
-    """heyoka: Taylor series compiled for the equations; as many scenes at once as the processor's
-    vectors hold.
+    """heyoka: Taylor series compiled for the equations.
+
+    Each call integrates as many scenes as fit in a vector register of the processor.
     """
 
     name = "heyoka"
 
     def prepare(self, law: str, variable: bool) -> None:
-        """Write the equations as expressions; integrators are compiled for a tolerance."""
+        """Define the equations as symbolic expressions.
+
+        The integrators are compiled later, once per tolerance.
+        """
         import heyoka as hy
 
         symbols = SimpleNamespace(
@@ -242,7 +250,7 @@ class Heyoka:
         return self._known[key]
 
     def run(self, problems: list[Problem], tolerance: float) -> CycleNumbers:
-        """One cycle of each problem."""
+        """Integrate one cycle of each problem."""
         every, found = problem_arrays(problems), []
         for first in range(0, len(problems), self._wide):
             starts, psis, p, marks = (of[..., first : first + self._wide] for of in every)
@@ -251,12 +259,15 @@ class Heyoka:
 
 
 class Diffrax:
-    """diffrax: Dopri8, the whole cycle compiled as one, mapped over scenes; 64-bit floats."""
+    """diffrax: Dopri8 in 64-bit floats.
+
+    The whole cycle is compiled and mapped over scenes.
+    """
 
     name = "diffrax"
 
     def prepare(self, law: str, variable: bool) -> None:
-        """Trace the cycle."""
+        """Trace and compile the cycle."""
         import diffrax
         import jax
         import jax.numpy as jnp
@@ -299,7 +310,7 @@ class Diffrax:
         self._one = jax.jit(cycle)
 
     def run(self, problems: list[Problem], tolerance: float) -> CycleNumbers:
-        """One cycle of each problem."""
+        """Integrate one cycle of each problem."""
         starts, psis, p, marks = problem_arrays(problems)
         if len(problems) == 1:
             interval, drop = self._one(starts[0], psis[0], p[:, 0], marks[:, 0], tolerance)

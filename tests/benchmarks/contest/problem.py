@@ -1,10 +1,10 @@
-"""One cycle of stick-slip as anybody may integrate it: the equations, the marks, and the truth.
+"""Stick-slip cycles as benchmark problems, with exact results.
 
-The equations are those of the package, written down once more for whatever has `exp`, `log`, and
-`expm1`. Everybody is given them in the form that suits explicit methods, without stiffness: along
-the slow manifold up to a mark, through the rupture to another one, and along the slow manifold
-again. The marks are known beforehand, so that no peer has to find events; the engines of rsfstudy
-and whoever uses them have to.
+The module implements the equations of the package again, for any library that has ``exp``,
+``log`` and ``expm1``. All participants integrate the same non-stiff form, which suits explicit
+methods: along the slow manifold to a first mark, through the rupture to a second mark, and
+along the slow manifold again. The marks are known in advance, so that the other
+participants need no event detection. The engines of rsfstudy detect the events themselves.
 """
 
 from __future__ import annotations
@@ -30,31 +30,34 @@ from rsfstudy.slider.motion_point import MotionPoint
 from rsfstudy.slider.scene_functions import LOG_RATE_PER_PATH_LENGTH
 
 BUDGET = 10**9
-#: Places of the numbers of a scene.
+#: Indices of the parameters of a scene.
 A, B, MU, STIFFNESS, LOAD, LOG_LOAD, MASS, LOG_MASS, COT, ALPHA = range(10)
 
 
 @dataclass(frozen=True)
 class Problem:
-    """One cycle, from a maximum of spring stress on the limit cycle to the next.
+    """One limit cycle between two maxima of spring stress.
 
     Attributes
     ----------
     scene : Scene
+        Scene that has the limit cycle.
     begin : Point
+        Point at the maximum of spring stress.
     p : tuple of float
-        Numbers of the scene.
-    rises : float
-        Derivative of ln V there, over slip and load point displacement together.
+        Parameters of the scene.
+    initial_spring_stress_rate : float
+        Derivative of ln V at this point, by the sum of slip and load point displacement.
     interval, drop : float
-        The truth.
+        Exact recurrence interval and static stress drop.
     leave, rupture, rest : float
-        The marks: length of the path until the rupture begins, of that, and of what follows it.
-    lasts : float
+        Marks: path length until the rupture begins, path length of the rupture, and path length
+        of the rest of the cycle.
+    duration : float
         Duration of the rupture.
     fall, creep : float
-        Time of the minimum of spring stress, and what slip takes from the spring between it and the
-        mark that ends the rupture.
+        Time of the minimum of spring stress, and the spring stress that slip releases between this
+        minimum and the end of the rupture.
     """
 
     scene: Scene
@@ -72,19 +75,22 @@ class Problem:
 
     @property
     def marks(self) -> tuple[float, ...]:
-        """What `cycle_function` has to know."""
+        """Arguments of ``cycle_function`` that describe the marks."""
         paths = self.leave, self.rupture, self.rest
         return self.initial_spring_stress_rate, *paths, self.duration, self.fall, self.creep
 
     def error(self, found: tuple[float, float]) -> float:
-        """Largest relative error of the recurrence interval and of the static stress drop."""
+        """Return the largest relative error of a result.
+
+        The result consists of the recurrence interval and the static stress drop.
+        """
         truth = self.interval, self.drop
         errors = [abs(x / y - 1.0) for x, y in zip(found, truth, strict=True)]
         return math.inf if any(map(math.isnan, errors)) else max(errors)
 
 
 def cycle_problem(scene: Scene) -> Problem:
-    """The cycle of a scene, without marks."""
+    """Return the problem of a scene, without marks."""
     tight = Accuracy(MIN_RTOL, budget=BUDGET, engine="compiled")
     approach = LimitCycleSearch(scene, tight, meter("compiled"))
     if not approach.follow_until_converged(300):
@@ -111,7 +117,7 @@ def cycle_problem(scene: Scene) -> Problem:
 
 
 def with_marks(it: Problem, rtol: float) -> Problem:
-    """A problem with marks where the package sets them for an accuracy."""
+    """Return a problem with the marks of the package for an accuracy."""
     scene, passed = it.scene, dict[str, float]()
     allowed = Accuracy(rtol, budget=BUDGET, engine="compiled")
     moving = integrate_events(
@@ -145,7 +151,7 @@ def with_marks(it: Problem, rtol: float) -> Problem:
 
 
 def stretch_lengths(scene: Scene, accuracy: Accuracy, begin: MotionPoint) -> list[float]:
-    """How long the path is in each of the three stretches of a cycle."""
+    """Return the path lengths of the three stretches of a cycle."""
     lengths, regime, load = list[float](), "", scene.log_load_velocity
     watches = rise("log_slip_rate", load), approach_to_steady_state(2.0)
     for event in integrate_events(
@@ -161,7 +167,7 @@ def stretch_lengths(scene: Scene, accuracy: Accuracy, begin: MotionPoint) -> lis
 
 
 def meter(engine: str) -> WorkMeter:
-    """A meter without a limit."""
+    """Return a work meter with a practically unlimited budget."""
     return WorkMeter(BUDGET, engine=engine)
 
 
@@ -170,12 +176,15 @@ def _identity(function: Any) -> Any:
 
 
 def equations(m: Any, law: str, variable: bool, ready: Callable[[Any], Any] = _identity) -> Any:
-    """The equations of a law and a normal stress, in the functions of `m`, each made `ready`; where
-    it `branches`, the slow manifold spares what mass does not show.
+    """Return the equations of a law and a normal stress.
 
-    ``slow(f, psi, p)`` gives the rates of both, and of time, along the path in slip and load point
-    displacement and ln V; ``fast(f, x, g, p)`` the rates of all three along that in inertial time
-    and ln V.
+    The equations use the functions of the namespace ``m``, and ``ready`` compiles each
+    function. If ``m.branches`` is True, the slow manifold skips the second-order correction
+    if inertia is negligible.
+
+    ``slow(f, psi, p)`` returns the rates of f, psi and time along a path in slip, load
+    point displacement and ln V. ``fast(f, x, g, p)`` returns the rates of f, x and g along
+    a path in inertial time and ln V.
     """
     exp, log, expm1, clamped = (ready(of) for of in (m.exp, m.log, m.expm1, m.clamped))
     sqrt = ready(m.sqrt)
@@ -259,9 +268,10 @@ def equations(m: Any, law: str, variable: bool, ready: Callable[[Any], Any] = _i
 def cycle_function(
     balance: Any, strength: Any, slow: Any, fast: Any, ready: Callable[[Any], Any] = _identity
 ) -> Any:
-    """A function that goes through a cycle, as whoever integrates in floats or in arrays needs it.
+    """Return a function that integrates one cycle, for floats or arrays.
 
-    ``slow(f, psi, t, span, p, tolerance)`` and ``fast(f, x, g, span, p, tolerance)`` integrate.
+    The arguments ``slow(f, psi, t, span, p, tolerance)`` and ``fast(f, x, g, span, p,
+    tolerance)`` are the integrators of the two regimes.
     """
 
     @ready
@@ -273,7 +283,8 @@ def cycle_function(
         f, x, g = fast(f, x, g, rupture, p, tolerance)
         t = t + lasts
         psi = strength(g, p)[0] - p[A] * x
-        # from the minimum to the mark, the load point and creep have changed the spring
+        # Between the minimum and the end of the rupture, load point motion and creep change the
+        # spring stress.
         drop = f0 - f + p[STIFFNESS] * p[LOAD] * (t - fall) + creep
         f, psi, t = slow(f, psi, t, rest, p, tolerance)
         x, g, _shift = balance(f, psi, p)
@@ -285,7 +296,10 @@ def cycle_function(
 def problem_arrays(
     problems: list[Problem],
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-    """Spring stress and state at the beginning, numbers and marks: problems in the last place."""
+    """Return initial stresses and states, parameters and marks.
+
+    The last axis of each array is the problem.
+    """
     starts = np.array([(it.begin.spring_stress, it.begin.psis[0]) for it in problems]).T
     marks = [it.marks for it in problems]
     p = np.ascontiguousarray(np.array([it.p for it in problems]).T)
@@ -293,5 +307,9 @@ def problem_arrays(
 
 
 def unknown_scales(a: float) -> tuple[tuple[float, float, float], tuple[float, float, float]]:
-    """Changes of the unknowns that weigh as much as 1 in ln V, between ruptures and in them."""
+    """Return the changes of the unknowns that correspond to 1 in ln V.
+
+    The two tuples belong to the equations between ruptures and to the equations of a
+    rupture.
+    """
     return (a, a, 1.0), (a, 1.0, a)

@@ -1,4 +1,4 @@
-"""The engines of rsfstudy: cycles followed from a point, all events found on the way."""
+"""The engines of rsfstudy, which detect all events of a cycle."""
 
 from __future__ import annotations
 
@@ -9,16 +9,16 @@ from rsfstudy.motion.accuracy import Accuracy
 
 
 class RsfstudyEngine:
-    """One of the engines."""
+    """Participant that uses an engine of rsfstudy."""
 
     def __init__(self, engine: str) -> None:
         self.engine, self.name = engine, f"rsfstudy, {engine}"
 
     def prepare(self, law: str, variable: bool) -> None:
-        """Nothing to do: the first call compiles."""
+        """Do nothing, because the first call compiles the equations."""
 
     def run(self, problems: list[Problem], tolerance: float) -> CycleNumbers:
-        """One cycle of each problem."""
+        """Integrate one cycle of each problem."""
         found: CycleNumbers = []
         accuracy = Accuracy(tolerance, budget=BUDGET, engine=self.engine)
         for it in problems:
