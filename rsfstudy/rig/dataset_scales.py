@@ -114,7 +114,7 @@ def convert_dataset_units(
     `apply_scales`.
     """
     units = {
-        "sigma_*": stress_unit, "D_c": length_unit, "D_c/V_*": time_unit, 
+        "sigma_*": stress_unit, "D_c": length_unit, "D_c/V_*": time_unit,
             "V_*/D_c": f"{time_unit}-1",
         "V_*": f"{length_unit} {time_unit}-1", "sigma_*/D_c": f"{stress_unit} {length_unit}-1",
     }  # fmt: skip
