@@ -154,7 +154,7 @@ def test_laws_of_one_and_of_two_states_are_fitted_beside_each_other() -> None:
         parameters = alone.parameter.values
         assert {*parameters} & effects == names
         among = fit.sel(parameter=parameters, other_parameter=parameters)
-        np.testing.assert_array_equal(among.coordinate_covariance, alone.coordinate_covariance)
+        np.testing.assert_array_equal(among.covariance, alone.covariance)
         assert np.isnan(fit.correlation).sum() == 8**2 - len(parameters) ** 2
         for name in (*parameters, "criterion", "a_minus_b_stderr"):
             assert float(fit[name]) == float(alone[name]), name
@@ -345,7 +345,7 @@ def test_the_posterior_is_that_of_the_errors(free: tuple[str, ...], draws: int) 
     one = synthetic_record(seed=4, count=200)
     fit = rsfstudy.fit(one, laws=["slowness"], free=free, posterior=draws, **options).squeeze()
     drawn = fit.posterior
-    spread = np.sqrt(np.diag(fit.coordinate_covariance))
+    spread = np.sqrt(np.diag(fit.covariance))
     off = (drawn.mean("draw") - np.array([float(fit[n]) for n in free])) / spread
     slack = 0.0 if free[0] == "mu_star" else 0.15
     assert np.abs(off).max() < 5.0 / math.sqrt(draws) + slack

@@ -22,10 +22,10 @@ FILES = sorted(ROOT.rglob("*.py"))
 #: pages are above all layers.
 FLOORS = (
     ("_deprecation",),
-    ("errors", "status", "defaults", "formatting", "_lazy", "_former_modules"),
+    ("errors", "status", "defaults", "formatting", "_lazy_exports", "_former_modules"),
     ("argument_checks",),
     ("error_boundary",),
-    ("netcdf", "paths", "quantities"),
+    ("netcdf_encoding", "path_checks", "quantities"),
     ("slider",),
     ("parts", "vocabulary"),
     ("axes", "motion"),

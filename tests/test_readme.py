@@ -155,7 +155,7 @@ def test_the_command_of_the_readme_fits_the_record(tmp_path, monkeypatch):
 @pytest.mark.parametrize(
     ("base", "example", "written"),
     [
-        (laws.Law, laws.BUILT_IN_PARTS["slowness"], ("evolution", "numbers", "check")),
+        (laws.Law, laws.BUILT_IN_PARTS["slowness"], ("evolution", "parameter_values", "check")),
         (measures.Measure, CriticalStep, ("compute", "error_scales")),
         (reductions.Reduction, reductions.Reduction, ("__call__", "derivatives")),
     ],

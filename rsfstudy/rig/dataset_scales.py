@@ -106,17 +106,16 @@ def build_scales_of_rig(rig: Mapping[str, Any]) -> dict[str, UnitScale]:
 def convert_dataset_units(
     dataset: xr.Dataset,
     si_scales: Mapping[str, UnitScale],
-    stress_unit: str,
-    length_unit: str,
-    time_unit: str,
+    stress: str,
+    length: str,
+    time: str,
 ) -> xr.Dataset:
     """A dataset in units of stress, length and time, by its scales in SI units; see
     `apply_scales`.
     """
     units = {
-        "sigma_*": stress_unit, "D_c": length_unit, "D_c/V_*": time_unit,
-            "V_*/D_c": f"{time_unit}-1",
-        "V_*": f"{length_unit} {time_unit}-1", "sigma_*/D_c": f"{stress_unit} {length_unit}-1",
+        "sigma_*": stress, "D_c": length, "D_c/V_*": time, "V_*/D_c": f"{time}-1",
+        "V_*": f"{length} {time}-1", "sigma_*/D_c": f"{stress} {length}-1",
     }  # fmt: skip
     size = {
         n: float(unit_factor("units", units[n], si_scales[n].units))
