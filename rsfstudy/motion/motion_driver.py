@@ -326,8 +326,9 @@ class MotionDriver:
             Rows of the segment table after the first segment, and the number of final segments with
             reported start events.
         initial_imposed_stress : float, optional
-            Shear stress that an oscillating load point adds initially. The integration excludes the
-            varying part of this stress. Events and recordings include it.
+            Initial value of the last unknown, if the load point oscillates. The imposed shear
+            stress is the difference of this unknown from its initial value. The unknown
+            ``spring_stress`` excludes the imposed stress, but events and recordings include it.
 
         Yields
         ------

@@ -82,7 +82,7 @@ def attempt_step(motion, workspace, max_length):
 
 
 def take_step_ignoring_error(motion, workspace):
-    """Take one step of size ``motion.step_length``, whatever its error."""
+    """Take one step of size ``motion.step_length`` without an error test."""
     workspace.order_eight_step_block[LENGTH_INDEX] = motion.step_length
     evaluate_in_place(
         workspace.attempt_step,
@@ -268,6 +268,8 @@ def select_initial_step_length(workspace, clock_direction, tolerance):
 def prepare_dense_output(motion, workspace, step_length):
     """Compute the coefficients of the dense output of the step.
 
+    The function evaluates the right-hand side three times.
+
     Parameters
     ----------
     motion : record
@@ -275,7 +277,7 @@ def prepare_dense_output(motion, workspace, step_length):
     workspace : Workspace
         Arrays of the regime, with the stages of the step.
     step_length : float
-        Size of the step. The function evaluates the right-hand side three times.
+        Size of the step.
     """
     count, y, stages, rows = (
         workspace.unknown_count,

@@ -211,7 +211,7 @@ class SciPyStepper(Stepper):
         return solver
 
     def _take_solver_step(self, motion: Any, solver: OdeSolver) -> bool:
-        """Take one step of the solver, and return False if it exceeds the budget.
+        """Take one solver step, and return False if it exceeds the budget.
 
         Trial steps may leave the domain, so floating-point warnings are suppressed. The solver
         rejects these steps, and the event loop checks the accepted steps.
