@@ -61,8 +61,8 @@ def integrate_events(
     event_specs : sequence of EventSpecification, default: ()
         Requested events.
     start : MotionPoint, optional
-        Initial point within the last loading segment. By default, the motion starts with the first
-        segment from steady sliding at V_*, or from the initial stress and state of the scene.
+        Initial point within the last loading segment. By default, the motion starts in the first
+        segment, from steady sliding at V_* or from the initial stress and state of the scene.
     with_time : bool, default: False
         If True, time is one of the unknowns. Otherwise, times and slips of events may be NaN, and
         the integration needs less work.

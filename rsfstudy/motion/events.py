@@ -75,7 +75,7 @@ class EventSpecification(NamedTuple):
         If True, the motion ends at the event.
     may_defer : bool, default: False
         If True, the engine may report the event and the start of the motion later, together with
-        other events. Fewer reports are faster.
+        other events. The integration is then faster.
     """
 
     kind: EventKind
@@ -232,9 +232,9 @@ class Event(NamedTuple):
     specification : EventSpecification or None
         Specification of a requested event. It is None for other events.
     time : float
-        Time since the start, in D_c/V_*. It is NaN if the motion has no clock.
+        Time since the start, in D_c/V_*. It is NaN if time is not an unknown of the motion.
     slip : float
-        Slip since the start, in D_c. It is NaN if the motion has no clock.
+        Slip since the start, in D_c. For most sliders it is NaN if time is not an unknown.
     point : MotionPoint
         Point of the motion at the event.
     regime : str

@@ -7,7 +7,8 @@ MAX_STEP_LENGTH = 1e9
 #: Maximum step size along the path, in units of slip by D_c. A longer step may skip a rapid change
 #: of the motion between two stages. During stationary contact, no rapid changes occur until ln V
 #: has increased to a few units below its steady-state value. The maximum step size therefore
-#: increases with the difference of ln V from loading, divided by the second constant.
+#: increases with the difference between ln V_0 and ln V. The second constant is the scale of this
+#: difference.
 LONGEST_PATH_STEP, STATIONARY_LOG_RATE_SCALE = 3.0, 10.0
 
 

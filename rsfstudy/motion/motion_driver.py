@@ -323,8 +323,8 @@ class MotionDriver:
         recording : Recording, optional
             Object that receives the recorded rows.
         kinks_and_reported_count : tuple of (ndarray, int), optional
-            Rows of the segment table after the first segment, and the number of final segments with
-            reported start events.
+            Rows of the segment table after the first segment, and the number of segments whose
+            start is reported. The reported segments are the last segments.
         initial_imposed_stress : float, optional
             Initial value of the last unknown, if the load point oscillates. The imposed shear
             stress is the difference of this unknown from its initial value. The unknown
@@ -376,9 +376,8 @@ class MotionDriver:
             self._initial_values,
             (
                 *(*duration_start_time_and_slip, stress, tolerance),
-                # The step limit depends on the tolerance. Otherwise, the comparison of two runs
-                # with
-                # different tolerances would underestimate the error.
+                # The step limit depends on the tolerance. Otherwise, two runs with different
+                # tolerances could share an error, and their difference would not reveal the error.
                 (tolerance / REFERENCE_TOLERANCE_OF_STEP_LIMIT) ** 0.125,
                 -1.0 if backward else 1.0,
                 int(min(evaluation_budget, work_meter.budget - work_meter.evaluations)),

@@ -109,9 +109,10 @@ def estimate_neglected_inertia_error(
 def _accumulate_residuals(
     scene: Scene, recorded_rows: np.ndarray, slip_rate_norms: np.ndarray
 ) -> np.ndarray:
-    """Compute an upper bound of the change of ln V due to residuals up to each row.
+    """Compute an upper bound of the change of ln V due to residuals.
 
-    The bound is the smaller of the integrated residual and the largest residual so far.
+    The bound for each row is the smaller of the integrated residual and the largest residual so
+    far.
     """
     residuals = np.array(list(_iterate_residuals(scene, recorded_rows, slip_rate_norms)))
     states = recorded_rows[
@@ -133,7 +134,7 @@ def _iterate_residuals(
 ) -> Iterator[float]:
     """Yield the residual of the equation of motion, divided by a, at each row.
 
-    The residual is set to zero where the mass is negligible.
+    The residual is set to zero if the inertia weight is negligible.
     """
     segments = list(_iterate_segment_scenes(scene))
     begins = [begin for begin, _acting, _p in segments]
@@ -153,7 +154,7 @@ def _iterate_residuals(
 def _compute_force_balance_residual(
     segment_scene: Scene, parameters: Numbers, recorded_row: np.ndarray, inertia_weight: float
 ) -> float:
-    """Compute the residual of the equation of motion, divided by a, at one row.
+    """Compute the residual of the equation of motion at a row, divided by a.
 
     The row must be on the slow manifold.
     """
@@ -169,7 +170,7 @@ def _compute_force_balance_residual(
 
 
 def _iterate_segment_scenes(scene: Scene) -> Iterator[tuple[float, Scene, Numbers]]:
-    """Yield the start time, the scene and the parameters of each segment of loading."""
+    """Yield the start time, scene and parameters of each loading segment."""
     for acting, table in scene.continuous_segments:
         for n, row in enumerate(table.tolist()):
             p = list(acting.parameter_values)

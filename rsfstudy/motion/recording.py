@@ -266,7 +266,7 @@ def truncate_recording_at_row(motion_table: np.ndarray, last_row: np.ndarray) ->
     after = int(motion_table[:, 0].searchsorted(last_row[0]))
     place = int(motion_table[after, SAMPLE_COLUMN]) if after < len(motion_table) else 0
     begin = after - place
-    # The recording may end with this row.
+    # If the recording ends before the end of the step, no samples need to be replaced.
     if not place or begin + SAMPLES_PER_STEP >= len(motion_table):
         return np.vstack([motion_table[:after], last_row])
     part, times = float(place), motion_table[begin : begin + SAMPLES_PER_STEP + 1, 0]
@@ -449,7 +449,7 @@ def interpolate_rows(columns: np.ndarray, row_positions: np.ndarray, result: np.
     columns, row_positions, result = map(np.asarray, (columns, row_positions, result))
     after = np.ceil(row_positions).astype(int)
     within = columns[SAMPLE_COLUMN, after].astype(int)
-    # Rows between two regimes do not belong to a step.
+    # Between two regimes, the interpolation is linear.
     jumps = np.flatnonzero((within == 0) & (row_positions > 0.0))
     within[jumps] = 1
     begin = after - within

@@ -75,9 +75,9 @@ from rsfstudy.parts import LOAD_VELOCITY, LOG_LOAD_VELOCITY, STIFFNESS, B
 #: regime, a target time, and the termination of the motion. The values are floats because Numba
 #: would compile a separate function for each integer literal.
 SWITCH_CONDITION, TIME_CONDITION, TERMINATION_CONDITION = -1.0, -2.0, -3.0
-#: Ratio of two levels of SETTLED events: the level for the slip rate and the sum of the states, and
-#: the level for all unknowns. The second level alone is insufficient. If one unknown was initially
-#: very large, its decrease would end the motion although the slip rate still changes.
+#: Factor of the level of SETTLED events for the slip rate and the sum of the states. The level
+#: without this factor applies to all unknowns. Both conditions must be met. Otherwise, the decrease
+#: of one initially very large unknown would end the motion although the slip rate still changes.
 FRICTION_SETTLING_LEVEL_FACTOR = 10.0
 #: Results of ``find_jump_side``.
 NO_EVENT, BEFORE_JUMP, AFTER_JUMP = range(3)
@@ -112,10 +112,10 @@ def has_deferrable_event(workspace):
 
 
 def regime_switch_excess(motion, workspace, point_columns):
-    """Return a number that is negative unless the motion must change regime.
+    """Return the excess of the effect of inertia over its limit.
 
-    The number is at least zero if the motion must leave the slow manifold. In other regimes the
-    number is -1.
+    The excess is at least zero if the motion must leave the slow manifold. In ruptures, and for
+    motions without inertia, the function returns -1.
     """
     if motion.regime != SLOW_REGIME or not motion.has_mass:
         return -1.0
@@ -236,9 +236,9 @@ def slip_since_start(motion, clock, time, spring_stress, parameters):
 def append_start_events(motion, workspace, last_point, event_table):
     """Append the events at the start of a regime or segment.
 
-    The first event is the start of the regime or segment. Requested events follow if they occur at
-    the jump from the last point of the previous regime or segment. Return True if one of these
-    events ends the motion.
+    The first event is the start of the regime or segment, unless the start of the segment is not
+    reported. Requested events follow if they occur at the jump from the last point of the previous
+    regime or segment. Return True if one of these events ends the motion.
     """
     p, passed = workspace.parameters, time_at_step_begin(motion, workspace)
     p_before = workspace.parameters_before if motion.pending_start == KINK_CODE else p

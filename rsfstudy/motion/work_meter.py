@@ -145,7 +145,7 @@ class WorkMeter:
         Returns
         -------
         int
-            Number of evaluations that were counted before this motion started.
+            Number of evaluations of other motions that the meter has counted.
         """
         others = self.evaluations - work_before[0] - work_before[1]
         if work_now[0] > work_before[0]:

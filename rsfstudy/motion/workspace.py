@@ -1,6 +1,30 @@
-"""Workspace of a regime: arrays, functions and constants of its integration.
+"""Workspace of a regime: arrays, functions and constants.
 
-The module ``motion_loop`` creates a workspace for each regime. Steppers receive it as an argument.
+``motion_loop.advance_motion`` creates a workspace for each regime, and steppers receive it as an
+argument. The arrays are written by the following functions. Functions without a module name belong
+to ``motion_loop``.
+
+=========================================  ====================================================
+Arrays                                     Written by
+=========================================  ====================================================
+y                                          set_unknowns_of_regime, advance_to_step_end
+rates                                      stepper (at the start of a regime),
+                                           advance_to_step_end
+y_end, rates_at_end                        stepper (each step),
+                                           step_integration.truncate_step_at_clock (y_end only)
+stage_rates, order_eight_step_block,       steppers.order_eight
+dense_output_rows
+y_within                                   stepper (each interpolation), has_left_rupture
+rates_within, point_within                 step_integration.evaluate_point_at_clock,
+                                           step_integration.is_step_resolved (rates_within),
+                                           has_left_rupture (point_within)
+dense_slopes                               step_integration.is_step_resolved
+point_at_begin                             follow_regime (at its start), advance_to_step_end
+point_at_end                               follow_regime (each step), end_step_at_end_time,
+                                           step_integration.truncate_step_at_clock
+event_clocks, event_specs                  step_events.locate_events_in_step
+parameters, parameters_before              start_next_segment
+=========================================  ====================================================
 """
 
 from __future__ import annotations
