@@ -134,7 +134,7 @@ class Accuracy:
     def local_tolerance(self) -> float:
         """Local error tolerance of a step.
 
-        It is smaller than ``rtol`` because local errors accumulate during a motion.
+        The tolerance is smaller than ``rtol`` because local errors accumulate during a motion.
         """
         return 0.07 * self.rtol * self.refinement
 

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 
 def evaluate_in_place(function, y, rates, parameters, result):
-    """Call a function of the equations, which fills an array.
+    """Call a function that fills an array.
 
     Parameters
     ----------

@@ -64,7 +64,7 @@ def engine_name(engine: Any) -> str:
 
 
 def find_user_stepper(stepper_name: str) -> tuple[type, ...]:
-    """Find the user-defined stepper with a name.
+    """Find a user-defined stepper by its name.
 
     Parameters
     ----------

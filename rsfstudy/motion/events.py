@@ -9,9 +9,10 @@ each with its time, slip and point. A measure can request the following events:
                                 upward or downward crossing of a level by a quantity
     approach_to_steady_state(fraction)
                                 distance from steady sliding below a fraction of the largest
-                                distance so far. The event is reported at the end of each such step
-                                in the last segment of loading, unless normal stress still changes
-                                or steady sliding is unstable.
+                                distance so far. The event is reported at the end of each step that
+                                meets this condition. Only steps in the last segment of loading are
+                                checked. The event is not reported if normal stress still changes
+                                or if steady sliding is unstable.
 
 Each requested event may end the motion. The available quantities are the attributes of a
 ``MotionPoint``. The attribute ``apparent_friction`` is the friction coefficient that a rig
@@ -20,8 +21,8 @@ measures. Extrema are available for ``log_slip_rate``, ``spring_stress`` and ``a
 In addition to the requested events, the table lists the start of the motion, each change of regime,
 the beginning of each segment of loading, the end of the motion, and the end of the step in which
 the last requested sample was recorded. An event at the transition between two regimes or segments
-is reported at the beginning of the later regime or segment. If a motion cannot continue, it raises
-``MotionStopped`` with the reason.
+is reported at the beginning of the later regime or segment. If a motion cannot continue, the
+integration raises ``MotionStopped`` with the reason.
 """
 
 from __future__ import annotations

@@ -94,7 +94,7 @@ def point_without_derived_values(
     spring_stress : float
         Spring stress :math:`f`, in sigma_*.
     states : tuple of float
-        States, and unknowns of the loading and the fluid.
+        States of the law, followed by the unknowns of the loading and the fluid.
     log_slip_rate : float, default: nan
         Value of :math:`\ln(V/V_*)`. Only motions with inertia need it.
     frictional_stress : float, default: nan
@@ -121,7 +121,7 @@ def restart_point(scene: Scene, spring_stress: float, states: Numbers) -> Motion
     spring_stress : float
         Spring stress :math:`f`, in sigma_*.
     states : tuple of float
-        States, and unknowns of the loading and the fluid.
+        States of the law, followed by the unknowns of the loading and the fluid.
 
     Returns
     -------
@@ -237,7 +237,7 @@ def slow_manifold_point(scene: Scene, spring_stress: float, states: Numbers) -> 
     spring_stress : float
         Spring stress :math:`f`, in sigma_*.
     states : tuple of float
-        States, and unknowns of the loading and the fluid.
+        States of the law, followed by the unknowns of the loading and the fluid.
 
     Returns
     -------

@@ -551,7 +551,7 @@ def find_events_at_jump(
     specification : EventSpecification
         Specification of the event.
     point : MotionPoint
-        Point at which the event is reported. It is one of the two points.
+        Point at which the event is reported, either ``point_before`` or ``point_after``.
     """
     last, first = _pack_point(point_before).tolist(), _pack_point(point_after).tolist()
     table = (

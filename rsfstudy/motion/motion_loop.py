@@ -22,8 +22,8 @@ calls have this order::
         enter_initial_regime           after the end of a loading segment
 
 The header of ``array_layout`` lists the functions that write each field of ``motion``. The class
-``Workspace`` describes the arrays of a regime. The steppers, in the package ``steppers``, only
-integrate. The loop finds all events for all steppers.
+``Workspace`` describes the arrays of a regime, and the header of ``workspace`` lists the functions
+that write them. Steppers only take steps. The loop detects and locates the events for all steppers.
 
 The module uses only Python that Numba can compile. To debug a rupture, simulate a scene with
 ``inertia=True`` and ``engine="scipy"``, or ``engine="python"`` to debug the stages of a step. Set a

@@ -365,7 +365,7 @@ def find_termination_status(
     normal_stress : float
         Normal stress in sigma_*.
     load_velocity : float
-        Load point velocity in V_*. A stopped slider terminates the motion only if it is 0.
+        Load point velocity in V_*. If it is 0, the motion terminates when slip stops.
 
     Returns
     -------
@@ -401,7 +401,7 @@ def margin_to_termination(
     Returns
     -------
     float
-        Smallest difference of a logarithm from its limit. The margin is positive if the motion
+        Smallest distance between a logarithm and its limit. The margin is positive if the motion
         continues.
     """
     stress = math.log(max(normal_stress, MIN_POSITIVE_NORMAL_STRESS))

@@ -513,7 +513,7 @@ def record_at_clock(motion, workspace, recording_table, clock):
 def append_recorded_row(motion, recording_table, clock, time, point_columns, parameters):
     """Append a point to the recording table.
 
-    The columns are the columns of ``recording.pack_recorded_row``.
+    The columns are in the order of ``recording.pack_recorded_row``.
     """
     n = motion.recorded_rows
     recording_table[n, 0] = motion.time + (motion.end_time if time > motion.end_time else time)

@@ -1,4 +1,4 @@
-"""Work of a motion, limits of its tolerances, and its early termination."""
+"""Work budget, tolerance limits and early termination of motions."""
 
 from __future__ import annotations
 

@@ -207,7 +207,7 @@ def create_workspace(
 
 
 def fill_rates_by_step_clock(motion, workspace, y, result):
-    """Fill in derivatives by the independent variable of the step.
+    """Fill in derivatives with respect to the clock of the step.
 
     Parameters
     ----------

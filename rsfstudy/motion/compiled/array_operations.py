@@ -68,7 +68,7 @@ def _pointer_moved_by(_context: Any, pointer: Any, item_count: Any) -> Any:
 
 
 def evaluate_in_place(function, y, rates, parameters, result):
-    """Call a function of the equations, which fills an array.
+    """Call a function that fills an array.
 
     Parameters
     ----------

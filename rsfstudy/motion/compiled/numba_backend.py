@@ -174,7 +174,7 @@ def compile_equations_of_scene(scene: Scene, *, with_time: bool) -> None:
 def _pack_initial_state_bytes(field_values: tuple[tuple[str, float], ...]) -> bytes:
     """Pack the initial state of motions into bytes.
 
-    Copies of bytes are faster than copies of records, which Numpy copies field by field.
+    Copies of bytes are faster than copies of records, which NumPy copies field by field.
     """
     memory = np.zeros(1, array_layout.MOTION_STATE_DTYPE)
     for name, value in field_values:

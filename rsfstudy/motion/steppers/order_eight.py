@@ -121,7 +121,7 @@ def step_to_segment_end(motion, workspace, approximate_length):
 
 
 def take_step_with_time_as_clock(motion, workspace):
-    """Take one step in time, and return its error over the tolerance."""
+    """Take one step in time, and return the error divided by the tolerance."""
     count, y, new, stages, length = (
         workspace.unknown_count,
         workspace.y,

@@ -69,7 +69,7 @@ def build_step_attempt_function(
 
 @cache
 def _build_step_attempt_factory(unknown_count: int) -> Function:
-    """Compile a function that builds the step function of some equations."""
+    """Compile a function that builds step functions for equations."""
     n, scales = range(unknown_count), HEADER_SIZE + unknown_count
     lines = [
         f"step[{ERROR_INDEX}] = math.nan",
