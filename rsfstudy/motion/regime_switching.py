@@ -253,8 +253,8 @@ def may_switch_back_to_slow_manifold(
 ) -> bool:
     r"""Return True if the slip rate is small enough for the slow manifold.
 
-    The limit is half of the slip rate at which the motion leaves the slow manifold. The difference
-    prevents repeated changes between the regimes.
+    The limit is half of the slip rate at which the motion leaves the slow manifold. The lower
+    limit prevents repeated changes between the regimes.
 
     Parameters
     ----------
