@@ -1,9 +1,10 @@
 """Integration of the equations of motion of a scene in time.
 
-``Accuracy`` selects tolerances, the work budget and the engine. The event loop advances a motion
-through the segments of its loading and through its regimes (quasi-static, and with inertia), finds
-events, and records the motion on request. There are three engines: SciPy, Python and compiled. The
-package never decides what a motion means: measures do that.
+``Accuracy`` defines the tolerances, the work budget and the engine. ``integrate_events`` integrates
+a scene through its loading segments and regimes, and yields events. A ``Recording`` also stores the
+samples of the motion. To read the implementation, start with ``event_integration``, followed by
+``motion_driver`` and ``motion_loop``. The engines are SciPy, Python and the compiled engine.
+Measures, which interpret the motions, are in ``rsfstudy.measures``.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""From the accuracy a user asks for to the tolerances that deliver it."""
+"""Requested accuracy of results, and tolerances of the integration."""
 
 from __future__ import annotations
 
@@ -12,18 +12,21 @@ from rsfstudy.error_boundary import guard_methods
 from rsfstudy.errors import InvalidValue
 from rsfstudy.motion.engines import SCIPY, engine_name
 
+#: Default value and limits of ``rtol``.
 DEFAULT_RTOL = 1e-7
 MIN_RTOL, MAX_RTOL = 1e-11, 1e-2
+#: Default value of ``budget``.
 DEFAULT_EVALUATION_BUDGET = 500_000
-#: More than any computer evaluates; files hold it.
+#: Upper limit of ``budget``. Files can store this integer exactly.
 MAX_EVALUATION_BUDGET = 10**15
-#: The loosest accuracy that decides where to leave the slow manifold: its series in mass turns back
-#: at a change of ln V of 0.08, which a motion that is to leave it beyond would never reach.
+#: Upper limit of ``rtol`` in the thresholds of the slow manifold. The series in the inertia weight
+#: has a turning point at a change of ln V of 0.08, so a motion would never reach a larger
+#: threshold.
 _MAX_REGIME_SWITCHING_RTOL = 2e-5
-#: How far above what was asked for an error estimate may stay: numbers are then still good to
-#: something near it, and two runs that agree less than that tell nothing of their errors.
+#: Maximum ratio of an error estimate to ``rtol``. If the results of two runs differ by more, their
+#: difference is not a reliable error estimate.
 MAX_ERROR_OVER_RTOL = 100.0
-#: Relative error that rounding alone explains.
+#: Relative error due to rounding.
 RELATIVE_ROUNDING_ERROR = 1e-13
 
 
@@ -31,28 +34,40 @@ RELATIVE_ROUNDING_ERROR = 1e-13
 @guard_methods
 @dataclass(frozen=True)
 class Accuracy:
-    """The accuracy a result must meet, and the work it may cost.
+    """Requested accuracy of results, and limits of the computation.
 
     Parameters
     ----------
-    rtol : float
-        Relative error allowed in headline numbers (of ln V for slip rates, of V_0/V_* - 1 for rate
-        steps).
-    budget : int
-        Right-hand sides one measurement may evaluate before it ends as `work_budget_spent`.
-    methods : tuple of (str, str)
-        Regimes and the SciPy integrators that serve them, where not the default one.
-    engine : {"scipy", "python", "compiled"}, or type
-        What integrates motions; or a stepper of the user's own, given by its class, for which its
-        name stands from then on.
-    refinement : float
-        Part of the usual tolerances that the integration is given; see `refined`.
+    rtol : float, default: 1e-7
+        Relative error tolerance of the main results. It applies to ln V for slip rates, and to
+        V_0/V_* - 1 for rate steps.
+    budget : int, default: 500_000
+        Maximum number of right-hand side evaluations of one measurement. A measurement that exceeds
+        the budget has the status ``work_budget_spent``.
+    methods : tuple of (str, str), default: ()
+        Pairs of a regime and the SciPy solver for this regime. The default solver is DOP853.
+    engine : {"scipy", "python", "compiled"} or type, default: "scipy"
+        Engine that integrates motions, or a subclass of ``Stepper``. After a subclass has been
+        passed once, its name is valid too.
+    refinement : float, default: 1.0
+        Factor of all integration tolerances. See ``refined``.
 
     Raises
     ------
     InvalidValue
-        For an rtol outside 1e-11 to 1e-2, a budget below 1, what is no engine, or integrators for
-        an engine that has its own.
+        If ``rtol`` is not between 1e-11 and 1e-2, if ``budget`` is not a positive integer, if the
+        engine is unknown, or if ``methods`` are given for an engine other than SciPy.
+
+    Examples
+    --------
+    >>> from rsfstudy import Accuracy
+    >>> accuracy = Accuracy(rtol=1e-6, engine="python")
+    >>> accuracy.budget
+    500000
+    >>> f"{accuracy.local_tolerance:.1e}"
+    '7.0e-08'
+    >>> accuracy.refined().refinement
+    0.1
     """
 
     rtol: float = DEFAULT_RTOL
@@ -62,6 +77,7 @@ class Accuracy:
     refinement: float = 1.0
 
     def __post_init__(self) -> None:
+        """Check the values."""
         for name in ("rtol", "budget"):
             if isinstance(getattr(self, name), bool) or not isinstance(getattr(self, name), Real):
                 raise InvalidValue(name, getattr(self, name), "must be a number")
@@ -82,56 +98,78 @@ class Accuracy:
             raise InvalidValue("methods", self.methods, rule, remedy="Leave them out.")
 
     def refined(self) -> Accuracy:
-        """The accuracy of a second run, which tells the error of the first: every tolerance is a
-        tenth.
+        """Return the accuracy of a second run, for an error estimate.
 
-        At order eight it costs a third more than the first. The errors of the two are far apart,
-        and nothing is shared that could be wrong in both.
+        All tolerances are ten times smaller. With a method of order eight, the second run costs
+        about a third more than the first run.
+
+        Returns
+        -------
+        Accuracy
+            Accuracy with a smaller ``refinement``.
+
+        Notes
+        -----
+        The errors of both runs differ by about a factor of ten, so their difference is an estimate
+        of the first error. The runs share no intermediate results.
         """
         return _cached_copy_with_tolerances(self, self.rtol, 0.1 * self.refinement)
 
     def with_rtol(self, rtol: float) -> Accuracy:
-        """The same with another `rtol`."""
+        """Return a copy with another relative error tolerance.
+
+        Parameters
+        ----------
+        rtol : float
+            New relative error tolerance.
+
+        Returns
+        -------
+        Accuracy
+            Copy with the same budget, methods, engine and refinement.
+        """
         return _cached_copy_with_tolerances(self, rtol, self.refinement)
 
     @property
     def local_tolerance(self) -> float:
-        """Local tolerance for the integrator: local errors add up over a motion, so a part of
-        `rtol`.
+        """Local error tolerance of a step.
+
+        The tolerance is smaller than ``rtol`` because local errors accumulate during a motion.
         """
         return 0.07 * self.rtol * self.refinement
 
     @property
     def max_inertia_weight(self) -> float:
-        """Weight (K/a) w**2 of mass up to which the slow manifold stands in for the full equations.
+        """Maximum inertia weight :math:`(K/a) w^2` on the slow manifold.
 
-        The manifold is of second order in it. Where slip peaks at a weight, ln V is off by 1.6
-        times its third power, and over random scenes a stress drop by up to 0.4 times (the tests
-        measure the first).
+        The slow manifold is of second order in the weight :math:`W`. If the slip rate has its
+        maximum at the weight :math:`W`, the error of ln V is :math:`1.6 W^3`. In random scenes, the
+        error of the stress drop is up to :math:`0.4 W^3`. The test suite measures the first factor.
         """
         return math.cbrt(0.75 * min(self.rtol, _MAX_REGIME_SWITCHING_RTOL) * self.refinement)
 
     @property
     def max_inertia_correction(self) -> float:
-        """Change d of ln V by inertia up to which the slow manifold may be used: this bound comes
-        first where slip weakens strongly.
+        """Maximum change of ln V by inertia on the slow manifold.
 
-        Leaving it at d costs a cycle up to 0.07 d**3 over random scenes, and 0.0014 d**3 of the
-        paper's slider (the tests measure it).
+        This limit is reached before ``max_inertia_weight`` if friction weakens strongly with slip.
+        For the limit :math:`d`, the error of a cycle is up to :math:`0.07 d^3` in random scenes,
+        and :math:`0.0014 d^3` for the slider of the paper. The test suite measures these errors.
         """
         return math.cbrt(15.0 * min(self.rtol, _MAX_REGIME_SWITCHING_RTOL) * self.refinement)
 
     @property
     def max_remaining_slip(self) -> float:
-        """Slip in D_c that may remain when the inertial equations hand back to the slow
-        manifold.
-        """
+        """Maximum slip, in D_c, of the transition to the slow manifold."""
         return 0.3 * self.rtol * self.refinement
 
 
 @lru_cache(maxsize=256)
 def _cached_copy_with_tolerances(accuracy: Accuracy, rtol: float, refinement: float) -> Accuracy:
-    """A copy, the same for all cells of a study."""
+    """Return a copy with other tolerances.
+
+    The copy is cached, so all cells of a study share it.
+    """
     return replace(accuracy, rtol=rtol, refinement=refinement)
 
 
@@ -141,20 +179,31 @@ def estimate_error(
     relative_error_floor: float,
     error_scale: float | None = None,
 ) -> float:
-    """Error estimate of a number, from what `Accuracy.refined` makes of it.
-
-    Three times the difference, which misses only where the second error is more than two thirds of
-    the first; and where both are small by chance, what it hides.
+    """Estimate the error of a result from the result of a refined run.
 
     Parameters
     ----------
-    value, refined_value : float
-        Results of the first run, and of the refined one.
+    value : float
+        Result of the first run.
+    refined_value : float
+        Result of the refined run. See ``Accuracy.refined``.
     relative_error_floor : float
-        Relative error that chance may hide: a small part of the accuracy asked for, measured by the
-        study coverage.
+        Relative error that remains if both runs agree by chance. It is a small fraction of the
+        requested accuracy, and the study ``coverage`` measures it.
     error_scale : float, optional
-        What that error is relative to, where the number itself may come near zero.
+        Value that relative errors refer to. The default is ``value``. Pass a scale if the value may
+        be close to zero.
+
+    Returns
+    -------
+    float
+        Absolute error estimate.
+
+    Notes
+    -----
+    The estimate is three times the difference of the results, plus the error floor and the rounding
+    error. Three times the difference is an upper bound of the first error if the second error is at
+    most two thirds of the first error.
     """
     value = float(value)
     hidden = (relative_error_floor + RELATIVE_ROUNDING_ERROR) * abs(

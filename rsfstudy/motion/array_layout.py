@@ -1,48 +1,55 @@
-"""Layout of the numbers of the loop of motions: the state of a motion, and its tables.
+"""Layout of the arrays of the event loop.
 
-Who writes the fields of the state of a motion (`MOTION`), and when:
+The module defines the state of a motion and the columns of the tables. A kink is a boundary between
+two loading segments at which the loading rate changes and the stress does not jump. The fields of
+``MOTION_STATE_DTYPE`` are written by the following functions. Functions without a module name
+belong to ``motion_loop``.
 
-    end_time, time, slip, spring_stress  running.MotionDriver.run as it starts;
-                                         loop.enter_segment at each kink
-    tolerance, step_limit_factor,
-    direction, budget, recording_mode,
-    reported_kinks                       running.MotionDriver.run as it starts
-    kinks_ahead                          the same; loop.enter_segment, one less at each kink
-    may_reverse, may_terminate, has_mass,
-    has_clock, clock_is_path_length,
-    slip_is_clock, unknowns,
-    unknowns_fast, states,
-    unknowns_behind_fluid                running.MotionDriver as it is made, for all its motions
-    starts_at_point                      the same; loop.enter_initial_regime clears it
-    regime                               loop.enter_initial_regime as it starts and at kinks;
-                                         loop.advance where the regime changes
-    pending_start                        running.MotionDriver (START_CODE), loop.advance
-                                         (REGIME_CODE), loop.enter_segment (KINK_CODE);
-                                         loop.follow_regime clears it once told
-    regime_start_time                    loop.follow_regime where a regime ends;
-                                         loop.enter_segment, 0
-    clock                                the stepper as it begins, 0; loop.accept_step after each
-                                         step
-    end, step_length                     the stepper by each step; steps.truncate_at brings the end
-                                         forward
-    next_step_length                     the stepper, for the next step;
-                                         steps.halve_unresolved_step; 0 by loop.advance and
-                                         loop.enter_segment where none is known
-    time_per_step                        the stepper by each step; 0 by loop.follow_regime
-    is_dense                             steppers.order_eight: cleared by a step, set by the first
-                                         look into it
-    dense_output_limit                   loop.follow_regime as a regime begins; then
-                                         steps.halve_unresolved_step
-    steps                                steps.take_step
-    evaluations_slow, evaluations_fast   workspace.count_evaluations at each right-hand side
-    jacobians                            steppers.scipy
-    target_time                          who looks for a time, before that: loop.truncate_step,
-                                         within_steps.record_requested
-    event_rows, recorded_rows            within_steps.add_event and record_point, by each row;
-                                         loop.advance, 0 by each call
-    samples_taken                        within_steps.record_requested
-    must_report                          loop.follow_regime at a kink; loop.advance clears it
-    termination, final_normal_stress     loop.is_valid by each step, where the motion may end so
+========================================  =====================================================
+Fields                                    Written by
+========================================  =====================================================
+end_time, time, slip, spring_stress       MotionDriver.iterate_events (initial values),
+                                          start_next_segment (at each kink)
+tolerance, step_limit_factor, direction,  MotionDriver.iterate_events (initial values)
+budget, recording_mode, reported_kinks
+kinks_ahead                               MotionDriver.iterate_events (initial value),
+                                          start_next_segment (decremented)
+may_reverse, may_terminate, has_clock,    motion_driver.get_motion_driver (constant)
+unknowns_behind_fluid
+has_mass, clock_is_path_length, states,   MotionDriver (constant)
+slip_is_clock, unknowns, unknowns_fast
+starts_at_point                           motion_driver.get_motion_driver (set),
+                                          enter_initial_regime (cleared)
+regime                                    enter_initial_regime (at the start and at kinks),
+                                          advance_motion (at changes of regime)
+pending_start                             MotionDriver (START_CODE), advance_motion
+                                          (REGIME_CODE), start_next_segment (KINK_CODE),
+                                          follow_regime (cleared after the first step)
+regime_start_time                         follow_regime (at the end of a regime),
+                                          start_next_segment (set to 0)
+clock                                     stepper (set to 0 at the start of a regime),
+                                          advance_to_step_end
+end, step_length                          stepper (each step),
+                                          step_integration.truncate_step_at_clock (end only)
+next_step_length                          stepper, step_integration.halve_unresolved_step,
+                                          advance_motion and start_next_segment (set to 0)
+time_per_step                             stepper (each step), follow_regime (set to 0)
+is_dense                                  steppers.order_eight (cleared by each step, set by the
+                                          first interpolation)
+dense_output_limit                        follow_regime (at the start of a regime),
+                                          step_integration.halve_unresolved_step
+steps                                     step_integration.take_step
+evaluations_slow, evaluations_fast        workspace.count_evaluations, steppers.scipy
+jacobians                                 steppers.scipy
+target_time                               truncate_step_at_regime_or_time_end,
+                                          step_events.record_requested_samples
+event_rows, recorded_rows                 step_events.append_event_row,
+                                          step_events.append_recorded_row,
+                                          advance_motion (set to 0 in each call)
+samples_taken                             step_events.record_requested_samples
+must_report                               follow_regime (at a kink), advance_motion (cleared)
+termination, final_normal_stress          is_step_end_valid (if may_terminate is set)
+========================================  =====================================================
 """
 
 from __future__ import annotations
@@ -51,61 +58,61 @@ import struct
 
 import numpy as np
 
-#: The state of a motion, which it keeps from one call to the next; first what it is called with,
-#: and what it has to say of itself.
+#: State of a motion, which persists between calls of the loop. The first fields are the arguments
+#: of the motion (``CALL_ARGUMENT_FIELDS``), and the next fields are the counters.
 MOTION_STATE_DTYPE = np.dtype(
     [
-        ("end_time", "f8"),  # time at which to end
-        ("time", "f8"),  # time, slip and spring stress at the start
+        ("end_time", "f8"),  # duration of the loading segment
+        ("time", "f8"),  # time, slip and spring stress at the start of the loading segment
         ("slip", "f8"),
         ("spring_stress", "f8"),
         ("tolerance", "f8"),
-        ("step_limit_factor", "f8"),  # part of the longest steps at this tolerance
-        ("direction", "f8"),  # of the clock: 1 or -1
-        ("budget", "i8"),  # right-hand sides that it may spend
-        ("recording_mode", "i8"),  # when the slider is recorded
-        ("kinks_ahead", "i8"),  # kinks of the loading ahead, and the last of them that are reported
-        ("reported_kinks", "i8"),
-        ("evaluations_slow", "i8"),  # right-hand sides, by regime
+        ("step_limit_factor", "f8"),  # factor of the maximum step size at this tolerance
+        ("direction", "f8"),  # direction of the independent variable: 1 or -1
+        ("budget", "i8"),  # maximum number of right-hand side evaluations
+        ("recording_mode", "i8"),  # RECORD_NEVER, RECORD_WITHIN_STEPS, ...
+        ("kinks_ahead", "i8"),  # number of remaining kinks
+        ("reported_kinks", "i8"),  # number of final kinks that are reported as events
+        ("evaluations_slow", "i8"),  # right-hand side evaluations in each regime
         ("evaluations_fast", "i8"),
         ("steps", "i8"),
-        ("event_rows", "i8"),  # rows of the table of events, and of the recording
-        ("recorded_rows", "i8"),
+        ("event_rows", "i8"),  # number of filled rows of the event table
+        ("recorded_rows", "i8"),  # number of filled rows of the recording table
         ("jacobians", "i8"),
-        ("regime_start_time", "f8"),  # time at which the regime began
-        ("clock", "f8"),  # at the beginning of a step, and at its end
-        ("end", "f8"),
-        ("step_length", "f8"),  # length of the step; its end may have been brought forward
-        ("next_step_length", "f8"),  # of the next step; 0 where none is known
-        ("time_per_step", "f8"),  # change of time by the clock of a step against time; 0 of others
-        ("dense_output_limit", "f8"),  # longest step with dense output as accurate as is wanted
-        ("regime", "i8"),
-        ("pending_start", "i8"),  # what to tell before the first event of a regime
-        ("may_reverse", "i8"),  # whether slip may, with shear stress
-        ("may_terminate", "i8"),  # whether the motion ends where it cannot go on
-        ("has_mass", "i8"),  # whether there are two regimes
-        ("has_clock", "i8"),  # whether time is an unknown
-        ("clock_is_path_length", "i8"),  # whether it is, which limits steps
-        ("slip_is_clock", "i8"),  # whether the clock is slip
-        ("samples_taken", "i8"),  # how often the slider was recorded at values asked for
-        ("target_time", "f8"),  # time that is looked for
-        ("must_report", "i8"),  # whether what was told at a kink cannot wait
-        ("starts_at_point", "i8"),  # whether it begins at the last point, not where y is
-        ("is_dense", "i8"),  # whether dense output of the step is there
-        ("termination", "i8"),  # why the motion cannot go on, and normal stress there
-        ("final_normal_stress", "f8"),
-        ("unknowns", "i8"),  # between ruptures, and in them
-        ("unknowns_fast", "i8"),
-        ("states", "i8"),
-        ("unknowns_behind_fluid", "i8"),  # unknowns of a fluid behind the one that a kink sets
+        ("regime_start_time", "f8"),  # start time of the regime, from segment start
+        ("clock", "f8"),  # independent variable at the beginning of the step
+        ("end", "f8"),  # independent variable at the end of the step, which may be truncated
+        ("step_length", "f8"),  # signed step size before truncation
+        ("next_step_length", "f8"),  # size of the next step, or 0 if it is unknown
+        ("time_per_step", "f8"),  # dt/d(clock) of a step with time as independent variable, or 0
+        ("dense_output_limit", "f8"),  # maximum step size with sufficiently accurate dense output
+        ("regime", "i8"),  # SLOW_REGIME or FAST_REGIME
+        ("pending_start", "i8"),  # code of the start event to report after the first step, or 0
+        ("may_reverse", "i8"),  # 1 if slip and shear stress may change sign
+        ("may_terminate", "i8"),  # 1 if the loop checks whether the motion can continue
+        ("has_mass", "i8"),  # 1 if the motion has two regimes
+        ("has_clock", "i8"),  # 1 if time is an unknown
+        ("clock_is_path_length", "i8"),  # 1 if path length is the independent variable
+        ("slip_is_clock", "i8"),  # 1 if slip is the independent variable
+        ("samples_taken", "i8"),  # number of requested samples recorded so far
+        ("target_time", "f8"),  # time of the root that is being located
+        ("must_report", "i8"),  # 1 if the loop must return after a kink to report an event
+        ("starts_at_point", "i8"),  # 1 if the motion starts at last_point instead of y
+        ("is_dense", "i8"),  # 1 if the dense output of the step has been computed
+        ("termination", "i8"),  # termination status
+        ("final_normal_stress", "f8"),  # normal stress ratio at termination
+        ("unknowns", "i8"),  # number of unknowns between ruptures
+        ("unknowns_fast", "i8"),  # number of unknowns in ruptures
+        ("states", "i8"),  # number of states
+        ("unknowns_behind_fluid", "i8"),  # number of fluid unknowns, which are last
     ]
 )
-#: The same as bytes: fields of records take much longer to write and to read.
+#: Formats of the arguments and the counters. Packing bytes is much faster than record fields.
 CALL_FORMAT, COUNTER_FORMAT = struct.Struct("=7d4q"), struct.Struct("=6q")
 CALL_ARGUMENT_FIELDS = (MOTION_STATE_DTYPE.names or ())[:11]
-#: Rows of the table of functions; and how many equations have there, of which the last may be
-#: missing (see `inplace.InPlaceFunctions`).
+#: Rows of the function table: slow manifold and ruptures.
 SLOW_REGIME, FAST_REGIME = 0, 1
+#: Number of functions in each row, in the order of ``in_place_functions.InPlaceFunctions``.
 FUNCTIONS_PER_REGIME = 4
 
 #: Columns of the table of event specifications.
@@ -118,20 +125,23 @@ SPECIFICATION_COLUMNS = (
     SPEC_MAX_DISTANCE,
     SPEC_MAX_FRICTION_DISTANCE,
 ) = 0, 1, 2, 3, 4, 5, 6
+#: Values of the column SPEC_KIND.
 MAXIMUM, MINIMUM, RISE, FALL, SETTLED = range(5)
 
-#: When the slider is recorded: never, evenly within each step, or at clocks or times asked for.
+#: Recording modes: never, at even intervals within each step, or at requested slips or times.
 RECORD_NEVER, RECORD_WITHIN_STEPS, RECORD_AT_CLOCKS, RECORD_AT_TIMES = range(4)
 
 
-#: Columns of the table of events; from EVENT_POINT on, those of a point.
+#: Columns of the event table. The columns of the point begin at EVENT_POINT.
 EVENT_CODE, EVENT_REGIME, EVENT_CLOCK, EVENT_TIME, EVENT_SLIP, EVENT_EVALUATIONS, EVENT_POINT = (
     range(7)
 )
-#: Codes of events that are not asked for; those of others are the places of their specifications.
+#: Codes of events that are always reported. The code of a requested event is the index of its
+#: specification.
 START_CODE, REGIME_CODE, END_CODE, SAMPLED_CODE, KINK_CODE = -1, -2, -3, -4, -5
 
-#: Columns of a point, in the order of `Point`, of which the states are the last.
+#: Columns of a point, in the order of the fields of ``MotionPoint``. The states are the last
+#: columns.
 (
     LOG_SLIP_RATE,
     LOG_SLIP_RATE_GROWTH,
@@ -146,10 +156,10 @@ START_CODE, REGIME_CODE, END_CODE, SAMPLED_CODE, KINK_CODE = -1, -2, -3, -4, -5
 ) = range(10)
 APPARENT_FRICTION, APPARENT_FRICTION_RATE, FIRST_STATE = 10, 11, 12
 
-#: Why a call returns: to be called again once its tables are read; because the motion has ended;
-#: because its regime ends; because it cannot go on; or because its segment of loading ends. (The
-#: change of regimes has a file, `regime_switching`; `REGIME_CODE` and `KINK_CODE` above are what is
-#: told of both.)
+#: Return codes of the loop and of its functions. After PAUSED, the caller reads the tables and
+#: calls the loop again. TERMINATED means that the motion cannot continue, for example because
+#: normal stress has vanished. The codes REGIME_ENDED and SEGMENT_ENDED are used within the loop
+#: only.
 (
     PAUSED,
     MOTION_ENDED,
@@ -160,5 +170,5 @@ APPARENT_FRICTION, APPARENT_FRICTION_RATE, FIRST_STATE = 10, 11, 12
     INVALID_STEP,
     SEGMENT_ENDED,
 ) = range(8)
-#: What `steps.take_step` returns where it has taken one.
+#: Return code of ``step_integration.take_step`` for a successful step.
 STEP_TAKEN = -1

@@ -1,27 +1,70 @@
-"""Calls of the loop of motions on its arrays and equations, in plain Python.
+"""Array operations of the event loop in plain Python.
 
-Uncompiled, arrays are memoryviews, and an equation is a function that fills one. The compiler has
-pointers and addresses in their place (`compiled.calls`).
+The arrays are memory views, and the equations are functions that fill arrays. In compiled code,
+arrays are pointers and functions are addresses, so the functions of ``compiled.array_operations``
+replace the functions of this module.
 """
 
 from __future__ import annotations
 
 
 def evaluate_in_place(function, y, rates, parameters, result):
-    """Have a function of the equations fill `result`."""
+    """Call a function that fills an array.
+
+    Parameters
+    ----------
+    function : callable
+        Function of ``in_place_functions.InPlaceFunctions``.
+    y, rates, parameters : array
+        Arguments of the function.
+    result : array
+        Output array.
+    """
     function(y, rates, parameters, result)
 
 
 def array_as_pointer(array):
-    """An array from its first number on."""
+    """Return an array in the form that ``offset_pointer`` accepts.
+
+    Parameters
+    ----------
+    array : array
+        Array to convert.
+
+    Returns
+    -------
+    array
+        The array itself.
+    """
     return array
 
 
 def offset_pointer(array, item_count):
-    """An array from so many numbers further on."""
+    """Return the part of an array that begins at an index.
+
+    Parameters
+    ----------
+    array : array
+        Array to slice.
+    item_count : int
+        Number of items to skip.
+
+    Returns
+    -------
+    array
+        View of the remaining items.
+    """
     return array[item_count:]
 
 
 def copy_values(source, target, item_count):
-    """Copy so many numbers."""
+    """Copy the first items of an array to another array.
+
+    Parameters
+    ----------
+    source, target : array
+        Arrays to read and to write.
+    item_count : int
+        Number of items.
+    """
     target[:item_count] = source[:item_count]

@@ -1,4 +1,4 @@
-"""Creation of engines from their names: steppers of Python engines, and the compiled engine."""
+"""Creation of steppers and of the compiled engine from engine names."""
 
 from __future__ import annotations
 
@@ -22,7 +22,18 @@ if TYPE_CHECKING:
 
 
 def check_engine_is_usable(name: str) -> None:
-    """Raise InvalidValue for an engine that is unknown, or not installed."""
+    """Raise InvalidValue if an engine is unknown or not installed.
+
+    Parameters
+    ----------
+    name : str
+        Name of the engine.
+
+    Raises
+    ------
+    InvalidValue
+        If the engine is unknown, or if it is the compiled engine and Numba is not installed.
+    """
     if name not in ENGINES and not find_user_stepper(name):
         raise unknown_engine_error(name)
     if name == COMPILED:
@@ -32,8 +43,27 @@ def check_engine_is_usable(name: str) -> None:
 def create_stepper(
     engine_name: str, equations_by_regime: Any, method_by_regime: Mapping[str, str]
 ) -> Any:
-    """Stepper of a motion through regimes with these systems of equations; 0, which
-    stands for it, where it is compiled.
+    """Create the stepper of a motion.
+
+    Parameters
+    ----------
+    engine_name : str
+        Name of the engine.
+    equations_by_regime : tuple of Equations
+        Equations of each regime.
+    method_by_regime : mapping of str to str
+        Name of the SciPy solver for each regime.
+
+    Returns
+    -------
+    Stepper or int
+        Stepper. For the compiled engine the result is 0, because the compiled loop does not need a
+        stepper object.
+
+    Raises
+    ------
+    InvalidValue
+        If the engine is unknown.
     """
     if engine_name == COMPILED:
         return 0
@@ -47,7 +77,7 @@ def create_stepper(
 
 @cache
 def _stepper_classes_by_engine() -> dict[str, Any]:
-    """The steppers of plain Python, by the names of engines."""
+    """Return the stepper classes of the SciPy and Python engines."""
     order_eight = importlib.import_module("rsfstudy.motion.steppers.order_eight")
     scipy = importlib.import_module("rsfstudy.motion.steppers.scipy")
     return {PYTHON: order_eight.OrderEightStepper, SCIPY: scipy.SciPyStepper}
@@ -55,12 +85,17 @@ def _stepper_classes_by_engine() -> dict[str, Any]:
 
 @cache
 def import_compiled_engine() -> Any:
-    """The compiled engine.
+    """Import the compiled engine.
+
+    Returns
+    -------
+    module
+        Module ``compiled.numba_backend``.
 
     Raises
     ------
     InvalidValue
-        Where Numba is not installed.
+        If Numba is not installed.
     """
     try:
         return importlib.import_module("rsfstudy.motion.compiled.numba_backend")
@@ -73,7 +108,17 @@ def import_compiled_engine() -> Any:
 def call_array_function_by_engine(
     function: Callable[..., None], engine_name: str, *arrays: np.ndarray
 ) -> None:
-    """Call a function of arrays as an engine does: compiled, or on memoryviews."""
+    """Call a function of arrays in plain Python or compiled.
+
+    Parameters
+    ----------
+    function : callable
+        Function that fills arrays.
+    engine_name : str
+        Name of the engine. The function is compiled if the engine is ``"compiled"``.
+    *arrays : ndarray
+        Arguments of the function. In plain Python, the function receives memory views.
+    """
     if engine_name == COMPILED:
         import_compiled_engine().compile_array_function(
             function, *(array.ndim for array in arrays)

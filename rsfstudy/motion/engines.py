@@ -1,6 +1,7 @@
-"""Names of the engines that integrate motions: SciPy, Python steppers, and compiled steppers.
+"""Names of the engines that integrate motions: SciPy, Python and compiled.
 
-The classes and functions that the names stand for are created in `engine_factory`.
+A user-defined stepper is an additional engine. The module ``engine_factory`` creates the classes
+and functions of the engines.
 """
 
 from __future__ import annotations
@@ -18,18 +19,29 @@ from rsfstudy.quantities import is_variable_name
 
 SCIPY, PYTHON, COMPILED = "scipy", "python", "compiled"
 ENGINES = (SCIPY, PYTHON, COMPILED)
-#: Steppers of a user's own, by name, as far as they are known in this process.
+#: User-defined steppers that are registered in this process.
 _USER_STEPPERS: dict[str, type] = {}
 
 
 def engine_name(engine: Any) -> str:
-    """The name of an engine that is given by its name, or by the class of a stepper of a user's
-    own, for which its name stands from then on.
+    """Return the name of an engine, and register user-defined steppers.
+
+    Parameters
+    ----------
+    engine : str or type
+        Name of an engine, or a subclass of ``Stepper``. A subclass is registered under its
+        attribute ``name``.
+
+    Returns
+    -------
+    str
+        Name of the engine.
 
     Raises
     ------
     InvalidValue
-        For a class that is no stepper, or has no name of its own.
+        If a name is not valid, or if a class is not a stepper, has no valid name, or has the name
+        of another engine.
     """
     if not isinstance(engine, type):
         if not isinstance(engine, str) or not (engine in ENGINES or is_variable_name(engine)):
@@ -52,37 +64,74 @@ def engine_name(engine: Any) -> str:
 
 
 def find_user_stepper(stepper_name: str) -> tuple[type, ...]:
-    """The stepper of a user's own that a name stands for; none where it stands for none."""
+    """Find a user-defined stepper by its name.
+
+    Parameters
+    ----------
+    stepper_name : str
+        Name of the stepper.
+
+    Returns
+    -------
+    tuple of type
+        Tuple with the stepper class, or an empty tuple if no stepper has this name.
+    """
     return (_USER_STEPPERS[stepper_name],) if stepper_name in _USER_STEPPERS else ()
 
 
 def register_user_steppers(steppers: Iterable[type]) -> None:
-    """Have the names of steppers that were checked stand for them, whatever they stood for."""
+    """Register user-defined steppers without checks.
+
+    Worker processes call the function. A stepper replaces an earlier stepper with the same name.
+
+    Parameters
+    ----------
+    steppers : iterable of type
+        Stepper classes.
+    """
     for stepper in steppers:
         _USER_STEPPERS[stepper.name] = stepper  # type: ignore[attr-defined]
 
 
 def _qualified_name_of_stepper(stepper: type) -> tuple[str, str]:
-    """Module and name of a stepper, which an earlier definition of it shares."""
+    """Return the module and the name of a stepper class.
+
+    They do not change if a class is defined again, for example in a notebook.
+    """
     return stepper.__module__, stepper.__qualname__
 
 
 def unknown_engine_error(engine: Any) -> InvalidValue:
-    """Return the error for a name or class that is not an engine."""
+    """Return the error for a name or class that is not an engine.
+
+    Parameters
+    ----------
+    engine : object
+        Value that is not an engine.
+
+    Returns
+    -------
+    InvalidValue
+        Error with the allowed choices.
+    """
     return InvalidValue("engine", engine, "is unknown", choices=(*ENGINES, *_USER_STEPPERS))
 
 
 @dataclass
 class CompilationLog:
-    """Record of what has been compiled in this process; found in the cache, it does not count.
+    """Record of compilations in this process.
 
-    Attributes
+    Programs that were loaded from the cache are not counted.
+
+    Parameters
     ----------
-    compiled_program_count : int
-    total_compilation_seconds : float
-        Time it took.
-    context_while_compiling : callable
-        Gives the context in which to compile: whoever limits or measures time leaves it out.
+    compiled_program_count : int, default: 0
+        Number of compiled programs.
+    total_compilation_seconds : float, default: 0.0
+        Total compilation time in seconds.
+    context_while_compiling : callable, optional
+        Function that returns a context manager for the compilation. A time limit or a timer can
+        exclude the compilation with it. By default, the context manager does nothing.
     """
 
     compiled_program_count: int = 0
@@ -94,5 +143,18 @@ compilation_log = CompilationLog()
 
 
 def is_engine_installed(engine: str) -> bool:
-    """True if an engine can be used here, as far as one can tell without loading it."""
+    """Return True if the packages of an engine are installed.
+
+    The function does not import the packages.
+
+    Parameters
+    ----------
+    engine : str
+        Name of the engine.
+
+    Returns
+    -------
+    bool
+        True if the engine does not need Numba, or if Numba is installed.
+    """
     return engine != COMPILED or importlib.util.find_spec("numba") is not None

@@ -1,4 +1,9 @@
-"""The course of a motion, told as events: through segments of loading and regimes, in one time."""
+"""Integration of a scene through its loading segments, as events.
+
+``integrate_events`` is the main function. Consecutive segments without a jump in stress form a
+chain. The driver of the event loop integrates each chain, and ``integrate_events`` handles the
+jumps between the chains.
+"""
 
 from __future__ import annotations
 
@@ -43,37 +48,44 @@ def integrate_events(
     until: float = math.inf,
     resume_from: Event | None = None,
 ) -> Iterator[Event]:
-    """Follow a scene from the instant after its first step, for as long as the caller asks.
+    """Integrate a scene from the instant after its first step.
 
     Parameters
     ----------
     scene : Scene
+        Scene to integrate.
     accuracy : Accuracy
+        Requested accuracy.
     work_meter : WorkMeter
-        Charged with the work, by regime.
-    event_specs : sequence of EventSpecification
-        What to be told of.
-    start : Point, optional
-        Where to start, in the last segment of loading; else all begins with steady sliding at V_*.
-    with_time : bool
-        Carry time along: without it, times and slips are NaN, and work is saved.
+        Counter of right-hand side evaluations in each regime.
+    event_specs : sequence of EventSpecification, default: ()
+        Requested events.
+    start : MotionPoint, optional
+        Initial point within the last loading segment. By default, the motion starts in the first
+        segment, from steady sliding at V_* or from the initial stress and state of the scene.
+    with_time : bool, default: False
+        If True, time is one of the unknowns. Otherwise, times and slips of events may be NaN, and
+        the integration needs less work.
     recording : Recording, optional
-        Takes in what the motion does, step by step.
-    until : float
-        Time at which to end.
+        Object that records the motion.
+    until : float, default: inf
+        Time at which the motion ends, in D_c/V_*.
     resume_from : Event, optional
-        End of an earlier motion of the scene, from which to go on.
+        Last event of an earlier motion of the scene. The motion continues from this event.
 
     Yields
     ------
     Event
+        Events in the order of their occurrence.
 
     Raises
     ------
     MotionStopped
-        With `normal_stress_lost`, `shear_stress_reversed`, `locked` or `slip_rate_unbounded` where
-        the equations end; `work_budget_spent`; or `integration_failed` where no step can be taken,
-        a step has no length, or a number is not finite.
+        If the motion cannot continue. The status is ``normal_stress_lost``,
+        ``shear_stress_reversed``, ``locked``, ``slip_stopped`` or ``slip_rate_unbounded`` if the
+        slider reaches a limit of the equations. The status is ``work_budget_spent`` if the budget
+        is exhausted. The status is ``integration_failed`` if the stepper fails or a value is not
+        finite.
     """
     chains: Sequence[tuple[Scene, np.ndarray]]
     chains = (
@@ -116,7 +128,7 @@ def integrate_events(
             if acting.parts.loading.has_load_point_unknown
             else None,
         )
-        if before is None and end == math.inf:  # it has all there is to tell
+        if before is None and end == math.inf:  # The motion consists of a single chain.
             yield from motion
             return
         for last in motion:
@@ -130,14 +142,15 @@ def integrate_events(
                 if last.specification is not None and last.specification.terminal:
                     return
         if last.kind is EventKind.END:
-            # it was located to the spacing of numbers around the clock
+            # The located end time has a rounding error.
             last = last._replace(time=end)
             if recording is not None:
                 recording.clip_times_to(end)
         if end >= until:
             yield last
             return
-        numbers = list(acting.parameter_values)  # of the first segment of the chain
+        # The parameters of the scene belong to the first segment of the chain.
+        numbers = list(acting.parameter_values)
         numbers[LOG_LOAD_VELOCITY] = float(table[-1, SEGMENT_LOG_VELOCITY])
         start, before = last.point, (last.point, tuple(numbers))
         time, slip = last.time, last.slip
@@ -146,8 +159,9 @@ def integrate_events(
 def _remaining_segment_chains(
     scene: Scene, resume_from: Event
 ) -> tuple[Sequence[tuple[Scene, np.ndarray]], MotionPoint]:
-    """The chains of segments that are left after the end of a motion, and the point to begin at:
-    behind the jump, where it ended at one.
+    """Return the chains after the end of a motion, and the initial point.
+
+    If the motion ended at a jump, the initial point is the point after the jump.
     """
     first, point, left = 0, resume_from.point, []
     for acting, table in scene.continuous_segments:
@@ -165,7 +179,7 @@ def _remaining_segment_chains(
 
 
 def _truncate_segments_at(segment_table: np.ndarray, end_time: float) -> np.ndarray:
-    """Those of the segments of a chain that begin before a time, the last of which ends then."""
+    """Return the segments of a chain up to an end time."""
     if end_time == math.inf or segment_table[-1, SEGMENT_END] <= end_time:
         return segment_table
     count = max(int(np.searchsorted(segment_table[:, SEGMENT_START], end_time)), 1)
@@ -180,21 +194,22 @@ def _segment_start_events(
     segment_scene: Scene,
     event_specs: Sequence[EventSpecification],
 ) -> Iterator[Event]:
-    """Events where a later segment begins: that it does, and what happens there, after a point with
-    the numbers of the segment before.
+    """Yield the events at the start of a later chain.
+
+    The first event is the start of the segment. Requested events that occur at the jump follow.
     """
     yield event._replace(kind=EventKind.SEGMENT)
     for spec, point in find_events_at_jump(
         *point_and_parameters_before, event.point, segment_scene.parameter_values, event_specs
     ):
-        # slip from the first point: the spring may have jumped with the load point
+        # The slip of the start event is valid for both points, because slip never jumps.
         yield event._replace(kind=spec.kind, specification=spec, point=point)
 
 
 def _steady_sliding_may_be_stable(scene: Scene, event_specs: Sequence[EventSpecification]) -> bool:
-    """Return False if steady sliding is unstable under the last segment of loading.
+    """Return False if steady sliding is unstable in the last loading segment.
 
-    The growth rate of small perturbations is computed only if a specification asks for settling.
+    The growth rate of small perturbations is computed only if a settling event is requested.
     """
     if scene.log_load_velocity == -math.inf or all(
         spec.kind is not EventKind.SETTLED for spec in event_specs
@@ -205,4 +220,5 @@ def _steady_sliding_may_be_stable(scene: Scene, event_specs: Sequence[EventSpeci
 
 
 def _without_settling_events(event_specs: Sequence[EventSpecification]) -> list[EventSpecification]:
+    """Return the event specifications without settling events."""
     return [spec for spec in event_specs if spec.kind is not EventKind.SETTLED]

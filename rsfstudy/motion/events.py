@@ -9,9 +9,10 @@ each with its time, slip and point. A measure can request the following events:
                                 upward or downward crossing of a level by a quantity
     approach_to_steady_state(fraction)
                                 distance from steady sliding below a fraction of the largest
-                                distance so far. The event is reported at the end of each such step
-                                in the last segment of loading, unless normal stress still changes
-                                or steady sliding is unstable.
+                                distance so far. The event is reported at the end of each step that
+                                meets this condition. Only steps in the last segment of loading are
+                                checked. The event is not reported if normal stress still changes
+                                or if steady sliding is unstable.
 
 Each requested event may end the motion. The available quantities are the attributes of a
 ``MotionPoint``. The attribute ``apparent_friction`` is the friction coefficient that a rig
@@ -20,8 +21,8 @@ measures. Extrema are available for ``log_slip_rate``, ``spring_stress`` and ``a
 In addition to the requested events, the table lists the start of the motion, each change of regime,
 the beginning of each segment of loading, the end of the motion, and the end of the step in which
 the last requested sample was recorded. An event at the transition between two regimes or segments
-is reported at the beginning of the later regime or segment. If a motion cannot continue, it raises
-``MotionStopped`` with the reason.
+is reported at the beginning of the later regime or segment. If a motion cannot continue, the
+integration raises ``MotionStopped`` with the reason.
 """
 
 from __future__ import annotations
@@ -52,15 +53,30 @@ class EventKind(StrEnum):
     SAMPLED = "sampled"
     END = "end"
 
-    # that of an enumeration is written in Python, and tables of events are looked up by it
+    # The hash function of enumerations is slow because it is written in Python.
     __hash__ = str.__hash__
 
 
 @renamed_members
 class EventSpecification(NamedTuple):
-    """Event specification; whether the motion ends there; and whether whoever asks can wait for it,
-    and for the beginning, until something else has happened: an engine may then tell several events
-    at once.
+    """Specification of a requested event.
+
+    The functions ``maximum``, ``minimum``, ``rise``, ``fall`` and ``approach_to_steady_state``
+    create specifications.
+
+    Parameters
+    ----------
+    kind : EventKind
+        Kind of the event.
+    quantity : str, default: ""
+        Attribute of ``MotionPoint``. Settling events have no quantity.
+    level : float, default: 0.0
+        Level of a crossing, or fraction of a settling event.
+    terminal : bool, default: False
+        If True, the motion ends at the event.
+    may_defer : bool, default: False
+        If True, the engine may report the event and the start of the motion later, together with
+        other events. The integration is then faster.
     """
 
     kind: EventKind
@@ -74,7 +90,22 @@ class EventSpecification(NamedTuple):
 def maximum(
     quantity: str, *, terminal: bool = False, may_defer: bool = False
 ) -> EventSpecification:
-    """A maximum of ``log_slip_rate``, ``spring_stress`` or ``apparent_friction``."""
+    """Create the specification of a maximum.
+
+    Parameters
+    ----------
+    quantity : {"log_slip_rate", "spring_stress", "apparent_friction"}
+        Quantity whose maxima are located.
+    terminal : bool, default: False
+        If True, the motion ends at the first maximum.
+    may_defer : bool, default: False
+        If True, the engine may report the event later. See ``EventSpecification``.
+
+    Returns
+    -------
+    EventSpecification
+        Specification of the event.
+    """
     return _specify_quantity_event(
         EventKind.MAXIMUM, quantity, terminal=terminal, may_defer=may_defer
     )
@@ -84,7 +115,22 @@ def maximum(
 def minimum(
     quantity: str, *, terminal: bool = False, may_defer: bool = False
 ) -> EventSpecification:
-    """A minimum of ``log_slip_rate``, ``spring_stress`` or ``apparent_friction``."""
+    """Create the specification of a minimum.
+
+    Parameters
+    ----------
+    quantity : {"log_slip_rate", "spring_stress", "apparent_friction"}
+        Quantity whose minima are located.
+    terminal : bool, default: False
+        If True, the motion ends at the first minimum.
+    may_defer : bool, default: False
+        If True, the engine may report the event later. See ``EventSpecification``.
+
+    Returns
+    -------
+    EventSpecification
+        Specification of the event.
+    """
     return _specify_quantity_event(
         EventKind.MINIMUM, quantity, terminal=terminal, may_defer=may_defer
     )
@@ -94,7 +140,24 @@ def minimum(
 def rise(
     quantity: str, level: float, *, terminal: bool = False, may_defer: bool = False
 ) -> EventSpecification:
-    """A quantity on its way up, at a level."""
+    """Create the specification of an upward crossing of a level.
+
+    Parameters
+    ----------
+    quantity : str
+        Attribute of ``MotionPoint``.
+    level : float
+        Level of the crossing.
+    terminal : bool, default: False
+        If True, the motion ends at the first crossing.
+    may_defer : bool, default: False
+        If True, the engine may report the event later. See ``EventSpecification``.
+
+    Returns
+    -------
+    EventSpecification
+        Specification of the event.
+    """
     return _specify_quantity_event(
         EventKind.RISE, quantity, level, terminal=terminal, may_defer=may_defer
     )
@@ -104,7 +167,24 @@ def rise(
 def fall(
     quantity: str, level: float, *, terminal: bool = False, may_defer: bool = False
 ) -> EventSpecification:
-    """A quantity on its way down, at a level."""
+    """Create the specification of a downward crossing of a level.
+
+    Parameters
+    ----------
+    quantity : str
+        Attribute of ``MotionPoint``.
+    level : float
+        Level of the crossing.
+    terminal : bool, default: False
+        If True, the motion ends at the first crossing.
+    may_defer : bool, default: False
+        If True, the engine may report the event later. See ``EventSpecification``.
+
+    Returns
+    -------
+    EventSpecification
+        Specification of the event.
+    """
     return _specify_quantity_event(
         EventKind.FALL, quantity, level, terminal=terminal, may_defer=may_defer
     )
@@ -113,7 +193,7 @@ def fall(
 def _specify_quantity_event(
     kind: EventKind, quantity: str, level: float = 0.0, *, terminal: bool, may_defer: bool
 ) -> EventSpecification:
-    """Return an event specification. The quantity may have its former name."""
+    """Create an event specification. The quantity may have its former name."""
     return EventSpecification(
         kind, renamed_value(MotionPoint, quantity), level, terminal, may_defer
     )
@@ -121,35 +201,50 @@ def _specify_quantity_event(
 
 @renamed_keywords
 def approach_to_steady_state(fraction: float, *, terminal: bool = False) -> EventSpecification:
-    """Return the specification of an event for motions that approach steady sliding.
+    """Create the specification of the approach to steady sliding.
 
     The event occurs if the distance from steady sliding falls below a fraction of the largest
     distance so far. The distance is measured in ln V and in each state divided by b. Unknowns
     listed in the attribute ``excluded_from_distance`` of a part are ignored.
+
+    Parameters
+    ----------
+    fraction : float
+        Fraction of the largest distance.
+    terminal : bool, default: False
+        If True, the motion ends at the event.
+
+    Returns
+    -------
+    EventSpecification
+        Specification of the event.
     """
     return EventSpecification(EventKind.SETTLED, level=fraction, terminal=terminal)
 
 
 @renamed_members
 class Event(NamedTuple):
-    """One row of the table.
+    """Event of a motion.
 
-    Attributes
+    Parameters
     ----------
     kind : EventKind
+        Kind of the event.
     specification : EventSpecification or None
-        What was asked for, if it was.
-    time, slip : float
-        Since the start, in D_c/V_* and D_c; NaN in a motion without clock.
-    point : Point
-        What the slider does then.
+        Specification of a requested event. It is None for other events.
+    time : float
+        Time since the start, in D_c/V_*. It is NaN if time is not an unknown of the motion.
+    slip : float
+        Slip since the start, in D_c. For most sliders it is NaN if time is not an unknown.
+    point : MotionPoint
+        Point of the motion at the event.
     regime : str
-        The equations in use.
+        Name of the regime.
     evaluation_count : int
-        Right-hand sides spent so far.
+        Number of right-hand side evaluations so far.
     clock : float
-        Clock of those equations, since they have been in use: length along the path, or slip of a
-        rigid slider.
+        Independent variable of the equations, measured from the start of the regime. It is the
+        length along the path, or the slip of a rigid slider.
     """
 
     kind: EventKind

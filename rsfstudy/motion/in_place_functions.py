@@ -1,7 +1,9 @@
-"""The equations of a scene as the loop of motions calls them: functions that fill arrays.
+"""Conversion of equations to functions that fill arrays.
 
-They are made of the functions of floats of `slider.equations.Equations`. What the compiler makes of
-them cannot raise: where a function does, the numbers that were to be filled in are NaN.
+The event loop calls the equations through these functions. ``build_in_place_functions`` converts
+the functions of ``slider.equations.Equations``, which take and return tuples of floats. Compiled
+functions cannot raise exceptions. If the equations raise an exception in compiled code, the results
+are NaN, because the functions first assign NaN.
 """
 
 from __future__ import annotations
@@ -17,8 +19,22 @@ from rsfstudy.slider import Equations, Function, Numbers
 
 
 class InPlaceFunctions(NamedTuple):
-    """Functions ``(y, rates, p, result)`` that fill arrays, in the order of the table of functions
-    (`layout`); `attempt` is ``(y, stages, p, step)``, and the last is missing in ruptures.
+    """Functions that fill arrays, in the order of the function table.
+
+    The arguments of a function are ``(y, rates, p, result)``. The arguments of ``attempt_step`` are
+    ``(y, stages, p, step)``.
+
+    Parameters
+    ----------
+    fill_rates : callable
+        Function that fills in the derivatives of the unknowns.
+    fill_point : callable
+        Function that fills in the columns of a point.
+    attempt_step : callable
+        Function that attempts one step. See ``steppers.unrolled_step``.
+    fill_balance : callable or None
+        Function that fills in ln(V/V_*) and friction on the slow manifold. It is None for the
+        equations in ruptures.
     """
 
     fill_rates: Function
@@ -28,8 +44,17 @@ class InPlaceFunctions(NamedTuple):
 
 
 def build_in_place_functions(equations: Equations) -> InPlaceFunctions:
-    """The functions that fill arrays for a system of equations; the same ones for all scenes of the
-    same parts.
+    """Convert the functions of equations to functions that fill arrays.
+
+    Parameters
+    ----------
+    equations : Equations
+        System of equations.
+
+    Returns
+    -------
+    InPlaceFunctions
+        Functions that fill arrays. All scenes with the same parts share them.
     """
     rate, point, balance = (
         equations.rate_function,
@@ -55,6 +80,7 @@ def _build_in_place_functions_cached(
     state_count: int,
     parameter_count: int,
 ) -> InPlaceFunctions:
+    """Convert functions, once for each combination of parts."""
     of_unknowns, numbers = (
         build_unpack_function(unknown_count),
         build_unpack_function(parameter_count),
@@ -78,7 +104,22 @@ def build_fill_rates_function(
     unpack_parameters: Function,
     unknown_count: int,
 ) -> Function:
-    """Function that fills in the rates of so many unknowns."""
+    """Build the function that fills in the derivatives of the unknowns.
+
+    Parameters
+    ----------
+    rate_function : callable
+        Right-hand side of the equations.
+    unpack_unknowns, unpack_parameters : callable
+        Functions that convert arrays to tuples.
+    unknown_count : int
+        Number of unknowns.
+
+    Returns
+    -------
+    callable
+        Function ``fill_rates(y, rates, p, result)``.
+    """
 
     def fill_rates(y, rates, p, result):  # type: ignore[no-untyped-def]
         for i in range(unknown_count):
@@ -96,7 +137,22 @@ def build_fill_point_function(
     unpack_parameters: Function,
     state_count: int,
 ) -> Function:
-    """Function that fills in the columns of a point, of unknowns and their rates."""
+    """Build the function that fills in the columns of a point.
+
+    Parameters
+    ----------
+    point_function : callable
+        Function that returns the point for unknowns and their derivatives.
+    unpack_unknowns, unpack_parameters : callable
+        Functions that convert arrays to tuples.
+    state_count : int
+        Number of states.
+
+    Returns
+    -------
+    callable
+        Function ``fill_point(y, rates, p, result)``.
+    """
 
     def fill_point(y, rates, p, result):  # type: ignore[no-untyped-def]
         result[LOG_SLIP_RATE] = math.nan
@@ -113,8 +169,20 @@ def build_fill_point_function(
 def build_fill_balance_function(
     force_balance_function: Function, unpack_states: Function, unpack_parameters: Function
 ) -> Function:
-    """Function that fills in ln(V/V_*) and friction on the slow manifold, at a spring stress and
-    states.
+    """Build the function that solves the force balance on the slow manifold.
+
+    Parameters
+    ----------
+    force_balance_function : callable
+        Function that returns ln(V/V_*), friction and the state shift.
+    unpack_states, unpack_parameters : callable
+        Functions that convert arrays to tuples.
+
+    Returns
+    -------
+    callable
+        Function ``fill_balance(y, rates, p, result)``. It fills in ln(V/V_*) and friction for the
+        spring stress and the states in ``y``.
     """
 
     def fill_balance(y, rates, p, result):  # type: ignore[no-untyped-def]
@@ -130,7 +198,20 @@ def build_fill_balance_function(
 
 @cache
 def build_unpack_function(item_count: int, first_index: int = 0) -> Callable[..., Numbers]:
-    """A function that makes a tuple of so many numbers of an array."""
+    """Build a function that converts items of an array to a tuple.
+
+    Parameters
+    ----------
+    item_count : int
+        Number of items.
+    first_index : int, default: 0
+        Index of the first item.
+
+    Returns
+    -------
+    callable
+        Function of an array that returns a tuple of float.
+    """
     made: dict[str, Any] = {}
     listed = ", ".join(f"y[{i}]" for i in range(first_index, first_index + item_count))
     exec(f"def unpacked(y):\n    return ({listed},)", made)

@@ -1,6 +1,6 @@
-"""Starting points of motions: of the first, and after each jump of the loading.
+"""Initial points of motions, at the start and after jumps of the loading.
 
-When motions change between their regimes is for `regime_switching` to say.
+The event loop chooses the regime of an initial point. The criteria are in ``regime_switching``.
 """
 
 from __future__ import annotations
@@ -27,15 +27,26 @@ _UNEVALUATED_FIELDS = (math.nan,) * len(MotionPoint._fields[5:-1])
 
 
 def initial_point(scene: Scene) -> MotionPoint:
-    """The beginning of a motion the instant after the step of a scene (see `unevaluated_point`),
-    which moves the spring and imposed normal stress: with mass, slip rate follows within the
-    inertial time. Before it the slider slides steadily at V_*, or as its stated stress and state
-    have it.
+    """Return the initial point of a motion, immediately after its first step.
+
+    Before the step, the slider slides steadily at V_*, or it has the initial stress and state of
+    the scene. The step changes the spring stress and the imposed normal stress. With inertia, the
+    slip rate does not jump and changes within the inertial time.
+
+    Parameters
+    ----------
+    scene : Scene
+        Scene during its first loading segment.
+
+    Returns
+    -------
+    MotionPoint
+        Initial point. Only the fields of ``point_without_derived_values`` are computed.
 
     Raises
     ------
     MotionStopped
-        Where the step leaves no friction of forward slip to integrate.
+        If normal stress vanishes or shear stress reverses in the step.
     """
     check_start_has_friction(scene)
     psis, log_slip_rate = compute_steady_states(scene, 0.0, 0.0), 0.0
@@ -48,7 +59,18 @@ def initial_point(scene: Scene) -> MotionPoint:
 
 
 def point_before_start(scene: Scene) -> MotionPoint:
-    """The point of a motion before its first step."""
+    """Return the point of a motion before its first step.
+
+    Parameters
+    ----------
+    scene : Scene
+        Scene during its first loading segment.
+
+    Returns
+    -------
+    MotionPoint
+        Point on the slow manifold.
+    """
     before = scene.with_segment(Segment(1.0))
     psis = compute_steady_states(before, 0.0, 0.0)
     if scene.starts_unsteady:
@@ -63,8 +85,26 @@ def point_without_derived_values(
     log_slip_rate: float = math.nan,
     frictional_stress: float = math.nan,
 ) -> MotionPoint:
-    """A point that holds what a motion begins with: spring stress, states and, with mass, ln(V/V_*)
-    and frictional stress. All else is NaN, and told with the first event.
+    r"""Return a point that contains only the initial values of a motion.
+
+    Parameters
+    ----------
+    scene : Scene
+        Scene of the motion.
+    spring_stress : float
+        Spring stress :math:`f`, in sigma_*.
+    states : tuple of float
+        States of the law, followed by the unknowns of the loading and the fluid.
+    log_slip_rate : float, default: nan
+        Value of :math:`\ln(V/V_*)`. Only motions with inertia need it.
+    frictional_stress : float, default: nan
+        Frictional stress :math:`g`, in sigma_*. Only motions with inertia need it.
+
+    Returns
+    -------
+    MotionPoint
+        Point with the given values. All other fields are NaN. The first event of the motion
+        contains their values.
     """
     psi = scene.equation_functions.friction_functions.state_sum(states)
     known = log_slip_rate, math.nan, spring_stress, frictional_stress, psi
@@ -72,13 +112,26 @@ def point_without_derived_values(
 
 
 def restart_point(scene: Scene, spring_stress: float, states: Numbers) -> MotionPoint:
-    """The point at which a motion may begin again with this spring stress and these states, which
-    is on the slow manifold.
+    """Return a point on the slow manifold, from which a motion can restart.
+
+    Parameters
+    ----------
+    scene : Scene
+        Scene of the motion.
+    spring_stress : float
+        Spring stress :math:`f`, in sigma_*.
+    states : tuple of float
+        States of the law, followed by the unknowns of the loading and the fluid.
+
+    Returns
+    -------
+    MotionPoint
+        Initial point. Only the fields of ``point_without_derived_values`` are computed.
 
     Raises
     ------
     MotionStopped
-        If the spring stress is incompatible with friction of forward slip.
+        If the spring stress is incompatible with forward slip.
     """
     x, friction, _shift = scene.equation_functions.force_balance_function(
         spring_stress, states, scene.parameter_values
@@ -89,16 +142,19 @@ def restart_point(scene: Scene, spring_stress: float, states: Numbers) -> Motion
 
 
 def _replace_loading_unknowns(scene: Scene, states: Numbers) -> Numbers:
-    """States with those of the loading, behind those of the law, as it begins with them; without
-    those of a loading that has ended.
+    """Replace the unknowns of the loading by their initial values.
+
+    The unknowns of the loading follow the states of the law. Unknowns of an earlier loading are
+    removed.
     """
     begun, of_law = scene.parts.loading.initial_unknowns(scene), scene.parts.law.state_count
     return (*states[:of_law], *begun, *states[of_law + len(begun) : scene.state_count])
 
 
 def _find_specified_initial_states(scene: Scene, steady_states: Numbers) -> tuple[Numbers, float]:
-    """States freed of stress, and ln(V/V_*), of the stress and state that a scene begins with: Psi
-    is sought with which the state variable is the one stated.
+    """Find the states and ln(V/V_*) for the specified stress and state.
+
+    The function solves for the value of Psi at which the state variable has its specified value.
     """
     before = scene.with_segment(Segment(1.0))
     others = steady_states[1 : before.state_count]
@@ -114,13 +170,27 @@ def _find_specified_initial_states(scene: Scene, steady_states: Numbers) -> tupl
 
 
 def point_after_loading_jump(scene: Scene, point: MotionPoint) -> MotionPoint:
-    """A point of a motion the instant after a step of the load point or of imposed normal stress,
-    or where an oscillation begins or ends: states stay, and with mass slip rate does.
+    """Return the point of a motion immediately after a jump of the loading.
+
+    A jump is a step of the load point, a step of imposed normal stress, or the beginning or end of
+    an oscillation. The states do not change. With inertia, the slip rate does not change either.
+
+    Parameters
+    ----------
+    scene : Scene
+        Scene after the jump.
+    point : MotionPoint
+        Point before the jump.
+
+    Returns
+    -------
+    MotionPoint
+        Point after the jump.
 
     Raises
     ------
     MotionStopped
-        As `starting` does.
+        If normal stress vanishes or shear stress reverses in the jump.
     """
     psis = _replace_loading_unknowns(scene, point.psis)
     after = point._replace(spring_stress=point.spring_stress + scene.spring_stress_step, psis=psis)
@@ -129,7 +199,27 @@ def point_after_loading_jump(scene: Scene, point: MotionPoint) -> MotionPoint:
 
 
 def point_with_slip_rate(scene: Scene, point: MotionPoint, log_slip_rate: float) -> MotionPoint:
-    """A point with another ln(V/V_*), and the frictional stress that goes with it."""
+    r"""Return a point with another slip rate and the corresponding friction.
+
+    Parameters
+    ----------
+    scene : Scene
+        Scene of the motion.
+    point : MotionPoint
+        Point to change.
+    log_slip_rate : float
+        New value of :math:`\ln(V/V_*)`.
+
+    Returns
+    -------
+    MotionPoint
+        Point with the new slip rate and frictional stress.
+
+    Raises
+    ------
+    MotionStopped
+        If normal stress vanishes.
+    """
     excess = scene.a * log_slip_rate + point.psi
     friction = frictional_stress_after_jump(scene, excess, point.psis)
     if friction is None:
@@ -138,15 +228,42 @@ def point_with_slip_rate(scene: Scene, point: MotionPoint, log_slip_rate: float)
 
 
 def slow_manifold_point(scene: Scene, spring_stress: float, states: Numbers) -> MotionPoint:
-    """The point with this spring stress and these states, where mass hardly acts."""
+    """Return the point on the slow manifold for a spring stress and states.
+
+    Parameters
+    ----------
+    scene : Scene
+        Scene of the motion.
+    spring_stress : float
+        Spring stress :math:`f`, in sigma_*.
+    states : tuple of float
+        States of the law, followed by the unknowns of the loading and the fluid.
+
+    Returns
+    -------
+    MotionPoint
+        Point with all fields.
+    """
     return equations_between_ruptures(scene, with_time=False).evaluate_point(
         (spring_stress, *states)
     )
 
 
 def check_start_has_friction(scene: Scene, start_point: MotionPoint | None = None) -> None:
-    """Refuse a displacement step that leaves no friction of forward slip to integrate; it is that
-    of the beginning, or leads to a point.
+    """Raise MotionStopped if a step makes forward slip impossible.
+
+    Parameters
+    ----------
+    scene : Scene
+        Scene after the step.
+    start_point : MotionPoint, optional
+        Point after the step. By default, the step from the initial stress is checked.
+
+    Raises
+    ------
+    MotionStopped
+        If normal stress vanishes, or if shear stress reverses and the law is not regularised or the
+        load point is at rest.
     """
     slider = scene.parts.slider
     begins = slider.initial_stress + scene.spring_stress_step

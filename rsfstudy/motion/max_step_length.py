@@ -1,18 +1,35 @@
-"""Longest steps of the clocks of an integration."""
+"""Maximum step sizes of the integration."""
 
 from __future__ import annotations
 
-#: Longest step of any clock. A motion at rest would otherwise double its steps until they overflow.
+#: Upper limit of all step sizes. Otherwise, the step size would overflow if the motion is at rest.
 MAX_STEP_LENGTH = 1e9
-#: Longest step along the path, as far as slip of D_c is: longer ones may pass a turn of the motion
-#: that none of their stages sees. Stationary contact has no turns, up to a few units of ln V before
-#: slip takes up again; and normal stress stretches them all.
+#: Maximum step size along the path, in units of slip by D_c. A longer step may skip a rapid change
+#: of the motion between two stages. During stationary contact, no rapid changes occur until ln V
+#: has increased to a few units below its steady-state value. The maximum step size therefore
+#: increases with the difference between ln V_0 and ln V. The second constant is the scale of this
+#: difference.
 LONGEST_PATH_STEP, STATIONARY_LOG_RATE_SCALE = 3.0, 10.0
 
 
 def compute_max_step_length(
     log_slip_rate: float, normal_stress: float, log_load_velocity: float
 ) -> float:
-    """Longest step of a form whose clock is length along the path."""
+    r"""Compute the maximum step size along the path.
+
+    Parameters
+    ----------
+    log_slip_rate : float
+        Natural logarithm of the slip rate, :math:`\ln(V/V_*)`.
+    normal_stress : float
+        Normal stress in sigma_*. The step size is proportional to normal stress above 1.
+    log_load_velocity : float
+        Natural logarithm of the load point velocity, :math:`\ln(V_0/V_*)`.
+
+    Returns
+    -------
+    float
+        Maximum step size.
+    """
     stationary = max(1.0, (log_load_velocity - log_slip_rate) / STATIONARY_LOG_RATE_SCALE)
     return min(LONGEST_PATH_STEP * stationary * max(1.0, normal_stress), MAX_STEP_LENGTH)

@@ -1,4 +1,10 @@
-"""Runs the loop of motions, and makes events of the tables that it fills."""
+"""Driver of the event loop, which converts its tables into events.
+
+``get_motion_driver`` returns the driver of a scene. ``MotionDriver.iterate_events`` allocates the
+arrays of a motion, calls ``motion_loop.advance_motion`` until the motion ends, and yields the
+events. A backend prepares the arguments of the loop for plain Python (``PythonBackend``) or for the
+compiled loop (``compiled.numba_backend.NumbaBackend``).
+"""
 
 from __future__ import annotations
 
@@ -47,18 +53,18 @@ from rsfstudy.slider import (
 )
 from rsfstudy.status import Status
 
-#: Rows of the tables of events and of recordings that one call may fill.
+#: Minimum number of rows of the event table, and number of rows of the recording table.
 _MIN_EVENT_ROWS, _RECORDING_ROWS = 64, 4096
 _EVENT_KIND_CODES = {
     kind: array_layout.__dict__[kind.name]
     for kind in EventKind
     if kind.name in array_layout.__dict__
 }
-#: Columns of a point, by the names of its numbers; what is asked of none reads the first.
+#: Column of each attribute of a point. The empty name is mapped to the first column.
 _POINT_COLUMN_BY_QUANTITY = {
     name: column for column, name in enumerate(MotionPoint._fields[:-1])
 } | {"": 0}
-#: What is told beside what was asked for: the codes of these count from the end.
+#: Events that the table always contains. Their negative codes are list indices from the end.
 _UNREQUESTED_EVENTS = [
     (k, None)
     for k in (
@@ -69,7 +75,7 @@ _UNREQUESTED_EVENTS = [
         EventKind.START,
     )
 ]
-#: Makes a named tuple of a tuple, in half the time that its name takes.
+#: Constructor of named tuples that takes half the time of a call of the class.
 _make_named_tuple_quickly = tuple.__new__
 _STEP_TOO_SHORT_TEXT = "a step would be shorter than the spacing of numbers around the clock"
 _NO_RECORDING_TABLES = array_layout.RECORD_NEVER, np.empty(0), np.empty((0, FIRST_STATE_COLUMN))
@@ -77,12 +83,24 @@ _NO_KINKS = np.empty((0, SEGMENT_STRESS_FALL + 1)), 0
 
 
 class PythonBackend:
-    """The loop as it stands, and its arguments; `compiled.machine.NumbaBackend` is the other
-    machine that runs it.
+    """Backend that runs the event loop in plain Python.
+
+    The class ``compiled.numba_backend.NumbaBackend`` has the same methods.
     """
 
     def initial_state_values(self, field_values: tuple[tuple[str, float], ...]) -> dict[str, float]:
-        """Initial state of motions that have these numbers in their state, and others 0."""
+        """Return the initial values of all fields of the motion state.
+
+        Parameters
+        ----------
+        field_values : tuple of (str, float)
+            Names and values of the fields that are not 0.
+
+        Returns
+        -------
+        dict of str to float
+            Initial values.
+        """
         return {
             **dict.fromkeys(array_layout.MOTION_STATE_DTYPE.names or (), 0),
             **dict(field_values),
@@ -91,12 +109,37 @@ class PythonBackend:
     def create_motion_state(
         self, initial_state: dict[str, float], call_arguments: tuple[float, ...]
     ) -> PythonMotionState:
-        """The state of a motion: its `memory`, and its `counters`."""
+        """Create the state of a motion.
+
+        Parameters
+        ----------
+        initial_state : dict of str to float
+            Initial values of the fields, from ``initial_state_values``.
+        call_arguments : tuple of float
+            Values of the fields in ``array_layout.CALL_ARGUMENT_FIELDS``.
+
+        Returns
+        -------
+        PythonMotionState
+            State of the motion.
+        """
         called = zip(array_layout.CALL_ARGUMENT_FIELDS, call_arguments, strict=True)
         return PythonMotionState(**{**initial_state, **dict(called)})
 
     def build_function_table(self, equations_by_regime: tuple[Equations, ...]) -> np.ndarray:
-        """The table of functions of the regimes."""
+        """Build the function table of the loop.
+
+        Parameters
+        ----------
+        equations_by_regime : tuple of Equations
+            Equations on the slow manifold and, with inertia, in ruptures.
+
+        Returns
+        -------
+        ndarray of shape (2, FUNCTIONS_PER_REGIME)
+            Functions that fill arrays, one row per regime. Both rows contain the force balance
+            function of the slow manifold.
+        """
         rows = np.zeros((2, array_layout.FUNCTIONS_PER_REGIME), dtype=object)
         for row, system in zip(rows, equations_by_regime, strict=False):
             row[:] = build_in_place_functions(system)
@@ -104,51 +147,100 @@ class PythonBackend:
         return rows
 
     def as_loop_arguments(self, *arrays: np.ndarray) -> Sequence[memoryview]:
-        """Arrays as the loop takes them."""
+        """Convert arrays to arguments of the loop.
+
+        Parameters
+        ----------
+        *arrays : ndarray
+            Arrays that the loop reads or fills.
+
+        Returns
+        -------
+        list of memoryview
+            Memory views of the arrays. Python reads their items faster than array items.
+        """
         return [memoryview(array) for array in arrays]  # type: ignore[arg-type]
 
     def as_loop_parameters(self, parameters: Sequence[float]) -> Any:
-        """The numbers of a scene as the loop takes them."""
+        """Convert the parameters of a scene to an argument of the loop.
+
+        Parameters
+        ----------
+        parameters : sequence of float
+            Parameters of the scene.
+
+        Returns
+        -------
+        list of float
+            Copy of the parameters.
+        """
         return list(parameters)
 
     def get_loop_function(self) -> Any:
-        """The loop."""
+        """Return the event loop.
+
+        Returns
+        -------
+        callable
+            The function ``motion_loop.advance_motion``.
+        """
         return advance_motion
 
 
 @partial(renamed_members, writable=True)
 class PythonMotionState(SimpleNamespace):
-    """The state of a motion in plain Python."""
+    """State of a motion with the fields of ``MOTION_STATE_DTYPE``."""
 
     @property
     def memory(self) -> list[PythonMotionState]:
-        """The state as the loop takes it."""
+        """Argument ``motion_memory`` of the loop."""
         return [self]
 
     def work_and_row_counters(self) -> tuple[int, ...]:
-        """Right-hand sides by regime, steps, events, rows, and Jacobians."""
+        """Return the counters of work and of table rows.
+
+        Returns
+        -------
+        tuple of int
+            Right-hand side evaluations in the slow and in the fast regime, steps, event rows,
+            recorded rows and Jacobians.
+        """
         return (
             *(self.evaluations_slow, self.evaluations_fast, self.steps),
             *(self.event_rows, self.recorded_rows, self.jacobians),
         )
 
     def get_state_field(self, field_name: str) -> float:
-        """One of its fields."""
+        """Return the value of a field.
+
+        Parameters
+        ----------
+        field_name : str
+            Name of the field.
+
+        Returns
+        -------
+        float
+            Value of the field.
+        """
         return float(getattr(self, field_name))
 
 
 class MotionDriver:
-    """Runs motions by the same equations, which may differ in their numbers and beginnings.
+    """Integrator of motions that have the same equations.
+
+    The motions may differ in their initial points and parameters.
 
     Parameters
     ----------
-    slow : Equations
-        The equations, or those between ruptures.
-    fast : Equations, optional
-        Those in ruptures.
+    slow_equations : Equations
+        Equations between ruptures.
+    fast_equations : Equations, optional
+        Equations in ruptures. Omit them if the scene has no inertia.
     engine : str
-    fields : float
-        Fields of the state of a motion (`layout.MOTION`) in which such motions differ from others.
+        Name of the engine.
+    **fields : float
+        Initial values of fields of the motion state. See ``array_layout.MOTION_STATE_DTYPE``.
     """
 
     def __init__(
@@ -204,38 +296,50 @@ class MotionDriver:
         kinks_and_reported_count: tuple[np.ndarray, int] = _NO_KINKS,
         initial_imposed_stress: float | None = None,
     ) -> Iterator[Event]:
-        """Events of a motion, a table of them by each call of the loop.
+        """Yield the events of a motion in the order of their occurrence.
 
         Parameters
         ----------
-        start_point_or_unknowns : Point or tuple of float
-            Where it begins: a point, whose regime is found, or the unknowns.
+        start_point_or_unknowns : MotionPoint or tuple of float
+            Initial point, or initial unknowns of the slow regime. The loop chooses the regime of an
+            initial point.
         work_meter : WorkMeter
-            Charged with the work.
+            Counter of the work of the motion.
         event_specs : sequence of EventSpecification
+            Requested events.
         tolerance : float
-            Local error per step.
-        duration_start_time_and_slip : tuple of float
-            How long it lasts, and time and slip where it begins.
-        backward : bool
-            Run against the clock of the equations.
+            Local error tolerance of a step.
+        duration_start_time_and_slip : tuple of float, default: (inf, 0.0, 0.0)
+            Duration of the first loading segment, initial time and initial slip.
+        backward : bool, default: False
+            If True, the independent variable decreases.
         parameters : tuple of float, optional
-            Other numbers than those of the equations.
-        switch_thresholds : SwitchThresholds
-            When to change between the regimes.
-        evaluation_budget : float
-            Right-hand sides it may spend, if fewer than the meter leaves.
+            Parameters that replace the parameters of the equations.
+        switch_thresholds : SwitchThresholds, optional
+            Thresholds for changes between the regimes. A motion without inertia does not need them.
+        evaluation_budget : float, default: inf
+            Maximum number of right-hand side evaluations. The remaining budget of the work meter is
+            a second limit.
         recording : Recording, optional
-        kinks_and_reported_count : tuple of ndarray and int
-            Those of the loading, and how many of the last ones are reported.
+            Object that receives the recorded rows.
+        kinks_and_reported_count : tuple of (ndarray, int), optional
+            Rows of the segment table after the first segment, and the number of segments whose
+            start is reported. The reported segments are the last segments.
         initial_imposed_stress : float, optional
-            Where the load point moves to and fro, shear stress that this adds when the last unknown
-            is zero: while steps are taken, stresses are without what it adds, told with it.
+            Initial value of the last unknown, if the load point oscillates. The imposed shear
+            stress is the difference of this unknown from its initial value. The unknown
+            ``spring_stress`` excludes the imposed stress, but events and recordings include it.
+
+        Yields
+        ------
+        Event
+            Start of the motion, requested events, and the events of ``EventKind`` that are always
+            reported.
 
         Raises
         ------
         MotionStopped
-            Where it cannot go on.
+            If the motion cannot continue or exceeds the budget.
         """
         machine, states, systems, numbers = self._backend, self._states, self._equations, self._p
         before, turns = numbers, len(kinks_and_reported_count[0])
@@ -253,13 +357,13 @@ class MotionDriver:
                 _pack_point(start_point_or_unknowns),
                 start_point_or_unknowns.spring_stress,
             )
-        else:  # behind the unknowns is room for as many
+        else:  # The second half of the array holds the derivatives.
             y, last, stress = (
                 np.array((*start_point_or_unknowns, *start_point_or_unknowns)),
                 np.empty(array_layout.FIRST_STATE + states),
                 0.0,
             )
-        if parameters is not None or turns:  # numbers that are those of this motion alone
+        if parameters is not None or turns:  # The loop changes the parameters at kinks.
             before = numbers = machine.as_loop_parameters(
                 systems[0].parameters if parameters is None else parameters
             )
@@ -272,7 +376,8 @@ class MotionDriver:
             self._initial_values,
             (
                 *(*duration_start_time_and_slip, stress, tolerance),
-                # what limits a step must differ between two tolerances whose results tell errors
+                # The step limit depends on the tolerance. Otherwise, two runs with different
+                # tolerances could share an error, and their difference would not reveal the error.
                 (tolerance / REFERENCE_TOLERANCE_OF_STEP_LIMIT) ** 0.125,
                 -1.0 if backward else 1.0,
                 int(min(evaluation_budget, work_meter.budget - work_meter.evaluations)),
@@ -300,7 +405,7 @@ class MotionDriver:
             known, settled = (slow, fast, steps, jacobians), known
             others = work_meter.charge_new_work(regimes, settled, known)
             if recording is not None and recorded:
-                kept = rows[:recorded].copy(order="F")  # columns are what is asked for
+                kept = rows[:recorded].copy(order="F")  # Recordings are read by column.
                 if initial_imposed_stress is not None:
                     kept[:, SHEAR_STRESS_COLUMNS] += kept[:, -1:] - initial_imposed_stress
                 recording.append_rows(kept, regimes)
@@ -322,6 +427,7 @@ class MotionDriver:
 
 
 def _add_to_stresses(point: MotionPoint, stress_change: float) -> MotionPoint:
+    """Return a point with another spring stress and frictional stress."""
     return point._replace(
         spring_stress=point.spring_stress + stress_change,
         frictional_stress=point.frictional_stress + stress_change,
@@ -338,9 +444,30 @@ def iterate_events_of_equations(
     backward: bool = False,
     recording: Recording | None = None,
 ) -> Iterator[Event]:
-    """Events along one system of equations from a state; against its clock if `backward`.
+    """Yield the events of one system of equations, without changes of regime.
 
-    A rigid slider has slip for its clock: a recording that asks for values has them at slips.
+    Parameters
+    ----------
+    equations : Equations
+        System of equations.
+    initial_unknowns : tuple of float
+        Initial values of the unknowns.
+    tolerance : float
+        Local error tolerance of a step.
+    work_meter : WorkMeter
+        Counter of the work of the motion.
+    event_specs : sequence of EventSpecification, default: ()
+        Requested events.
+    backward : bool, default: False
+        If True, the independent variable decreases.
+    recording : Recording, optional
+        Object that receives the recorded rows. The independent variable of a rigid slider is slip,
+        so the ``sample_times`` of the recording are slips.
+
+    Yields
+    ------
+    Event
+        Events in the order of their occurrence.
     """
     runner = MotionDriver(equations, engine=work_meter.engine)
     return runner.iterate_events(
@@ -350,7 +477,22 @@ def iterate_events_of_equations(
 
 @cached_per_scene
 def get_motion_driver(scene: Scene, engine: str, *, with_time: bool) -> MotionDriver:
-    """What runs the motions of a scene."""
+    """Return the driver of the motions of a scene.
+
+    Parameters
+    ----------
+    scene : Scene
+        Scene during its first loading segment.
+    engine : str
+        Name of the engine.
+    with_time : bool
+        If True, time is one of the unknowns.
+
+    Returns
+    -------
+    MotionDriver
+        Driver of the scene. The scene caches it.
+    """
     return MotionDriver(
         equations_between_ruptures(scene, with_time=with_time),
         equations_in_rupture(scene, with_time=with_time) if scene.has_mass else None,
@@ -368,9 +510,7 @@ def get_motion_driver(scene: Scene, engine: str, *, with_time: bool) -> MotionDr
 def _prepare_recording_tables(
     recording: Recording | None, equations: Equations, state_count: int
 ) -> tuple[int, np.ndarray, np.ndarray]:
-    """Whether a chain of segments records, and when; the times or clocks at which to; and the table
-    that the loop fills.
-    """
+    """Return the recording mode, requested samples and output table."""
     if recording is None:
         return _NO_RECORDING_TABLES
     if recording.sample_times is None:
@@ -395,8 +535,23 @@ def find_events_at_jump(
     parameters_after: Numbers,
     event_specs: Sequence[EventSpecification],
 ) -> Iterator[tuple[EventSpecification, MotionPoint]]:
-    """Events that are watched for and happen where a motion jumps from a point to another, with the
-    numbers of the scene at both; and at which of them.
+    """Yield the requested events that occur at a jump between two points.
+
+    Parameters
+    ----------
+    point_before, point_after : MotionPoint
+        Points immediately before and after the jump.
+    parameters_before, parameters_after : tuple of float
+        Parameters of the scene before and after the jump.
+    event_specs : sequence of EventSpecification
+        Requested events.
+
+    Yields
+    ------
+    specification : EventSpecification
+        Specification of the event.
+    point : MotionPoint
+        Point at which the event is reported, either ``point_before`` or ``point_after``.
     """
     last, first = _pack_point(point_before).tolist(), _pack_point(point_after).tolist()
     table = (
@@ -414,7 +569,7 @@ def find_events_at_jump(
 def _pack_event_specifications(
     event_specs: tuple[EventSpecification, ...],
 ) -> tuple[np.ndarray, list[tuple[EventKind, EventSpecification | None]]]:
-    """The table of event specifications, and what codes of events mean."""
+    """Return the table of event specifications and the meanings of codes."""
     meanings = [*((spec.kind, spec) for spec in event_specs), *_UNREQUESTED_EVENTS]
     asked = np.zeros((len(event_specs), len(array_layout.SPECIFICATION_COLUMNS)))
     for row, spec in zip(asked, event_specs, strict=True):
@@ -428,14 +583,14 @@ def _pack_event_specifications(
 
 
 def _pack_point(point: MotionPoint) -> np.ndarray:
-    """A point as the loop has it."""
+    """Convert a point to the columns that the loop uses."""
     return np.array((*point[:-1], *point.psis))
 
 
 def _motion_stopped_error(
     return_code: int, motion_state: Any, regime_names: Sequence[str], stepper: Any
 ) -> MotionStopped:
-    """Why a motion cannot go on."""
+    """Return the exception for a motion that cannot continue."""
     if return_code == array_layout.TERMINATED:
         return termination_error(
             int(motion_state.get_state_field("termination")),

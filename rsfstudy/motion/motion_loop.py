@@ -1,16 +1,38 @@
-"""The loop of all motions: step by step through their regimes, until there is something to tell.
+"""Event loop that integrates a motion through regimes and loading segments.
 
-Plain Python of a kind that Numba compiles. What takes the steps is a stepper (`steppers`); compiled
-or not, with whatever stepper, events are found here. `driver` calls it.
+``motion_driver.MotionDriver.iterate_events`` calls ``advance_motion`` until the motion ends. The
+calls have this order::
 
-To follow a rupture with a debugger, simulate a scene with ``inertia=True``, because without mass
-there is one regime only; with ``engine="scipy"``, or ``engine="python"`` to see inside of steps.
-Each step passes `truncate_step` once: a breakpoint there with the condition ``motion.regime == 1``
-(`FAST_REGIME`) stops at each step of a rupture, of which ``workspace.point_at_begin`` and
-``workspace.point_at_end`` are the points at both ends (columns in the order of
-`layout.LOG_SLIP_RATE` and so on). The line ``return REGIME_ENDED`` of `follow_regime` is its end
-with the same condition, and its beginning with ``motion.regime == 0`` (`SLOW_REGIME`). `layout`
-says who writes which field of ``motion``.
+    advance_motion                     integrate until the motion ends or a table is full
+        enter_initial_regime           choose the regime of the initial point
+        follow_regime                  integrate one regime within one loading segment
+            begin_regime               let the stepper evaluate the first derivatives
+            take_step                  attempt steps until the error of one step is small enough
+            halve_unresolved_step      improve the dense output of a recorded step
+            is_step_end_valid          check for the end of the motion, e.g. vanishing normal stress
+            truncate_step_at_regime_or_time_end
+            record_regime_start        first step only
+            append_start_events        first step only
+            record_step                append the samples of the step to ``recording_table``
+            append_events_in_step      append the events of the step to ``event_table``
+            has_left_rupture           check the return to the slow manifold
+            advance_to_step_end        copy the end of the step to the beginning of the next step
+        set_unknowns_of_regime         after a change of regime
+        start_next_segment             after the end of a loading segment
+        enter_initial_regime           after the end of a loading segment
+
+The header of ``array_layout`` lists the functions that write each field of ``motion``. The class
+``Workspace`` describes the arrays of a regime, and the header of ``workspace`` lists the functions
+that write them. Steppers only take steps. The loop detects and locates the events for all steppers.
+
+The module uses only Python that Numba can compile. To debug a rupture, simulate a scene with
+``inertia=True`` and ``engine="scipy"``, or ``engine="python"`` to debug the stages of a step. Set a
+breakpoint in ``truncate_step_at_regime_or_time_end`` with the condition ``motion.regime == 1``
+(``FAST_REGIME``). The debugger then stops once in every step of the rupture. The points at both
+ends of the step are ``workspace.point_at_begin`` and ``workspace.point_at_end``. Their columns are
+numbered by ``array_layout.LOG_SLIP_RATE`` and the following constants. To stop at the end of a
+rupture, set a breakpoint with the same condition at ``return REGIME_ENDED`` in ``follow_regime``.
+To stop at the beginning of a rupture, use the condition ``motion.regime == 0`` there.
 """
 
 from __future__ import annotations
@@ -97,10 +119,10 @@ from rsfstudy.parts import (
     SEGMENT_VELOCITY,
 )
 
-#: How often the clock at which a step is to end is looked for.
+#: Number of corrections of the clock at which the last step of a loading segment ends.
 END_TIME_CORRECTION_COUNT = 2
-#: Change of ln V_0 at a kink beyond which the length of steps is found anew: displacement along the
-#: path, V + V_0, is then another, and rejected steps would cost more than the first one does.
+#: Change of ln V_0 at a kink above which the stepper selects a new initial step size. The path
+#: length depends on V + V_0, so the former step size would be rejected several times.
 MAX_LOG_LOAD_RATE_CHANGE = 3.0
 
 
@@ -117,35 +139,39 @@ def advance_motion(
     recording_table,
     stepper,
 ):
-    """Follow a motion from where `memory` and `y` are.
+    """Advance a motion until it ends, or until its events must be reported.
 
     Parameters
     ----------
-    motion_memory : array of MOTION, shape (1,)
-        The state of the motion.
-    y : array
-        Unknowns, and behind them their rates.
-    last_point : array
-        The last point of the regime before; at first, the point at which to begin.
+    motion_memory : array of MOTION_STATE_DTYPE, shape (1,)
+        State of the motion. The loop updates it in place.
+    y : array of shape (2 * unknowns,)
+        Unknowns, followed by their derivatives. The loop updates both in place.
+    last_point : array of shape (FIRST_STATE + states,)
+        Last point of the previous regime. In the first call, it is the initial point.
     workspace_block : array
-        Memory for the workspace of a regime.
+        Memory for the workspace of a regime. See ``workspace.workspace_size``.
     loop_constants : tuple
-        Scales of the unknowns, of which those in a rupture follow those between ruptures; the table
-        of functions, a row for each regime; the limits of the regimes; the numbers of the
-        scene; and as many that take in what those were before a kink.
-    event_specs, requested_samples : array
-        Event specifications, one row of numbers after the other, and when to record.
-    kinks : array
-        The segments of loading that follow on the first without a jump.
-    event_table, recording_table : array
-        What happens, and what is recorded.
+        Scales of the unknowns of both regimes, function table with one row per regime, switch
+        thresholds, parameters of the scene, and memory for the parameters before the last kink.
+    event_specs : array of shape (specifications * 7,)
+        Event specifications. The columns are ``array_layout.SPECIFICATION_COLUMNS``.
+    kinks : array of shape (segments, 6)
+        Rows of the segment table for the loading segments after the first segment.
+    requested_samples : array
+        Times or slips at which to record the motion.
+    event_table : array of shape (rows, EVENT_POINT + FIRST_STATE + states)
+        Output table of events.
+    recording_table : array of shape (rows, FIRST_STATE_COLUMN + states)
+        Output table of recorded samples.
     stepper : Stepper
-        What takes the steps.
+        Stepper of the motion. The compiled loop does not use it.
 
     Returns
     -------
     int
-        Why it returns.
+        Return code, for example ``PAUSED`` or ``MOTION_ENDED``. After ``PAUSED``, the caller reads
+        the tables and calls the function again.
     """
     motion = motion_memory[0]
     motion.event_rows = motion.recorded_rows = 0
@@ -202,7 +228,7 @@ def advance_motion(
 
 
 def are_tables_full(motion, event_spec_count, event_table, recording_table):
-    """True if the tables have no room for all that one more step may add to them."""
+    """Return True if the tables may be too small for one more step."""
     full = len(event_table) - motion.event_rows < 2 * event_spec_count + 4
     return full or (
         len(recording_table) > 0
@@ -211,7 +237,7 @@ def are_tables_full(motion, event_spec_count, event_table, recording_table):
 
 
 def start_next_segment(motion, workspace, last_point, kinks, recording_table):
-    """Go on to the next segment of loading, whose numbers take the place of those before it."""
+    """Replace the loading parameters by the parameters of the next segment."""
     n, p, relief = (
         len(kinks) - motion.kinks_ahead,
         workspace.parameters,
@@ -228,10 +254,11 @@ def start_next_segment(motion, workspace, last_point, kinks, recording_table):
     )
     motion.end_time = kinks[n, SEGMENT_END] - kinks[n, SEGMENT_START]
     motion.pending_start, motion.kinks_ahead = KINK_CODE, motion.kinks_ahead - 1
-    if motion.recording_mode == RECORD_WITHIN_STEPS:  # to the last digit, too
+    # The located end of a segment has a rounding error.
+    if motion.recording_mode == RECORD_WITHIN_STEPS:
         recording_table[motion.recorded_rows - 1, 0] = motion.time
     copy_values(p, workspace.parameters_before, LAW)
-    # the length of a step goes on with the motion, unless its path has become quite another
+    # The step size remains valid unless the load point velocity changes strongly.
     if not abs(kinks[n, SEGMENT_LOG_VELOCITY] - p[LOG_LOAD_VELOCITY]) < MAX_LOG_LOAD_RATE_CHANGE:
         motion.next_step_length = 0.0
     p[LOAD_VELOCITY], p[LOG_LOAD_VELOCITY] = (
@@ -248,7 +275,10 @@ def start_next_segment(motion, workspace, last_point, kinks, recording_table):
 def enter_initial_regime(
     motion, y, last_point, functions, manifold_values, switch_thresholds, parameters
 ):
-    """Begin in the regime that a point is for; `below` takes in the slow manifold there."""
+    """Choose the regime of a point, and set the unknowns of this regime.
+
+    The function uses ``manifold_values`` as memory for the values on the slow manifold.
+    """
     motion.starts_at_point, motion.regime = 0, SLOW_REGIME
     set_unknowns_of_regime(motion, y, last_point)
     if motion.has_mass:
@@ -266,8 +296,10 @@ def enter_initial_regime(
 
 
 def set_unknowns_of_regime(motion, y, last_point):
-    """Begin a regime at the last point of one before: spring stress, states and time carry over;
-    between ruptures ln V and friction follow from these, and jump.
+    """Set the unknowns of a regime from the last point before it.
+
+    Spring stress, states and time are continuous. If the new regime is the slow manifold, ln V and
+    friction are computed from these unknowns, so they may jump.
     """
     y[0] = last_point[SPRING_STRESS]
     if motion.regime == FAST_REGIME:
@@ -282,7 +314,7 @@ def set_unknowns_of_regime(motion, y, last_point):
 
 
 def follow_regime(motion, workspace, last_point, requested_samples, event_table, recording_table):
-    """Follow one regime; returns why it ends, or why the call has to."""
+    """Integrate one regime, and return a code for the reason of its end."""
     if motion.pending_start:
         motion.time_per_step = 0.0
         begin_regime(motion, workspace)
@@ -360,7 +392,10 @@ def follow_regime(motion, workspace, last_point, requested_samples, event_table,
 
 
 def is_step_end_valid(motion, workspace):
-    """True if a motion does, if only through this step: that then ends where the motion does."""
+    """Return True if the motion is valid during at least part of the step.
+
+    If the motion terminates within the step, the function truncates the step at the termination.
+    """
     columns, velocity = workspace.point_at_end, workspace.parameters[LOAD_VELOCITY]
     motion.final_normal_stress = columns[NORMAL_STRESS_RATIO]
     motion.termination = find_termination_status(
@@ -385,7 +420,15 @@ def is_step_end_valid(motion, workspace):
 
 
 def truncate_step_at_regime_or_time_end(motion, workspace):
-    """Let the step end where the regime has to be left, and where time is over; whether it is."""
+    """Truncate the step at the end of the regime or of the loading segment.
+
+    Returns
+    -------
+    leaves_regime : bool
+        True if the motion must leave the slow manifold.
+    is_over : bool
+        True if the loading segment ends in this step.
+    """
     before, after = (
         regime_switch_excess(motion, workspace, workspace.point_at_begin),
         regime_switch_excess(motion, workspace, workspace.point_at_end),
@@ -413,10 +456,11 @@ def truncate_step_at_regime_or_time_end(motion, workspace):
 
 
 def end_step_at_end_time(motion, workspace, clock):
-    """Let the step end where time is over.
+    """Repeat the step so that it ends at the end time of the segment.
 
-    Dense output tells the clock. Where stability limits steps it is far less accurate than their
-    ends: the step is taken anew to that clock, and again with what time it was missing.
+    The argument ``clock`` is an estimate from dense output. If stability limits the step size,
+    dense output is much less accurate than the end of the step. The function therefore corrects the
+    clock by the remaining time and repeats the step.
     """
     for _ in range(END_TIME_CORRECTION_COUNT):
         retake_step(motion, workspace, clock)
@@ -432,7 +476,7 @@ def end_step_at_end_time(motion, workspace, clock):
 
 
 def has_left_rupture(motion, workspace):
-    """True if the full equations have done their work."""
+    """Return True if the motion can return to the slow manifold."""
     if motion.regime == SLOW_REGIME or not may_switch_back_to_slow_manifold(
         workspace.point_at_end[LOG_SLIP_RATE], workspace.switch_thresholds
     ):
@@ -455,7 +499,7 @@ def has_left_rupture(motion, workspace):
 
 
 def advance_to_step_end(motion, workspace):
-    """The end of a step is the beginning of the next."""
+    """Copy the end of the step to the beginning of the next step."""
     motion.clock = motion.end
     copy_values(workspace.y_end, workspace.y, workspace.unknown_count)
     copy_values(workspace.rates_at_end, workspace.rates, workspace.unknown_count)

@@ -38,8 +38,8 @@ from rsfstudy.slider import (
     equations_against_displacement,
 )
 
-#: Largest ratio of errors to estimates without this factor, rounded up: over random scenes with
-#: thresholds loosened three to ten times, friction errs by up to 1.4 times its estimate.
+#: Safety factor of the estimate. In random scenes with thresholds three to ten times larger than
+#: usual, the error of friction is up to 1.4 times the estimate without this factor.
 _ERROR_SAFETY_FACTOR = 2.0
 _SLIP_COLUMN, _SLIP_RATE_COLUMN = (
     MOTION_VARIABLES.index("slip"),
@@ -50,34 +50,37 @@ _SLIP_COLUMN, _SLIP_RATE_COLUMN = (
 def estimate_neglected_inertia_error(
     scene: Scene, recorded_rows: np.ndarray, slow_regime_number: int, initial_log_slip_rate: float
 ) -> np.ndarray:
-    """Estimate the error in ln V that the approximate treatment of inertia causes.
-
-    The estimate is the sum of two contributions:
-
-    - The residual of the full equation of motion on the slow manifold. If W is the weight of mass
-      and s is the displacement of slip and load point together, friction is smaller than spring
-      stress by ``a W d(ln V)/ds``. The residual divided by a is the local error e of ln V. The
-      resulting change of spring stress and state is at most the integral of e over
-      ``(1 + K/a) d(slip) + |dPsi|/a``. The motion is attracted to its course, so the largest e is
-      an upper bound as well.
-    - The slip, in units of D_c, that is neglected when ln V jumps to the slow manifold. The state
-      does not evolve over this slip.
+    r"""Estimate the error of ln V due to the approximation of inertia.
 
     Parameters
     ----------
     scene : Scene
+        Scene of the motion.
     recorded_rows : ndarray
-        Rows of a recording, as in ``Recording.table``.
+        Rows of a recording, from ``Recording.as_table``.
     slow_regime_number : int
-        Number of the slow-manifold regime in these rows.
+        Index of the slow-manifold regime in these rows.
     initial_log_slip_rate : float
-        ln(V/V_*) before the first row.
+        Value of :math:`\ln(V/V_*)` before the first row.
 
     Returns
     -------
     ndarray of shape (rows,)
         Error estimate of ln V for the motion up to each row. The estimate is zero if the scene has
         no inertia.
+
+    Notes
+    -----
+    The estimate is the sum of two contributions:
+
+    - The residual of the full equation of motion on the slow manifold. Let :math:`W` be the inertia
+      weight and :math:`s` the sum of slip and load point displacement. Friction is smaller than
+      spring stress by :math:`a W \, d(\ln V)/ds`. The residual divided by :math:`a` is the local
+      error :math:`e` of ln V. The resulting change of spring stress and state is at most the
+      integral of :math:`e` over :math:`(1 + K/a) \, d\delta + |d\Psi|/a`. Errors decay along the
+      motion, so the largest :math:`e` is another upper bound.
+    - The slip, in units of D_c, that is neglected when ln V jumps to the slow manifold. The state
+      does not evolve over this slip.
     """
     if not scene.has_mass:
         return np.zeros(len(recorded_rows))
@@ -87,7 +90,8 @@ def estimate_neglected_inertia_error(
     on_manifold = recorded_rows[:, REGIME_COLUMN] == slow_regime_number
     arrives = on_manifold & (recorded_rows[:, SAMPLE_COLUMN] == 0.0)
     slips = softness * np.maximum(norms[1:], norms[:-1]) ** 2 * np.abs(np.diff(rates))
-    # the middle and the end of each step, and the beginning of each regime
+    # Residuals are evaluated at the middle and end of each step and at the beginning of each
+    # regime.
     used = np.flatnonzero(
         on_manifold & (recorded_rows[:, SAMPLE_COLUMN] % (SAMPLES_PER_STEP // 2) == 0.0)
     )
@@ -95,7 +99,7 @@ def estimate_neglected_inertia_error(
     if not used.size:
         return _ERROR_SAFETY_FACTOR * jumps
     left = np.maximum.accumulate(_accumulate_residuals(scene, recorded_rows[used], norms[1:][used]))
-    # rows in between count as the next one that is used, because residuals may rise steeply
+    # Other rows get the estimate of the next evaluated row, because residuals may rise steeply.
     numbers = np.arange(len(recorded_rows))
     number = np.minimum(np.searchsorted(used, numbers), used.size - 1)
     number -= (np.abs(used[number] - numbers) >= SAMPLES_PER_STEP // 2) & (number > 0)
@@ -105,9 +109,10 @@ def estimate_neglected_inertia_error(
 def _accumulate_residuals(
     scene: Scene, recorded_rows: np.ndarray, slip_rate_norms: np.ndarray
 ) -> np.ndarray:
-    """Compute an upper bound of the change of ln V due to residuals up to each row.
+    """Compute an upper bound of the change of ln V due to residuals.
 
-    The bound is the smaller of the integrated residual and the largest residual so far.
+    The bound for each row is the smaller of the integrated residual and the largest residual so
+    far.
     """
     residuals = np.array(list(_iterate_residuals(scene, recorded_rows, slip_rate_norms)))
     states = recorded_rows[
@@ -117,7 +122,8 @@ def _accumulate_residuals(
     ways = (1.0 + softness) * np.diff(recorded_rows[:, _SLIP_COLUMN]) + np.abs(
         np.diff(states)
     ) / scene.a
-    ways[recorded_rows[1:, SAMPLE_COLUMN] == 0.0] = 0.0  # a rupture may come between these two rows
+    # A rupture may separate the first row of a regime from the previous row.
+    ways[recorded_rows[1:, SAMPLE_COLUMN] == 0.0] = 0.0
     sums = np.append(0.0, np.cumsum(0.5 * (residuals[1:] + residuals[:-1]) * ways))
     found: np.ndarray = np.minimum(np.maximum.accumulate(residuals), sums)
     return found
@@ -128,12 +134,12 @@ def _iterate_residuals(
 ) -> Iterator[float]:
     """Yield the residual of the equation of motion, divided by a, at each row.
 
-    The residual is set to zero where the mass is negligible.
+    The residual is set to zero if the inertia weight is negligible.
     """
     segments = list(_iterate_segment_scenes(scene))
     begins = [begin for begin, _acting, _p in segments]
     for row, norm in zip(recorded_rows, slip_rate_norms.tolist(), strict=True):
-        # the last row of a segment has the time at which the next one begins
+        # The last row of a segment and the first row of the next segment have the same time.
         side = bisect_right if row[SAMPLE_COLUMN] == 0.0 else bisect_left
         _begin, acting, p = segments[max(side(begins, row[0]) - 1, 0)]
         load = acting.inertial_time * abs(p[LOAD_VELOCITY])
@@ -148,7 +154,7 @@ def _iterate_residuals(
 def _compute_force_balance_residual(
     segment_scene: Scene, parameters: Numbers, recorded_row: np.ndarray, inertia_weight: float
 ) -> float:
-    """Compute the residual of the equation of motion, divided by a, at one row.
+    """Compute the residual of the equation of motion at a row, divided by a.
 
     The row must be on the slow manifold.
     """
@@ -164,7 +170,7 @@ def _compute_force_balance_residual(
 
 
 def _iterate_segment_scenes(scene: Scene) -> Iterator[tuple[float, Scene, Numbers]]:
-    """Yield the start time, the scene and the parameters of each segment of loading."""
+    """Yield the start time, scene and parameters of each loading segment."""
     for acting, table in scene.continuous_segments:
         for n, row in enumerate(table.tolist()):
             p = list(acting.parameter_values)

@@ -1,4 +1,4 @@
-"""Readings of a rig along a motion, and motions that are resampled along their paths."""
+"""Readings of a rig along a recorded motion, and resampling of motions."""
 
 from __future__ import annotations
 
@@ -17,20 +17,45 @@ from rsfstudy.motion.recording import (
 )
 from rsfstudy.slider import Scene
 
-#: Columns of a recorded motion that the length of its path depends on.
+#: Columns of a recorded motion that define its path length.
 _PATH_LENGTH_COLUMNS = tuple(
     MOTION_VARIABLES.index(name) for name in ("time", "log10_slip_rate", "shear_stress")
 )
 
 
 def recorded_friction_coefficient(motion_table: np.ndarray) -> np.ndarray:
-    """The friction coefficient along a recorded motion."""
+    """Return the apparent friction coefficient along a recorded motion.
+
+    Parameters
+    ----------
+    motion_table : ndarray
+        Rows of a recorded motion.
+
+    Returns
+    -------
+    ndarray
+        Friction coefficient of each row.
+    """
     return motion_table[:, RECORDED_VARIABLES.index("friction_coefficient")]
 
 
 def recorded_load_point_displacement(scene: Scene, motion_table: np.ndarray) -> np.ndarray:
-    """Load point displacement along a recorded motion, since before its first step: slip, and by
-    how much the spring is longer.
+    """Compute the load point displacement along a recorded motion.
+
+    The displacement is the sum of the slip and the elongation of the spring. It is measured from
+    the point before the first step.
+
+    Parameters
+    ----------
+    scene : Scene
+        Scene of the motion.
+    motion_table : ndarray
+        Rows of a recorded motion.
+
+    Returns
+    -------
+    ndarray
+        Displacement of each row, in D_c.
     """
     longer = (
         motion_table[:, MOTION_VARIABLES.index("shear_stress")] - scene.mu_star
@@ -44,10 +69,10 @@ def resample_motion_along_path(
     variable_names: Sequence[str] = MOTION_VARIABLES,
     engine: str = SCIPY,
 ) -> dict[str, np.ndarray]:
-    """Resample a recorded motion at points that are spread along its path.
+    """Resample a recorded motion at points along its path.
 
-    Half of the points are spread evenly by path length in time, ln V and stress. The other half
-    follow the integration steps, which are short where the path bends. Each extremum of slip rate
+    Half of the points are distributed evenly by path length in time, ln V and stress. The other
+    half follow the integration steps, which are short if the path bends. Each extremum of slip rate
     and of stress is one of the points.
 
     Parameters
@@ -56,15 +81,15 @@ def resample_motion_along_path(
         Rows of a recorded motion.
     point_count : int
         Number of points.
-    variable_names : sequence of str
-        Names of the first columns, which are returned.
-    engine : str
+    variable_names : sequence of str, default: MOTION_VARIABLES
+        Names of the returned variables. They must be the first columns of the table.
+    engine : str, default: "scipy"
         Name of the engine that runs the resampling loop.
 
     Returns
     -------
     dict of str to ndarray
-        Values of each column at the points. The values are NaN if the table is empty.
+        Values of each variable at the points. The values are NaN if the table is empty.
     """
     if not len(motion_table):
         return {name: np.full(point_count, np.nan) for name in variable_names}
@@ -81,6 +106,6 @@ def resample_motion_along_path(
     call_array_function_by_engine(
         resample_along_path, engine, columns, *seen, path, at, room, found
     )
-    # times of a rupture may differ by less than rounding
+    # Interpolation can make times decrease within a rupture because of rounding errors.
     np.maximum.accumulate(found[0], out=found[0])
     return dict(zip(variable_names, found, strict=True))

@@ -1,4 +1,9 @@
-"""Recording along a motion: where each regime begins, and within each step."""
+"""Recording of a motion as a table of samples.
+
+The event loop fills blocks of rows, which ``motion_driver`` appends to a ``Recording``.
+``Recording.as_table`` converts the blocks to a table. ``resample_along_path`` resamples the table
+for plots and files.
+"""
 
 from __future__ import annotations
 
@@ -13,7 +18,7 @@ from scipy.optimize import brentq
 from rsfstudy.motion.events import Event
 from rsfstudy.slider import MotionPoint, Scene
 
-#: What is recorded, in this order.
+#: Names of the first recorded columns.
 MOTION_VARIABLES = (
     "time",
     "slip",
@@ -23,33 +28,34 @@ MOTION_VARIABLES = (
     "normal_stress_ratio",
     "state_variable",
 )
-#: Those that are shear stress.
+#: Columns of the spring stress and the frictional stress.
 SHEAR_STRESS_COLUMNS = slice(
     MOTION_VARIABLES.index("shear_stress"), MOTION_VARIABLES.index("frictional_stress") + 1
 )
-#: The same, and what a rig reads.
+#: Names of all recorded variables. The last variable is the apparent friction that a rig measures.
 RECORDED_VARIABLES = (*MOTION_VARIABLES, "friction_coefficient")
-#: Columns behind those: the regime; the place within a step, 0 where a regime begins and
-#: `SAMPLES_PER_STEP` at the end of each step; and from this one on the states.
+#: Columns after the recorded variables: the regime, the sample number within the step, and the
+#: first state. The sample number is 0 at the beginning of a regime and ``SAMPLES_PER_STEP`` at the
+#: end of each step.
 REGIME_COLUMN, SAMPLE_COLUMN, FIRST_STATE_COLUMN = range(
     len(RECORDED_VARIABLES), len(RECORDED_VARIABLES) + 3
 )
-#: Samples within each integration step of a recorded motion: enough for a smooth curve.
+#: Number of samples per integration step. The polynomial through them is smooth in plots.
 SAMPLES_PER_STEP = 6
 
 
 @dataclass
 class Recording:
-    """Takes in what a motion does, from the engine that integrates it.
+    """Recorder of a motion.
 
-    Attributes
+    Parameters
     ----------
-    regime_names : list of str
-        Those of the motion, as they came.
+    regime_names : list of str, optional
+        Names of the regimes in the order of their first occurrence.
     sample_times : ndarray, optional
-        Times at which to record, in D_c/V_*, or slips in D_c of a rigid slider; they must not fall.
-        Without it, all of the motion is recorded, evenly within each step. Where a segment of
-        loading begins at such a time, what it ends with is recorded.
+        Requested times in D_c/V_*, or requested slips of a rigid slider in D_c, in increasing
+        order. If a loading segment begins at a requested time, the end of the previous segment is
+        recorded. By default, the motion is recorded at even intervals within each step.
     """
 
     regime_names: list[str] = field(default_factory=list)
@@ -58,18 +64,43 @@ class Recording:
     _clipped_block_count: int = 0
 
     def index_of_regime(self, regime_name: str) -> int:
-        """Place of a regime among those of the motion."""
+        """Return the index of a regime, and add new regimes to the list.
+
+        Parameters
+        ----------
+        regime_name : str
+            Name of the regime.
+
+        Returns
+        -------
+        int
+            Index in ``regime_names``.
+        """
         if regime_name not in self.regime_names:
             self.regime_names.append(regime_name)
         return self.regime_names.index(regime_name)
 
     def remaining_sample_times(self) -> np.ndarray:
-        """Times that are still to be recorded."""
+        """Return the requested times that have not been recorded yet.
+
+        Returns
+        -------
+        ndarray
+            Remaining times or slips.
+        """
         assert self.sample_times is not None
         return np.asarray(self.sample_times, dtype=float)[sum(map(len, self._row_blocks)) :]
 
     def append_rows(self, rows: np.ndarray, regime_names: Sequence[str]) -> None:
-        """Take in rows as the loop makes them, in which regimes are numbered as in a list."""
+        """Append rows of the recording table of the event loop.
+
+        Parameters
+        ----------
+        rows : ndarray
+            Rows of the table. The method may change them in place.
+        regime_names : sequence of str
+            Names of the regimes in the order of their numbers in ``rows``.
+        """
         if self.sample_times is not None and not np.isnan(rows[0, 0]):
             rows[:, 0] = self.sample_times[
                 len(self.sample_times) - len(self.remaining_sample_times()) :
@@ -80,7 +111,13 @@ class Recording:
         self._row_blocks.append(rows)
 
     def clip_times_to(self, max_time: float) -> None:
-        """End at this time what was taken in since the last such time, or the start."""
+        """Limit the recorded times of a chain of segments to its end time.
+
+        Parameters
+        ----------
+        max_time : float
+            End time of the chain. The method also assigns it to the last row.
+        """
         if self.sample_times is not None:
             return
         for rows in self._row_blocks[self._clipped_block_count :]:
@@ -90,9 +127,20 @@ class Recording:
         self._clipped_block_count = len(self._row_blocks)
 
     def as_table(self, scene: Scene, end_event: Event | None = None) -> np.ndarray:
-        """The quantities of `RECORDED_VARIABLES`, the number of the regime and the states freed of
-        stress, in columns; up to an event. Of states, those that there are in every segment of
-        loading.
+        """Return the recorded motion as a table.
+
+        Parameters
+        ----------
+        scene : Scene
+            Scene of the motion.
+        end_event : Event, optional
+            Event at which the table ends. By default, the table contains all samples.
+
+        Returns
+        -------
+        ndarray
+            Table with one row per sample. The columns are ``RECORDED_VARIABLES``, the regime, the
+            sample number, and the states that all loading segments have in common.
         """
         rows = self._row_blocks or [np.empty((0, FIRST_STATE_COLUMN + scene.state_count))]
         columns = min(part.shape[1] for part in rows)
@@ -108,12 +156,40 @@ class Recording:
         return convert_to_recorded_units(scene, table)
 
     def table_up_to_row(self, scene: Scene, last_row: np.ndarray) -> np.ndarray:
-        """The same, up to a row within a step or at its end."""
+        """Return the recorded motion up to a row within a step.
+
+        Parameters
+        ----------
+        scene : Scene
+            Scene of the motion.
+        last_row : ndarray
+            Last row of the table, from ``recorded_row``.
+
+        Returns
+        -------
+        ndarray
+            Table with one row per sample.
+        """
         return truncate_recording_at_row(self.as_table(scene), last_row)
 
 
 def convert_to_recorded_units(scene: Scene, rows: np.ndarray) -> np.ndarray:
-    """The same rows, of which slip rates become decimal logarithms, and stresses those that act."""
+    """Convert rows of the event loop to recorded units, in place.
+
+    Slip rates become decimal logarithms, and the stress deviations become total stresses.
+
+    Parameters
+    ----------
+    scene : Scene
+        Scene of the motion.
+    rows : ndarray
+        Rows of the recording table of the loop.
+
+    Returns
+    -------
+    ndarray
+        The array ``rows``.
+    """
     rows[..., 2] /= math.log(10.0)
     rows[..., SHEAR_STRESS_COLUMNS] += scene.mu_star
     return rows
@@ -122,8 +198,21 @@ def convert_to_recorded_units(scene: Scene, rows: np.ndarray) -> np.ndarray:
 def pack_recorded_row(
     time: float, slip: float, point: MotionPoint, regime_number: int
 ) -> tuple[float, ...]:
-    """Row that is recorded of a point: the quantities of `RECORDED_VARIABLES`, less scales and
-    offsets, the regime, the place within a step, and the states.
+    """Pack a point into a row of the recording table.
+
+    Parameters
+    ----------
+    time, slip : float
+        Time in D_c/V_* and slip in D_c since the start.
+    point : MotionPoint
+        Point to record.
+    regime_number : int
+        Index of the regime.
+
+    Returns
+    -------
+    tuple of float
+        Row in the units of the event loop. The sample number is 0.
     """
     stresses = point.spring_stress, point.frictional_stress, point.normal_stress
     return (
@@ -135,18 +224,50 @@ def pack_recorded_row(
 def recorded_row(
     scene: Scene, time: float, slip: float, point: MotionPoint, regime: int
 ) -> np.ndarray:
-    """Row of a point as `Recording.table` has it."""
+    """Return a point as a row of ``Recording.as_table``.
+
+    Parameters
+    ----------
+    scene : Scene
+        Scene of the motion.
+    time, slip : float
+        Time in D_c/V_* and slip in D_c since the start.
+    point : MotionPoint
+        Point to convert.
+    regime : int
+        Index of the regime.
+
+    Returns
+    -------
+    ndarray
+        Row in recorded units. The sample number is 0.
+    """
     return convert_to_recorded_units(scene, np.array(pack_recorded_row(time, slip, point, regime)))
 
 
 def truncate_recording_at_row(motion_table: np.ndarray, last_row: np.ndarray) -> np.ndarray:
-    """Rows up to one within a step, or at its end, evenly spaced in what is left of the step, whose
-    rows in the table they replace. Its time tells where in the step it is.
+    """Truncate a recorded motion at a row within a step.
+
+    The samples of the truncated step are replaced by evenly spaced samples up to the last row. The
+    position of the last row within the step is computed from its time.
+
+    Parameters
+    ----------
+    motion_table : ndarray
+        Recorded motion. The function may change it in place.
+    last_row : ndarray
+        Last row of the truncated motion.
+
+    Returns
+    -------
+    ndarray
+        Truncated motion.
     """
     after = int(motion_table[:, 0].searchsorted(last_row[0]))
     place = int(motion_table[after, SAMPLE_COLUMN]) if after < len(motion_table) else 0
     begin = after - place
-    if not place or begin + SAMPLES_PER_STEP >= len(motion_table):  # nothing was recorded beyond it
+    # If the recording ends before the end of the step, no samples need to be replaced.
+    if not place or begin + SAMPLES_PER_STEP >= len(motion_table):
         return np.vstack([motion_table[:after], last_row])
     part, times = float(place), motion_table[begin : begin + SAMPLES_PER_STEP + 1, 0]
     if times[place] > last_row[0] > times[place - 1]:
@@ -175,8 +296,27 @@ def resample_along_path(  # type: ignore[no-untyped-def]
     work_array,
     result,
 ):
-    """Fill in how far along the path the rows are, numbers of rows and parts that are spread evenly
-    along it, and the first columns there.
+    """Resample a recorded motion at points along its path.
+
+    The path length depends half on the changes of time, ln V and stress, and half on the number of
+    rows. Extrema of slip rate and stress replace the nearest points.
+
+    Parameters
+    ----------
+    columns : array of shape (columns, rows)
+        Columns of the recorded motion.
+    time, log_slip_rate, stress : array of shape (rows,)
+        Columns that define the path length.
+    step_sample_numbers : array of shape (rows,)
+        Sample numbers within the steps.
+    path_lengths : array of shape (rows,)
+        Output array of path lengths. All initial values must be 0.
+    row_positions : array of shape (points,)
+        Output array of fractional row numbers of the points.
+    work_array : array of shape (SAMPLES_PER_STEP + 1,)
+        Memory for intermediate results.
+    result : array of shape (result columns, points)
+        Output array of the first columns at the points.
     """
     last, points, total = len(path_lengths) - 1, len(row_positions), 0.0
     for values in (time, log_slip_rate, stress):
@@ -221,7 +361,15 @@ def resample_along_path(  # type: ignore[no-untyped-def]
 
 
 def replace_nearest_row_position(row_positions: Any, row_position: float) -> None:
-    """Put a place among others that rise where the nearest of those between the ends is."""
+    """Replace the nearest inner row position by another row position.
+
+    Parameters
+    ----------
+    row_positions : array
+        Increasing row positions. The first and last positions are never replaced.
+    row_position : float
+        Row position to insert.
+    """
     nearest = 1
     while nearest < len(row_positions) - 2 and abs(
         row_positions[nearest + 1] - row_position
@@ -234,11 +382,31 @@ def replace_nearest_row_position(row_positions: Any, row_position: float) -> Non
 def find_extreme_position(
     values: Any, step_sample_numbers: Any, extreme_row: int, work_array: Any
 ) -> float:
-    """Number of the row, and part to the next, where values are extreme; next to an extreme row."""
+    """Find the fractional row number of an extremum.
+
+    The extremum of the interpolation polynomial of a step is found by Newton's method.
+
+    Parameters
+    ----------
+    values : array of shape (rows,)
+        Column of a recorded motion.
+    step_sample_numbers : array of shape (rows,)
+        Sample numbers within the steps.
+    extreme_row : int
+        Row with the largest or smallest value.
+    work_array : array of shape (SAMPLES_PER_STEP + 1,)
+        Memory for the coefficients of the polynomial.
+
+    Returns
+    -------
+    float
+        Fractional row number. If the polynomial has no extremum near ``extreme_row``, the result is
+        ``extreme_row``.
+    """
     for after in (
         extreme_row,
         extreme_row + 1,
-    ):  # the step it lies in, or ends, and the one that begins with it
+    ):  # The row belongs to the first step, and the second step may begin at the row.
         begin = after - int(step_sample_numbers[after]) if after < len(values) else after
         if begin == after or begin + SAMPLES_PER_STEP >= len(values):
             continue
@@ -263,13 +431,25 @@ def find_extreme_position(
 
 
 def interpolate_rows(columns: np.ndarray, row_positions: np.ndarray, result: np.ndarray) -> None:
-    """Fill in values of columns between rows, at numbers of rows and parts: of the polynomial
-    through those of the step. The compiler has a loop in place of this (`compiled.calls`).
+    """Interpolate columns at fractional row numbers.
+
+    Within a step, the function evaluates the polynomial through the samples of the step. Between
+    two regimes, it interpolates linearly. The compiler replaces this function by
+    ``compiled.array_operations.interpolate_rows``.
+
+    Parameters
+    ----------
+    columns : array of shape (columns, rows)
+        Columns of the recorded motion.
+    row_positions : array of shape (points,)
+        Fractional row numbers.
+    result : array of shape (result columns, points)
+        Output array of the first columns at the row numbers.
     """
     columns, row_positions, result = map(np.asarray, (columns, row_positions, result))
     after = np.ceil(row_positions).astype(int)
     within = columns[SAMPLE_COLUMN, after].astype(int)
-    # from one regime to the next there is a straight line
+    # Between two regimes, the interpolation is linear.
     jumps = np.flatnonzero((within == 0) & (row_positions > 0.0))
     within[jumps] = 1
     begin = after - within
@@ -283,8 +463,9 @@ def interpolate_rows(columns: np.ndarray, row_positions: np.ndarray, result: np.
     result[:, jumps] = (1.0 - share) * columns[:, line] + share * columns[:, line + 1]
 
 
-#: Coefficients of the polynomial through the values at the places of a step, by those values: in
-#: places from its middle, over half of them.
+#: Interpolation within a step. The variable of the polynomial is -1 at the beginning of the step
+#: and 1 at its end. ``INTERPOLATION_COEFFICIENTS[power][k]`` is the contribution of sample ``k`` to
+#: the coefficient of ``power``.
 HALF_SAMPLES, _SAMPLE_INDICES = 0.5 * SAMPLES_PER_STEP, np.arange(SAMPLES_PER_STEP + 1)
 _INVERSE_VANDERMONDE = np.linalg.inv(
     np.vander(np.linspace(-1.0, 1.0, SAMPLES_PER_STEP + 1), increasing=True)
@@ -293,7 +474,7 @@ INTERPOLATION_COEFFICIENTS = tuple(tuple(row) for row in _INVERSE_VANDERMONDE.to
 
 
 def _evaluate_polynomial(x: float, coefficients: Sequence[float]) -> float:
-    """Value of a polynomial, by the coefficients of rising powers."""
+    """Evaluate a polynomial with coefficients of increasing powers."""
     value = 0.0
     for coefficient in reversed(coefficients):
         value = coefficient + x * value
@@ -301,7 +482,7 @@ def _evaluate_polynomial(x: float, coefficients: Sequence[float]) -> float:
 
 
 def _interpolation_weights(step_positions: np.ndarray) -> np.ndarray:
-    """Weights of the values at the places of a step, a row each, at parts of it in places."""
+    """Compute the weights of the samples of a step, one row per sample."""
     return np.asarray(
         _INVERSE_VANDERMONDE.T @ (step_positions / HALF_SAMPLES - 1.0) ** _SAMPLE_INDICES[:, None]
     )

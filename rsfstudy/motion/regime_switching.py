@@ -1,6 +1,9 @@
-"""When to change between the slow manifold and the full equations, and where motions end.
+"""Criteria for changes between regimes and for the termination of motions.
 
-Most are plain functions of floats, which every engine calls.
+With inertia, a motion alternates between the slow manifold and the full equations. The slow
+manifold approximates the effect of inertia by a series in the inertia weight :math:`(K/a) w^2`,
+with the slip rate norm :math:`w`. The loop uses the full equations in ruptures. Most criteria are
+functions of floats, which all engines call.
 """
 
 from __future__ import annotations
@@ -19,35 +22,36 @@ from rsfstudy.slider import (
 )
 from rsfstudy.status import Status
 
-#: Normal stress over sigma_* at which the fault counts as open, and as locked.
+#: Limits of the normal stress, in sigma_*. The fault is open below the first limit and locked above
+#: the second limit.
 MIN_NORMAL_STRESS, MAX_NORMAL_STRESS = 1e-9, 1e6
-#: Normal stress that stands for none, in logarithms.
+#: Lower bound of the normal stress, in sigma_*, before a logarithm is taken.
 MIN_POSITIVE_NORMAL_STRESS = 1e-300
-#: ln(V/V_*) beyond which slip without mass counts as unbounded: 10^120 V_*.
+#: Upper limit of ln(V/V_*) without inertia. The slip rate is unbounded above 10^120 V_*.
 MAX_LOG_SLIP_RATE_WITHOUT_INERTIA = 120.0 * math.log(10.0)
-#: How a motion goes on, or why it cannot.
+#: Termination status of a motion.
 CONTINUES, NORMAL_STRESS_VANISHED, NORMAL_STRESS_UNBOUNDED, SLIP_STOPPED, SLIP_RATE_UNBOUNDED = (
     range(5)
 )
 
 
 class SwitchThresholds(NamedTuple):
-    """The numbers that decide when to change.
+    r"""Thresholds for changes between slow manifold and full equations.
 
-    Attributes
+    Parameters
     ----------
     max_slip_rate_norm : float
-        Slip rate norm w at which to leave the slow manifold, which is a series in (K/a) w**2.
+        Maximum slip rate norm :math:`w` on the slow manifold.
     max_inertia_correction : float
-        Change of ln V by inertia up to which the slow manifold may be used.
+        Maximum change of ln V by inertia on the slow manifold.
     max_remaining_slip : float
-        Slip in D_c that may remain when the full equations hand back.
+        Maximum slip of a transition to the slow manifold, in D_c.
     stiffness_over_a : float
-        K/a.
+        Ratio :math:`K/a`.
     a : float
-        Direct effect.
+        Coefficient :math:`a` of the direct effect.
     inertial_time : float
-        T V_*/(2 pi D_c).
+        Inertial time :math:`T/(2 \pi)`, in D_c/V_*.
     """
 
     max_slip_rate_norm: float
@@ -58,13 +62,26 @@ class SwitchThresholds(NamedTuple):
     inertial_time: float
 
 
-#: The limits of a motion without mass, which reads none.
+#: Thresholds of a motion without inertia. The loop does not use their values.
 NO_SWITCH_THRESHOLDS = SwitchThresholds(*[math.nan] * len(SwitchThresholds._fields))
 
 
 @cached_per_scene
 def compute_switch_thresholds(scene: Scene, accuracy: Accuracy) -> SwitchThresholds:
-    """The limits of a scene at an accuracy."""
+    """Compute the thresholds of a scene for a requested accuracy.
+
+    Parameters
+    ----------
+    scene : Scene
+        Scene with or without inertia.
+    accuracy : Accuracy
+        Requested accuracy.
+
+    Returns
+    -------
+    SwitchThresholds
+        Thresholds. All values are NaN if the scene has no inertia.
+    """
     if not scene.has_mass:
         return NO_SWITCH_THRESHOLDS
     softness = scene.stiffness / scene.a
@@ -79,15 +96,42 @@ def compute_switch_thresholds(scene: Scene, accuracy: Accuracy) -> SwitchThresho
 
 
 def compute_slip_rate_norm(log_slip_rate: float, switch_thresholds: SwitchThresholds) -> float:
-    """w = V T/(2 pi D_c)."""
+    r"""Compute the slip rate norm.
+
+    Parameters
+    ----------
+    log_slip_rate : float
+        Natural logarithm of the slip rate, :math:`\ln(V/V_*)`.
+    switch_thresholds : SwitchThresholds
+        Thresholds, which include the inertial time.
+
+    Returns
+    -------
+    float
+        Slip rate norm :math:`w = V T/(2 \pi D_c)`.
+    """
     return switch_thresholds.inertial_time * math.exp(min(log_slip_rate, LARGEST_LOG_SLIP_RATE))
 
 
 def compute_inertia_weight_at_mismatch(
     log_slip_rate: float, inertial_stress: float, switch_thresholds: SwitchThresholds
 ) -> float:
-    """Weight of mass where friction differs from spring stress by `inertial_stress`: 1 where
-    the slow manifold has to be left.
+    r"""Compute the effect of inertia relative to its limit.
+
+    Parameters
+    ----------
+    log_slip_rate : float
+        Natural logarithm of the slip rate, :math:`\ln(V/V_*)`.
+    inertial_stress : float
+        Difference between spring stress and friction, in sigma_*.
+    switch_thresholds : SwitchThresholds
+        Thresholds of the scene.
+
+    Returns
+    -------
+    float
+        Larger of two ratios: the slip rate norm and the change of ln V by inertia, each divided by
+        its threshold. The motion must leave the slow manifold if the result is 1 or larger.
     """
     correction = (
         abs(inertial_stress) / switch_thresholds.a / switch_thresholds.max_inertia_correction
@@ -100,7 +144,23 @@ def compute_inertia_weight_at_mismatch(
 
 
 def inertia_matters_at(scene: Scene, accuracy: Accuracy, point: MotionPoint) -> bool:
-    """Return True if the effect of inertia at a point exceeds that on the slow manifold."""
+    """Return True if the slow manifold is not accurate enough at a point.
+
+    Parameters
+    ----------
+    scene : Scene
+        Scene with or without inertia.
+    accuracy : Accuracy
+        Requested accuracy.
+    point : MotionPoint
+        Point of a motion.
+
+    Returns
+    -------
+    bool
+        True if the effect of inertia exceeds its limit on the slow manifold. Without inertia the
+        result is False.
+    """
     if not scene.has_mass:
         return False
     inertial_stress = point.spring_stress - point.frictional_stress
@@ -111,8 +171,26 @@ def inertia_matters_at(scene: Scene, accuracy: Accuracy, point: MotionPoint) -> 
 def slip_during_transition(
     initial_log_slip_rate: float, final_log_slip_rate: float, switch_thresholds: SwitchThresholds
 ) -> float:
-    """Slip in D_c, times the change of ln V, while slip rate goes to its value
-    `log_slip_rate_after` a step; left out, the state would miss the evolution of that slip.
+    r"""Compute the slip during a transition between two slip rates.
+
+    If the transition is treated as a jump, the states do not evolve over this slip.
+
+    Parameters
+    ----------
+    initial_log_slip_rate, final_log_slip_rate : float
+        Natural logarithms :math:`\ln(V/V_*)` of both slip rates.
+    switch_thresholds : SwitchThresholds
+        Thresholds of the scene.
+
+    Returns
+    -------
+    float
+        Slip in D_c, multiplied by the change of ln V. It is an upper bound because :math:`w` is the
+        larger slip rate norm.
+
+    Notes
+    -----
+    The slip is :math:`(K/a) w^2` in D_c.
     """
     norm = max(
         compute_slip_rate_norm(initial_log_slip_rate, switch_thresholds),
@@ -131,8 +209,24 @@ def starts_on_slow_manifold(
     inertial_stress: float,
     switch_thresholds: SwitchThresholds,
 ) -> bool:
-    """True if a motion begins on the slow manifold, from ln(V/V_*), where that has ln(V/V_*)
-    `manifold_log_slip_rate`, and friction differs from spring stress by `inertial_stress` there.
+    r"""Return True if a motion can start on the slow manifold.
+
+    Parameters
+    ----------
+    log_slip_rate : float
+        Initial :math:`\ln(V/V_*)`.
+    manifold_log_slip_rate : float
+        Value of :math:`\ln(V/V_*)` on the slow manifold.
+    inertial_stress : float
+        Difference between spring stress and friction on the slow manifold, in sigma_*.
+    switch_thresholds : SwitchThresholds
+        Thresholds of the scene.
+
+    Returns
+    -------
+    bool
+        True if inertia is small enough at both slip rates, and if the slip during the transition is
+        small enough.
     """
     rate = (
         compute_slip_rate_norm(log_slip_rate, switch_thresholds)
@@ -157,8 +251,22 @@ def starts_on_slow_manifold(
 def may_switch_back_to_slow_manifold(
     log_slip_rate: float, switch_thresholds: SwitchThresholds
 ) -> bool:
-    """True if ln(V/V_*) alone lets the full equations hand back: the slow manifold must not hand
-    straight back in its turn.
+    r"""Return True if the slip rate is small enough for the slow manifold.
+
+    The limit is half of the slip rate at which the motion leaves the slow manifold. The lower
+    limit prevents repeated changes between the regimes.
+
+    Parameters
+    ----------
+    log_slip_rate : float
+        Natural logarithm of the slip rate, :math:`\ln(V/V_*)`.
+    switch_thresholds : SwitchThresholds
+        Thresholds of the scene.
+
+    Returns
+    -------
+    bool
+        True if the slip rate norm is below the limit.
     """
     return (
         compute_slip_rate_norm(log_slip_rate, switch_thresholds)
@@ -173,18 +281,43 @@ def should_switch_back_to_slow_manifold(
     inertial_stress: float,
     switch_thresholds: SwitchThresholds,
 ) -> bool:
-    """True if the full equations have done their work at ln(V/V_*) and its growth, where the slow
-    manifold has ln(V/V_*) `manifold_log_slip_rate`, and friction differs from spring stress by
-    `inertial_stress`.
+    r"""Return True if a motion can return to the slow manifold.
 
-    The slip rate still has to go from ln V = x to the slow manifold's x_s, over a slip of about
-    (K/2a) w**2 min(1, |x - x_s|) D_c at the faster of the two; the state may change that much
-    unnoticed; and see `may_switch_back`.
+    Parameters
+    ----------
+    log_slip_rate : float
+        Value :math:`x = \ln(V/V_*)` of the full equations.
+    log_slip_rate_growth : float
+        Derivative of ``log_slip_rate`` along the motion.
+    manifold_log_slip_rate : float
+        Value :math:`x_s = \ln(V/V_*)` on the slow manifold.
+    inertial_stress : float
+        Difference between spring stress and friction on the slow manifold, in sigma_*.
+    switch_thresholds : SwitchThresholds
+        Thresholds of the scene.
 
-    A rise to a slow manifold that falls, where friction exceeds spring stress, has its peak below
-    that: they meet after a slip of several (K/a) w**2 D_c. It is followed up to there. So is a
-    fall to one that rises: its trough is above where that is now, by several times the change of
-    ln V by which that trails, which is what is missing over a.
+    Returns
+    -------
+    bool
+        True if the remaining slip is below its threshold, inertia is small, and no extremum of the
+        slip rate follows.
+
+    Notes
+    -----
+    The slip rate still changes from :math:`x` to :math:`x_s`. During this change the slider slips
+    by about
+
+    .. math:: \frac{K}{2a} w^2 \min(1, |x - x_s|)
+
+    in D_c, where :math:`w` is the larger slip rate norm. The states do not evolve over this slip if
+    the motion returns to the slow manifold immediately.
+
+    The function also returns False shortly before an extremum of the slip rate. If the slip rate
+    rises and friction exceeds spring stress, the slip rate on the slow manifold falls. The slip
+    rate then has a maximum before it meets the slow manifold, after a slip of several :math:`(K/a)
+    w^2` D_c. If the slip rate falls and spring stress exceeds friction, the slip rate on the slow
+    manifold rises. The slip rate then has a minimum above the present :math:`x_s`. The difference
+    is several times the inertial stress divided by :math:`a`.
     """
     norm = max(
         compute_slip_rate_norm(log_slip_rate, switch_thresholds),
@@ -220,10 +353,25 @@ def should_switch_back_to_slow_manifold(
 def find_termination_status(
     log_slip_rate: float, normal_stress: float, load_velocity: float
 ) -> int:
-    """Termination status of a motion: `CONTINUES`, unless normal stress vanishes, normal stress or
-    slip rate grow without bound, or slip stops.
+    r"""Find the termination status of a motion.
 
-    Shear stress may reverse in the overshoot of a rupture; the equations go through that unharmed.
+    Shear stress may change sign when a rupture overshoots. The equations remain valid, so the
+    motion does not terminate.
+
+    Parameters
+    ----------
+    log_slip_rate : float
+        Natural logarithm of the slip rate, :math:`\ln(V/V_*)`.
+    normal_stress : float
+        Normal stress in sigma_*.
+    load_velocity : float
+        Load point velocity in V_*. If it is 0, the motion terminates when slip stops.
+
+    Returns
+    -------
+    int
+        ``CONTINUES``, ``NORMAL_STRESS_VANISHED``, ``NORMAL_STRESS_UNBOUNDED``, ``SLIP_STOPPED`` or
+        ``SLIP_RATE_UNBOUNDED``.
     """
     if normal_stress <= MIN_NORMAL_STRESS:
         return NORMAL_STRESS_VANISHED
@@ -239,8 +387,22 @@ def find_termination_status(
 def margin_to_termination(
     log_slip_rate: float, normal_stress: float, load_velocity: float
 ) -> float:
-    """Margin of ln V and of the logarithm of normal stress to where a motion ends: positive where
-    it goes on.
+    r"""Compute the margin between a motion and its nearest termination limit.
+
+    Parameters
+    ----------
+    log_slip_rate : float
+        Natural logarithm of the slip rate, :math:`\ln(V/V_*)`.
+    normal_stress : float
+        Normal stress in sigma_*.
+    load_velocity : float
+        Load point velocity in V_*.
+
+    Returns
+    -------
+    float
+        Smallest distance between a logarithm and its limit. The margin is positive if the motion
+        continues.
     """
     stress = math.log(max(normal_stress, MIN_POSITIVE_NORMAL_STRESS))
     left = min(
@@ -252,7 +414,20 @@ def margin_to_termination(
 
 
 def termination_error(termination_status: int, normal_stress: float) -> MotionStopped:
-    """The end of a motion, by its termination status (see `find_termination`)."""
+    """Return the exception for a terminated motion.
+
+    Parameters
+    ----------
+    termination_status : int
+        Termination status from ``find_termination_status``.
+    normal_stress : float
+        Normal stress at the termination, in sigma_*.
+
+    Returns
+    -------
+    MotionStopped
+        Exception with the status and the message.
+    """
     if termination_status == NORMAL_STRESS_VANISHED:
         return MotionStopped(Status.NORMAL_STRESS_LOST, "normal stress vanished during the motion")
     if termination_status == NORMAL_STRESS_UNBOUNDED:

@@ -1,4 +1,4 @@
-"""Roots of functions, in plain Python of a kind that Numba compiles."""
+"""Brent's method for roots of functions, in Python that Numba can compile."""
 
 from __future__ import annotations
 
@@ -10,14 +10,24 @@ _MAX_BRENT_ITERATIONS = 100
 
 
 def build_root_finder(function: Function) -> Function:
-    """``(low, high, at_low, at_high, finest, relative, given)``: where a function of a number and
-    of what is `given` changes sign, by Brent's method, from its values at two numbers.
+    """Build a function that finds a root of another function.
 
-    It is found to `finest` and, relative to itself, to `relative`.
+    Parameters
+    ----------
+    function : callable
+        Function ``function(x, given)`` of a float and of additional arguments.
+
+    Returns
+    -------
+    callable
+        Function ``root(low, high, at_low, at_high, finest, relative, given)``. It returns a root
+        between ``low`` and ``high`` to the absolute tolerance ``finest`` plus the relative
+        tolerance ``relative``. The function values ``at_low`` and ``at_high`` must have opposite
+        signs.
 
     References
     ----------
-    Brent (1973), Algorithms for Minimization Without Derivatives, chapter 4.
+    Brent, R. P. (1973), Algorithms for Minimization Without Derivatives, chapter 4.
     """
 
     def root(low, high, at_low, at_high, finest, relative, given):  # type: ignore[no-untyped-def]
@@ -54,7 +64,23 @@ def build_root_finder(function: Function) -> Function:
 def root_interpolation_step(
     previous: float, best: float, other: float, at_previous: float, at_best: float, at_other: float
 ) -> float:
-    """Distance of the root from the best point, by a line or inverse quadratic interpolation."""
+    """Compute the distance from the best estimate to the next estimate.
+
+    Linear interpolation is used if there are two distinct points, and inverse quadratic
+    interpolation if there are three.
+
+    Parameters
+    ----------
+    previous, best, other : float
+        Previous estimate, best estimate, and other end of the bracket.
+    at_previous, at_best, at_other : float
+        Function values at the three points.
+
+    Returns
+    -------
+    float
+        Signed distance from ``best``.
+    """
     if previous == other:
         return -at_best * (best - previous) / (at_best - at_previous)
     to_latest = (at_previous - at_best) / (previous - best)

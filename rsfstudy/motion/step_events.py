@@ -1,5 +1,9 @@
-"""What lies within a step: events, located where a quantity changes sign and reported in their
-order; and samples, evenly within each step, or at clocks or times asked for.
+"""Detection of events within a step, and recording of samples.
+
+``append_events_in_step`` and ``record_step`` are called by ``motion_loop.follow_regime`` after each
+step. An event occurs at a root of its quantity. The root is bracketed by the ends of the step and
+is located with dense output. Samples are recorded at even intervals within each step, or at
+requested times or slips.
 """
 
 from __future__ import annotations
@@ -67,19 +71,24 @@ from rsfstudy.motion.step_integration import (
 from rsfstudy.motion.steppers import interpolate_unknowns
 from rsfstudy.parts import LOAD_VELOCITY, LOG_LOAD_VELOCITY, STIFFNESS, B
 
-#: What is read off a step beside event specifications: how far the regime is from being left, time
-#: less that which is looked for, and how far the motion is from its end.
-#: Not whole numbers, of each of which the compiler would make a case of its own.
+#: Conditions whose roots are located in addition to the event specifications: the end of the
+#: regime, a target time, and the termination of the motion. The values are floats because Numba
+#: would compile a separate function for each integer literal.
 SWITCH_CONDITION, TIME_CONDITION, TERMINATION_CONDITION = -1.0, -2.0, -3.0
-#: Level of settling for slip rate and the sum of the states of the law, relative to the level for
-#: all unknowns. One huge unknown cannot end a motion whose slip rate still changes.
+#: Factor of the level of SETTLED events for the slip rate and the sum of the states. The level
+#: without this factor applies to all unknowns. Both conditions must be met. Otherwise, the decrease
+#: of one initially very large unknown would end the motion although the slip rate still changes.
 FRICTION_SETTLING_LEVEL_FACTOR = 10.0
-#: Where something happens between two points.
+#: Results of ``find_jump_side``.
 NO_EVENT, BEFORE_JUMP, AFTER_JUMP = range(3)
 
 
 def evaluate_event_quantity(event_spec, point_columns, parameters):
-    """Quantity that changes sign where it happens: a slope, or the distance from a level."""
+    """Return the quantity that changes sign at an event.
+
+    The quantity of an extremum is a derivative. The quantity of a crossing is the difference from
+    the level.
+    """
     if event_spec[SPEC_KIND] == MAXIMUM or event_spec[SPEC_KIND] == MINIMUM:
         if event_spec[SPEC_QUANTITY] == LOG_SLIP_RATE:
             return point_columns[LOG_SLIP_RATE_GROWTH]
@@ -90,12 +99,12 @@ def evaluate_event_quantity(event_spec, point_columns, parameters):
 
 
 def get_event_specification(workspace, spec_index):
-    """One of the event specifications."""
+    """Return the row of an event specification."""
     return offset_pointer(workspace.event_specs, len(SPECIFICATION_COLUMNS) * spec_index)
 
 
 def has_deferrable_event(workspace):
-    """True if the asker can wait for anything; for the beginning then, too."""
+    """Return True if any requested event may be reported later."""
     found = False
     for w in range(workspace.event_spec_count):
         found = found or get_event_specification(workspace, w)[SPEC_MAY_DEFER] != 0.0
@@ -103,7 +112,11 @@ def has_deferrable_event(workspace):
 
 
 def regime_switch_excess(motion, workspace, point_columns):
-    """Not negative where the slow manifold has to be left; always negative elsewhere."""
+    """Return the excess of the effect of inertia over its limit.
+
+    The excess is at least zero if the motion must leave the slow manifold. In ruptures, and for
+    motions without inertia, the function returns -1.
+    """
     if motion.regime != SLOW_REGIME or not motion.has_mass:
         return -1.0
     missing = point_columns[SPRING_STRESS] - point_columns[FRICTIONAL_STRESS]
@@ -116,9 +129,9 @@ def regime_switch_excess(motion, workspace, point_columns):
 
 
 def has_event_occurred(event_spec, quantity_before, quantity_after, clock_direction):
-    """True if a quantity that changes so has done what is watched for."""
+    """Return True if a quantity changes sign in the event direction."""
     upwards = event_spec[SPEC_KIND] == RISE or event_spec[SPEC_KIND] == MINIMUM
-    # against the clock, slopes change sign the other way round
+    # If the integration runs backward, derivatives change sign in the opposite direction.
     if clock_direction < 0.0 and (
         event_spec[SPEC_KIND] == MAXIMUM or event_spec[SPEC_KIND] == MINIMUM
     ):
@@ -129,8 +142,10 @@ def has_event_occurred(event_spec, quantity_before, quantity_after, clock_direct
 
 
 def evaluate_root_condition(clock, condition_context):
-    """Quantity of a specification, `SWITCH_CONDITION`, `TIME_CONDITION` or `TERMINATION_CONDITION`,
-    at a clock within the step.
+    """Evaluate a condition within the step, for the root finder.
+
+    The condition is the index of an event specification, ``SWITCH_CONDITION``, ``TIME_CONDITION``
+    or ``TERMINATION_CONDITION``.
     """
     what, motion, workspace = condition_context
     if what == TIME_CONDITION:
@@ -158,8 +173,9 @@ _find_condition_root = build_root_finder(evaluate_root_condition)
 
 
 def locate_sign_change(condition, value_at_begin, value_at_end, motion, workspace):
-    """Clock within the step at which a reading, given at both ends, changes sign, to 1e-13 of the
-    step.
+    """Locate the root of a condition within the step.
+
+    The tolerance is 1e-13 of the step size. For ``TIME_CONDITION`` it is 1e-15 of the step size.
     """
     width = abs(motion.end - motion.clock)
     finest, relative = (
@@ -172,7 +188,7 @@ def locate_sign_change(condition, value_at_begin, value_at_end, motion, workspac
 
 
 def append_event_row(motion, event_table, event_code, clock, time, point_columns, parameters):
-    """Add an event to the table."""
+    """Append an event to the event table."""
     n = motion.event_rows
     event_table[n, EVENT_CODE], event_table[n, EVENT_REGIME], event_table[n, EVENT_CLOCK] = (
         event_code,
@@ -190,7 +206,7 @@ def append_event_row(motion, event_table, event_code, clock, time, point_columns
 
 
 def append_step_end_event(motion, workspace, event_table, event_code):
-    """Tell of the end of the step, by a code."""
+    """Append an event at the end of the step to the event table."""
     passed = time_at_step_end(motion, workspace)
     append_event_row(
         motion,
@@ -204,8 +220,10 @@ def append_step_end_event(motion, workspace, event_table, event_code):
 
 
 def slip_since_start(motion, clock, time, spring_stress, parameters):
-    """Slip since the start: the clock of a rigid slider; else from the spring, ``f = f_0 + K (V_0 t
-    - slip)``.
+    r"""Compute the slip since the start of the motion.
+
+    Slip is the independent variable of a rigid slider. For other sliders, slip is computed from the
+    spring stress :math:`f = f_0 + K (V_0 t - \delta)`.
     """
     if motion.slip_is_clock:
         return clock
@@ -216,9 +234,11 @@ def slip_since_start(motion, clock, time, spring_stress, parameters):
 
 
 def append_start_events(motion, workspace, last_point, event_table):
-    """Tell that a regime or segment has begun, and what happened on the way to it from the last
-    point of the one before: at the more extreme of both, or at the first beyond a level. Returns
-    whether that ends the motion.
+    """Append the events at the start of a regime or segment.
+
+    The first event is the start of the regime or segment, unless the start of the segment is not
+    reported. Requested events follow if they occur at the jump from the last point of the previous
+    regime or segment. Return True if one of these events ends the motion.
     """
     p, passed = workspace.parameters, time_at_step_begin(motion, workspace)
     p_before = workspace.parameters_before if motion.pending_start == KINK_CODE else p
@@ -252,9 +272,23 @@ def find_jump_side(
     point_after: Any,
     parameters_after: Any,
 ) -> int:
-    """Where what is watched for happens as a motion jumps from the last point of one regime or
-    segment to the first of another: `NO_EVENT`; or at the more extreme one, or the first beyond the
-    level, which is before (`BEFORE_JUMP`) or after (`AFTER_JUMP`) the jump.
+    """Find the side of a jump at which a requested event is reported.
+
+    Parameters
+    ----------
+    event_spec : array
+        Row of the table of event specifications.
+    point_before, point_after : array
+        Columns of the points before and after the jump.
+    parameters_before, parameters_after : array
+        Parameters of the scene before and after the jump.
+
+    Returns
+    -------
+    int
+        ``NO_EVENT`` if the event does not occur. For an extremum of ln V, ``BEFORE_JUMP`` or
+        ``AFTER_JUMP`` identifies the more extreme point. For other events the result is
+        ``AFTER_JUMP``.
     """
     if event_spec[SPEC_KIND] == SETTLED:
         return NO_EVENT
@@ -273,8 +307,9 @@ def find_jump_side(
 
 
 def locate_events_in_step(motion, workspace):
-    """Find when each thing watched for happens within the step; NaN where it does not. Returns how
-    many do.
+    """Locate all requested events within the step, and return their number.
+
+    The function fills in ``workspace.event_clocks``. The value is NaN if an event does not occur.
     """
     count, p = 0, workspace.parameters
     for w in range(workspace.event_spec_count):
@@ -317,8 +352,15 @@ def locate_events_in_step(motion, workspace):
 
 
 def append_events_in_step(motion, workspace, event_table):
-    """Tell what happens within the step, in its order. Returns 0 where nothing does, 1 where the
-    asker can wait for it, 2 where not, and 3 where it ends the motion.
+    """Append the requested events within the step to the event table.
+
+    The events are appended in the order of their occurrence.
+
+    Returns
+    -------
+    int
+        0 if there are no events, 1 if all events may be reported later, 2 if an event must be
+        reported after this step, and 3 if an event ends the motion.
     """
     urgent, p = 0, workspace.parameters
     for _ in range(locate_events_in_step(motion, workspace)):
@@ -357,7 +399,7 @@ def append_events_in_step(motion, workspace, event_table):
 
 
 def record_regime_start(motion, workspace, recording_table):
-    """Record where a regime begins."""
+    """Record the beginning of a regime."""
     if motion.recording_mode == RECORD_WITHIN_STEPS:
         append_recorded_row(
             motion,
@@ -371,7 +413,7 @@ def record_regime_start(motion, workspace, recording_table):
 
 
 def is_step_recorded(motion, workspace, requested_samples):
-    """True if the step is recorded between its ends."""
+    """Return True if samples are recorded within the step."""
     if motion.recording_mode != RECORD_AT_TIMES:
         return motion.recording_mode != RECORD_NEVER
     end = time_at_step_end(motion, workspace) + motion.time
@@ -382,8 +424,10 @@ def is_step_recorded(motion, workspace, requested_samples):
 
 
 def record_step(motion, workspace, recording_table, requested_samples, is_motion_over):
-    """Record the step; returns whether all that was asked for has been recorded with it. Where the
-    motion is `over`, it ends when that was asked for, whatever the last digit.
+    """Record the step, and return True after the last requested sample.
+
+    If ``is_motion_over`` is true, requested times up to ``motion.end_time`` are recorded in spite
+    of rounding errors.
     """
     if motion.recording_mode == RECORD_WITHIN_STEPS:
         record_step_evenly_spaced(motion, workspace, recording_table)
@@ -394,7 +438,10 @@ def record_step(motion, workspace, recording_table, requested_samples, is_motion
 
 
 def record_step_evenly_spaced(motion, workspace, recording_table):
-    """Record the step evenly along its clock, up to its end."""
+    """Record ``SAMPLES_PER_STEP`` samples of the step.
+
+    The last sample is the end of the step.
+    """
     for sample in range(1, SAMPLES_PER_STEP):
         clock = motion.clock + (motion.end - motion.clock) * (sample / SAMPLES_PER_STEP)
         record_at_clock(motion, workspace, recording_table, clock)
@@ -407,7 +454,10 @@ def record_step_evenly_spaced(motion, workspace, recording_table):
 
 
 def record_requested_samples(motion, workspace, recording_table, requested_samples, is_motion_over):
-    """Record the step where that is asked for, at times or at clocks, which grow."""
+    """Record the requested samples within the step.
+
+    The requested times or slips must increase.
+    """
     at_begin, at_end = motion.clock, motion.end
     if motion.recording_mode == RECORD_AT_TIMES:
         at_begin = time_at_step_begin(motion, workspace)
@@ -450,7 +500,7 @@ def record_requested_samples(motion, workspace, recording_table, requested_sampl
 
 
 def record_at_clock(motion, workspace, recording_table, clock):
-    """Record the slider at a clock within the step."""
+    """Record a sample within the step."""
     evaluate_point_at_clock(motion, workspace, clock)
     passed = motion.regime_start_time + time_since_regime_start(
         motion, workspace, workspace.y_within
@@ -461,7 +511,10 @@ def record_at_clock(motion, workspace, recording_table, clock):
 
 
 def append_recorded_row(motion, recording_table, clock, time, point_columns, parameters):
-    """Add what is recorded of a point (see `recording.pack_row`)."""
+    """Append a point to the recording table.
+
+    The columns are in the order of ``recording.pack_recorded_row``.
+    """
     n = motion.recorded_rows
     recording_table[n, 0] = motion.time + (motion.end_time if time > motion.end_time else time)
     recording_table[n, 1] = slip_since_start(

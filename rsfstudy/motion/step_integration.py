@@ -1,4 +1,8 @@
-"""Steps of one regime: taken, looked into, and cut short."""
+"""Integration, refinement and truncation of a single step.
+
+``take_step`` is the first call of the event loop in each step. The other functions evaluate the
+slider within the step or change the end of the step.
+"""
 
 from __future__ import annotations
 
@@ -25,14 +29,18 @@ from rsfstudy.motion.steppers import (
 from rsfstudy.motion.workspace import count_evaluations, fill_rates_by_step_clock
 from rsfstudy.parts import LOG_LOAD_VELOCITY
 
-#: What slopes of dense output may differ by from rates over a step, in local tolerances; how often
-#: a step is halved for that, and by how much the next may be longer; and how far apart, over the
-#: length of the step, values of dense output give its slopes.
+#: Constants of ``halve_unresolved_step``: maximum error of the derivative of dense output,
+#: multiplied by the step size, in local tolerances; maximum number of halvings of a step; growth
+#: factor of the step size limit after a resolved step; and spacing of finite differences of dense
+#: output, as a fraction of the step size.
 MAX_SLOPE_ERROR, MAX_HALVINGS, GROWTH_FACTOR, SLOPE_SPACING = 300.0, 6, 1.3, 5e-3
 
 
 def time_since_regime_start(motion, workspace, y):
-    """Time since the regime began, at some unknowns; NaN where nothing tells it."""
+    """Return the time since the start of the regime.
+
+    The result is NaN if time is not one of the unknowns ``y``.
+    """
     if not motion.has_clock:
         return math.nan
     unit = workspace.switch_thresholds.inertial_time if motion.regime == FAST_REGIME else 1.0
@@ -40,17 +48,24 @@ def time_since_regime_start(motion, workspace, y):
 
 
 def time_at_step_begin(motion, workspace):
-    """Time since the start, at the beginning of the step."""
+    """Return the time at the beginning of the step, from the segment start."""
     return motion.regime_start_time + time_since_regime_start(motion, workspace, workspace.y)
 
 
 def time_at_step_end(motion, workspace):
-    """Time since the start, at the end of the step."""
+    """Return the time at the end of the step, from the segment start."""
     return motion.regime_start_time + time_since_regime_start(motion, workspace, workspace.y_end)
 
 
 def take_step(motion, workspace):
-    """Take a step whose local error is allowed; why not, where there is none."""
+    """Take one step whose local error is within the tolerance.
+
+    Returns
+    -------
+    int
+        ``STEP_TAKEN``, ``NO_STEP_POSSIBLE``, ``BUDGET_EXCEEDED`` or ``INVALID_STEP``. A step is
+        invalid if its size is zero or if its end is not finite.
+    """
     longest = MAX_STEP_LENGTH
     if motion.clock_is_path_length:
         longest = compute_max_step_length(
@@ -78,15 +93,21 @@ def take_step(motion, workspace):
 
 
 def step_to_next_kink(motion, workspace, max_length):
-    """Length of a step that ends at the next kink, if that is not farther; else 0."""
+    """Take a step to the next kink, and return its length.
+
+    Return 0 if the kink is farther away than ``max_length``, or if the stepper cannot take this
+    step.
+    """
     left = motion.end_time - time_at_step_begin(motion, workspace)
     length = left / time_since_regime_start(motion, workspace, workspace.rates)
     return step_to_segment_end(motion, workspace, length) if 0.0 < length <= max_length else 0.0
 
 
 def halve_unresolved_step(motion, workspace):
-    """Halve the step of a recorded motion until what lies within it is known as well as its
-    end: where stability limits steps, and not accuracy, dense output is far less accurate.
+    """Halve the step until its dense output is accurate.
+
+    The event loop calls the function if the step is recorded. If stability limits the step size,
+    dense output is much less accurate than the end of the step.
     """
     for _ in range(MAX_HALVINGS):
         if is_step_resolved(motion, workspace):
@@ -97,10 +118,12 @@ def halve_unresolved_step(motion, workspace):
 
 
 def is_step_resolved(motion, workspace):
-    """True if the slopes of dense output are the rates there, as well as is wanted.
+    """Return True if the dense output of the step is accurate.
 
-    With an error e of dense output, they differ by its own slope, a few times e over the length of
-    the step, and by what the rates make of e, as much where stability limits the step.
+    The function compares the derivatives of dense output with the right-hand side at two points of
+    the step. Let h be the step size and e the error of dense output. The derivatives then differ by
+    a few times e/h, and by the effect of e on the right-hand side. If stability limits the step
+    size, the two contributions are comparable.
     """
     for i in range(workspace.unknown_count):
         workspace.rates_within[i] = 0.0
@@ -120,14 +143,14 @@ def is_step_resolved(motion, workspace):
         for i in range(workspace.unknown_count):
             differ = abs(motion.step_length * workspace.rates_within[i] - workspace.dense_slopes[i])
             size = workspace.scales[i] + max(abs(workspace.y[i]), abs(workspace.y_end[i]))
-            # a number that is none is not resolved
+            # The negation rejects NaN.
             if not differ <= MAX_SLOPE_ERROR * motion.tolerance * size:
                 return False
     return True
 
 
 def evaluate_point_at_clock(motion, workspace, clock):
-    """Fill in what the slider does at a clock within the step."""
+    """Fill in ``workspace.point_within`` at a clock within the step."""
     interpolate_unknowns(motion, workspace, clock)
     count_evaluations(motion, 1)
     evaluate_in_place(
@@ -147,7 +170,7 @@ def evaluate_point_at_clock(motion, workspace, clock):
 
 
 def truncate_step_at_clock(motion, workspace, clock):
-    """Let the step end at a clock within it."""
+    """Truncate the step at a clock within the step."""
     if clock != motion.end:
         evaluate_point_at_clock(motion, workspace, clock)
         copy_values(workspace.point_within, workspace.point_at_end, FIRST_STATE + motion.states)

@@ -1,4 +1,4 @@
-"""Work that a motion spends, the tolerances that bound its steps, and why it may end early."""
+"""Work budget, tolerance limits and early termination of motions."""
 
 from __future__ import annotations
 
@@ -11,20 +11,39 @@ from rsfstudy.errors import RsfStudyError
 from rsfstudy.motion.engines import SCIPY
 from rsfstudy.status import Status
 
-#: Local tolerance at which the longest steps of equations hold as they are; at others they change
-#: as steps of order eight do.
+#: Local tolerance for which the maximum step sizes are specified. For other tolerances, the maximum
+#: step size is proportional to the eighth root of the tolerance.
 REFERENCE_TOLERANCE_OF_STEP_LIMIT = 1e-7
-#: Local tolerance below which rounding decides, and SciPy warns.
+#: Minimum local tolerance. Rounding errors dominate below this limit, and SciPy issues a warning.
 MIN_LOCAL_TOLERANCE = 5e-14
 
 
 def larger_budget_remedy(budget: int) -> str:
-    """Remedy of allowing more than a budget, to be added to a message."""
+    """Return the end of a message that suggests a larger budget.
+
+    Parameters
+    ----------
+    budget : int
+        Budget that was exceeded.
+
+    Returns
+    -------
+    str
+        Text with four times the budget.
+    """
     return f"; --budget {4 * budget} (budget=) allows more"
 
 
 class MotionStopped(RsfStudyError):
-    """A motion that cannot go on, with the status that says why."""
+    """Raised if a motion cannot continue.
+
+    Parameters
+    ----------
+    status : Status
+        Reason of the termination.
+    message : str
+        Error message.
+    """
 
     def __init__(self, status: Status, message: str) -> None:
         super().__init__(message)
@@ -34,21 +53,24 @@ class MotionStopped(RsfStudyError):
 @renamed_members
 @dataclass
 class WorkMeter:
-    """Work that one measurement spends, by regime, with which integrators; ends it when its budget
-    is spent.
+    """Counter of the work of a measurement.
 
-    Attributes
+    Parameters
     ----------
     budget : int
-        Right-hand sides it may evaluate.
-    methods : mapping of str to str
-        Name of the SciPy integrator of a regime; DOP853 where none is named.
-    engine : str
-        What integrates.
-    evaluations_by_regime : dict
-        Right-hand sides evaluated so far.
-    evaluations, steps, jacobians : int
-        Right-hand sides in all (those of numerical Jacobians too), steps, and Jacobians.
+        Maximum number of right-hand side evaluations.
+    methods : mapping of str to str, optional
+        Name of the SciPy solver for each regime. The default is DOP853 for all regimes.
+    engine : str, default: "scipy"
+        Name of the engine.
+    evaluations_by_regime : dict of str to int, optional
+        Number of right-hand side evaluations in each regime.
+    evaluations : int, default: 0
+        Number of right-hand side evaluations, including evaluations for numerical Jacobians.
+    steps : int, default: 0
+        Number of integration steps.
+    jacobians : int, default: 0
+        Number of Jacobians.
     """
 
     budget: int
@@ -60,19 +82,46 @@ class WorkMeter:
     jacobians: int = 0
 
     def charge(self, regime_name: str, evaluations: int) -> None:
-        """Add evaluations; raises `MotionStopped` once more than the budget is spent."""
+        """Add right-hand side evaluations, and check the budget.
+
+        Parameters
+        ----------
+        regime_name : str
+            Name of the regime.
+        evaluations : int
+            Number of evaluations.
+
+        Raises
+        ------
+        MotionStopped
+            If the total exceeds the budget.
+        """
         self.add_evaluations(regime_name, evaluations)
         self.check_budget()
 
     def add_evaluations(self, regime_name: str, evaluations: int) -> None:
-        """Add evaluations."""
+        """Add right-hand side evaluations without a check of the budget.
+
+        Parameters
+        ----------
+        regime_name : str
+            Name of the regime.
+        evaluations : int
+            Number of evaluations.
+        """
         self.evaluations_by_regime[regime_name] = (
             self.evaluations_by_regime.get(regime_name, 0) + evaluations
         )
         self.evaluations += evaluations
 
     def check_budget(self) -> None:
-        """Raise `MotionStopped` where more than the budget is spent."""
+        """Raise MotionStopped if the evaluations exceed the budget.
+
+        Raises
+        ------
+        MotionStopped
+            If the total exceeds the budget.
+        """
         if self.evaluations > self.budget:
             raise MotionStopped(
                 Status.WORK_BUDGET_SPENT,
@@ -82,14 +131,21 @@ class WorkMeter:
     def charge_new_work(
         self, regime_names: Sequence[str], work_before: Sequence[int], work_now: Sequence[int]
     ) -> int:
-        """Add what a motion has spent since what is known of it; returns what else is on the meter.
+        """Add the work of a motion since its last report.
 
         Parameters
         ----------
         regime_names : sequence of str
-            Those of the motion: one, or that between ruptures and that in them.
+            Name of the slow regime, followed by the name of the fast regime if there are two
+            regimes.
         work_before, work_now : sequence of int
-            Right-hand sides in one and in the other, steps, and Jacobians: before, and now.
+            Cumulative work of the motion at the last report and now. The items are evaluations in
+            the slow and in the fast regime, steps and Jacobians.
+
+        Returns
+        -------
+        int
+            Number of evaluations of other motions that the meter has counted.
         """
         others = self.evaluations - work_before[0] - work_before[1]
         if work_now[0] > work_before[0]:

@@ -1,4 +1,31 @@
-"""Workspace of one regime of a motion: the places of its numbers."""
+"""Workspace of a regime: arrays, functions and constants.
+
+``motion_loop.advance_motion`` creates a workspace for each regime, and steppers receive it as an
+argument. The arrays are written by the following functions. Functions without a module name belong
+to ``motion_loop``.
+
+=========================================  ====================================================
+Arrays                                     Written by
+=========================================  ====================================================
+y                                          set_unknowns_of_regime, advance_to_step_end
+rates                                      stepper (at the start of a regime),
+                                           advance_to_step_end
+y_end, rates_at_end                        stepper (each step),
+                                           step_integration.truncate_step_at_clock (y_end only)
+stage_rates, order_eight_step_block,       steppers.order_eight
+dense_output_rows
+y_within                                   stepper (each interpolation), has_left_rupture
+rates_within, point_within                 step_integration.evaluate_point_at_clock,
+                                           step_integration.is_step_resolved (rates_within),
+                                           has_left_rupture (point_within)
+dense_slopes                               step_integration.is_step_resolved
+point_at_begin                             follow_regime (at its start), advance_to_step_end
+point_at_end                               follow_regime (each step), end_step_at_end_time,
+                                           step_integration.truncate_step_at_clock
+event_clocks, event_specs                  step_events.locate_events_in_step
+parameters, parameters_before              start_next_segment
+=========================================  ====================================================
+"""
 
 from __future__ import annotations
 
@@ -16,44 +43,56 @@ from rsfstudy.motion.steppers.unrolled_step import (
 )
 
 Array = Any
-#: Time by the clock of a step that stands for none.
+#: Positive number that replaces a zero derivative of time, so that no division by zero occurs.
 MIN_TIME_PER_CLOCK = 1e-300
 
 
 @renamed_members
 class Workspace(NamedTuple):
-    """Arrays of one regime, which are indexed only, and what it works with.
+    """Arrays, functions and constants of one regime.
 
-    Attributes
+    In compiled code, the arrays are pointers, so they support indexing only.
+
+    Parameters
     ----------
     unknown_count : int
-        How many unknowns there are.
-    y, y_end : array
-        Unknowns at the beginning of a step, and at its end.
-    rates, rates_at_end : array
-        Their rates there.
-    stage_rates, order_eight_step_block, scales, dense_output_rows : array
-        Of a step of order eight: its stages, of which the rates there are the first and the last;
-        its block (see `steppers.unrolled`), and of this the scales of the unknowns and the rows of
-        dense output.
-    y_within, rates_within, dense_slopes : array
-        Unknowns within the step, their rates, and slopes of dense output.
+        Number of unknowns.
+    y, y_end : array of shape (unknown_count,)
+        Unknowns at the beginning and at the end of the step.
+    rates, rates_at_end : array of shape (unknown_count,)
+        Derivatives of the unknowns at the beginning and at the end of the step.
+    stage_rates : array
+        Derivatives in all stages of an order-eight step. The arrays ``rates`` and ``rates_at_end``
+        are part of this array.
+    order_eight_step_block : array
+        Header, final unknowns, scales and dense output of an order-eight step. See
+        ``steppers.unrolled_step``.
+    scales : array of shape (unknown_count,)
+        Scales of the unknowns, for the error tolerance.
+    dense_output_rows : array
+        Coefficients of the dense output of an order-eight step.
+    y_within, rates_within : array of shape (unknown_count,)
+        Unknowns within the step, and their derivatives.
+    dense_slopes : array of shape (unknown_count,)
+        Derivatives of the dense output.
     point_at_begin, point_at_end, point_within : array
-        Columns of the points at the beginning of the step, at its end, and within it.
-    event_clocks : array
-        Clocks at which events happen within a step.
+        Columns of the points at the beginning of the step, at its end, and within the step.
+    event_clocks : array of shape (event_spec_count,)
+        Values of the independent variable at the events of the step. The value is NaN if an event
+        does not occur.
     fill_rates, fill_point, attempt_step, fill_balance : function
-        The equations (see `inplace`).
+        Functions of the equations. See ``in_place_functions.InPlaceFunctions``.
     event_specs : array
-        Event specifications, one row of numbers after the other.
+        Flattened table of event specifications.
     event_spec_count : int
-        How many rows.
+        Number of event specifications.
     parameters, parameters_before : array
-        The numbers of the scene, and what they were before the last kink.
+        Parameters of the scene, and their values before the last kink.
     switch_thresholds : SwitchThresholds
-        When to change between the regimes; none is read where there is no mass.
-    stepper : object
-        What takes the steps.
+        Thresholds for changes between the regimes. All thresholds are NaN if the scene has no
+        inertia.
+    stepper : Stepper
+        Stepper of the motion.
     """
 
     unknown_count: int
@@ -85,7 +124,22 @@ class Workspace(NamedTuple):
 
 
 def workspace_size(unknown_count: int, state_count: int, event_spec_count: int) -> int:
-    """Length of a workspace."""
+    """Compute the length of the array that holds a workspace.
+
+    Parameters
+    ----------
+    unknown_count : int
+        Largest number of unknowns of a regime.
+    state_count : int
+        Number of states.
+    event_spec_count : int
+        Number of event specifications.
+
+    Returns
+    -------
+    int
+        Number of floats.
+    """
     of_unknowns = 1 + DENSE_ROW_COUNT + 1 + TOTAL_STAGE_COUNT + 1 + 1 + 1
     return (
         HEADER_SIZE
@@ -98,8 +152,29 @@ def workspace_size(unknown_count: int, state_count: int, event_spec_count: int) 
 def create_workspace(
     workspace_block, y, unknown_count, unknown_scales, state_count, functions, shared_members
 ):
-    """The workspace of a regime, in a block of that size; `shared_members` are its last six
-    members.
+    """Create the workspace of a regime within a block of memory.
+
+    Parameters
+    ----------
+    workspace_block : array
+        Memory of the arrays. See ``workspace_size``.
+    y : array
+        Unknowns at the beginning of the step.
+    unknown_count : int
+        Number of unknowns of the regime.
+    unknown_scales : array of shape (unknown_count,)
+        Scales of the unknowns.
+    state_count : int
+        Number of states.
+    functions : sequence
+        Row of the function table.
+    shared_members : tuple
+        Last six fields of the workspace, which both regimes share.
+
+    Returns
+    -------
+    Workspace
+        Workspace of the regime.
     """
     new, columns = offset_pointer(workspace_block, HEADER_SIZE), FIRST_STATE + state_count
     own = offset_pointer(new, unknown_count)
@@ -132,7 +207,20 @@ def create_workspace(
 
 
 def fill_rates_by_step_clock(motion, workspace, y, result):
-    """Fill in the rates at some unknowns by the clock of the step."""
+    """Fill in derivatives with respect to the clock of the step.
+
+    Parameters
+    ----------
+    motion : record
+        State of the motion.
+    workspace : Workspace
+        Workspace of the regime.
+    y : array of shape (unknown_count,)
+        Unknowns.
+    result : array of shape (unknown_count,)
+        Output array of the derivatives. If ``motion.time_per_step`` is positive, the independent
+        variable of the step is proportional to time.
+    """
     evaluate_in_place(workspace.fill_rates, y, y, workspace.parameters, result)
     if motion.time_per_step > 0.0:
         slower = motion.time_per_step / max(result[workspace.unknown_count - 1], MIN_TIME_PER_CLOCK)
@@ -141,7 +229,15 @@ def fill_rates_by_step_clock(motion, workspace, y, result):
 
 
 def count_evaluations(motion: Any, evaluation_count: int) -> None:
-    """Count right-hand sides."""
+    """Add right-hand side evaluations to the counter of the current regime.
+
+    Parameters
+    ----------
+    motion : record
+        State of the motion.
+    evaluation_count : int
+        Number of evaluations.
+    """
     if motion.regime == SLOW_REGIME:
         motion.evaluations_slow += evaluation_count
     else:

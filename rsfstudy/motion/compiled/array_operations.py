@@ -1,8 +1,8 @@
-"""Compiled forms of functions of the loop: pointers to numbers, calls of equations
-by their addresses, and the steps of order eight.
+"""Functions that replace Python functions of the event loop in compiled code.
 
-The loop is compiled once, for all equations; the equations once for each combination of parts.
-Arrays would be passed from function to function as ten words each, and counted.
+The compiled loop uses pointers instead of arrays, and calls the equations through their addresses.
+The loop is therefore compiled only once for all equations. Pointers are also faster, because Numba
+would pass an array to a function as ten words and count its references.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ from rsfstudy.motion.recording import (
 from rsfstudy.motion.steppers import order_eight
 
 _NUMBA_FLOAT_POINTER_TYPE = types.CPointer(types.float64)
-#: ``function(y, rates, p, result)``: all pointers to numbers, of which some are not read.
+#: Type of ``function(y, rates, p, result)``. All arguments are pointers to floats.
 _LLVM_DOUBLE_POINTER_TYPE = ir.DoubleType().as_pointer()
 _LLVM_FUNCTION_TYPE = ir.FunctionType(ir.VoidType(), [_LLVM_DOUBLE_POINTER_TYPE] * 4)
 
@@ -36,6 +36,8 @@ _LLVM_FUNCTION_TYPE = ir.FunctionType(ir.VoidType(), [_LLVM_DOUBLE_POINTER_TYPE]
 def _call_function_at_address(
     _context: Any, function: Any, y: Any, rates: Any, parameters: Any, result: Any
 ) -> Any:
+    """Generate code that calls a function at an address."""
+
     def code(target: Any, builder: Any, _signature: Any, arguments: Any) -> Any:
         function, *pointers = arguments
         builder.call(builder.inttoptr(function, _LLVM_FUNCTION_TYPE.as_pointer()), pointers)
@@ -46,6 +48,8 @@ def _call_function_at_address(
 
 @intrinsic  # type: ignore[untyped-decorator]
 def _array_data_pointer(_context: Any, array: Any) -> Any:
+    """Generate code that returns a pointer to the first item of an array."""
+
     def code(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
         return cgutils.create_struct_proxy(signature.args[0])(context, builder, arguments[0]).data
 
@@ -54,6 +58,8 @@ def _array_data_pointer(_context: Any, array: Any) -> Any:
 
 @intrinsic  # type: ignore[untyped-decorator]
 def _pointer_moved_by(_context: Any, pointer: Any, item_count: Any) -> Any:
+    """Generate code that moves a pointer by a number of items."""
+
     def code(_target: Any, builder: Any, _signature: Any, arguments: Any) -> Any:
         pointer, numbers = arguments
         return builder.gep(pointer, [numbers])
@@ -62,31 +68,85 @@ def _pointer_moved_by(_context: Any, pointer: Any, item_count: Any) -> Any:
 
 
 def evaluate_in_place(function, y, rates, parameters, result):
-    """Have a function of the equations fill `result`."""
+    """Call a function that fills an array.
+
+    Parameters
+    ----------
+    function : int
+        Address of the function.
+    y, rates, parameters : pointer
+        Arguments of the function.
+    result : pointer
+        Output array.
+    """
     _call_function_at_address(function, y, rates, parameters, result)
 
 
 def array_as_pointer(array):
-    """A pointer to the first number of an array, which its caller keeps alive."""
+    """Return a pointer to the first item of an array.
+
+    Parameters
+    ----------
+    array : ndarray
+        Array to convert. The caller must keep a reference to the array.
+
+    Returns
+    -------
+    pointer
+        Pointer to the first item.
+    """
     return _array_data_pointer(array)
 
 
 def offset_pointer(pointer, item_count):
-    """A pointer so many numbers further on."""
+    """Move a pointer by a number of items.
+
+    Parameters
+    ----------
+    pointer : pointer
+        Pointer to an item of an array.
+    item_count : int
+        Number of items to skip.
+
+    Returns
+    -------
+    pointer
+        Pointer to a later item.
+    """
     return _pointer_moved_by(pointer, item_count)
 
 
 def copy_values(source, target, item_count):
-    """Copy so many numbers."""
+    """Copy the first items of an array to another array.
+
+    Parameters
+    ----------
+    source, target : pointer
+        Arrays to read and to write.
+    item_count : int
+        Number of items.
+    """
     for i in range(item_count):
         target[i] = source[i]
 
 
 def interpolate_rows(columns, row_positions, result):
-    """Fill in values of columns between rows (see `recording.interpolate_rows`)."""
+    """Interpolate columns at fractional row numbers.
+
+    The function is equivalent to ``recording.interpolate_rows``.
+
+    Parameters
+    ----------
+    columns : array of shape (columns, rows)
+        Columns of the recorded motion.
+    row_positions : array of shape (points,)
+        Fractional row numbers.
+    result : array of shape (result columns, points)
+        Output array of the first columns at the row numbers.
+    """
     last, weights = columns.shape[1] - 1, np.empty(SAMPLES_PER_STEP + 1)
     for i in range(len(row_positions)):
-        if not 0.0 <= row_positions[i] <= last:  # of a record that is not finite
+        if not 0.0 <= row_positions[i] <= last:  # The recording may contain NaN.
             result[:, i] = math.nan
             continue
         after = math.ceil(row_positions[i])
@@ -112,7 +172,7 @@ def interpolate_rows(columns, row_positions, result):
                 result[c, i] += weights[k] * columns[c, min(begin + k, last)]
 
 
-#: What stands in place of which function.
+#: Compiled replacements of Python functions.
 COMPILED_REPLACEMENT_BY_FUNCTION: Mapping[Any, Any] = {
     array_operations.evaluate_in_place: evaluate_in_place,
     array_operations.array_as_pointer: array_as_pointer,

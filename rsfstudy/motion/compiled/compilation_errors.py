@@ -1,4 +1,7 @@
-"""Says which part of a slider cannot be compiled, and where."""
+"""Error messages for equations that cannot be compiled.
+
+The messages name the part and the source line that cause the error.
+"""
 
 from __future__ import annotations
 
@@ -20,8 +23,22 @@ _NUMBA_ERROR_LOCATION_PATTERN = re.compile(r'\n+File "(?P<file>.+?)", line (?P<l
 def check_function_never_raises(
     function: Function, checked_functions: set[Function] | None = None
 ) -> None:
-    """Raise InvalidValue where a function, or one that it reaches, raises: what is called by its
-    address cannot.
+    """Raise InvalidValue if a function contains a raise statement.
+
+    Functions that are called through their addresses cannot raise exceptions. The check includes
+    all functions that the function calls.
+
+    Parameters
+    ----------
+    function : callable
+        Function to check.
+    checked_functions : set of callable, optional
+        Functions that were already checked. The function adds new items.
+
+    Raises
+    ------
+    InvalidValue
+        If one of the functions contains a raise statement.
     """
     checked_functions = set() if checked_functions is None else checked_functions
     if function in checked_functions:
@@ -44,7 +61,18 @@ def check_function_never_raises(
 
 
 def compilation_error(error: Exception) -> InvalidValue:
-    """Error of Numba, with the part and the line: its text begins with the innermost function."""
+    """Convert an error of Numba to an error that names the part and the line.
+
+    Parameters
+    ----------
+    error : Exception
+        Error of Numba. Its message begins with the innermost function.
+
+    Returns
+    -------
+    InvalidValue
+        Error for the user.
+    """
     text, what, where = str(error), _EQUATIONS_TEXT, ""
     places = list(_NUMBA_ERROR_LOCATION_PATTERN.finditer(text))
     of_parts = [
@@ -63,7 +91,7 @@ def compilation_error(error: Exception) -> InvalidValue:
 
 
 def _describe_parts_defined_in(source_file: str) -> str:
-    """The parts that a file defines, in words, or the equations."""
+    """Describe the parts that a source file defines, for error messages."""
     names = [
         part.name
         for part in _iterate_part_classes()
@@ -73,7 +101,7 @@ def _describe_parts_defined_in(source_file: str) -> str:
 
 
 def _iterate_part_classes(base_class: type[Part] = Part) -> Iterator[type[Part]]:
-    """All parts there are in this process, the latest definition first."""
+    """Yield all part classes of this process, the latest definition first."""
     for part in reversed(base_class.__subclasses__()):
         yield from _iterate_part_classes(part)
         if "name" in vars(part):
@@ -81,11 +109,13 @@ def _iterate_part_classes(base_class: type[Part] = Part) -> Iterator[type[Part]]
 
 
 def _source_file_of_part(part_class: type[Part]) -> Path | None:
+    """Return the source file of a part class, or None for a notebook."""
     try:
         return _resolve_path(inspect.getfile(part_class))
-    except (OSError, TypeError):  # defined in a notebook
+    except (OSError, TypeError):  # Classes of a notebook have no source file.
         return None
 
 
 def _resolve_path(file: str) -> Path:
+    """Return the absolute path of a file."""
     return Path(file).resolve()

@@ -1,10 +1,13 @@
-"""Compiles the motion of a combination of parts, once, and finds it again in a cache on disk.
+"""Compilation of functions with Numba, and a cache of the results on disk.
 
-The functions are those of plain Python, but for a few (`calls.REPLACEMENTS`). They are copied, each
-function that they name or close over standing for its compiled copy, and compiled as one. What is
-compiled lies in a folder of its own, named by a digest of all that decides it, which is written
-aside, renamed when complete, and never changed. What lies there is run: where others could write to
-it, nothing is read or kept.
+``compile_function`` and ``compile_cfunc_addresses`` are the main functions. They copy a function
+and all functions that it calls, replace some of them (``COMPILED_REPLACEMENT_BY_FUNCTION``), and
+compile the copy.
+
+Each result is stored in a folder named by a digest of the functions, the compiler and the
+processor. The folder is written under a temporary name, renamed when it is complete, and never
+changed. The cache contains machine code that this process executes. Folders that other users can
+write to are therefore neither read nor written.
 """
 
 from __future__ import annotations
@@ -38,32 +41,49 @@ from rsfstudy.motion.compiled.array_operations import COMPILED_REPLACEMENT_BY_FU
 from rsfstudy.motion.engines import compilation_log
 
 _CACHE_ENTRY_FILE_NAME = "motion.py"
-#: Modules that are as their version, or that of Python, says.
+#: Modules whose content is identified by their version or by the version of Python.
 _MODULES_IDENTIFIED_BY_VERSION = {*sys.stdlib_module_names, "numpy", "numba"}
-#: Quotients by the numbers of a scene may be products with reciprocals, found once a step; and
-#: products and sums may be rounded together.
+#: The fast-math flags permit reciprocals instead of divisions, and fused multiply-add operations.
+#: The compiler can then compute reciprocals of the parameters once per step.
 _COMPILER_OPTIONS: Mapping[str, Any] = {
     "error_model": "numpy",
     "nogil": True,
     "fastmath": {"arcp", "contract", "nsz"},
 }
 _CFUNC_SIGNATURE = numba.types.void(*[numba.types.CPointer(numba.types.float64)] * 4)
-#: Changes where what is kept is laid out or named in another way.
+#: Version of the layout and the names of the cache. Increment it if either of them changes.
 _CACHE_FORMAT_VERSION = 4
-#: Compiled functions whose addresses are in use.
+#: Compiled functions that must not be deleted because their addresses are in use.
 _CFUNCS_KEPT_ALIVE: list[Any] = []
 _logger = logging.getLogger(__name__)
 
 
 def compile_cache_folder() -> Path:
-    """Folder where compiled motions are kept: the one that the system has for such things."""
+    """Return the folder of compiled functions.
+
+    Returns
+    -------
+    Path
+        Folder within ``XDG_CACHE_HOME``, or within ``~/.cache`` by default.
+    """
     home = os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache"
     return Path(home) / "rsfstudy" / "compiled"
 
 
 def compute_code_digest(signature: Any, *functions: Callable[..., Any]) -> str:
-    """Digest of functions of a signature and of all that they reach, of the compiler, what it is
-    allowed, and the processor.
+    """Compute a digest of functions and their compilation options.
+
+    Parameters
+    ----------
+    signature : object
+        Numba signature of the functions.
+    *functions : callable
+        Functions to digest. The functions that they call are included.
+
+    Returns
+    -------
+    str
+        Hexadecimal digest. It also depends on the version of the compiler and on the processor.
     """
     content = _ContentDigest()
     content.add_value((signature, functions))
@@ -85,14 +105,14 @@ def compute_code_digest(signature: Any, *functions: Callable[..., Any]) -> str:
 
 
 class _ContentDigest:
-    """Digests whatever a compiler can make a constant of."""
+    """Digest of values that a compiler may treat as constants."""
 
     def __init__(self) -> None:
         self.sha256_hash = hashlib.sha256()
         self._function_numbers: dict[int, int] = {}
 
     def add_value(self, value: Any) -> None:
-        """Add a value, and what it refers to."""
+        """Add a value and all values that it refers to."""
         if isinstance(value, types.FunctionType):
             known = id(value) in self._function_numbers
             number = self._function_numbers.setdefault(id(value), len(self._function_numbers))
@@ -116,6 +136,7 @@ class _ContentDigest:
             self._add_text(repr(value))
 
     def _add_code(self, code: types.CodeType, global_values: Mapping[str, Any]) -> None:
+        """Add a code object and the globals that it reads."""
         self.sha256_hash.update(code.co_code)
         self.add_value(code.co_varnames)
         for constant in code.co_consts:
@@ -129,15 +150,29 @@ class _ContentDigest:
             if not isinstance(value, types.ModuleType):
                 self.add_value(value)
             elif value.__name__.partition(".")[0] not in _MODULES_IDENTIFIED_BY_VERSION:
-                # a compiler takes what is read from a module for a constant
+                # Numba treats the attributes of a module as constants.
                 self.add_value([getattr(value, read, None) for read in code.co_names])
 
     def _add_text(self, text: str) -> None:
+        """Add a text, with a separator."""
         self.sha256_hash.update(text.encode() + b"\0")
 
 
 def compile_function(function: Callable[..., Any], signature: Any) -> Any:
-    """A compiled function."""
+    """Compile a function, or load it from the cache.
+
+    Parameters
+    ----------
+    function : callable
+        Function to compile.
+    signature : object
+        Numba signature of the function.
+
+    Returns
+    -------
+    Dispatcher
+        Compiled function, which Python can call.
+    """
 
     def compile_for(entry: str) -> Any:
         copy = _copy_with_compiled_globals(function, entry)
@@ -151,7 +186,18 @@ def compile_function(function: Callable[..., Any], signature: Any) -> Any:
 
 
 def compile_cfunc_addresses(functions: Sequence[Callable[..., Any]]) -> tuple[int, ...]:
-    """Addresses of compiled functions of pointers to numbers."""
+    """Compile functions of pointers, or load them from the cache.
+
+    Parameters
+    ----------
+    functions : sequence of callable
+        Functions with the arguments ``(y, rates, p, result)``.
+
+    Returns
+    -------
+    tuple of int
+        Addresses of the compiled functions. They are valid until the process ends.
+    """
 
     def compile_for(entry: str) -> list[Any]:
         return [
@@ -165,16 +211,19 @@ def compile_cfunc_addresses(functions: Sequence[Callable[..., Any]]) -> tuple[in
 
 
 class _ContentKeyedCache(FunctionCache):  # type: ignore[misc]
-    """Numba's cache of a function that is named by its content: by what a closure holds Numba would
-    find none again, because compiled functions are others in each process.
+    """Numba cache of a function with a content digest in its file name.
+
+    The cache of Numba also uses the values of a closure as a key. These values include compiled
+    functions, which differ between processes, so Numba would never find a cached function again.
     """
 
     def _index_key(self, signature: Any, codegen: Any) -> tuple[Any, ...]:
+        """Return a key that does not contain the values of the closure."""
         return signature, codegen.magic_tuple()
 
 
 def _compile_cfunc(function: Any, *, use_cache: bool) -> Any:
-    """A compiled function of pointers to numbers, kept in the cache or not."""
+    """Compile a function of pointers, with or without the cache."""
     compiled = CFunc(
         function, normalize_signature(_CFUNC_SIGNATURE), locals={}, options=dict(_COMPILER_OPTIONS)
     )
@@ -185,11 +234,14 @@ def _compile_cfunc(function: Any, *, use_cache: bool) -> Any:
 
 
 def _load_or_compile(entry_name: str, compile_at_path: Callable[[str], Any]) -> Any:
-    """Compiled functions, from the folder of that name where it is there and whole."""
+    """Load functions from their cache folder, or compile them.
+
+    A damaged cache folder is replaced.
+    """
     folder = _cache_entry_folder(entry_name)
     if folder is not None:
         if folder.exists():
-            with contextlib.suppress(Exception):  # whatever a cache can be damaged by
+            with contextlib.suppress(Exception):  # A damaged cache can raise any exception.
                 return compile_at_path(str(folder / _CACHE_ENTRY_FILE_NAME))
         shutil.rmtree(folder, ignore_errors=True)
     began = time.perf_counter()
@@ -200,7 +252,7 @@ def _load_or_compile(entry_name: str, compile_at_path: Callable[[str], Any]) -> 
                 if folder is None
                 else _compile_in_temporary_folder(folder, compile_at_path)
             )
-        except OSError:  # nothing can be kept
+        except OSError:  # The cache folder cannot be written.
             return compile_at_path("")
         finally:
             compilation_log.compiled_program_count += 1
@@ -208,7 +260,10 @@ def _load_or_compile(entry_name: str, compile_at_path: Callable[[str], Any]) -> 
 
 
 def _cache_entry_folder(entry_name: str) -> Path | None:
-    """The folder of that name; None where there is no cache, or not for this user alone."""
+    """Return the cache folder of an entry, or None if it is not private.
+
+    The result is also None if the folder cannot be created.
+    """
     try:
         cache = compile_cache_folder()
         cache.parent.parent.mkdir(parents=True, exist_ok=True)
@@ -218,13 +273,14 @@ def _cache_entry_folder(entry_name: str) -> Path | None:
             if folder.exists() and not _is_private_folder(folder):
                 _warn_folder_not_private(folder)
                 return None
-    except (OSError, RuntimeError):  # it cannot be made, or the user has no home
+    except (OSError, RuntimeError):  # The folder cannot be created, or the user has no home folder.
         return None
     return cache / entry_name
 
 
 @functools.cache
 def _warn_folder_not_private(folder: Path) -> None:
+    """Log a warning, once per folder, that a folder is not private."""
     _logger.warning(
         "%s: others own it or may write to it, and nothing compiled is kept there or taken from "
         "it. Remove it, or choose another place (XDG_CACHE_HOME).",
@@ -233,8 +289,8 @@ def _warn_folder_not_private(folder: Path) -> None:
 
 
 def _is_private_folder(folder: Path) -> bool:
-    """True if nobody else owns a folder, or a link to it, or may write to it."""
-    if not hasattr(os, "geteuid"):  # Windows: no owners, no modes
+    """Return True if only the current user owns and can write to a folder."""
+    if not hasattr(os, "geteuid"):  # Windows has no numeric owners and modes.
         return True
     found = folder.stat()
     owners = {found.st_uid, folder.lstat().st_uid}
@@ -242,14 +298,14 @@ def _is_private_folder(folder: Path) -> bool:
 
 
 def _compile_in_temporary_folder(folder: Path, compile_at_path: Callable[[str], Any]) -> Any:
-    """Compile in a folder of its own, which is then renamed."""
+    """Compile in a temporary folder, and rename the complete folder."""
     aside = Path(tempfile.mkdtemp(prefix=f"{folder.name}.", dir=folder.parent))
     try:
         entry = aside / _CACHE_ENTRY_FILE_NAME
         entry.write_text("# Stands for a function that rsfstudy has compiled.\n")
-        os.utime(entry, (0, 0))  # Numba looks at its age
+        os.utime(entry, (0, 0))  # The cache of Numba depends on the modification time.
         ready = compile_at_path(str(entry))
-        with contextlib.suppress(OSError):  # somebody else was faster
+        with contextlib.suppress(OSError):  # Another process may have renamed its folder earlier.
             os.rename(aside, folder)
         return ready
     finally:
@@ -257,10 +313,11 @@ def _compile_in_temporary_folder(folder: Path, compile_at_path: Callable[[str], 
 
 
 def _copy_with_compiled_globals(function: Any, entry_path: str = "") -> Any:
-    """A copy of a function whose names stand for compiled functions, as if it stood in a file.
+    """Copy a function, with compiled functions in place of its callees.
 
-    Its own name tells its content: a linker takes functions of one name for one function, wherever
-    they come from, and Numba numbers its names anew in each process.
+    The qualified name of the copy contains a digest of its content. A linker treats functions with
+    equal names as the same function, and the numbers that Numba adds to names differ between
+    processes. If ``entry_path`` is given, it becomes the source file of the copy.
     """
     named = {
         name: function.__globals__.get(name) for name in _global_names_read_by(function.__code__)
@@ -284,26 +341,34 @@ def _copy_with_compiled_globals(function: Any, entry_path: str = "") -> Any:
 
 @functools.cache
 def _global_names_read_by(code: types.CodeType) -> tuple[str, ...]:
-    """Names of the globals that a function reads, without those of attributes."""
+    """Return the names of the globals that a function reads.
+
+    Names of attributes are not included.
+    """
     reads = (i.argval for i in dis.get_instructions(code) if i.opname == "LOAD_GLOBAL")
     return tuple(dict.fromkeys(reads))
 
 
 def _is_function(value: Any) -> bool:
+    """Return True if a value is a Python function."""
     return isinstance(value, types.FunctionType)
 
 
 def _compiled_replacement_of(value: Any) -> Any:
-    """Value that the compiler is given for one that a function names."""
+    """Return the compiled replacement of a function, or the value itself."""
     return COMPILED_REPLACEMENT_BY_FUNCTION.get(value, value) if _is_function(value) else value
 
 
 def _jit_compile_callee(function: Any) -> Any:
-    """A compiled function that only others call; those of several equations share it."""
+    """Compile a function that only compiled functions call.
+
+    Functions that several equations call are compiled only once.
+    """
     return _jit_compile_callee_cached(_compiled_replacement_of(function))
 
 
 @functools.cache
 def _jit_compile_callee_cached(function: Any) -> Any:
+    """Compile a function without wrappers for Python and C."""
     inner = {"no_cpython_wrapper": True, "no_cfunc_wrapper": True}
     return numba.njit(_copy_with_compiled_globals(function), **_COMPILER_OPTIONS, **inner)

@@ -1,4 +1,8 @@
-"""The loop of motions, compiled once for all; and the equations of a combination of parts."""
+"""Backend that runs the event loop compiled by Numba.
+
+The loop is compiled once for all motions, and the equations are compiled once for each combination
+of parts. ``compile_equations_of_scene`` compiles all functions of a scene in advance.
+"""
 
 from __future__ import annotations
 
@@ -39,36 +43,76 @@ _LOOP_CONSTANTS_TYPE = types.Tuple(
 )
 
 
-#: The many objects of a compiler take a third of a second to be looked through as a process ends.
+#: Without this call, garbage collection of the objects of Numba delays exit by a third of a second.
 atexit.register(gc.freeze)
 
 
 class NumbaBackend:
-    """The loop, compiled, and its arguments (see `driver.PythonBackend`)."""
+    """Backend that runs the compiled event loop.
+
+    The methods are documented in ``motion_driver.PythonBackend``.
+    """
 
     def initial_state_values(self, field_values: tuple[tuple[str, float], ...]) -> bytes:
+        """Return the initial values of all fields as bytes.
+
+        See ``motion_driver.PythonBackend``.
+        """
         return _pack_initial_state_bytes(field_values)
 
     def create_motion_state(
         self, initial_state: bytes, call_arguments: tuple[float, ...]
     ) -> NumbaMotionState:
+        """Create the state of a motion.
+
+        See ``motion_driver.PythonBackend``.
+        """
         return NumbaMotionState(initial_state, call_arguments)
 
     def build_function_table(self, equations_by_regime: tuple[Equations, ...]) -> np.ndarray:
+        """Build the table of function addresses.
+
+        See ``motion_driver.PythonBackend``.
+        """
         return _build_function_table(*map(compiled_function_addresses, equations_by_regime))
 
     def as_loop_arguments(self, *arrays: np.ndarray) -> Sequence[np.ndarray]:
+        """Return the arrays unchanged.
+
+        See ``motion_driver.PythonBackend``.
+        """
         return arrays
 
     def as_loop_parameters(self, parameters: Sequence[float]) -> Any:
+        """Convert the parameters of a scene to an array.
+
+        See ``motion_driver.PythonBackend``.
+        """
         return np.array(parameters)
 
     def get_loop_function(self) -> Any:
+        """Return the compiled event loop.
+
+        See ``motion_driver.PythonBackend``.
+        """
         return get_compiled_loop()
 
 
 class NumbaMotionState:
-    """The state of a motion as a record."""
+    """State of a motion as a record array.
+
+    Parameters
+    ----------
+    initial : bytes
+        Initial values of the fields.
+    called_with : tuple of float
+        Values of the fields in ``array_layout.CALL_ARGUMENT_FIELDS``.
+
+    Attributes
+    ----------
+    memory : ndarray of MOTION_STATE_DTYPE, shape (1,)
+        Argument ``motion_memory`` of the loop.
+    """
 
     def __init__(self, initial: bytes, called_with: tuple[float, ...]) -> None:
         self._bytes = bytearray(initial)
@@ -76,22 +120,47 @@ class NumbaMotionState:
         self.memory = np.frombuffer(self._bytes, array_layout.MOTION_STATE_DTYPE)
 
     def work_and_row_counters(self) -> tuple[int, ...]:
-        """Right-hand sides by regime, steps, events, rows, and Jacobians."""
+        """Return the counters of work and of table rows.
+
+        Returns
+        -------
+        tuple of int
+            Right-hand side evaluations in the slow and in the fast regime, steps, event rows,
+            recorded rows and Jacobians.
+        """
         return array_layout.COUNTER_FORMAT.unpack_from(self._bytes, array_layout.CALL_FORMAT.size)
 
     def get_state_field(self, field_name: str) -> float:
-        """One of its fields."""
+        """Return the value of a field.
+
+        Parameters
+        ----------
+        field_name : str
+            Name of the field.
+
+        Returns
+        -------
+        float
+            Value of the field.
+        """
         return float(self.memory[field_name][0])
 
 
 def compile_equations_of_scene(scene: Scene, *, with_time: bool) -> None:
-    """Compile what motions of such a scene need, with time or without it, or find it in the cache.
-    What carries no time may also be a path that leaves mass out.
+    """Compile the equations of a scene, or load them from the cache.
+
+    Parameters
+    ----------
+    scene : Scene
+        Scene of the motions.
+    with_time : bool
+        If True, time is one of the unknowns. If False, the equations without inertia are compiled
+        too, because some paths use them.
 
     Raises
     ------
     InvalidValue
-        Where a part of the scene cannot be compiled.
+        If a part of the scene cannot be compiled.
     """
     get_compiled_loop()
     compiled_function_addresses(equations_between_ruptures(scene, with_time=with_time))
@@ -103,7 +172,10 @@ def compile_equations_of_scene(scene: Scene, *, with_time: bool) -> None:
 
 @lru_cache(maxsize=256)
 def _pack_initial_state_bytes(field_values: tuple[tuple[str, float], ...]) -> bytes:
-    """The state that motions begin with, as bytes: records are copied one field after the other."""
+    """Pack the initial state of motions into bytes.
+
+    Copies of bytes are faster than copies of records, which NumPy copies field by field.
+    """
     memory = np.zeros(1, array_layout.MOTION_STATE_DTYPE)
     for name, value in field_values:
         memory[name] = value
@@ -114,7 +186,10 @@ def _pack_initial_state_bytes(field_values: tuple[tuple[str, float], ...]) -> by
 def _build_function_table(
     slow_regime_addresses: tuple[int, ...], fast_regime_addresses: tuple[int, ...] = ()
 ) -> np.ndarray:
-    """The table of addresses; both regimes know of the balance between ruptures."""
+    """Build the table of function addresses.
+
+    Both rows contain the force balance function of the slow manifold.
+    """
     rows = np.zeros((2, array_layout.FUNCTIONS_PER_REGIME), dtype=np.int64)
     (
         rows[array_layout.SLOW_REGIME, : len(slow_regime_addresses)],
@@ -126,7 +201,13 @@ def _build_function_table(
 
 @cache
 def get_compiled_loop() -> Any:
-    """The compiled loop of motions."""
+    """Compile the event loop, or load it from the cache.
+
+    Returns
+    -------
+    Dispatcher
+        Compiled ``motion_loop.advance_motion``.
+    """
     memory = types.Array(numba.from_dtype(array_layout.MOTION_STATE_DTYPE), 1, "C")
     tables = _ARRAY_TYPE, _TABLE_TYPE, _ARRAY_TYPE, _TABLE_TYPE, _TABLE_TYPE, types.int64
     signature = types.int64(
@@ -136,12 +217,24 @@ def get_compiled_loop() -> Any:
 
 
 def compile_scalar_function(function: Function, *arguments: float | Numbers) -> Any:
-    """A function of floats and of tuples of floats, compiled for arguments of this form.
+    """Compile a function of floats and of tuples of floats.
+
+    Parameters
+    ----------
+    function : callable
+        Function to compile.
+    *arguments : float or tuple of float
+        Examples of the arguments, which define the argument types.
+
+    Returns
+    -------
+    Dispatcher
+        Compiled function.
 
     Raises
     ------
     InvalidValue
-        Where a function of a part cannot be compiled, or raises.
+        If the function cannot be compiled or contains a raise statement.
     """
     return _compile_scalar_function_cached(
         function, *[len(x) if isinstance(x, tuple) else 0 for x in arguments]
@@ -150,6 +243,7 @@ def compile_scalar_function(function: Function, *arguments: float | Numbers) -> 
 
 @cache
 def _compile_scalar_function_cached(function: Function, *argument_lengths: int) -> Any:
+    """Compile a function for argument lengths, where 0 represents a float."""
     check_function_never_raises(function)
     floats = (types.UniTuple(types.float64, n) if n else types.float64 for n in argument_lengths)
     try:
@@ -160,19 +254,41 @@ def _compile_scalar_function_cached(function: Function, *argument_lengths: int) 
 
 @cache
 def compile_array_function(function: Function, *argument_dimensions: int) -> Any:
-    """A function of arrays of so many dimensions, compiled."""
+    """Compile a function of arrays.
+
+    Parameters
+    ----------
+    function : callable
+        Function to compile.
+    *argument_dimensions : int
+        Number of dimensions of each array.
+
+    Returns
+    -------
+    Dispatcher
+        Compiled function.
+    """
     kinds = (types.Array(types.float64, count, "C") for count in argument_dimensions)
     return compile_function(function, tuple(kinds))
 
 
 def compiled_function_addresses(equations: Equations) -> tuple[int, ...]:
-    """Addresses of the compiled functions of a system of equations, in the order of
-    `InPlaceFunctions`.
+    """Return the addresses of the compiled functions of equations.
+
+    Parameters
+    ----------
+    equations : Equations
+        System of equations.
+
+    Returns
+    -------
+    tuple of int
+        Addresses in the order of ``in_place_functions.InPlaceFunctions``.
 
     Raises
     ------
     InvalidValue
-        Where a function of a part cannot be compiled, or raises.
+        If a function of a part cannot be compiled or contains a raise statement.
     """
     return _compile_or_reuse_addresses(
         tuple(filter(None, build_in_place_functions(equations))), equations
@@ -185,6 +301,7 @@ _COMPILED_ADDRESS_CACHE: dict[tuple[Any, ...], tuple[int, ...]] = {}
 def _compile_or_reuse_addresses(
     functions: tuple[Any, ...], equations: Equations
 ) -> tuple[int, ...]:
+    """Compile functions that fill arrays, or reuse the compiled functions."""
     if functions not in _COMPILED_ADDRESS_CACHE:
         for function in (equations.rate_function, equations.point_function):
             check_function_never_raises(function)

@@ -1,7 +1,10 @@
-"""Interface of steppers for the loop of motions: to begin, to attempt a step, and values within it.
+"""Steppers of the event loop, and the base class of user-defined steppers.
 
-A stepper of one's own is a class derived from `Stepper`. The compiler has the functions of
-`order_eight` in place of those below.
+The loop calls the functions of this module, which call the methods of the stepper of the motion. In
+the compiled loop, the functions of ``order_eight`` replace the functions of this module. For each
+regime, the loop first calls ``begin_regime``. In each step, it calls ``attempt_step`` once, or
+``step_to_segment_end`` if a loading segment ends in the step. It may then call
+``interpolate_unknowns`` and ``retake_step`` any number of times.
 """
 
 from __future__ import annotations
@@ -13,35 +16,37 @@ from typing import Any, ClassVar
 from rsfstudy._deprecation import adopt_former_members, renamed_members
 from rsfstudy.slider import Equations
 
-#: What `Stepper.attempt` returns where it takes no step: none is long enough, or the budget is
-#: spent.
+#: Return values of ``Stepper.attempt_step`` if no step was taken: the step size is too small, or
+#: the evaluation budget is exceeded.
 NO_STEP, BUDGET_SPENT = 0.0, -1.0
 
 
 @renamed_members
 class Stepper(ABC):
-    """Integrates the equations of a motion, one step at a time.
+    """Base class of steppers, which integrate the equations of a motion.
 
-    A motion has a stepper of its own. What it knows of the motion stands in its state
-    (`layout.MOTION`) and its workspace (`workspace.Workspace`), which are arguments of all methods.
+    Each motion has its own stepper instance. The arguments ``motion`` and ``workspace`` of the
+    methods contain the state of the motion. See ``array_layout.MOTION_STATE_DTYPE`` and
+    ``workspace.Workspace``. A subclass must define ``name`` and the abstract methods.
 
     Parameters
     ----------
     systems : tuple of Equations
-        The equations of the regimes that the motion goes through, by their numbers.
+        Equations of each regime, indexed by ``motion.regime``.
     methods : mapping of str to str
-        Names of integrators by the names of regimes, for a stepper that has several.
+        Names of integration methods for regimes. A stepper with a single method ignores them.
 
     Attributes
     ----------
     failure : str
-        Why no step could be taken.
+        Reason why no step could be taken.
     """
 
-    #: What it is called in files and on the command line.
+    #: Name of the stepper in files and on the command line.
     name: ClassVar[str]
 
     def __init_subclass__(cls) -> None:
+        """Give the methods of the subclass their former names too."""
         super().__init_subclass__()
         adopt_former_members(cls)
 
@@ -50,61 +55,175 @@ class Stepper(ABC):
 
     @abstractmethod
     def begin_regime(self, motion: Any, workspace: Any) -> None:
-        """Begin with the unknowns ``workspace.y`` of the regime ``motion.regime``, at clock zero;
-        fill in their rates, ``workspace.rates``. Where the loading has a kink,
-        ``motion.next_step_length`` is that of the step it has cut short; elsewhere it is 0.
+        """Begin the integration of the regime ``motion.regime``.
+
+        The method reads the initial unknowns ``workspace.y`` and must fill in their derivatives
+        ``workspace.rates``. The independent variable ``motion.clock`` is 0. After a kink of the
+        loading, ``motion.next_step_length`` is the proposed step size. Otherwise it is 0.
+
+        Parameters
+        ----------
+        motion : record
+            State of the motion.
+        workspace : Workspace
+            Arrays of the regime.
         """
 
     @abstractmethod
     def attempt_step(self, motion: Any, workspace: Any, max_length: float) -> float:
-        """Take a step whose local error is allowed, in the direction of ``motion.direction``.
+        """Take one step whose local error is within the tolerance.
 
-        Fills in ``workspace.y_end`` and ``workspace.rates_at_end``, the unknowns at its end and
-        their rates, and ``motion.end`` and ``motion.step_length``, the clock there and the length.
-        Each right-hand side is charged by ``workspace.count_evaluations``.
+        The sign of ``motion.direction`` is the direction of the step. The method must set
+        ``workspace.y_end``, ``workspace.rates_at_end``, ``motion.end`` and ``motion.step_length``.
+        It must also call ``workspace.count_evaluations`` for its right-hand side evaluations.
+
+        Parameters
+        ----------
+        motion : record
+            State of the motion.
+        workspace : Workspace
+            Arrays of the regime.
+        max_length : float
+            Maximum step size.
 
         Returns
         -------
         float
-            Its length, or `NO_STEP`, or `BUDGET_SPENT`.
+            Size of the step, ``NO_STEP`` or ``BUDGET_SPENT``.
         """
 
     def step_to_segment_end(self, motion: Any, workspace: Any, approximate_length: float) -> float:
-        """Take a step that ends when the segment of loading does, as `attempt` does; of about that
-        length. A stepper that cannot returns 0.
+        """Take one step to the end of the loading segment.
+
+        The default implementation takes no step and returns 0. The loop then calls ``attempt_step``
+        and truncates the step.
+
+        Parameters
+        ----------
+        motion : record
+            State of the motion.
+        workspace : Workspace
+            Arrays of the regime.
+        approximate_length : float
+            Estimate of the step size.
+
+        Returns
+        -------
+        float
+            Size of the step, ``BUDGET_SPENT``, or 0 if no step was taken.
         """
         return 0.0
 
     @abstractmethod
     def interpolate_unknowns(self, motion: Any, workspace: Any, clock: float) -> None:
-        """Fill in ``workspace.y_within``, the unknowns at a clock within the step."""
+        """Fill in the unknowns ``workspace.y_within`` within the step.
+
+        Parameters
+        ----------
+        motion : record
+            State of the motion.
+        workspace : Workspace
+            Arrays of the regime.
+        clock : float
+            Independent variable, between the beginning and the end of the step.
+        """
 
     @abstractmethod
     def retake_step(self, motion: Any, workspace: Any, clock: float) -> None:
-        """Take the step anew, to end at a clock within it."""
+        """Repeat the step with an earlier end.
+
+        The method must set the same fields as ``attempt_step``.
+
+        Parameters
+        ----------
+        motion : record
+            State of the motion.
+        workspace : Workspace
+            Arrays of the regime.
+        clock : float
+            Independent variable at the new end of the step.
+        """
 
 
 def begin_regime(motion, workspace):
-    """Start the clock of the equations."""
+    """Reset the independent variable, and let the stepper begin a regime.
+
+    Parameters
+    ----------
+    motion : record
+        State of the motion.
+    workspace : Workspace
+        Arrays of the regime.
+    """
     motion.clock = 0.0
     workspace.stepper.begin_regime(motion, workspace)
 
 
 def attempt_step(motion, workspace, max_length):
-    """Length of the step that could be taken; not positive where there is none."""
+    """Let the stepper take one step.
+
+    Parameters
+    ----------
+    motion : record
+        State of the motion.
+    workspace : Workspace
+        Arrays of the regime.
+    max_length : float
+        Maximum step size.
+
+    Returns
+    -------
+    float
+        Size of the step, ``NO_STEP`` or ``BUDGET_SPENT``.
+    """
     return workspace.stepper.attempt_step(motion, workspace, max_length)
 
 
 def step_to_segment_end(motion, workspace, approximate_length):
-    """Length of a step that ends when the segment does; 0 where none could be taken."""
+    """Let the stepper take one step to the end of the loading segment.
+
+    Parameters
+    ----------
+    motion : record
+        State of the motion.
+    workspace : Workspace
+        Arrays of the regime.
+    approximate_length : float
+        Estimate of the step size.
+
+    Returns
+    -------
+    float
+        Size of the step, ``BUDGET_SPENT``, or 0 if no step was taken.
+    """
     return workspace.stepper.step_to_segment_end(motion, workspace, approximate_length)
 
 
 def interpolate_unknowns(motion, workspace, clock):
-    """Fill in the unknowns at a clock within the step."""
+    """Let the stepper interpolate the unknowns within the step.
+
+    Parameters
+    ----------
+    motion : record
+        State of the motion.
+    workspace : Workspace
+        Arrays of the regime.
+    clock : float
+        Independent variable, between the beginning and the end of the step.
+    """
     workspace.stepper.interpolate_unknowns(motion, workspace, clock)
 
 
 def retake_step(motion, workspace, clock):
-    """Take the step anew, to a clock within it."""
+    """Let the stepper repeat the step with an earlier end.
+
+    Parameters
+    ----------
+    motion : record
+        State of the motion.
+    workspace : Workspace
+        Arrays of the regime.
+    clock : float
+        Independent variable at the new end of the step.
+    """
     workspace.stepper.retake_step(motion, workspace, clock)

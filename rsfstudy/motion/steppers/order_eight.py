@@ -1,6 +1,8 @@
-"""Steps of order eight, DOP853 of SciPy written out: as plain Python, and as the compiler has them.
+"""Explicit Runge-Kutta stepper of order eight, for plain Python and Numba.
 
-The tableau, the error and the controller of step lengths are those of `scipy.integrate.DOP853`.
+The tableau, the error estimate and the step size control are equal to those of
+``scipy.integrate.DOP853``. The Python engine calls the functions as methods of
+``OrderEightStepper``, and the compiled loop calls them directly.
 """
 
 from __future__ import annotations
@@ -23,19 +25,23 @@ from rsfstudy.motion.steppers.unrolled_step import (
 )
 from rsfstudy.motion.workspace import count_evaluations, fill_rates_by_step_clock
 
-#: Weights of the stages of dense output, and of all stages in its rows.
+#: Weights of the additional stages of dense output, and of all stages in its coefficients.
 _EXTRA_WEIGHTS, _DENSE_WEIGHTS = (tuple(x.ravel().tolist()) for x in (DOP853.A_EXTRA, DOP853.D))
-#: Weights of the stages before each stage, of which the last is the end of the step, and in its
-#: errors of fifth and third order.
+#: Weights of the stages. The last row belongs to the end of the step.
 _RUNGE_KUTTA_STAGE_WEIGHTS = tuple(
     map(tuple, [*DOP853.A[:STAGE_COUNT, :STAGE_COUNT].tolist(), DOP853.B.tolist()])
 )
+#: Weights of the stages in the error estimates of order five and three.
 _FIFTH_ORDER_WEIGHTS, _THIRD_ORDER_WEIGHTS = tuple(DOP853.E5.tolist()), tuple(DOP853.E3.tolist())
+#: Constants of the step size control.
 _SAFETY_FACTOR, _MIN_FACTOR, _MAX_FACTOR, _ERROR_EXPONENT = 0.9, 0.2, 10.0, -1.0 / 8.0
 
 
 def begin_regime(motion, workspace):
-    """Start the clock of the equations."""
+    """Evaluate the initial derivatives, and select the first step size.
+
+    See ``Stepper.begin_regime``.
+    """
     motion.clock = 0.0
     evaluate_in_place(
         workspace.fill_rates, workspace.y, workspace.y, workspace.parameters, workspace.rates
@@ -50,7 +56,10 @@ def begin_regime(motion, workspace):
 
 
 def attempt_step(motion, workspace, max_length):
-    """Length of the step that could be taken; not positive where there is none."""
+    """Take one step whose local error is within the tolerance.
+
+    See ``Stepper.attempt_step``.
+    """
     towards = math.nextafter(motion.clock, motion.direction * math.inf)
     shortest = 10.0 * abs(towards - motion.clock)
     length = max(min(motion.next_step_length, max_length), shortest)
@@ -73,7 +82,7 @@ def attempt_step(motion, workspace, max_length):
 
 
 def take_step_ignoring_error(motion, workspace):
-    """Take a step of the length that is stated, whatever its error."""
+    """Take one step of size ``motion.step_length`` without an error test."""
     workspace.order_eight_step_block[LENGTH_INDEX] = motion.step_length
     evaluate_in_place(
         workspace.attempt_step,
@@ -86,9 +95,12 @@ def take_step_ignoring_error(motion, workspace):
 
 
 def step_to_segment_end(motion, workspace, approximate_length):
-    """Take a step against time, which is the last unknown, up to when the segment ends; its clock
-    runs as time does at its beginning, when it has that length. Returns 0 where its error is too
-    large.
+    """Take one step to the end of the loading segment.
+
+    Time is an unknown, so the end of the segment is a known value of the last unknown. The function
+    therefore integrates this step with an independent variable that is proportional to time. Both
+    independent variables advance at the same speed at the beginning of the step. The function
+    returns 0 if the error of the step exceeds the tolerance. See ``Stepper.step_to_segment_end``.
     """
     motion.time_per_step, motion.step_length = (
         workspace.rates[workspace.unknown_count - 1],
@@ -109,7 +121,7 @@ def step_to_segment_end(motion, workspace, approximate_length):
 
 
 def take_step_with_time_as_clock(motion, workspace):
-    """Take a step by the clock of a pace; returns its local error over what is allowed."""
+    """Take one step in time, and return the error divided by the tolerance."""
     count, y, new, stages, length = (
         workspace.unknown_count,
         workspace.y,
@@ -138,14 +150,20 @@ def take_step_with_time_as_clock(motion, workspace):
 
 
 def retake_step(motion, workspace, clock):
-    """Take the step anew, to a clock within it."""
+    """Repeat the step with an earlier end.
+
+    See ``Stepper.retake_step``.
+    """
     motion.end, motion.step_length, motion.is_dense = clock, clock - motion.clock, 0
     motion.time_per_step = 0.0
     take_step_ignoring_error(motion, workspace)
 
 
 def interpolate_unknowns(motion, workspace, clock):
-    """Fill in the unknowns at a clock within the step."""
+    """Interpolate the unknowns within the step with dense output.
+
+    See ``Stepper.interpolate_unknowns``.
+    """
     if not motion.is_dense:
         prepare_dense_output(motion, workspace, motion.step_length)
         count_evaluations(motion, EXTRA_STAGE_COUNT)
@@ -154,7 +172,22 @@ def interpolate_unknowns(motion, workspace, clock):
 
 
 def increase_step_length(length, error_over_tolerance, was_rejected_before):
-    """Length of the step after one that was accepted with this error."""
+    """Compute the size of the step after an accepted step.
+
+    Parameters
+    ----------
+    length : float
+        Size of the accepted step.
+    error_over_tolerance : float
+        Local error of the accepted step, divided by the tolerance.
+    was_rejected_before : bool
+        True if a longer attempt was rejected. The step size then does not increase.
+
+    Returns
+    -------
+    float
+        Size of the next step.
+    """
     factor = (
         _MAX_FACTOR
         if error_over_tolerance == 0.0
@@ -164,13 +197,48 @@ def increase_step_length(length, error_over_tolerance, was_rejected_before):
 
 
 def reduce_step_length(length, error_over_tolerance):
-    """Length of the next attempt after one that was rejected; its error may be no number."""
+    """Compute the size of the next attempt after a rejected step.
+
+    Parameters
+    ----------
+    length : float
+        Size of the rejected step.
+    error_over_tolerance : float
+        Local error of the rejected step, divided by the tolerance. It may be NaN.
+
+    Returns
+    -------
+    float
+        Size of the next attempt.
+    """
     factor = _SAFETY_FACTOR * error_over_tolerance**_ERROR_EXPONENT
     return length * (factor if factor > _MIN_FACTOR else _MIN_FACTOR)
 
 
 def select_initial_step_length(workspace, clock_direction, tolerance):
-    """Length of the first step, by two evaluations of the rates."""
+    """Select the size of the first step of a regime.
+
+    The algorithm evaluates the right-hand side once.
+
+    Parameters
+    ----------
+    workspace : Workspace
+        Arrays of the regime, with the initial unknowns and their derivatives.
+    clock_direction : float
+        Direction of the step, 1 or -1.
+    tolerance : float
+        Local error tolerance.
+
+    Returns
+    -------
+    float
+        Step size.
+
+    References
+    ----------
+    Hairer, E., Norsett, S. P. and Wanner, G. (1993), Solving Ordinary Differential Equations I,
+    section II.4.
+    """
     y, first, count = workspace.y, workspace.rates, workspace.unknown_count
     d0 = d1 = 0.0
     for i in range(count):
@@ -198,7 +266,19 @@ def select_initial_step_length(workspace, clock_direction, tolerance):
 
 
 def prepare_dense_output(motion, workspace, step_length):
-    """Fill in the rows of dense output, by three more evaluations of the rates."""
+    """Compute the coefficients of the dense output of the step.
+
+    The function evaluates the right-hand side three times.
+
+    Parameters
+    ----------
+    motion : record
+        State of the motion.
+    workspace : Workspace
+        Arrays of the regime, with the stages of the step.
+    step_length : float
+        Size of the step.
+    """
     count, y, stages, rows = (
         workspace.unknown_count,
         workspace.y,
@@ -227,7 +307,15 @@ def prepare_dense_output(motion, workspace, step_length):
 
 
 def evaluate_dense_output(workspace, step_fraction):
-    """Unknowns at a part of a step from its beginning."""
+    """Evaluate the dense output within the step.
+
+    Parameters
+    ----------
+    workspace : Workspace
+        Arrays of the regime, with the coefficients of the dense output.
+    step_fraction : float
+        Distance from the beginning of the step, divided by the step size.
+    """
     for i in range(workspace.unknown_count):
         value = 0.0
         for r in range(DENSE_ROW_COUNT):
@@ -239,7 +327,17 @@ def evaluate_dense_output(workspace, step_fraction):
 
 
 class OrderEightStepper(Stepper):
-    """DOP853 in plain Python: every step can be followed with a debugger."""
+    """Explicit Runge-Kutta stepper of order eight in plain Python.
+
+    A debugger can follow every stage of a step.
+
+    Parameters
+    ----------
+    systems : tuple of Equations
+        Equations of each regime, indexed by ``motion.regime``.
+    methods : mapping of str to str
+        Ignored, because the stepper has a single method.
+    """
 
     name = "python"
     begin_regime = staticmethod(begin_regime)

@@ -1,4 +1,4 @@
-"""SciPy's integrators, one by regime: what takes the steps where nothing else is asked for."""
+"""Default stepper, which calls the ODE solvers of SciPy."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ from rsfstudy.motion.work_meter import MotionStopped
 from rsfstudy.slider import Equations, Numbers
 from rsfstudy.status import Status
 
-#: SciPy's integrators, by name.
+#: ODE solvers of SciPy.
 SCIPY_SOLVER_BY_METHOD_NAME: Mapping[str, type[OdeSolver]] = {
     method.__name__: method for method in (DOP853, RK45, RK23, Radau, BDF, LSODA)
 }
@@ -33,12 +33,14 @@ DEFAULT_METHOD = "DOP853"
 
 
 class _BudgetExceeded(Exception):
-    """The budget is, within a step."""
+    """Raised within a step if the evaluation budget is exceeded."""
 
 
 def _build_float_interpolant(dense_output: Any) -> Callable[[float], Iterable[float]]:
-    """The unknowns at a clock by dense output; that of order eight as it says, operation by
-    operation, but on floats: arrays of so few numbers take four times as long.
+    """Build a function that interpolates the unknowns within a step.
+
+    For DOP853, the function repeats the operations of SciPy with floats. SciPy's array operations
+    take four times longer for a few unknowns.
     """
     if type(dense_output).__name__ != "Dop853DenseOutput":
         values: Callable[[float], Iterable[float]] = dense_output
@@ -58,7 +60,15 @@ def _build_float_interpolant(dense_output: Any) -> Callable[[float], Iterable[fl
 
 
 class SciPyStepper(Stepper):
-    """Steps by the integrators of SciPy."""
+    """Stepper that uses the ODE solvers of SciPy.
+
+    Parameters
+    ----------
+    systems : tuple of Equations
+        Equations of each regime, indexed by ``motion.regime``.
+    methods : mapping of str to str
+        Names of SciPy solvers for regimes. The default is ``"DOP853"``.
+    """
 
     name = "scipy"
 
@@ -71,16 +81,24 @@ class SciPyStepper(Stepper):
         self._max_evaluations = math.inf
 
     def begin_regime(self, motion: Any, workspace: Any) -> None:
+        """Create a solver for the regime.
+
+        See the base class.
+        """
         ends = 0.0, motion.direction * np.inf
-        # the longest first step is asked of a trial step, which may leave the domain
+        # The solver estimates the first step with a trial step, which may leave the domain.
         begin, known = np.array(workspace.y[: workspace.unknown_count]), motion.next_step_length
         first = {"first_step": known} if known else {}
         self._solver = self._create_solver(motion, workspace, ends, begin, **first)
         workspace.rates[: workspace.unknown_count] = self._current_solver_rates()
 
     def attempt_step(self, motion: Any, workspace: Any, max_length: float) -> float:
+        """Take one step with the solver.
+
+        See the base class.
+        """
         motion.time_per_step = 0.0
-        if self._solver.status == "finished":  # a step that was taken anew
+        if self._solver.status == "finished":  # The previous step was repeated.
             ends = motion.clock, motion.direction * np.inf
             begin, length = (
                 np.array(workspace.y[: workspace.unknown_count]),
@@ -91,7 +109,7 @@ class SciPyStepper(Stepper):
         solver.max_step = max_length
         if motion.next_step_length and isinstance(
             solver, DOP853
-        ):  # it may have been too long for a kink
+        ):  # The loop may have shortened the previous step before a kink.
             solver.h_abs = motion.next_step_length
         if not self._take_solver_step(motion, solver):
             return BUDGET_SPENT
@@ -106,6 +124,10 @@ class SciPyStepper(Stepper):
         return abs(float(motion.step_length))
 
     def step_to_segment_end(self, motion: Any, workspace: Any, approximate_length: float) -> float:
+        """Take one step with the stepper of order eight.
+
+        Solvers other than DOP853 return 0. See the base class.
+        """
         if not isinstance(self._solver, DOP853):
             return 0.0
         self._interpolant = None
@@ -113,6 +135,10 @@ class SciPyStepper(Stepper):
         return taken
 
     def interpolate_unknowns(self, motion: Any, workspace: Any, clock: float) -> None:
+        """Interpolate the unknowns with the dense output of the solver.
+
+        See the base class.
+        """
         if motion.time_per_step > 0.0:
             order_eight.interpolate_unknowns(motion, workspace, clock)  # type: ignore[no-untyped-call]
             return
@@ -122,8 +148,12 @@ class SciPyStepper(Stepper):
             workspace.y_within[i] = unknown
 
     def retake_step(self, motion: Any, workspace: Any, clock: float) -> None:
+        """Repeat the step with a new solver.
+
+        The solver may need several steps to reach the new end. See the base class.
+        """
         begin, motion.time_per_step = np.array(workspace.y[: workspace.unknown_count]), 0.0
-        # the clock may round to where the step begins; an integrator wants a way to go
+        # A SciPy solver rejects an interval of zero length, which can result from rounding.
         end = clock if clock != motion.clock else np.nextafter(clock, motion.direction * np.inf)
         length, ends = abs(end - motion.clock), (motion.clock, end)
         self._solver = solver = self._create_solver(
@@ -151,12 +181,12 @@ class SciPyStepper(Stepper):
         initial_unknowns: np.ndarray,
         **first: float,
     ) -> OdeSolver:
-        """An integrator of the regime from one clock to another, whose work is charged."""
+        """Create a solver whose right-hand side evaluations are counted."""
         system = self.systems[motion.regime]
         rate_of, p, is_slow = system.rate_function, system.parameters, motion.regime == SLOW_REGIME
 
         def rate(_clock: float, unknowns: np.ndarray) -> Numbers:
-            if is_slow:  # as `count_evaluations` does, in half the time
+            if is_slow:  # A call of `count_evaluations` would take twice as long.
                 motion.evaluations_slow += 1
             else:
                 motion.evaluations_fast += 1
@@ -181,10 +211,10 @@ class SciPyStepper(Stepper):
         return solver
 
     def _take_solver_step(self, motion: Any, solver: OdeSolver) -> bool:
-        """Take one step; whether the budget is enough for it.
+        """Take one solver step, and return False if it exceeds the budget.
 
-        Trial steps may leave the domain, and the solver then rejects them; what it accepts is
-        checked.
+        Trial steps may leave the domain, so floating-point warnings are suppressed. The solver
+        rejects these steps, and the event loop checks the accepted steps.
         """
         known, self._max_evaluations, self.failure = (
             solver.njev,
@@ -202,13 +232,16 @@ class SciPyStepper(Stepper):
         return True
 
     def _current_solver_rates(self) -> np.ndarray:
-        """Rates where the solver stands; most have just computed them."""
+        """Return the derivatives at the current point of the solver.
+
+        Most solvers have already computed them.
+        """
         known = getattr(self._solver, "f", None)
         if known is None:
             known = self._solver.fun(self._solver.t, self._solver.y)
         return np.asarray(known, dtype=float)
 
     def _store_step_end(self, workspace: Any) -> None:
-        """Fill in the end of a step."""
+        """Copy the end of the step to the workspace."""
         workspace.y_end[: workspace.unknown_count] = self._solver.y
         workspace.rates_at_end[: workspace.unknown_count] = self._current_solver_rates()

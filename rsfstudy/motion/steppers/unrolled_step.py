@@ -1,11 +1,13 @@
-"""Source of steps of order eight, written out for so many unknowns.
+"""Source code of a Runge-Kutta step, unrolled for a number of unknowns.
 
-The tableau is that of SciPy's DOP853 (Hairer, Norsett and Wanner 1993). Loops over stages and
-unknowns would cost as much as simple equations do; and what is the same in all stages a compiler
-finds only where the equations stand in the step itself.
+The tableau is the tableau of SciPy's DOP853 (Hairer, Norsett and Wanner 1993). Loops over stages
+and unknowns would take as much time as the equations of a simple scene. In unrolled code with the
+equations inlined, the compiler can also share expressions between the stages.
+``build_step_attempt_function`` is the main function.
 
-What is known of a step beside its stages is one block of numbers: its sizes, the unknowns at its
-end, their scales, and the rows of its dense output.
+The results of a step are stored in the stages and in one block. The block contains a header, the
+unknowns at the end of the step, the scales of the unknowns, and the coefficients of the dense
+output.
 """
 
 from __future__ import annotations
@@ -20,19 +22,20 @@ from zlib import crc32
 import numpy as np
 from scipy.integrate import DOP853
 
-#: Stages of a step, of its dense output beyond the step's end, and rows of that.
+#: Number of stages of a step, of additional stages for dense output, and of rows of dense output
+#: coefficients.
 STAGE_COUNT, EXTRA_STAGE_COUNT, DENSE_ROW_COUNT = 12, 3, 7
 TOTAL_STAGE_COUNT = STAGE_COUNT + 1 + EXTRA_STAGE_COUNT
-#: Weights of the stages before each stage, of which the last is the end of the step, and of all of
-#: them in its errors of fifth and third order.
+#: Weights of the derivatives in each weighted sum: the stages, of which the last is the end of the
+#: step, and the error estimates of order five and three.
 _RATE_WEIGHTS_BY_SUM_NAME: Mapping[str, np.ndarray] = {
     **{f"stage_{s}": DOP853.A[s, :s] for s in range(1, STAGE_COUNT)},
     f"stage_{STAGE_COUNT}": DOP853.B,
     "error_of_fifth": DOP853.E5,
     "error_of_third": DOP853.E3,
 }
-#: Places of the sizes of a step, in front of its block, and how many they are: its length, the
-#: tolerance, and its local error over what is allowed.
+#: Indices of the header of the block: step size, tolerance, and error divided by the tolerance. The
+#: last constant is the length of the header.
 LENGTH_INDEX, TOLERANCE_INDEX, ERROR_INDEX, HEADER_SIZE = 0, 1, 2, 3
 
 Function = Callable[..., Any]
@@ -41,11 +44,24 @@ Function = Callable[..., Any]
 def build_step_attempt_function(
     rate_function: Function, unknown_count: int, unpack_parameters: Function
 ) -> Function:
-    """One step by rates of so many unknowns: ``attempt(y, stages, p, step)``.
+    """Build a function that attempts one step.
 
-    From `y`, whose rates are the first stage, it fills in the other stages, the unknowns at its
-    end, and its local error over what is allowed. `unpack_parameters` makes the tuple of numbers
-    that `rate` reads of `p`.
+    Parameters
+    ----------
+    rate_function : callable
+        Right-hand side ``rate_function(unknowns, parameters)`` of the equations.
+    unknown_count : int
+        Number of unknowns.
+    unpack_parameters : callable
+        Function that converts an array of parameters to a tuple.
+
+    Returns
+    -------
+    callable
+        Function ``attempt(y, stages, p, step)``. Its arguments are the initial unknowns, the
+        derivatives in all stages, the parameters and the block. The first stage must contain the
+        derivatives at ``y``. The function fills in the other stages, the final unknowns and the
+        error.
     """
     made: Function = _build_step_attempt_factory(unknown_count)(rate_function, unpack_parameters)
     return made
@@ -53,7 +69,7 @@ def build_step_attempt_function(
 
 @cache
 def _build_step_attempt_factory(unknown_count: int) -> Function:
-    """Source of such steps of ``rate_of`` and ``numbers``."""
+    """Compile a function that builds step functions for equations."""
     n, scales = range(unknown_count), HEADER_SIZE + unknown_count
     lines = [
         f"step[{ERROR_INDEX}] = math.nan",
@@ -90,7 +106,10 @@ def _build_step_attempt_factory(unknown_count: int) -> Function:
 
 @cache
 def _compile_weighted_sum_functions() -> dict[str, Any]:
-    """Weighted sums of the rates in all stages, as functions: compiled once for all equations."""
+    """Compile the weighted sums of the derivatives as functions.
+
+    All systems of equations share the compiled functions.
+    """
     return {
         name: _compile_function_source(
             name, _sum_argument_source(name), [f"return {_weighted_sum_source(name)}"], {}
@@ -100,17 +119,18 @@ def _compile_weighted_sum_functions() -> dict[str, Any]:
 
 
 def _sum_call_source(sum_name: str, unknown_index: int) -> str:
-    """A weighted sum of the rates of an unknown."""
+    """Return the source of a weighted sum for one unknown."""
     rates = _sum_argument_source(sum_name).split(", ")
     return f"{sum_name}({', '.join(f'{rate}_{unknown_index}' for rate in rates)})"
 
 
 def _sum_argument_source(sum_name: str) -> str:
-    """Terms of a sum."""
+    """Return the source of the arguments of a weighted sum."""
     return ", ".join(f"k{s}" for s in np.flatnonzero(_RATE_WEIGHTS_BY_SUM_NAME[sum_name]))
 
 
 def _weighted_sum_source(sum_name: str) -> str:
+    """Return the source of the body of a weighted sum."""
     return " + ".join(
         f"{float(x)!r} * k{s}" for s, x in enumerate(_RATE_WEIGHTS_BY_SUM_NAME[sum_name]) if x
     )
@@ -122,7 +142,7 @@ def _compile_function_source(
     body_lines: Sequence[str],
     global_values: Mapping[str, Any],
 ) -> Function:
-    """The function that some lines define, which a debugger shows."""
+    """Compile a function from its source, which a debugger can display."""
     made: dict[str, Any] = {**global_values, "__name__": __name__, "math": math}
     text = "\n    ".join([f"def {function_name}({argument_source}):", *body_lines])
     file = f"<{__name__}.{function_name} {crc32(text.encode()):08x}>"
