@@ -54,8 +54,9 @@ def compare_same_lattice(first: xr.Dataset, second: xr.Dataset) -> pd.DataFrame:
         Table with one row per variable. The column ``values`` is the number of compared values,
         ``identical`` is the number of identical values, and ``largest_difference`` is the largest
         absolute difference. The column ``beyond_errors`` is the number of values that differ by
-        more than the sum of both error estimates, or NaN if the variable has no error estimates.
-        The attribute ``differs`` in ``attrs`` contains the differences between the fingerprints.
+        more than the sum of both error estimates. For codes, ``beyond_errors`` is the number of
+        unequal values. For other variables without error estimates, ``beyond_errors`` is NaN. The
+        attribute ``differs`` in ``attrs`` contains the differences between the fingerprints.
     """
     if is_of_single_scene(first):
         return _compare_motions(first, second)
@@ -67,7 +68,7 @@ def compare_same_lattice(first: xr.Dataset, second: xr.Dataset) -> pd.DataFrame:
         if set(both.dims) <= set(values.dims):
             known = both.broadcast_like(values).transpose(*values.dims).values
             rows.append(_variable_agreement(name, first, second, known))
-        elif bool(both.all()):  # else it may be reduced from cells missing in one of them
+        elif bool(both.all()):  # Reductions may use cells that one dataset lacks.
             rows.append(_variable_agreement(name, first, second))
     return _agreement_table(
         rows, *(read_provenance(dataset)["fingerprint"] for dataset in (first, second))
@@ -123,7 +124,7 @@ def _variable_agreement(
         allowed = errors[0].values[common_cell_mask] + errors[1].values[common_cell_mask]
         # NaN compares as False, so a missing number or a missing error exceeds the estimates.
         found["beyond_errors"] = int((~same & ~(gap <= allowed)).sum())
-    elif "flag_values" in a.attrs:  # Codes have no error estimates, so any difference is significant.
+    elif "flag_values" in a.attrs:  # Codes have no error estimates.
         found["beyond_errors"] = int((~same).sum())
     return found
 

@@ -103,11 +103,12 @@ def _compute_digests(dataset: xr.Dataset) -> dict[str, str]:
 
 
 def _hash_bytes(content: bytes) -> str:
+    """Compute the BLAKE2b digest of bytes."""
     return hashlib.blake2b(content, digest_size=8).hexdigest()
 
 
 def _array_to_portable_bytes(values: np.ndarray) -> bytes:
-    """Convert an array to bytes that do not depend on the storage format of the file."""
+    """Convert an array to bytes that do not depend on the storage format."""
     if values.dtype.kind in "OUTS":
         return json.dumps([str(text) for text in values.flat]).encode()
     numbers = np.asarray(values, dtype="<f8")
@@ -115,7 +116,7 @@ def _array_to_portable_bytes(values: np.ndarray) -> bytes:
 
 
 def _parse_digest(text: object) -> Mapping[str, str]:
-    """Parse a digest. Return an empty mapping if the string is not a valid digest."""
+    """Parse a digest. Return an empty mapping if the string is invalid."""
     try:
         listed = json.loads(str(text))
     except (ValueError, RecursionError):
