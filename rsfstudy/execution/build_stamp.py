@@ -1,6 +1,7 @@
 """Build command that adds the commit to wheels of the package.
 
-Setuptools loads this module by its path, without importing the package. No other module imports it.
+Setuptools loads this module by its path, without importing the package. No other module imports
+this module.
 """
 
 from __future__ import annotations

@@ -101,7 +101,8 @@ def compute_serially(task: CellTask, batches: CellBatchIterator) -> Generator[St
     """Compute cells one after the other in this process.
 
     Finished cells are yielded in groups, because writing each cell separately may take longer than
-    computing it. The size of the groups doubles, unless a group takes longer than 0.5 s.
+    the computation of the cell. Each group is as large as all previous groups together, unless a
+    group takes longer than 0.5 s.
 
     Parameters
     ----------

@@ -63,7 +63,7 @@ def _digest_cell_fields(
     measure_field_names: tuple[str, ...],
     field_values: tuple[Any, ...],
 ) -> Any:
-    """Compute the digest of the field names and of the values except floats."""
+    """Compute the digest of the field names and of the non-float values."""
     names = [
         *(("scene", n) for n in scene_field_names),
         *(("measure", n) for n in measure_field_names),
@@ -222,8 +222,8 @@ class CellBatchIterator(Iterator[np.ndarray]):
 def order_cells_by_golden_section(cell_numbers: np.ndarray) -> np.ndarray:
     """Reorder cells with strides of the golden section.
 
-    The first few cells are then a representative sample of all cells. Their computation times and
-    failures are typical of the other cells.
+    The first few cells are then a representative sample of all cells. The computation times and
+    failures of the sample are typical of the remaining cells.
 
     Parameters
     ----------

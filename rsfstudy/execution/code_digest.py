@@ -10,8 +10,8 @@ All digests are computed from compiled code, so that comments, docstrings and li
 affect a digest. For a user-defined class, the search follows every name that a function uses. Any
 change of a function, a constant or a helper therefore changes the digest. The same code has the
 same digest in a study file, a script, a notebook and a worker. The search does not follow the
-imports inside functions. It ends at Python, at installed packages and at rsfstudy, because their
-versions are recorded.
+imports inside functions. The search ends at Python, at installed packages and at rsfstudy, because
+these packages have version numbers.
 """
 
 from __future__ import annotations
@@ -176,7 +176,7 @@ class _DigestTextCollector:
             yield from self._texts_of_instance_state(value, used_names)
 
     def _module_texts(self, module: ModuleType, used_names: Iterable[str]) -> Iterator[str]:
-        """Yield the strings for the members of a module that are used."""
+        """Yield the strings for the used members of a module."""
         if not _is_digested_by_used_names(module.__name__):
             yield module.__name__
             return
@@ -268,7 +268,7 @@ def _has_docstring_slot(code: CodeType) -> bool:
 def _is_generated_class_member(member_name: str, value: Any) -> bool:
     """Return True for members that Python, dataclasses or msgspec generate.
 
-    These members do not affect the results.
+    Generated members do not affect the results.
     """
     if member_name == "_abc_impl" or member_name.startswith("__annot"):
         return True

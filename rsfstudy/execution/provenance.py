@@ -195,7 +195,7 @@ _PACKAGES_WITH_RECORDED_VERSION = (
 
 
 def read_git_commit_and_state(checkout_directory: Path) -> str:
-    """Return the commit of a checkout, and if the checkout is clean.
+    """Return the commit and the state of a checkout.
 
     Only changes of the package, the named studies and ``pyproject.toml`` are considered, because
     other files do not affect the results.

@@ -101,13 +101,14 @@ class StudyRun:
     task : CellTask
         Scene, measure and accuracy of the cells.
     workers : int, default: 1
-        Number of cells that are computed at the same time. It affects the sizes of the batches.
+        Number of cells that are computed at the same time. The number affects the sizes of the
+        batches.
 
     Raises
     ------
     InvalidValue
         If the scene of a cell is invalid, or if a reduction or a claim does not fit the lattice.
-        These errors are raised before any cell is computed.
+        The constructor checks the study before any cell is computed.
     """
 
     def __init__(
@@ -121,8 +122,8 @@ class StudyRun:
     def _check_reductions_and_claims(self) -> None:
         """Check the reductions and claims with a lattice of pending cells.
 
-        Mistakes are then found before any cell is computed. Claims are not checked if the user has
-        overridden values of the study.
+        The check finds mistakes in a study before any cell is computed. Claims are not checked if
+        the user has overridden values of the study.
         """
         pending = CellColumns.build_pending_cells(
             self.study.size, self.task.output_packing.packed_number_count
@@ -189,7 +190,7 @@ class StudyRun:
             If the run cannot continue. The finished cells remain in the journal and, for NetCDF
             output, in the file ``NAME.partial.nc``.
         Interrupted
-            If the user interrupts the run. The finished cells are saved in the same files.
+            If the user interrupts the run. The finished cells are saved as for a ``RunError``.
         """
         keeping = self.options
         if keeping.format == "zarr":
@@ -319,7 +320,7 @@ class StudyRun:
         return kind(why + self._describe_how_to_resume(journal))
 
     def _describe_how_to_resume(self, journal: CellJournal) -> str:
-        """Describe the number of finished cells, and how to resume the run."""
+        """Describe the finished cells, and how to resume the run."""
         known = int((journal.statuses(self.plan.keys) != int(Status.PENDING)).sum())
         text = f"{known} of {self.study.size} cells are finished"
         if self.options.output is None:

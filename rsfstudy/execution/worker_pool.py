@@ -3,7 +3,7 @@
 ``WorkerPool`` starts worker processes on this machine, or uses a Dask cluster. If a worker dies,
 its batch is lost, and other batches that were waiting on that worker may be lost too. All lost
 cells are then computed one at a time while no other cell is running. A cell is therefore recorded
-as lost only if it kills its worker.
+as lost only if the cell itself kills a worker.
 """
 
 from __future__ import annotations
@@ -210,7 +210,7 @@ def make_dask_batch_mapper(
         def run_isolated(cell: np.ndarray) -> StoredCellRows:
             """Compute a suspect cell while no other cell is running.
 
-            If its worker dies again, the cell is recorded as lost.
+            If the worker of the cell dies repeatedly, the cell is recorded as lost.
             """
             (key,) = plan.keys[cell].tolist()
             for _ in range(_MAX_WORKER_DEATHS_PER_CELL):

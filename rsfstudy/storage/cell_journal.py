@@ -4,8 +4,8 @@ The journal is an SQLite file next to the results. Each cell is stored as soon a
 that an interrupted run can be resumed. Only one run can use a journal at a time.
 
 The key of a cell is a digest of the exact values of the scene fields and the measure fields. All
-other settings that affect the results form the fingerprint of the journal. A run cannot use a
-journal with a different fingerprint.
+other settings that affect the results form the fingerprint of the journal. A run rejects a journal
+with a different fingerprint, unless the only difference is a smaller work budget in the journal.
 """
 
 from __future__ import annotations
@@ -194,7 +194,7 @@ class CellJournal:
     ------
     DataError
         If the file cannot be opened, if another run uses the file, or if the stored fingerprint
-        differs from ``fingerprint``. In the last case the message lists the differences.
+        differs from ``fingerprint``. If the fingerprints differ, the message lists the differences.
     """
 
     def __init__(
@@ -395,7 +395,7 @@ def _fill_cell_columns(
 ) -> None:
     """Fill the columns with stored rows.
 
-    Damaged rows raise a KeyError, OverflowError, TypeError or ValueError.
+    If a row is damaged, the function raises a KeyError, OverflowError, TypeError or ValueError.
     """
     if any(_compute_checksum(*known) != checksum for *known, checksum in stored_rows):
         raise ValueError("checksum")

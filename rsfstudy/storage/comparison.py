@@ -54,8 +54,8 @@ def compare_same_lattice(first: xr.Dataset, second: xr.Dataset) -> pd.DataFrame:
         Table with one row per variable. The column ``values`` is the number of compared values,
         ``identical`` is the number of identical values, and ``largest_difference`` is the largest
         absolute difference. The column ``beyond_errors`` is the number of values that differ by
-        more than the sum of both error estimates. For codes, ``beyond_errors`` is the number of
-        unequal values. For other variables without error estimates, ``beyond_errors`` is NaN. The
+        more than the sum of both error estimates, or NaN if the variable has no error estimates.
+        For floating-point variables with flag values, every difference is beyond the errors. The
         attribute ``differs`` in ``attrs`` contains the differences between the fingerprints.
     """
     if is_of_single_scene(first):
@@ -105,8 +105,8 @@ def _variable_agreement(
 ) -> dict[str, Any]:
     """Compare one variable in the cells that are finished in both datasets.
 
-    If the shapes differ, or if only one of the two variables contains floating-point numbers, no
-    values are identical.
+    If the shapes differ, or if only one of the two variables contains floating-point numbers, the
+    number of identical values is 0.
     """
     a, b = first[variable_name], second.get(variable_name)
     found: dict[str, Any] = {"variable": variable_name, "values": a.size, "identical": 0}
@@ -205,8 +205,8 @@ def compare_results(first: xr.Dataset, second: xr.Dataset) -> Comparison:
     ------
     InvalidValue
         If a dataset lacks an axis and has no fixed value of the coordinate, or if points with the
-        same label have different field values. Points with the same number differ, for example, if
-        the two studies use different random samples.
+        same label have different field values. For example, two different random samples have
+        numbered points with different values.
     """
     both = [
         _add_axes_of_other_dataset(one, other) for one, other in ((first, second), (second, first))

@@ -119,8 +119,9 @@ def open_zarr_store(path: Path) -> xr.Dataset:
     """Open a Zarr store lazily.
 
     Zarr stores attributes as JSON, which does not distinguish numeric types. The function therefore
-    converts flag values to the dtype of their variable. It also removes the dtype of strings from
-    the encoding, because older versions of xarray cannot write that dtype to a NetCDF file.
+    converts flag values to the dtype of their variable. The function also removes the dtype of
+    strings from the encoding, because older versions of xarray cannot write that dtype to a NetCDF
+    file.
 
     Parameters
     ----------

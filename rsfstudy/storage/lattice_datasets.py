@@ -126,9 +126,9 @@ def build_lattice_variables(
 def build_lattice_coordinates(study: Study) -> dict[Any, Any]:
     """Build the coordinates of the lattice of a study.
 
-    The coordinates include the dimension coordinates, the fields that vary along each axis, derived
-    coordinates, fixed scene fields as scalars, the inner coordinates of the measure, and the tables
-    of user-defined loadings.
+    The coordinates include the dimension coordinates, the fields that vary along each axis, and the
+    fixed scene fields as scalars. The tables of user-defined loadings and the inner coordinates of
+    the measure are included too.
 
     Parameters
     ----------
@@ -246,8 +246,8 @@ def root_attributes(
 ) -> dict[str, Any]:
     """Build the root attributes of a dataset.
 
-    The attributes follow the CF and ACDD conventions. They also contain the declaration of the
-    study and the provenance of the run as JSON.
+    The attributes follow the CF and ACDD conventions. The attributes also contain the declaration
+    of the study and the provenance of the run as JSON.
 
     Parameters
     ----------

@@ -132,7 +132,8 @@ def has_user_code(results: xr.Dataset) -> bool:
     """Return True if user-defined code affected the results.
 
     User-defined loadings are data rather than code, because the results contain their samples or
-    segments.
+    segments. If the results contain loadings, the function searches the axes and the base scene for
+    other user-defined parts.
 
     Parameters
     ----------
@@ -218,7 +219,7 @@ def study_from_declaration(
 
 
 def _collect_known_user_parts(study: Study | None) -> Mapping[str, UserPart]:
-    """Return the user-defined parts of a study and of the files it loaded."""
+    """Return the user-defined parts of a study and of its files."""
     others = {name: part for slot in SLOTS for name, part in slot.user_parts.items()}
     return {} if study is None else {**others, **study.user_parts}
 
@@ -315,8 +316,8 @@ def _named_subclasses(base_class: Any) -> dict[str, Any]:
 def find_primary_output(dataset: xr.Dataset) -> str | None:
     """Find the name of the main result of a dataset.
 
-    If the measure is user-defined, the function returns the first numeric output that has one value
-    per cell.
+    If rsfstudy has no such measure, or if the main result is not numeric, the function returns the
+    first numeric output with one value per cell.
 
     Parameters
     ----------
@@ -326,7 +327,7 @@ def find_primary_output(dataset: xr.Dataset) -> str | None:
     Returns
     -------
     str or None
-        Name of the main result, or None if no numeric output has one value per cell.
+        Name of the main result, or None if there is no numeric output with one value per cell.
     """
     cells = set(dataset["status"].dims)
     plain = [
