@@ -224,7 +224,7 @@ def read_git_commit_and_state(checkout_directory: Path) -> str:
 
     with contextlib.suppress(OSError, subprocess.SubprocessError):
         if Path(run_git("rev-parse", "--show-toplevel")) == checkout_directory.resolve():
-            # Output files of runs in the checkout do not count as changes.
+            # Other files, such as the output files of runs, do not affect the results.
             changed = run_git(
                 "status", "--porcelain", "--", _PACKAGE_DIRECTORY.name, "studies", "pyproject.toml"
             )
