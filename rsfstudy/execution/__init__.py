@@ -1,9 +1,9 @@
-"""Execution of studies: from a declaration to finished cells.
+"""Execution of studies: planning, computing and recording of cells.
 
-The package plans batches of cells, computes them in this process or on Dask workers, survives lost
-workers, and resumes interrupted runs. Digests of the code and of the declaration decide if the
-cells of a journal are still valid (``provenance``). It never imports the command line and never
-decides how results are shown.
+The package divides the cells of a study into batches and computes the batches in this process or on
+Dask workers. The package handles lost workers and resumes interrupted runs. Digests of the code and
+of the declaration determine if the cells in a journal are still valid (see ``provenance``). The
+package does not import the command-line interface, and does not format output for users.
 """
 
 from __future__ import annotations

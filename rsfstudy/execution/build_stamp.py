@@ -1,5 +1,7 @@
-"""How a wheel is built: as ever, and with the commit that it is built from. Nothing else imports
-this; setuptools loads it by its path, without the package.
+"""Build command that adds the commit to wheels of the package.
+
+Setuptools loads this module by its path, without importing the package. No other module imports
+this module.
 """
 
 from __future__ import annotations
@@ -10,15 +12,18 @@ from pathlib import Path
 from setuptools.command.build_py import build_py
 
 
-class BuildWithCommit(build_py):  # type: ignore[misc]  # of which there are no types
-    """The modules of the package, and beside them ``commit.txt``, where git knows the commit."""
+class BuildWithCommit(build_py):  # type: ignore[misc]  # Setuptools has no type hints.
+    """Build command that writes the commit to ``commit.txt`` in the package.
+
+    The file is not written if git cannot determine the commit.
+    """
 
     def run(self) -> None:
-        """Build, and write the commit."""
+        """Build the modules, and write the commit."""
         super().run()
-        if self.editable_mode:  # the checkout itself is asked
+        if self.editable_mode:  # An editable installation reads the commit from the checkout.
             return
-        # tags could be of other names
+        # All tags are excluded, so that the output is always the hash of the commit.
         words = ["git", "describe", "--always", "--dirty", "--abbrev=40", "--exclude=*"]
         try:
             commit = subprocess.check_output(words, text=True, stderr=subprocess.DEVNULL)

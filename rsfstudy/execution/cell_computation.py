@@ -1,4 +1,9 @@
-"""Computes cells one after the other; a cell that fails becomes an outcome as well."""
+"""Computation of cells, in this process or in a worker process.
+
+``compute_cell`` computes a single cell. If a cell raises an exception, the exception becomes the
+outcome of the cell. ``compute_serially`` computes all cells in this process, and ``compute_batch``
+computes a batch of cells in a worker process.
+"""
 
 from __future__ import annotations
 
@@ -33,15 +38,16 @@ from rsfstudy.study import STUDIES_PACKAGE, Cell, CellChanges
 if TYPE_CHECKING:
     from rsfstudy.execution.cell_plan import CellBatchIterator, CellPlan
 
-#: Wall time that a cell may take, over its limit of CPU time: for cells that sleep or wait.
+#: Ratio of the wall time limit to the CPU time limit of a cell. The wall time limit ends cells that
+#: sleep or wait.
 WALL_OVER_CPU_TIME_LIMIT = 10.0
-#: Seconds after which finished cells are handed over; the disk may take 30 ms to keep them.
+#: Time in s after which finished cells are handed over. Writing the cells to disk may take 30 ms.
 _FINISHED_CELLS_HANDOVER_INTERVAL = 0.5
-#: Identifies this process.
+#: Unique identifier of this process.
 _PROCESS_ID = uuid.uuid4().hex
-#: CPU time that Dask itself may use on a worker, over that of the cells.
+#: CPU time that Dask may use on a worker, relative to the time limit of a cell.
 _DASK_CPU_TIME_OVER_CELL_TIME = 0.25
-#: Characters of a message that are kept.
+#: Maximum length of a stored message, in characters.
 _MAX_MESSAGE_LENGTH = 2000
 
 StoredCellRows = list[StoredCellRow]
@@ -49,23 +55,27 @@ StoredCellRows = list[StoredCellRow]
 
 @dataclass(frozen=True)
 class CellTask:
-    """Scene, measure, accuracy and conditions that every cell is computed with.
+    """Scene, measure, accuracy and conditions that all cells of a run share.
 
     Parameters
     ----------
     base_scene : Scene
-        Each cell says what it changes of its fields.
+        Scene of the study. Each cell changes some of its fields.
     measure : Measure
-        Each cell says what it changes of its fields.
+        Measure of the study. Each cell may change some of its fields.
     accuracy : Accuracy
-    time_limit : float
-        CPU time in s a cell may take on a worker. Nothing bounds it in the user's own process.
-    user_parts, user_stepper_classes : tuple of type
-        Parts of the slider, and a stepper, that are the user's own.
-    code_fingerprint : mapping
-        Versions, and digests of code, that decide a number: every worker must have the same.
-    origin_process_id : str
-        The process that made the task.
+        Accuracy of each cell.
+    time_limit : float, optional
+        CPU time in s that a cell may use on a worker. The time is not limited if cells are computed
+        in the process of the user. The default is ``CELL_TIME_LIMIT``.
+    user_parts : tuple of UserPart, default: ()
+        User-defined parts of the slider.
+    user_stepper_classes : tuple of type, default: ()
+        User-defined stepper, if any.
+    code_fingerprint : mapping of str to str, optional
+        Versions and code digests that affect the results. Every worker must have the same values.
+    origin_process_id : str, optional
+        Identifier of the process that created the task.
     """
 
     base_scene: Scene
@@ -79,18 +89,32 @@ class CellTask:
 
     @functools.cached_property
     def output_packing(self) -> OutputPacking:
-        """Places of the numbers of a cell."""
+        """Layout of the outputs of a cell."""
         return OutputPacking(self.measure)
 
 
-#: Takes a task and batches, and yields the finished cells, in any order.
+#: Function that takes a task and an iterator of batches, and yields finished cells in any order.
 CellBatchMapper = Callable[[CellTask, "CellBatchIterator"], Generator[StoredCellRows]]
 
 
 def compute_serially(task: CellTask, batches: CellBatchIterator) -> Generator[StoredCellRows]:
-    """Compute in this process, one cell after the other. Finished cells are handed over in groups,
-    because recording each on its own may cost more than computing it: each group is as large as all
-    before it, unless it takes too long.
+    """Compute cells one after the other in this process.
+
+    Finished cells are yielded in groups, because writing each cell separately may take longer than
+    the computation of the cell. Each group is as large as all previous groups together, unless a
+    group takes longer than 0.5 s.
+
+    Parameters
+    ----------
+    task : CellTask
+        Scene, measure and accuracy of the cells.
+    batches : CellBatchIterator
+        Batches of cells to compute.
+
+    Yields
+    ------
+    list of StoredCellRow
+        Finished cells.
     """
     finished: StoredCellRows = []
     handed_over, since = 0, time.monotonic()
@@ -109,13 +133,26 @@ def compute_serially(task: CellTask, batches: CellBatchIterator) -> Generator[St
 
 
 def serialize_task(task: CellTask) -> bytes:
-    """A task as bytes, with all the code that workers cannot import, and that of named studies, to
-    import which would load all that declares and reduces them.
+    """Serialise a task for the workers.
+
+    Code that workers cannot import is included in the serialised task. The modules of named studies
+    are included too, because importing them on a worker would load all code that declares and
+    reduces studies.
+
+    Parameters
+    ----------
+    task : CellTask
+        Task to serialise.
+
+    Returns
+    -------
+    bytes
+        Serialised task.
 
     Raises
     ------
     InvalidValue
-        Where the measure, a part of the slider or a stepper cannot be serialized.
+        If the measure, a part of the slider or a stepper cannot be serialised.
     """
     cloudpickle.register_pickle_by_value(importlib.import_module(STUDIES_PACKAGE))
     each: list[tuple[str, str, object]] = [("part", part.name, part) for part in task.user_parts]
@@ -132,12 +169,12 @@ def serialize_task(task: CellTask) -> bytes:
 
 @functools.lru_cache(maxsize=4)
 def _load_cell_task(serialized_task: bytes) -> CellTask:
-    """The task, in a worker process, which must run the same code as the process that sent it.
+    """Load a task in a worker process.
 
     Raises
     ------
     RunError
-        Where the worker runs other code.
+        If the task cannot be loaded, or if the worker has different versions or different code.
     """
     try:
         task: CellTask = cloudpickle.loads(serialized_task)
@@ -158,8 +195,22 @@ def _load_cell_task(serialized_task: bytes) -> CellTask:
 
 
 def pack_cell_batch(plan: CellPlan, cell_numbers: np.ndarray) -> bytes:
-    """Cells of a plan in as few bytes as possible, because Dask's scheduler keeps what it has
-    passed on. Parts of the user's own are sent by their names; a worker has them from the task.
+    """Pack a batch of cells into as few bytes as possible.
+
+    The batches are compressed because the Dask scheduler keeps all batches in memory. User-defined
+    parts are packed by name, because the task contains their code.
+
+    Parameters
+    ----------
+    plan : CellPlan
+        Plan that contains the cells.
+    cell_numbers : ndarray of int
+        Numbers of the cells in the batch.
+
+    Returns
+    -------
+    bytes
+        Packed batch.
     """
     cells = [
         (key, {n: getattr(v, "name", v) for n, v in of_scene.items()}, of_measure)
@@ -169,25 +220,36 @@ def pack_cell_batch(plan: CellPlan, cell_numbers: np.ndarray) -> bytes:
 
 
 def compute_batch(serialized_task: bytes, packed_batch: bytes) -> bytes:
-    """Compute a packed batch in a worker process; a cell over its time limit ends the process.
+    """Compute a packed batch of cells in a worker process.
+
+    If a cell exceeds its time limit, the operating system terminates the worker process.
+
+    Parameters
+    ----------
+    serialized_task : bytes
+        Result of ``serialize_task``.
+    packed_batch : bytes
+        Result of ``pack_cell_batch``.
 
     Returns
     -------
     bytes
-        Its first cells: those that were finished when it was time to hand them over. They are
-        pickled here, because Dask would serialize each value of a list on its own.
+        Pickled list of the finished cells. The list contains only the first cells of the batch if
+        the batch takes longer than 0.5 s. The list is pickled here because Dask would serialise
+        each value of a list separately.
 
     Raises
     ------
     RunError
-        Where the worker cannot load the task, or runs other code than the sender.
+        If the worker cannot load the task, or if the worker has different versions or different
+        code.
     """
     task = _load_cell_task(serialized_task)
     finished: StoredCellRows = []
     began = time.monotonic()
     ours = (
         task.origin_process_id == _PROCESS_ID
-    )  # a worker may be a thread of the user's own process
+    )  # A worker may be a thread of the process of the user.
     if not ours:
         compilation_log.context_while_compiling = _cpu_time_limits.suspend_temporarily
     with (
@@ -208,16 +270,34 @@ def compute_batch(serialized_task: bytes, packed_batch: bytes) -> bytes:
 def compute_cell(
     task: CellTask, cell: Cell, propagated_exceptions: tuple[type[BaseException], ...] = ()
 ) -> tuple[Outcome, float]:
-    """The outcome of one cell, and its wall time in s, without that of compiling; an exception is
-    an outcome too.
+    """Compute a single cell.
+
+    If the computation raises an exception, the outcome has the status ``CELL_RAISED`` and the
+    message of the exception.
+
+    Parameters
+    ----------
+    task : CellTask
+        Scene, measure and accuracy of the cells.
+    cell : Cell
+        Cell to compute.
+    propagated_exceptions : tuple of type, default: ()
+        Exceptions that are raised instead of recorded.
+
+    Returns
+    -------
+    outcome : Outcome
+        Status, outputs and message of the cell.
+    wall_time : float
+        Wall time in s, without the compilation of code.
     """
     begin = time.perf_counter() - compilation_log.total_compilation_seconds
     try:
         outcome = task.measure.with_(**cell.measure_changes)(cell.scene, task.accuracy)
     except propagated_exceptions:
         raise
-    except BaseException as error:  # a cell may raise SystemExit or CancelledError too
-        # not str(error), which may raise as well
+    except BaseException as error:  # A cell may raise SystemExit or CancelledError.
+        # The function str(error) is not used because it may raise an exception.
         text = traceback.format_exception_only(error)[-1].strip()
         outcome = Outcome(Status.CELL_RAISED, message=text)
     if outcome.message:
@@ -226,18 +306,21 @@ def compute_cell(
 
 
 def _shorten_message_for_storage(message: str) -> str:
-    """A message as a file can hold it."""
+    """Shorten a message, and escape characters that files cannot store."""
     text = shorten_text(message, _MAX_MESSAGE_LENGTH).encode(errors="backslashreplace").decode()
     return text.replace("\0", "\\0")
 
 
 class _CpuTimeLimits:
-    """Has the operating system end this process when a thread takes too long over a cell.
+    """CPU time limits of the threads that compute cells in this process.
 
-    CPU time is limited, because a slow or busy machine takes longer for the same computation. The
-    system counts it for the whole process, so the limit is multiplied by the number of threads that
-    compute. The system acts even while a cell holds the interpreter's lock. The limit is set once
-    for each batch: all cells but the last take no longer than `_HAND_OVER_INTERVAL` together.
+    If a thread exceeds its limit, the operating system ends the process, even if the thread holds
+    the lock of the Python interpreter. The limits apply to CPU time rather than wall time, because
+    a slow or busy machine needs more wall time for the same computation.
+
+    The operating system measures the CPU time of the whole process. The limit is therefore
+    multiplied by the number of computing threads. The limit is set once per batch, because all
+    cells of a batch except the last cell finish within ``_FINISHED_CELLS_HANDOVER_INTERVAL``.
     """
 
     def __init__(self) -> None:
@@ -246,7 +329,7 @@ class _CpuTimeLimits:
 
     @contextlib.contextmanager
     def enforce_in_this_thread(self, seconds: float) -> Iterator[None]:
-        """Allow this thread so many seconds of CPU time for a cell of a batch."""
+        """Limit the CPU time that this thread uses for a cell."""
         self._update_threads_and_timers(1, seconds)
         try:
             yield
@@ -254,6 +337,7 @@ class _CpuTimeLimits:
             self._update_threads_and_timers(-1, seconds)
 
     def _update_threads_and_timers(self, thread_ids: int, seconds: float) -> None:
+        """Change the number of computing threads, and restart the timers."""
         with self._lock:
             self._active_threads += thread_ids
             self._process_cpu_limit = self._active_threads * seconds
@@ -261,7 +345,7 @@ class _CpuTimeLimits:
 
     @contextlib.contextmanager
     def suspend_temporarily(self) -> Iterator[None]:
-        """No limit for a while; it starts anew afterwards."""
+        """Suspend the limit, and restart the timers afterwards."""
         self._set_timers(0.0)
         try:
             yield
@@ -270,14 +354,17 @@ class _CpuTimeLimits:
 
     @staticmethod
     def _set_timers(seconds: float) -> None:
-        """Set the limit, or none for 0 s. Beyond it, the worker's log shows each thread."""
+        """Set the timers, or cancel them if the limit is 0 s.
+
+        If the limit is exceeded, the stacks of all threads are written to the log of the worker.
+        """
         faulthandler.cancel_dump_traceback_later()
         signal.setitimer(signal.ITIMER_PROF, 0.0)
         if seconds:
             faulthandler.dump_traceback_later(
                 WALL_OVER_CPU_TIME_LIMIT * seconds + _FINISHED_CELLS_HANDOVER_INTERVAL, exit=True
             )
-            faulthandler.register(signal.SIGPROF, chain=True)  # which then ends the process
+            faulthandler.register(signal.SIGPROF, chain=True)  # The signal ends the process.
             signal.setitimer(
                 signal.ITIMER_PROF,
                 (1.0 + _DASK_CPU_TIME_OVER_CELL_TIME) * seconds + _FINISHED_CELLS_HANDOVER_INTERVAL,

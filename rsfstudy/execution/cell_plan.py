@@ -1,4 +1,8 @@
-"""The cells of a study before any is computed: their keys, their order, and their batches."""
+"""Planning of the cells of a study: keys, order, batches and cost.
+
+``CellPlan`` computes the keys of all cells before any cell is computed. ``CellBatchIterator``
+divides the cells into batches.
+"""
 
 from __future__ import annotations
 
@@ -20,14 +24,30 @@ from rsfstudy.study import CellChanges, Study
 
 _CELL_KEY_DTYPE = np.dtype("V16")
 _GOLDEN_SECTION_RATIO = (math.sqrt(5.0) - 1.0) / 2.0
-#: Time a batch should last in s, and the most cells it may hold: as many are lost with the machine.
+#: Target duration of a batch in s, and maximum number of cells in a batch. If a machine fails, all
+#: cells of its batch are lost.
 _TARGET_SECONDS_PER_BATCH, MAX_BATCH_SIZE = 0.3, 5000
-#: Typical time of one right-hand side in s, by engine, with its share of everything else.
+#: Typical time per right-hand-side evaluation in s, by engine, including all overheads.
 _SECONDS_PER_RHS_EVALUATION = {SCIPY: 1.2e-5, PYTHON: 8e-6, COMPILED: 5e-7}
 
 
 def compute_cell_key(scene: Scene, measure: Measure) -> bytes:
-    """Name of a cell: a digest of the exact values of its scene and of its measure's fields."""
+    """Compute the key of a cell.
+
+    The key is a digest of the exact values of the scene fields and the measure fields.
+
+    Parameters
+    ----------
+    scene : Scene
+        Scene of the cell.
+    measure : Measure
+        Measure of the cell.
+
+    Returns
+    -------
+    bytes
+        Key of 16 bytes.
+    """
     of_scene, of_measure = scene.as_dict(), measure.plain_fields
     values = (*of_scene.values(), *of_measure.values())
     floats = [value for value in values if type(value) is float]
@@ -43,7 +63,7 @@ def _digest_cell_fields(
     measure_field_names: tuple[str, ...],
     field_values: tuple[Any, ...],
 ) -> Any:
-    """Digest of the fields of a cell and of what they hold that is no float."""
+    """Compute the digest of the field names and of the non-float values."""
     names = [
         *(("scene", n) for n in scene_field_names),
         *(("measure", n) for n in measure_field_names),
@@ -52,25 +72,28 @@ def _digest_cell_fields(
 
 
 class CellPlan:
-    """The cells of a study in row-major order; it holds no scenes, so that large lattices fit.
+    """Keys of the cells of a study, in row-major order.
+
+    A plan does not contain the scenes of the cells, so that plans of large lattices fit in memory.
 
     Parameters
     ----------
     study : Study
+        Study to plan.
 
     Attributes
     ----------
-    keys : ndarray of bytes, shape (cells,)
-        Name of each cell; equal cells have the same name.
+    keys : ndarray of bytes, shape (n,)
+        Key of each cell. Equal cells have equal keys.
     unique_cell_numbers : ndarray of int
-        Numbers of the cells that differ: of equal ones, the first.
+        Numbers of the distinct cells. If several cells are equal, only the first cell is included.
     example_scenes : list of Scene
-        One of each combination of parts.
+        One scene for each combination of parts.
 
     Raises
     ------
     InvalidValue
-        For a cell that is no meaningful scene; the text names its place on the axes.
+        If the scene of a cell is invalid. The message contains the coordinates of the cell.
     """
 
     def __init__(self, study: Study) -> None:
@@ -89,7 +112,19 @@ class CellPlan:
         self.unique_cell_numbers = np.sort(np.unique(self.keys, return_index=True)[1])
 
     def select_cells(self, cell_numbers: np.ndarray) -> Iterator[tuple[bytes, CellChanges]]:
-        """Some cells by their keys, each as what it changes of the study's scene and measure."""
+        """Select cells by their numbers.
+
+        Parameters
+        ----------
+        cell_numbers : ndarray of int
+            Numbers of the cells.
+
+        Returns
+        -------
+        iterator of tuple of (bytes, CellChanges)
+            Key of each cell, and the field values that differ from the scene and measure of the
+            study.
+        """
         keys: list[bytes] = self.keys[cell_numbers].tolist()
         return zip(keys, map(self.study.cell_changes, cell_numbers.tolist()), strict=True)
 
@@ -97,8 +132,10 @@ class CellPlan:
 def _add_failure_counts_to_error(
     study: Study, cell_number: int, first_error: InvalidValue
 ) -> InvalidValue:
-    """The error of a cell that is no meaningful scene; where its axis is of samples or cases, with
-    how many of them are none.
+    """Add the number of invalid points to the error of an invalid cell.
+
+    The number is added only if the lattice has an axis with numbered points, such as random
+    samples.
     """
     if cell_number == study.size:
         return first_error
@@ -120,27 +157,29 @@ def _add_failure_counts_to_error(
 
 
 class CellBatchIterator(Iterator[np.ndarray]):
-    """Numbers of cells in batches that last a fraction of a second each, as far as the cells
-    finished so far can tell; each batch is made when it is asked for.
+    """Iterator over batches of cell numbers.
 
-    Clocks decide which cells travel together, and nothing else.
+    The size of each batch is chosen so that a batch takes about 0.3 s, according to the times of
+    the cells that have finished. The measured times affect only the batches and never the results.
 
     Parameters
     ----------
-    plan : Plan
-    cells : ndarray of int
+    plan : CellPlan
+        Plan that contains the cells.
+    cell_numbers : ndarray of int
         Numbers of the cells to compute.
-    workers : int
-        How many cells are computed at a time.
+    worker_count : int
+        Number of cells that are computed at the same time.
     """
 
     def __init__(self, plan: CellPlan, cell_numbers: np.ndarray, worker_count: int) -> None:
         self.plan, self._cell_numbers, self._next_cell_index = plan, cell_numbers, 0
-        # several batches for each worker, so that all end at about the same time
+        # Each worker computes several batches, so that all workers finish at about the same time.
         self._max_size = min(MAX_BATCH_SIZE, math.ceil(len(cell_numbers) / (4 * worker_count)))
         self._timed_cells, self._timed_seconds = 0, 0.0
 
     def __next__(self) -> np.ndarray:
+        """Return the cell numbers of the next batch."""
         numbers = self._cell_numbers[
             self._next_cell_index : self._next_cell_index + self.compute_next_batch_size()
         ]
@@ -150,7 +189,13 @@ class CellBatchIterator(Iterator[np.ndarray]):
         return numbers
 
     def compute_next_batch_size(self) -> int:
-        """Cells in the next batch: one, until some are finished."""
+        """Compute the number of cells in the next batch.
+
+        Returns
+        -------
+        int
+            Number of cells, which is 1 until the time of a cell is known.
+        """
         if not self._timed_seconds:
             return 1
         return max(
@@ -162,15 +207,33 @@ class CellBatchIterator(Iterator[np.ndarray]):
         )
 
     def record_time(self, seconds: float) -> None:
-        """Record how long a cell took; NaN where that is unknown."""
+        """Record the wall time of a finished cell.
+
+        Parameters
+        ----------
+        seconds : float
+            Wall time in s. NaN is ignored.
+        """
         if not math.isnan(seconds):
             self._timed_cells += 1
             self._timed_seconds += seconds
 
 
 def order_cells_by_golden_section(cell_numbers: np.ndarray) -> np.ndarray:
-    """Cells in another order, in strides of the golden section: the first few are a sample
-    of all, so that what they show (how long cells take, whether all fail) holds for the rest.
+    """Reorder cells with strides of the golden section.
+
+    The first few cells are then a representative sample of all cells. The computation times and
+    failures of the sample are typical of the remaining cells.
+
+    Parameters
+    ----------
+    cell_numbers : ndarray of int
+        Numbers of the cells.
+
+    Returns
+    -------
+    ndarray of int
+        Reordered numbers.
     """
     count = len(cell_numbers)
     stride = max(1, round(_GOLDEN_SECTION_RATIO * count))
@@ -180,8 +243,22 @@ def order_cells_by_golden_section(cell_numbers: np.ndarray) -> np.ndarray:
 
 
 def estimate_cost(plan: CellPlan) -> tuple[int, float]:
-    """Right-hand sides that the cells of a study usually take at its accuracy, and seconds on one
-    core: a guess, because it is the measure that states them, whatever its scenes are.
+    """Estimate the cost of the distinct cells of a study.
+
+    The estimate is approximate, because it uses the typical work of the measure and does not depend
+    on the scenes.
+
+    Parameters
+    ----------
+    plan : CellPlan
+        Plan of the study.
+
+    Returns
+    -------
+    rhs_evaluations : int
+        Expected number of right-hand-side evaluations at the accuracy of the study.
+    seconds : float
+        Expected time in s on one core.
     """
     accuracy = plan.study.accuracy
     work = len(plan.unique_cell_numbers) * plan.study.measure.expected_work(accuracy)

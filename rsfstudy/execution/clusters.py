@@ -1,4 +1,4 @@
-"""Dask clusters: worker processes started on this machine, or a scheduler that runs elsewhere."""
+"""Dask clusters, either local worker processes or a running scheduler."""
 
 from __future__ import annotations
 
@@ -20,20 +20,28 @@ from typing import Any
 
 from rsfstudy.errors import InvalidValue, RunError, shorten_text
 
-#: Time in s to wait for a process of this machine that does not answer.
+#: Timeout in s for connections to a process on this machine.
 _CLUSTER_CONNECT_TIMEOUT = 600
-#: What ends a run in order, where it is handled.
+#: Signals that end a run in an orderly way if a handler is installed.
 _SIGNALS_THAT_END_RUN = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 
 
 def check_script_has_main_guard(worker_count: int) -> None:
-    """Refuse a script that worker processes, which import it, would run as well: one whose line
-    that leads here stands below no condition.
+    """Check that worker processes would not run the main script again.
+
+    Worker processes import the main script. The line of the script that leads to this call must
+    therefore be inside a condition, such as ``if __name__ == "__main__":``. Notebooks and commands
+    are not checked, because workers do not import them.
+
+    Parameters
+    ----------
+    worker_count : int
+        Number of worker processes, for the error message.
 
     Raises
     ------
     InvalidValue
-        Where it is such a script.
+        If the line is not inside a condition.
     """
     main = sys.modules["__main__"]
     frame: FrameType | None = sys._getframe()
@@ -41,7 +49,7 @@ def check_script_has_main_guard(worker_count: int) -> None:
         frame = frame.f_back
     file = getattr(main, "__file__", None)
     if frame is None or file is None or Path(file).name == "__main__.py":
-        return  # a notebook, python -c and a package's __main__ are not imported
+        return  # Workers do not import a notebook, ``python -c`` or a ``__main__`` module.
     line, tree = frame.f_lineno, ast.parse("".join(linecache.getlines(frame.f_code.co_filename)))
     conditions = (n for n in ast.walk(tree) if isinstance(n, ast.If | ast.IfExp | ast.BoolOp))
     if not tree.body or any(n.lineno <= line <= (n.end_lineno or line) for n in conditions):
@@ -55,9 +63,11 @@ def check_script_has_main_guard(worker_count: int) -> None:
 
 @contextlib.contextmanager
 def _delay_interrupts() -> Iterator[None]:
-    """Delay Ctrl-C, and signals that end the run as it does, until the end of this block. Ctrl-C
-    and the end of a terminal are kept from processes that are started in it: the driver ends the
-    run, and then its workers. A second Ctrl-C is not delayed.
+    """Delay the signals that end a run until the end of the block.
+
+    A second Ctrl-C is not delayed. Processes that are started in the block do not receive Ctrl-C or
+    the signal that a terminal sends when it closes. The main process ends the run first, and then
+    ends its workers.
     """
     held: list[int] = []
     found = {int(number): signal.getsignal(number) for number in _SIGNALS_THAT_END_RUN}
@@ -73,8 +83,8 @@ def _delay_interrupts() -> Iterator[None]:
         return
     for number in handlers:
         signal.signal(number, hold)
-    # threads and processes inherit the signals that are blocked when they are started; SIGTERM is
-    # what ends those that do not answer
+    # Threads and processes inherit the signals that are blocked when they start. SIGTERM is not
+    # blocked, because it ends processes that do not respond.
     blocked = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT, signal.SIGHUP})
     try:
         yield
@@ -82,7 +92,7 @@ def _delay_interrupts() -> Iterator[None]:
         signal.pthread_sigmask(signal.SIG_SETMASK, blocked)
         for number, handler in handlers.items():
             signal.signal(number, handler)
-        if held:  # also where a process that had the signal too could not be started
+        if held:  # This runs even if the signal prevented a process from starting.
             handlers[held[0]](held[0], None)
 
 
@@ -116,19 +126,24 @@ def _tolerate_lost_resource_tracker() -> None:
 
 @contextlib.contextmanager
 def start_local_cluster(worker_count: int, log_path: Path) -> Iterator[Any]:
-    """A Dask client of worker processes on this machine, with one thread each.
+    """Start worker processes on this machine, with one thread each.
 
     Parameters
     ----------
     worker_count : int
-        How many.
+        Number of worker processes.
     log_path : Path
-        Where they write errors.
+        File to which the workers write errors.
+
+    Yields
+    ------
+    distributed.Client
+        Client that is connected to the workers.
 
     Raises
     ------
     RunError
-        If they cannot be started.
+        If a worker process cannot be started.
     """
     import dask
     from distributed import Client, LocalCluster
@@ -137,11 +152,11 @@ def start_local_cluster(worker_count: int, log_path: Path) -> Iterator[Any]:
 
     quiet = {
         "distributed.scheduler.allowed-failures": 0,
-        # a worker that is slow, or busy with its cell, is ended by the time limit only
+        # Only the time limit ends a worker that is slow or busy with its cell.
         "distributed.scheduler.worker-ttl": None,
-        # when a worker has died, Dask would close it for good if it were not back after this time
+        # Dask would permanently close a worker that has died and not restarted within this time.
         "distributed.deploy.lost-worker-timeout": "1000 days",
-        # by default each process ticks 50 times and samples its stack 100 times a second
+        # By default, each process ticks 50 times and samples its stack 100 times per second.
         "distributed.admin.tick.interval": "1s",
         "distributed.worker.profile.enabled": False,
         "distributed.comm.timeouts.connect": f"{_CLUSTER_CONNECT_TIMEOUT}s",
@@ -151,14 +166,14 @@ def start_local_cluster(worker_count: int, log_path: Path) -> Iterator[Any]:
     }
     with dask.config.set(quiet), contextlib.ExitStack() as stack:
         _tolerate_lost_resource_tracker()
-        resource_tracker.ensure_running()  # before workers start, because it unblocks signals
+        resource_tracker.ensure_running()  # It unblocks signals.
         with _delay_interrupts():
             try:
                 cluster = LocalCluster(
                     n_workers=worker_count,
                     threads_per_worker=1,
                     processes=True,
-                    dashboard_address="127.0.0.1:0",  # its pages listen, even where it has none
+                    dashboard_address="127.0.0.1:0",  # The server also runs without pages.
                     scheduler_kwargs={"dashboard": False},
                     silence_logs=logging.ERROR,
                     plugins=(worker_log.RedirectStderrPlugin(log_path.resolve()),),
@@ -173,11 +188,14 @@ def start_local_cluster(worker_count: int, log_path: Path) -> Iterator[Any]:
         yield stack.enter_context(Client(cluster))
         said = log_path.stat().st_size
         stack.close()
-        os.truncate(log_path, said)  # that a heartbeat found the scheduler closed is no news
+        os.truncate(log_path, said)  # Heartbeats log that the scheduler has closed.
 
 
 async def _check_scheduler_answers(scheduler_address: str) -> None:
-    """Check that Dask answers; its client would wait for ever if another program listens there."""
+    """Check that a Dask scheduler answers at an address.
+
+    If another program listens at the address, the Dask client would wait forever.
+    """
     from distributed import Security
     from distributed.comm.core import connect
 
@@ -187,24 +205,37 @@ async def _check_scheduler_answers(scheduler_address: str) -> None:
 
 @contextlib.contextmanager
 def connect_to_cluster(scheduler_address: str, *, timeout: float = 30.0) -> Iterator[Any]:
-    """A client of a Dask scheduler that is already running, with the certificates of Dask's
-    configuration.
+    """Connect to a running Dask scheduler.
+
+    The TLS certificates are taken from the configuration of Dask.
+
+    Parameters
+    ----------
+    scheduler_address : str
+        Address of the scheduler.
+    timeout : float, default: 30.0
+        Time to wait for an answer in s.
+
+    Yields
+    ------
+    distributed.Client
+        Client that is connected to the scheduler.
 
     Raises
     ------
     RunError
-        If none answers at the address.
+        If no scheduler answers at the address.
     """
     from distributed import Client
     from distributed.utils import silence_logging_cmgr
 
-    # the run reports a failure of the cluster once; Dask's client would log more until it is
-    # closed
+    # The run reports a failure of the cluster once. The Dask client would log further messages
+    # until the client is closed.
     with silence_logging_cmgr(logging.CRITICAL + 1):
         try:
             asyncio.run(asyncio.wait_for(_check_scheduler_answers(scheduler_address), timeout))
             client = Client(scheduler_address, timeout=timeout)
-        except Exception as error:  # Dask raises errors of many kinds for a wrong address
+        except Exception as error:  # Dask raises errors of many types for a wrong address.
             raise RunError(
                 f"no Dask scheduler answers at {shorten_text(scheduler_address)!r}: "
                 f"{shorten_text(error) or 'it took too long'}. "

@@ -1,13 +1,17 @@
-"""Digests of code: of the physics, from its sources, and of a user's own measure, parts and
-stepper, from the objects in memory, because their files may have changed since they were imported.
-A measure in the file of a named study is digested as a user's own is, because what else stands in
-that file decides no number.
+"""Digests of code.
 
-All are of compiled code, so that remarks, what docstrings say and the places of lines do not
-count. Of such classes the search follows every name that a function uses: the same code has
-the same digest in a study file, a script, a notebook or a worker, and any change of a function, a
-constant or a helper changes it. Modules that a function imports when it runs are not followed. The
-search ends at Python, installed packages and the rest of rsfstudy, which have versions.
+``digest_sources`` computes the digest of the physics from the source files.
+``digest_user_classes`` computes the digest of user-defined measures, parts and steppers from the
+objects in memory, because their files may have changed since the import. Measures in the modules of
+named studies are treated like user-defined measures, because the other code of these modules does
+not affect the results (see ``digest_physics_and_measures``).
+
+All digests are computed from compiled code, so that comments, docstrings and line numbers do not
+affect a digest. For a user-defined class, the search follows every name that a function uses. Any
+change of a function, a constant or a helper therefore changes the digest. The same code has the
+same digest in a study file, a script, a notebook and a worker. The search does not follow the
+imports inside functions. The search ends at Python, at installed packages and at rsfstudy, because
+these packages have version numbers.
 """
 
 from __future__ import annotations
@@ -40,7 +44,7 @@ _INSTALLATION_DIRECTORIES = tuple(
     }
 )
 _TYPES_DIGESTED_BY_REPR = (int, float, complex, str, bytes, bool, type(None), type(Ellipsis))
-#: What containers, and what wraps functions, are made of.
+#: Functions that return the contents of containers and the functions inside wrappers.
 _GETTERS_OF_CONTAINER_PARTS: tuple[tuple[Any, Callable[[Any], Any]], ...] = (
     (property, lambda value: (value.fget, value.fset)),
     (functools.cached_property, lambda value: value.func),
@@ -52,8 +56,19 @@ _GETTERS_OF_CONTAINER_PARTS: tuple[tuple[Any, Callable[[Any], Any]], ...] = (
 
 
 def digest_sources(sources_by_file_name: Mapping[str, bytes]) -> str:
-    """Digest of the code in files, given by their names."""
-    # a third of the time of parsing it to a tree that Python can see; 2 leaves docstrings out
+    """Compute the digest of the code in source files.
+
+    Parameters
+    ----------
+    sources_by_file_name : mapping of str to bytes
+        Contents of the files by name.
+
+    Returns
+    -------
+    str
+        Digest of 16 hexadecimal digits.
+    """
+    # Compiling takes a third of the time of ast.parse, and optimize=2 removes docstrings.
     compiled = (
         compile(text, name, "exec", optimize=2) for name, text in sources_by_file_name.items()
     )
@@ -61,8 +76,20 @@ def digest_sources(sources_by_file_name: Mapping[str, bytes]) -> str:
 
 
 def digest_physics_and_measures(physics_digest: str, measure_classes: Iterable[type]) -> str:
-    """Digest of the physics and measures: that of the physics alone, unless one of them stands in
-    the file of a named study.
+    """Compute the digest of the physics and of measures in named studies.
+
+    Parameters
+    ----------
+    physics_digest : str
+        Digest of the physics.
+    measure_classes : iterable of type
+        Classes of the measure.
+
+    Returns
+    -------
+    str
+        Digest of 16 hexadecimal digits. If no class is defined in the module of a named study, this
+        is ``physics_digest``.
     """
     theirs = tuple(measure for measure in measure_classes if _is_study_module(measure.__module__))
     return (
@@ -73,8 +100,18 @@ def digest_physics_and_measures(physics_digest: str, measure_classes: Iterable[t
 
 
 def digest_user_classes(*classes_or_data: object) -> str:
-    """Digest of classes and of all they use, and of data such as protocols; "none" where all of
-    them are classes of rsfstudy.
+    """Compute the digest of user-defined classes and of the code they use.
+
+    Parameters
+    ----------
+    *classes_or_data : object
+        Classes, and data such as protocols. Classes of rsfstudy and of installed packages are
+        ignored.
+
+    Returns
+    -------
+    str
+        Digest of 16 hexadecimal digits, or "none" if there are no user-defined classes or data.
     """
     own = tuple(
         one if isinstance(one, type) else repr(one)
@@ -85,6 +122,7 @@ def digest_user_classes(*classes_or_data: object) -> str:
 
 
 def _hash_texts(texts: Iterable[str]) -> str:
+    """Compute the first 16 digits of the SHA-256 digest of strings."""
     sha256 = hashlib.sha256()
     for part in texts:
         sha256.update(part.encode(errors="surrogatepass") + b"\0")
@@ -92,20 +130,26 @@ def _hash_texts(texts: Iterable[str]) -> str:
 
 
 class _DigestTextCollector:
-    """Texts that differ wherever the code differs; each object is visited once."""
+    """Collector of strings that differ if the code differs.
+
+    Each object is visited only once.
+    """
 
     def __init__(self) -> None:
         self._visited: dict[Hashable, Any] = {}
 
     def collect_texts(self, value: Any, used_names: Iterable[str]) -> Iterator[str]:
-        """The texts for a value, given the names that the code around it uses."""
+        """Yield the strings for a value.
+
+        The argument ``used_names`` contains the names that the surrounding code uses.
+        """
         if isinstance(value, _TYPES_DIGESTED_BY_REPR):
             yield repr(value)
         elif isinstance(value, ModuleType):
             yield from self._module_texts(value, used_names)
         elif isinstance(value, CodeType):
             yield from self._code_texts(value)
-        elif isinstance(value, tuple):  # may be one object here and two elsewhere
+        elif isinstance(value, tuple):  # Equal tuples may or may not be the same object.
             for part in value:
                 yield from self.collect_texts(part, used_names)
         elif id(value) not in self._visited:
@@ -125,14 +169,14 @@ class _DigestTextCollector:
             (parts for kind, parts in _GETTERS_OF_CONTAINER_PARTS if isinstance(value, kind)), None
         ):
             yield from self.collect_texts(kept(value), used_names)
-        elif hasattr(value, "__wrapped__"):  # a cached function
+        elif hasattr(value, "__wrapped__"):  # The value is a cached function.
             yield from self.collect_texts(value.__wrapped__, used_names)
         else:
             yield from self._class_texts(type(value))
             yield from self._texts_of_instance_state(value, used_names)
 
     def _module_texts(self, module: ModuleType, used_names: Iterable[str]) -> Iterator[str]:
-        """Only what is used of a module counts."""
+        """Yield the strings for the used members of a module."""
         if not _is_digested_by_used_names(module.__name__):
             yield module.__name__
             return
@@ -178,19 +222,21 @@ class _DigestTextCollector:
         content = io.BytesIO()
         try:
             _PicklerWithoutCachedProperties(content, protocol=4).dump(value)
-        except Exception:  # a lock or a file decides no number
+        except Exception:  # Objects such as locks and files do not affect the results.
             yield type(value).__qualname__
         else:
             yield content.getvalue().hex()
 
 
 class _PicklerWithoutCachedProperties(pickle.Pickler):
-    """Pickler that leaves out the cached properties of all objects.
+    """Pickler that omits the cached properties of all objects.
 
-    Whether a property has been computed differs between processes, and decides no number.
+    The cached properties do not affect the results, and may be present in one process but not in
+    another.
     """
 
     def reducer_override(self, value: Any) -> Any:
+        """Reduce a copy of the object without its cached properties."""
         state = _state_without_caches(value)
         if isinstance(value, type) or len(state) == len(getattr(value, "__dict__", ())):
             return NotImplemented
@@ -213,14 +259,17 @@ def _state_without_caches(value: Any) -> dict[str, Any]:
 
 
 def _has_docstring_slot(code: CodeType) -> bool:
-    """True if the first constant is a docstring, or has its place."""
+    """Return True if the first constant is reserved for a docstring."""
     if sys.version_info >= (3, 13):
         return bool(code.co_flags & inspect.CO_HAS_DOCSTRING)
     return bool(code.co_flags & inspect.CO_NEWLOCALS) and not code.co_name.startswith("<")
 
 
 def _is_generated_class_member(member_name: str, value: Any) -> bool:
-    """True of what Python, dataclasses and msgspec make for a class, which decides no number."""
+    """Return True for members that Python, dataclasses or msgspec generate.
+
+    Generated members do not affect the results.
+    """
     if member_name == "_abc_impl" or member_name.startswith("__annot"):
         return True
     made = getattr(getattr(value, "__code__", None), "co_qualname", "").startswith("__create_fn__")
@@ -228,7 +277,7 @@ def _is_generated_class_member(member_name: str, value: Any) -> bool:
 
 
 def _names_used_by_code(code: CodeType) -> Iterator[str]:
-    """Names a function uses, those of the functions within it included."""
+    """Yield the names that a function and its nested functions use."""
     yield from code.co_names
     for constant in code.co_consts:
         if isinstance(constant, CodeType):
@@ -236,16 +285,20 @@ def _names_used_by_code(code: CodeType) -> Iterator[str]:
 
 
 def _is_digested_by_used_names(module_name: str | None) -> bool:
-    """True if what is digested of a module is what is used of it."""
+    """Return True if only the used members of a module are digested."""
     return _is_study_module(module_name) or _is_user_module(module_name)
 
 
 def _is_study_module(module_name: str | None) -> bool:
+    """Return True if a module belongs to the named studies."""
     return (module_name or "").startswith(f"{STUDIES}.")
 
 
 def _is_user_module(module_name: str | None) -> bool:
-    """True if a module is neither Python's nor installed nor of rsfstudy."""
+    """Return True if a module is user-defined.
+
+    Modules of Python, of installed packages and of rsfstudy are not user-defined.
+    """
     top = (module_name or "").partition(".")[0]
     if not top or top == _PACKAGE_NAME or (top in sys.stdlib_module_names and top != "__main__"):
         return False
@@ -254,6 +307,7 @@ def _is_user_module(module_name: str | None) -> bool:
 
 @functools.cache
 def _is_installed_file(file_path: str | None) -> bool:
+    """Return True if a file belongs to Python or to an installed package."""
     return file_path is not None and any(
         Path(file_path).resolve().is_relative_to(p) for p in _INSTALLATION_DIRECTORIES
     )

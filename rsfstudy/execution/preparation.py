@@ -1,4 +1,4 @@
-"""Preparation of a run: what workers are sent, and the run that takes in what they compute."""
+"""Preparation of a study run."""
 
 from __future__ import annotations
 
@@ -13,10 +13,24 @@ from rsfstudy.study import Study
 def prepare_study_run(study: Study, options: OutputOptions, workers: WorkerPool) -> StudyRun:
     """Prepare the run of a study on workers.
 
+    Parameters
+    ----------
+    study : Study
+        Study to run.
+    options : OutputOptions
+        Output files and handling of failed cells.
+    workers : WorkerPool
+        Workers that compute the cells.
+
+    Returns
+    -------
+    StudyRun
+        Run that is ready to be called.
+
     Raises
     ------
     InvalidValue
-        For anything wrong with the study, and for code that cannot be sent to the workers.
+        If the study is invalid, or if its code cannot be sent to the workers.
     """
     task = CellTask(
         study.base,
@@ -28,5 +42,5 @@ def prepare_study_run(study: Study, options: OutputOptions, workers: WorkerPool)
         code_fingerprint=code_fingerprint(study.accuracy.engine, study.user_classes),
     )
     if workers.make_cell_batch_mapper() is not compute_serially:
-        serialize_task(task)  # raises before any work if it cannot be sent
+        serialize_task(task)  # This raises an error before any cell is computed.
     return StudyRun(study, options, task, workers.count_concurrent_cells())

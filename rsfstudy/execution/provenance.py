@@ -1,5 +1,8 @@
-"""What decides the numbers of a run: versions and the code of the physics; and who made it, where
-and how: machine, time, command.
+"""Provenance of results.
+
+The fingerprint (``run_fingerprint``) contains all settings, versions and code digests that affect
+the results. The provenance (``collect_provenance``) also contains the time, the command, the commit
+and the machine.
 """
 
 from __future__ import annotations
@@ -23,7 +26,7 @@ if TYPE_CHECKING:
     from rsfstudy.study import Study
 
 _PACKAGE_DIRECTORY = Path(__file__).parent.parent
-#: Code whose change may change a number.
+#: Packages of rsfstudy that affect the results of cells.
 _PACKAGES_THAT_DECIDE_NUMBERS = (
     "slider",
     "motion",
@@ -36,8 +39,17 @@ _PACKAGES_THAT_DECIDE_NUMBERS = (
 
 
 def read_physics_sources(package_directory: Path) -> dict[str, bytes]:
-    """Source of everything that decides the number of a cell in every study, by the path in the
-    package.
+    """Read the source files that affect the results of all studies.
+
+    Parameters
+    ----------
+    package_directory : Path
+        Directory of the package.
+
+    Returns
+    -------
+    dict of str to bytes
+        Contents of the source files, by path relative to ``package_directory``.
     """
     files = [
         file
@@ -47,23 +59,29 @@ def read_physics_sources(package_directory: Path) -> dict[str, bytes]:
     return {file.relative_to(package_directory).as_posix(): file.read_bytes() for file in files}
 
 
-#: Read at import, because later changes to the files do not change the code that runs.
+#: Source files at the time of the import, because later changes do not affect the running code.
 _PHYSICS_SOURCES_AT_IMPORT = read_physics_sources(_PACKAGE_DIRECTORY)
 
 
 def code_fingerprint(engine: str = SCIPY, user_classes: Iterable[object] = ()) -> dict[str, str]:
-    """Versions, and digests of code, that decide the numbers of a cell.
+    """Collect the versions and code digests that affect the results of cells.
 
     Parameters
     ----------
-    engine : str
-    user_classes : iterable of type
-        The classes of the measure, and parts and a stepper of the user's own.
+    engine : str, optional
+        Name of the engine.
+    user_classes : iterable of object, default: ()
+        Classes of the measure, and user-defined parts and steppers.
+
+    Returns
+    -------
+    dict of str to str
+        Versions and digests by name.
     """
     return {
         "physics": _physics_digest(),
         "own_code": code_digest.digest_user_classes(*user_classes),
-        "python": f"{sys.version_info.major}.{sys.version_info.minor}",  # whose code is digested
+        "python": f"{sys.version_info.major}.{sys.version_info.minor}",  # It affects the byte code.
         "numpy": version("numpy"),
         "scipy": version("scipy"),
         **package_versions(engine),
@@ -72,11 +90,26 @@ def code_fingerprint(engine: str = SCIPY, user_classes: Iterable[object] = ()) -
 
 @functools.cache
 def _physics_digest() -> str:
+    """Compute the digest of the physics."""
     return code_digest.digest_sources(_PHYSICS_SOURCES_AT_IMPORT)
 
 
 def run_fingerprint(study: Study) -> dict[str, Any]:
-    """All that decides the numbers of a cell, except its scene and its measure's plain fields."""
+    """Collect all settings, versions and digests that affect the results.
+
+    The scene fields and the plain fields of the measure are excluded, because they form the keys of
+    the cells.
+
+    Parameters
+    ----------
+    study : Study
+        Study to run.
+
+    Returns
+    -------
+    dict of str to object
+        Fingerprint as plain data.
+    """
     plain, accuracy = study.measure.plain_fields, study.accuracy
     shared = code_fingerprint(accuracy.engine, study.user_classes)
     return {
@@ -94,13 +127,19 @@ def run_fingerprint(study: Study) -> dict[str, Any]:
 
 
 def collect_provenance(study: Study, command_line: str) -> dict[str, Any]:
-    """Where, when and from what a run was made, and by which versions.
+    """Collect the provenance of a run.
 
     Parameters
     ----------
     study : Study
+        Study to run.
     command_line : str
-        What the user typed.
+        Command or call of the user.
+
+    Returns
+    -------
+    dict of str to object
+        Time, command, versions, fingerprint, commit and machine, as plain data.
     """
     return {
         "time": datetime.now(UTC).isoformat(timespec="seconds"),
@@ -119,12 +158,19 @@ def collect_provenance(study: Study, command_line: str) -> dict[str, Any]:
 
 
 def provenance_attributes(command_line: str) -> dict[str, str]:
-    """Root attributes that say which rsfstudy made a dataset of one scene, when, and how.
+    """Build the root attributes that describe the origin of a dataset.
+
+    The attributes are used for datasets of a single scene.
 
     Parameters
     ----------
     command_line : str
-        What the user typed, or called.
+        Command or call of the user.
+
+    Returns
+    -------
+    dict of str to str
+        Attributes ``source`` and ``history``.
     """
     when = datetime.now(UTC).isoformat(timespec="seconds")
     return {"source": _build_source_attribute(), "history": f"{when} {command_line}"}
@@ -132,6 +178,7 @@ def provenance_attributes(command_line: str) -> dict[str, str]:
 
 @functools.cache
 def _build_source_attribute() -> str:
+    """Build the attribute ``source`` from the version and the commit."""
     commit = read_git_commit_and_state(_PACKAGE_DIRECTORY.parent)
     return f"rsfstudy {version('rsfstudy')}, commit {commit}, numerical model of a spring-slider"
 
@@ -148,8 +195,22 @@ _PACKAGES_WITH_RECORDED_VERSION = (
 
 
 def read_git_commit_and_state(checkout_directory: Path) -> str:
-    """Commit of a checkout of this project, and whether what decides numbers was clean; where its
-    root is none, as for an installed wheel, the commit that it was built from, or "none".
+    """Return the commit and the state of a checkout.
+
+    Only changes of the package, the named studies and ``pyproject.toml`` are considered, because
+    other files do not affect the results.
+
+    Parameters
+    ----------
+    checkout_directory : Path
+        Root directory of the checkout.
+
+    Returns
+    -------
+    str
+        Commit and state, such as "1a2b3c clean" or "1a2b3c with uncommitted changes". If the
+        directory is not a checkout, the function returns the commit from which the installed wheel
+        was built, or "none" if the commit is unknown.
     """
 
     def run_git(*words: str) -> str:
@@ -163,21 +224,34 @@ def read_git_commit_and_state(checkout_directory: Path) -> str:
 
     with contextlib.suppress(OSError, subprocess.SubprocessError):
         if Path(run_git("rev-parse", "--show-toplevel")) == checkout_directory.resolve():
-            # what runs leave in the checkout changes nothing
+            # Other files, such as the output files of runs, do not affect the results.
             changed = run_git(
                 "status", "--porcelain", "--", _PACKAGE_DIRECTORY.name, "studies", "pyproject.toml"
             )
             state = "with uncommitted changes" if changed else "clean"
             return f"{run_git('rev-parse', 'HEAD')} {state}"
-    stamp = _PACKAGE_DIRECTORY / "commit.txt"  # as `stamp` writes it into a wheel
+    stamp = _PACKAGE_DIRECTORY / "commit.txt"  # The build_stamp module writes this file.
     return stamp.read_text().strip() if stamp.exists() else "none"
 
 
 def package_versions(name: str) -> dict[str, str]:
-    """Versions of what decides the numbers of an engine, beside those of SciPy."""
+    """Return the versions of the packages that only one engine needs.
+
+    NumPy and SciPy are not included, because ``code_fingerprint`` adds them for all engines.
+
+    Parameters
+    ----------
+    name : str
+        Name of the engine.
+
+    Returns
+    -------
+    dict of str to str
+        Versions by package name. The dictionary is empty unless the engine compiles motions.
+    """
     if name != COMPILED:
         return {}
-    # loading it would make each command wait
+    # The versions are read from the metadata, because importing numba would delay every command.
     from importlib.metadata import PackageNotFoundError, version
 
     try:

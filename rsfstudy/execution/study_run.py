@@ -1,5 +1,7 @@
-"""Runs a study: plans its cells, has the missing ones computed, records them as they finish, and
-assembles, reduces and writes the dataset.
+"""Run of a study, from the plan of its cells to the results file.
+
+Calling a ``StudyRun`` computes the missing cells, adds each finished cell to the journal, assembles
+the dataset, applies the reductions and writes the results file.
 """
 
 from __future__ import annotations
@@ -32,10 +34,10 @@ from rsfstudy.storage import (
 )
 from rsfstudy.study import Study
 
-#: Statuses of cells that ended their worker.
+#: Names of the statuses of cells whose worker ended.
 _STATUSES_OF_LOST_CELLS = (Status.WORKER_LOST.name, Status.TIME_LIMIT_SPENT.name)
 _STATUSES_WITH_ANSWER = frozenset(status.name for status in Status if status.is_answer)
-#: A run ends early when this many cells have failed and none has succeeded.
+#: Number of failed cells after which a run ends early if no cell has succeeded.
 _MAX_FAILURES_WITHOUT_SUCCESS = 10
 
 ProgressCallback = Callable[[int, int], None]
@@ -43,22 +45,29 @@ ProgressCallback = Callable[[int, int], None]
 
 @dataclass(frozen=True, kw_only=True)
 class OutputOptions:
-    """Files that a run writes, and what it does about failed cells.
+    """Output files of a run, and handling of failed cells.
 
     Parameters
     ----------
-    output : Path or None
-        Directory of the results and of the journal of finished cells; None writes nothing.
-    format : {"netcdf", "zarr"}
-        One NetCDF file, or a Zarr store that is written in pieces.
-    fresh : bool
-        Forget the journal and compute every cell anew.
-    keep_going : bool
-        Go on even if the first cells all fail.
-    despite_failures : bool
-        Reduce the other cells where some failed.
-    command_line : str
-        What the user typed, for the history.
+    output : Path or None, default: None
+        Directory of the results file and the journal. If None, no files are written.
+    format : {"netcdf", "zarr"}, default: "netcdf"
+        Format of the results. A Zarr store is written in slabs, for lattices that do not fit in
+        memory.
+    fresh : bool, default: False
+        If True, delete the journal and compute all cells again.
+    keep_going : bool, default: False
+        If True, continue even if all of the first cells fail.
+    despite_failures : bool, default: False
+        If True, apply reductions to the remaining cells if some cells have failed.
+    command_line : str, default: "rsfstudy.run"
+        Command or call of the user, for the history of the file.
+
+    Raises
+    ------
+    InvalidValue
+        If the format is unknown, or if a Zarr store has no output directory or cannot be written
+        because the package zarr is not installed.
     """
 
     output: Path | None = None
@@ -69,6 +78,7 @@ class OutputOptions:
     command_line: str = "rsfstudy.run"
 
     def __post_init__(self) -> None:
+        """Check the format and the output directory."""
         if self.format not in RESULT_FORMATS:
             raise InvalidValue("format", self.format, "is unknown", choices=RESULT_FORMATS)
         if self.format == "zarr":
@@ -78,21 +88,27 @@ class OutputOptions:
 
 
 class StudyRun:
-    """One run of a study.
+    """Run of a study.
+
+    Call the run to compute the missing cells and to write the results.
 
     Parameters
     ----------
     study : Study
+        Study to run.
     options : OutputOptions
-    task : Task
-    workers : int
-        How many cells are computed at a time, to size the tasks.
+        Output files, and handling of failed cells.
+    task : CellTask
+        Scene, measure and accuracy of the cells.
+    workers : int, default: 1
+        Number of cells that are computed at the same time. The number affects the sizes of the
+        batches.
 
     Raises
     ------
     InvalidValue
-        For a declaration with a cell that makes no scene, or reductions or claims that do not fit
-        its lattice, before anything is computed.
+        If the scene of a cell is invalid, or if a reduction or a claim does not fit the lattice.
+        The constructor checks the study before any cell is computed.
     """
 
     def __init__(
@@ -104,8 +120,10 @@ class StudyRun:
         self._check_reductions_and_claims()
 
     def _check_reductions_and_claims(self) -> None:
-        """Apply the reductions to a lattice of pending cells, to find mistakes before any work.
-        Unless values were overridden, each claim must name a variable and a place of the result.
+        """Check the reductions and claims with a lattice of pending cells.
+
+        The check finds mistakes in a study before any cell is computed. Claims are not checked if
+        the user has overridden values of the study.
         """
         pending = CellColumns.build_pending_cells(
             self.study.size, self.task.output_packing.packed_number_count
@@ -123,35 +141,56 @@ class StudyRun:
             claim.check_selection(lattice)
 
     def output_path(self, file_suffix: str) -> Path:
-        """A file of this run."""
+        """Return the path of a file of this run.
+
+        Parameters
+        ----------
+        file_suffix : str
+            End of the file name, after the name of the study.
+
+        Returns
+        -------
+        Path
+            Path in the output directory.
+        """
         assert self.options.output is not None
         return self.options.output / f"{self.study.name}{file_suffix}"
 
     @property
     def worker_log_path(self) -> Path | None:
-        """The file for the last words of worker processes, if anything is written."""
+        """Path of the worker log, or None without an output directory."""
         return None if self.options.output is None else self.output_path(".workers.log")
 
     def __call__(
         self, cell_batch_mapper: CellBatchMapper, progress_callback: ProgressCallback
     ) -> xr.Dataset:
-        """Compute the missing cells, then assemble, reduce and write the dataset.
+        """Compute the missing cells, and write the results.
+
+        After the computation, the run assembles the dataset and applies the reductions.
 
         Parameters
         ----------
         cell_batch_mapper : callable
-            Function that computes the cells: ``cells.compute_serially``, or the result of
-            ``workers.make_dask_batch_mapper``.
+            Function that computes the cells: ``cell_computation.compute_serially``, or the result
+            of ``worker_pool.make_dask_batch_mapper``.
         progress_callback : callable
-            Called with the number of finished cells and of all cells.
+            Function that is called with the number of finished cells and the number of all cells.
+
+        Returns
+        -------
+        xarray.Dataset
+            Results of the study.
 
         Raises
         ------
         DataError
-            If results cannot be kept, or the journal holds cells computed differently.
+            If the results cannot be written, or if the journal contains cells that were computed
+            with different settings.
         RunError
-            When it cannot go on, or is interrupted (`Interrupted`); what is finished is kept in
-            ``NAME.partial.nc`` and in the journal.
+            If the run cannot continue. The finished cells remain in the journal and, for NetCDF
+            output, in the file ``NAME.partial.nc``.
+        Interrupted
+            If the user interrupts the run. The finished cells are saved as for a ``RunError``.
         """
         keeping = self.options
         if keeping.format == "zarr":
@@ -173,14 +212,15 @@ class StudyRun:
         cell_batch_mapper: CellBatchMapper,
         progress_callback: ProgressCallback,
     ) -> None:
+        """Compute the cells that are missing in the journal."""
         cells = self.plan.unique_cell_numbers
-        # failures are tried again
+        # Failed cells are computed again.
         answered = journal.statuses(self.plan.keys[cells]) < int(Status.WORK_BUDGET_SPENT)
         missing = order_cells_by_golden_section(cells[~answered])
         done, failed, total = int(answered.sum()), 0, len(cells)
         progress_callback(done, total)
         if self.worker_log_path is not None:
-            self.worker_log_path.unlink(missing_ok=True)  # of an earlier run
+            self.worker_log_path.unlink(missing_ok=True)  # An earlier run may have left it.
         if not len(missing):
             return
         batches = CellBatchIterator(self.plan, missing, self.workers)
@@ -206,7 +246,7 @@ class StudyRun:
                     )
 
     def _warn_of_lost_cells(self, finished_cells: StoredCellRows) -> None:
-        """Warn of cells that ended their worker."""
+        """Warn about cells whose worker ended."""
         for key, status, message, *_ in finished_cells:
             if status in _STATUSES_OF_LOST_CELLS:
                 cell = int(np.flatnonzero(self.plan.keys == np.void(key))[0])
@@ -219,6 +259,7 @@ class StudyRun:
     # ---- from cells to results ------------------------------------------------------------------
 
     def _write_results(self, journal: CellJournal) -> xr.Dataset:
+        """Assemble, reduce and write the dataset."""
         zarr = self.options.format == "zarr"
         try:
             results = (
@@ -228,7 +269,7 @@ class StudyRun:
             )
         except RsfStudyError:
             raise
-        except Exception as error:  # of a reduction
+        except Exception as error:  # A reduction may raise any exception.
             raise RunError(f"cannot be reduced ({type(error).__name__}: {error})") from error
         if self.options.output is None:
             return clean_attributes(results)
@@ -238,7 +279,18 @@ class StudyRun:
         return written
 
     def assemble_lattice(self, journal: CellJournal) -> xr.Dataset:
-        """The dataset of the cells in the journal, without reductions."""
+        """Assemble the dataset of the journal, without reductions.
+
+        Parameters
+        ----------
+        journal : CellJournal
+            Journal of the run.
+
+        Returns
+        -------
+        xarray.Dataset
+            Dataset with all cells of the study. Cells that are not in the journal are pending.
+        """
         return assemble_dataset(self.study, journal.read_cells(self.plan.keys), self.provenance)
 
     def _apply_reductions(self, lattice: xr.Dataset) -> xr.Dataset:
@@ -254,11 +306,11 @@ class StudyRun:
         )
 
     def _save_partial_results(self, journal: CellJournal, error: BaseException) -> RunError:
-        """Write what is finished, and give the error for a run that ended early."""
+        """Write the finished cells, and return the error to raise."""
         why = f"{self.study.name}: {str(error) or 'interrupted'}. "
         if self.options.output is not None and self.options.format == "netcdf":
             lattice = self.assemble_lattice(journal)
-            with contextlib.suppress(Exception):  # a reduction may not bear missing cells, or any
+            with contextlib.suppress(Exception):  # Reductions may fail for missing cells.
                 lattice = self._apply_reductions(lattice)
             try:
                 write_dataset(lattice, self.output_path(".partial.nc"))
@@ -268,7 +320,7 @@ class StudyRun:
         return kind(why + self._describe_how_to_resume(journal))
 
     def _describe_how_to_resume(self, journal: CellJournal) -> str:
-        """A sentence: how many cells are finished, where they are, and how to go on."""
+        """Describe the finished cells, and how to resume the run."""
         known = int((journal.statuses(self.plan.keys) != int(Status.PENDING)).sum())
         text = f"{known} of {self.study.size} cells are finished"
         if self.options.output is None:

@@ -1,5 +1,7 @@
-"""A file for the last words of worker processes and of the libraries below them: stacks of threads,
-tracebacks of Dask.
+"""Log file for the errors of worker processes.
+
+The file contains stack traces of threads, and tracebacks of Dask and of the libraries that Dask
+uses.
 """
 
 from __future__ import annotations
@@ -19,19 +21,30 @@ from distributed import WorkerPlugin
 from rsfstudy.errors import DataError
 
 _STDERR_FILE_NUMBER = 2
-#: Loggers in this process of Dask and of the libraries below it.
+#: Names of the loggers of Dask and of the libraries that Dask uses.
 _NAMES_OF_DASK_LOGGERS = ("distributed", "tornado", "asyncio")
 
 
 @contextlib.contextmanager
 def open_worker_log(log_path: Path | None) -> Iterator[Path]:
-    """The file, ready for writing; a temporary one where no name is given. It is removed if
-    it stays empty.
+    """Open a log file for errors, and redirect the loggers of Dask to it.
+
+    The file is deleted afterwards if it is empty.
+
+    Parameters
+    ----------
+    log_path : Path or None
+        Path of the file. If None, a temporary file is created.
+
+    Yields
+    ------
+    Path
+        Path of the file.
 
     Raises
     ------
     DataError
-        If it cannot be written.
+        If the file cannot be written.
     """
     try:
         if log_path is None:
@@ -52,7 +65,7 @@ def open_worker_log(log_path: Path | None) -> Iterator[Path]:
 
 @contextlib.contextmanager
 def _redirect_loggers(log_file: Path) -> Iterator[None]:
-    """Write errors that are logged in this process to the file, and nowhere else."""
+    """Redirect the errors that Dask logs in this process to a file."""
     handler = logging.FileHandler(log_file, delay=True)
     handler.setLevel(logging.ERROR)
     handler.setFormatter(logging.Formatter("%(asctime)s - %(name)s - %(message)s"))
@@ -70,18 +83,25 @@ def _redirect_loggers(log_file: Path) -> Iterator[None]:
 
 @dataclass(frozen=True)
 class RedirectStderrPlugin(WorkerPlugin):
-    """A Dask worker whose process writes errors to a file.
+    """Dask plugin that redirects the standard error of a worker to a file.
 
     Parameters
     ----------
     log_path : Path
+        Path of the file.
     """
 
     log_path: Path
 
     def setup(self, worker: Any) -> None:
-        """Called by Dask when the worker starts."""
-        if sys.__stderr__ is None:  # the number of a closed one may belong to another file by now
+        """Redirect the standard error when the worker starts.
+
+        Parameters
+        ----------
+        worker : distributed.Worker
+            Worker that starts.
+        """
+        if sys.__stderr__ is None:  # Another file may use the number of a closed stream.
             return
         with contextlib.suppress(OSError):
             file = os.open(self.log_path, os.O_WRONLY | os.O_CREAT | os.O_APPEND, 0o666)

@@ -1,8 +1,9 @@
-"""Sends batches of cells to Dask workers, and finds a cell that kills its worker.
+"""Computation of cells on Dask workers.
 
-When a worker dies, its batch is lost, and perhaps others that were waiting there. All these cells
-are then sent one at a time, while nothing else runs, so that only the cell that kills a worker on
-its own is blamed.
+``WorkerPool`` starts worker processes on this machine, or uses a Dask cluster. If a worker dies,
+its batch is lost, and other batches that were waiting on that worker may be lost too. All lost
+cells are then computed one at a time while no other cell is running. A cell is therefore recorded
+as lost only if the cell itself kills a worker.
 """
 
 from __future__ import annotations
@@ -38,39 +39,41 @@ from rsfstudy.execution.clusters import check_script_has_main_guard, start_local
 from rsfstudy.measures import Outcome
 from rsfstudy.status import Status
 
-#: Longest time limit in s, three years; the system's timers take `WALL_TIME_FACTOR` times that, and
-#: not much more.
+#: Maximum time limit in s, about three years. The timers of the operating system accept only
+#: slightly more than ``WALL_OVER_CPU_TIME_LIMIT`` times this value.
 _MAX_TIME_LIMIT = 1e8
-#: Most worker processes for each core, and most on a machine with few cores.
+#: Maximum number of worker processes per core, and on a machine with few cores.
 _MAX_WORKERS_PER_CORE, _MAX_WORKERS_ON_SMALL_MACHINES = 4, 8
-#: Time in s without any worker after which a run warns, and after which it ends.
+#: Times in s without a worker after which a run issues a warning, and after which the run ends.
 WARN_AFTER_SECONDS_WITHOUT_WORKER, GIVE_UP_AFTER_SECONDS_WITHOUT_WORKER = 30.0, 600.0
 _POLL_INTERVAL = 2.0
-#: How often a cell may kill its worker before it is recorded as the culprit.
+#: Number of times that a cell may kill its worker before the cell is recorded as lost.
 _MAX_WORKER_DEATHS_PER_CELL = 2
 _SCHEDULER_LOST_MESSAGE = "the Dask scheduler is lost"
 
 
 class WorkerPool(contextlib.ExitStack):
-    """A place where cells are computed, for one run after the other. Worker processes of this
-    machine are started when the first cell is needed, which takes seconds, and end where the
-    context does.
+    """Pool of workers that compute the cells of one or more runs.
+
+    Use the pool as a context manager. Worker processes on this machine are started when the first
+    cell is computed, which takes a few seconds. The processes end when the context is left.
 
     Parameters
     ----------
-    process_count : int
-        Worker processes started on this machine; with 0, cells are computed in this process.
-    client : distributed.Client, optional
-        A Dask cluster to use instead.
-    cell_time_limit : float
-        CPU time in s that a cell may take on a worker.
-    log : Path, optional
-        Where processes of this machine write errors, whatever the run.
+    process_count : int, default: 2
+        Number of worker processes on this machine. If 0, cells are computed in this process.
+    dask_client : distributed.Client, optional
+        Client of a Dask cluster, which is used instead of local processes.
+    cell_time_limit : float, optional
+        CPU time in s that a cell may use on a worker. The default is ``CELL_TIME_LIMIT``.
+    log_path : Path, optional
+        File to which the worker processes on this machine write errors, for all runs. By default,
+        each run has its own log file.
 
     Raises
     ------
     InvalidValue
-        For what is none of these, and where worker processes would run the user's script again.
+        If an argument is invalid, or if worker processes would run the script of the user again.
     """
 
     def __init__(
@@ -114,14 +117,36 @@ class WorkerPool(contextlib.ExitStack):
         self._mapper_of_started_processes: CellBatchMapper | None = None
 
     def count_concurrent_cells(self) -> int:
-        """Number of cells that are computed at the same time."""
+        """Count the cells that are computed at the same time.
+
+        Returns
+        -------
+        int
+            Number of cells.
+
+        Raises
+        ------
+        RunError
+            If the Dask cluster is not available.
+        """
         return max(
             1, self.process_count if self.client is None else count_worker_threads(self.client)
         )
 
     def make_cell_batch_mapper(self, log_path: Path | None = None) -> CellBatchMapper:
-        """Mapper that computes batches of cells there; `log` is where processes of this machine
-        write errors, unless all runs have one file.
+        """Create a function that computes batches of cells on the workers.
+
+        Parameters
+        ----------
+        log_path : Path, optional
+            File to which the worker processes on this machine write errors, unless the pool has a
+            log file.
+
+        Returns
+        -------
+        callable
+            Function that takes a ``CellTask`` and a ``CellBatchIterator``, and yields finished
+            cells.
         """
         if self.client is not None:
             return make_dask_batch_mapper(self.client)
@@ -134,6 +159,7 @@ class WorkerPool(contextlib.ExitStack):
     def _compute_batches_on_processes(
         self, log_path: Path | None, task: CellTask, batches: CellBatchIterator
     ) -> Generator[StoredCellRows]:
+        """Compute batches on local processes, and start them if necessary."""
         from rsfstudy.execution import worker_log
 
         try:
@@ -144,25 +170,33 @@ class WorkerPool(contextlib.ExitStack):
             yield from self._mapper_of_started_processes(task, batches)
         except RunError:
             self.close()
-            self._mapper_of_started_processes = None  # whoever comes next starts others
+            self._mapper_of_started_processes = None  # The next run starts new processes.
             raise
 
 
 def make_dask_batch_mapper(
     dask_client: Any, log_path: str = "the log of that worker"
 ) -> CellBatchMapper:
-    """Compute on the workers of a Dask client, which need no shared file system.
+    """Create a function that computes batches of cells on a Dask cluster.
+
+    The workers do not need a shared file system.
 
     Parameters
     ----------
     dask_client : distributed.Client
-    log_path : str
-        Where workers write errors, for messages.
+        Client of the cluster.
+    log_path : str, optional
+        File to which the workers write errors, for messages.
+
+    Returns
+    -------
+    callable
+        Function that takes a ``CellTask`` and a ``CellBatchIterator``, and yields finished cells.
     """
 
     def map_cells(task: CellTask, batches: CellBatchIterator) -> Generator[StoredCellRows]:
         sent, plan = serialize_task(task), batches.plan
-        left: list[np.ndarray] = []  # of batches that a worker returned before their end
+        left: list[np.ndarray] = []  # remainders of batches that a worker returned early
         running: dict[Any, np.ndarray] = {}
         suspects: list[np.ndarray] = []
 
@@ -174,12 +208,15 @@ def make_dask_batch_mapper(
             return future
 
         def run_isolated(cell: np.ndarray) -> StoredCellRows:
-            """Compute a suspect alone; if its worker dies again, the cell is recorded as lost."""
+            """Compute a suspect cell while no other cell is running.
+
+            If the worker of the cell dies repeatedly, the cell is recorded as lost.
+            """
             (key,) = plan.keys[cell].tolist()
             for _ in range(_MAX_WORKER_DEATHS_PER_CELL):
                 _wait_for_finished_futures(
                     dask_client, [dask_client.submit(abs, 0, pure=False)]
-                )  # a worker is there
+                )  # This waits until a worker is available.
                 began = time.monotonic()
                 _wait_for_finished_futures(dask_client, [future := submit(cell)])
                 del running[future]
@@ -191,7 +228,7 @@ def make_dask_batch_mapper(
 
         try:
             while True:
-                # no more than keeps the workers busy: the rest would fill the scheduler's memory
+                # More batches than the workers need would fill the memory of the scheduler.
                 for _ in range(
                     0 if suspects else 4 + 2 * count_worker_threads(dask_client) - len(running)
                 ):
@@ -226,7 +263,7 @@ def make_dask_batch_mapper(
 
 
 def _timeout_outcome(task: CellTask) -> Outcome:
-    """The outcome of a cell that took too long."""
+    """Build the outcome of a cell that exceeded its time limit."""
     text = (
         f"no answer within {task.time_limit:g} s of CPU time, or "
         f"{WALL_OVER_CPU_TIME_LIMIT:g} times "
@@ -237,7 +274,7 @@ def _timeout_outcome(task: CellTask) -> Outcome:
 
 
 def _worker_lost_outcome() -> Outcome:
-    """The outcome of a cell that killed its worker."""
+    """Build the outcome of a cell whose worker died."""
     text = (
         f"its worker died {_MAX_WORKER_DEATHS_PER_CELL} times while it computed nothing "
         "else: a crash, "
@@ -247,8 +284,26 @@ def _worker_lost_outcome() -> Outcome:
 
 
 def count_worker_threads(dask_client: Any) -> int:
-    """Number of cells that the workers of a client compute at the same time."""
-    if dask_client.status == "connecting":  # again
+    """Count the threads of the workers of a Dask client.
+
+    Each thread computes one cell at a time.
+
+    Parameters
+    ----------
+    dask_client : distributed.Client
+        Client of the cluster.
+
+    Returns
+    -------
+    int
+        Number of threads.
+
+    Raises
+    ------
+    RunError
+        If the client has lost its scheduler, or is not running.
+    """
+    if dask_client.status == "connecting":  # The client has lost the connection.
         raise RunError(_SCHEDULER_LOST_MESSAGE)
     if dask_client.status != "running":
         raise RunError(f"the Dask client is {dask_client.status}: connect one to a cluster")
@@ -259,12 +314,13 @@ def count_worker_threads(dask_client: Any) -> int:
 
 
 def _wait_for_finished_futures(dask_client: Any, running_futures: Iterable[Any]) -> Iterable[Any]:
-    """Wait for futures to finish, and give those that have.
+    """Wait until at least one future is finished, and return finished futures.
 
     Raises
     ------
     RunError
-        If the scheduler is lost, or there has been no worker for `GIVE_UP_AFTER` seconds.
+        If the scheduler is lost, or if there is no worker for
+        ``GIVE_UP_AFTER_SECONDS_WITHOUT_WORKER`` seconds.
     """
     from distributed import wait
 
@@ -296,12 +352,12 @@ def _wait_for_finished_futures(dask_client: Any, running_futures: Iterable[Any])
 
 
 def _batch_result(future: Any) -> StoredCellRows | None:
-    """The finished cells of a batch, or None where its worker died.
+    """Return the finished cells of a batch, or None if its worker died.
 
     Raises
     ------
     RunError
-        If the cluster failed in any other way.
+        If the cluster failed for any other reason.
     """
     from distributed import KilledWorker
 

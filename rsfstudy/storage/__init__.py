@@ -1,8 +1,8 @@
-"""Results files: the journal of finished cells, datasets, schema, comparison.
+"""Storage of results: cell journals, results files, schema and comparison.
 
-The package writes results completely or not at all, checks files when it reads them, rebuilds a
-study from the declaration in its file, and compares two files. Add a file format here. It never
-computes a cell.
+A results file is written completely or not at all, and is checked when it is read. A study can be
+rebuilt from the declaration in its results file. Add new file formats to this package. The package
+never computes cells.
 """
 
 from __future__ import annotations

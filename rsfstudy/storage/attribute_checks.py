@@ -1,6 +1,6 @@
-"""Checks of the variables in a file and of their attributes.
+"""Checks of variables and their attributes in results files.
 
-The checks are needed because files may have been written by other programs.
+The checks are needed because other programs may have written the files.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ import xarray as xr
 
 from rsfstudy.errors import DataError, shorten_text
 
-#: Attributes that must be texts, and the most characters of each.
+#: Maximum length of each string attribute, in characters.
 _MAX_CHARACTERS_OF_TEXT_ATTRIBUTES = {
     "long_name": 2000,
     "units": 200,
@@ -28,6 +28,11 @@ _INVALID_ATTRIBUTE_REMEDY = "Correct it with xarray, or run the study again."
 
 def check_variable_attributes(dataset: xr.Dataset) -> None:
     """Check the type and length of the attributes that rsfstudy uses.
+
+    Parameters
+    ----------
+    dataset : xarray.Dataset
+        Dataset to check.
 
     Raises
     ------
@@ -45,6 +50,13 @@ def check_variable_attributes(dataset: xr.Dataset) -> None:
 def check_motion_variables(dataset: xr.Dataset) -> None:
     """Check that the variables along a motion are numeric.
 
+    The variables along a motion have the same dimensions as the variable ``slip``.
+
+    Parameters
+    ----------
+    dataset : xarray.Dataset
+        Dataset to check.
+
     Raises
     ------
     DataError
@@ -60,6 +72,7 @@ def check_motion_variables(dataset: xr.Dataset) -> None:
 
 
 def _check_text_attribute(attribute_path: str, value: object, max_characters: int) -> None:
+    """Check the type and length of a string attribute."""
     if not isinstance(value, str):
         raise DataError(
             f"{attribute_path} is {shorten_text(value)}, and must be a text. "
@@ -73,6 +86,7 @@ def _check_text_attribute(attribute_path: str, value: object, max_characters: in
 
 
 def _check_flags(variable_name: str, attributes: Mapping[Any, Any]) -> None:
+    """Check that flag values are numbers, and that each has a meaning."""
     if not {"flag_values", "flag_meanings"} & set(attributes):
         return
     values = np.ravel(attributes.get("flag_values", ()))

@@ -1,8 +1,11 @@
-"""The journal of a study: every finished cell, on disk as soon as it is finished.
+"""Journal of the finished cells of a study.
 
-An SQLite file beside the results, for one run at a time. A cell is found again by the exact values
-of its scene and of its measure's fields; everything else that decides its numbers is the journal's
-fingerprint, and a journal with another fingerprint is refused.
+The journal is an SQLite file next to the results. Each cell is stored as soon as it is finished, so
+that an interrupted run can be resumed. Only one run can use a journal at a time.
+
+The key of a cell is a digest of the exact values of the scene fields and the measure fields. All
+other settings that affect the results form the fingerprint of the journal. A run rejects a journal
+with a different fingerprint, unless the only difference is a smaller work budget in the journal.
 """
 
 from __future__ import annotations
@@ -24,10 +27,12 @@ from rsfstudy.errors import DataError, shorten_text
 from rsfstudy.measures import Measure, Outcome
 from rsfstudy.status import Status
 
-#: A finished cell: its key, status, message, right-hand sides, wall time in s, numbers, checksum.
+#: Row of the table ``cells``: key, name of the status, message, number of right-hand-side
+#: evaluations, wall time in s, packed outputs, and checksum.
 StoredCellRow = tuple[bytes, str, str, int, float, bytes, int]
 
-#: Raised when the tables, the checksum or what a cell is named by change.
+#: Version of the journal format. Increment the version if the tables, the checksum or the
+#: definition of the cell key change.
 _FORMAT_VERSION = 4
 _CREATE_TABLES = """
 CREATE TABLE IF NOT EXISTS fingerprint (json TEXT NOT NULL);
@@ -35,19 +40,35 @@ CREATE TABLE IF NOT EXISTS cells (
     key BLOB PRIMARY KEY, status TEXT, message TEXT, work INTEGER, seconds REAL, numbers BLOB,
     checksum INTEGER);
 """
-#: What a journal has no need of, and might act when it is written to.
+#: Query for database objects that do not belong to a journal. A trigger, for example, would run
+#: whenever the journal is written.
 _FOREIGN_OBJECTS_QUERY = """
 SELECT type || ' ' || name FROM sqlite_master
 WHERE type NOT IN ('table', 'index') OR tbl_name NOT IN ('fingerprint', 'cells')
 """
 _KEYS_PER_QUERY = 900
-#: How long to wait for another run to end, in s.
+#: Time to wait until another run releases the journal, in s.
 _LOCK_TIMEOUT = 5.0
 _UNUSABLE_JOURNAL_REMEDY = "Choose another --output, or start over with --fresh."
 
 
 class OutputPacking:
-    """The position of each number of a measure in a row of float64."""
+    """Layout of the outputs of a measure in a row of float64 numbers.
+
+    Parameters
+    ----------
+    measure : Measure
+        Measure whose outputs are packed.
+
+    Attributes
+    ----------
+    shapes : dict of str to tuple of int
+        Shape of each output.
+    slices : dict of str to slice
+        Position of each output in the row.
+    packed_number_count : int
+        Length of the row.
+    """
 
     def __init__(self, measure: Measure) -> None:
         sizes = {name: len(values) for name, values in measure.inner_coordinates.items()}
@@ -60,7 +81,18 @@ class OutputPacking:
         self._struct_format = "" if any(self.shapes.values()) else f"<{self.packed_number_count}d"
 
     def pack_outputs(self, output_values: Mapping[str, Any]) -> bytes:
-        """Numbers as bytes; those that are missing become NaN."""
+        """Pack the outputs of a cell as bytes.
+
+        Parameters
+        ----------
+        output_values : mapping of str to float or ndarray
+            Outputs by name. Missing outputs become NaN.
+
+        Returns
+        -------
+        bytes
+            Little-endian float64 numbers.
+        """
         if self._struct_format:
             return struct.pack(
                 self._struct_format, *(output_values.get(name, math.nan) for name in self.shapes)
@@ -71,7 +103,22 @@ class OutputPacking:
         return row.tobytes()
 
     def pack_cell(self, cell_key: bytes, outcome: Outcome, wall_time: float) -> StoredCellRow:
-        """A cell as the journal holds it."""
+        """Pack the outcome of a cell as a row of the journal.
+
+        Parameters
+        ----------
+        cell_key : bytes
+            Key of the cell.
+        outcome : Outcome
+            Status, message and outputs of the cell.
+        wall_time : float
+            Wall time of the computation in s.
+
+        Returns
+        -------
+        StoredCellRow
+            Row of the journal, including the checksum.
+        """
         numbers, work = self.pack_outputs(outcome.values), outcome.rhs_evaluations
         row = (outcome.status.name, outcome.message, work, wall_time, numbers)
         return (cell_key, *row, _compute_checksum(cell_key, *row))
@@ -79,8 +126,20 @@ class OutputPacking:
 
 @dataclass(frozen=True)
 class CellColumns:
-    """Columns of some cells: status, message, right-hand sides, wall time, and one row of
-    numbers each.
+    """Statuses, messages, costs and outputs of a group of cells.
+
+    Parameters
+    ----------
+    statuses : ndarray of int8, shape (n,)
+        Codes of the statuses (see ``Status``).
+    messages : ndarray of str, shape (n,)
+        Error messages and remarks.
+    rhs_evaluations : ndarray of int64, shape (n,)
+        Numbers of right-hand-side evaluations.
+    wall_times : ndarray of float, shape (n,)
+        Wall times in s. The wall time of a pending cell is NaN.
+    packed_outputs : ndarray of float, shape (n, m)
+        Outputs of each cell, in the layout of ``OutputPacking``.
     """
 
     statuses: np.ndarray
@@ -91,7 +150,20 @@ class CellColumns:
 
     @classmethod
     def build_pending_cells(cls, cell_count: int, packed_number_count: int) -> CellColumns:
-        """Cells that are not computed yet."""
+        """Build the columns of cells that are not computed yet.
+
+        Parameters
+        ----------
+        cell_count : int
+            Number of cells.
+        packed_number_count : int
+            Number of packed outputs per cell.
+
+        Returns
+        -------
+        CellColumns
+            Columns with the status ``PENDING`` and NaN outputs.
+        """
         return cls(
             np.full(cell_count, int(Status.PENDING), dtype=np.int8),
             np.full(cell_count, "", dtype=object),
@@ -102,24 +174,27 @@ class CellColumns:
 
 
 class CellJournal:
-    """Finished cells of one study.
+    """Journal of the finished cells of one study.
+
+    The journal locks its file until it is closed. Use the journal as a context manager.
 
     Parameters
     ----------
     path : Path or None
-        The SQLite file; None keeps them in memory.
-    fingerprint : mapping
-        All that decides the numbers of a cell, except what its key holds, as plain data.
+        SQLite file. If None, the journal is kept in memory.
+    fingerprint : mapping of str to object
+        Settings that affect the results of all cells, as plain data. The fingerprint does not
+        contain the fields that form the cell keys.
     packing : OutputPacking
-        The numbers of a cell.
-    fresh : bool
-        Forget what the file holds.
+        Layout of the outputs of a cell.
+    fresh : bool, default: False
+        If True, delete an existing journal first.
 
     Raises
     ------
     DataError
-        If the file cannot be opened, another run uses it, or its fingerprint differs; the text says
-        where.
+        If the file cannot be opened, if another run uses the file, or if the stored fingerprint
+        differs from ``fingerprint``. If the fingerprints differ, the message lists the differences.
     """
 
     def __init__(
@@ -149,10 +224,11 @@ class CellJournal:
             self._db.close()
             raise self._build_unusable_journal_error(error) from error
         except BaseException:
-            self._db.close()  # an open connection would keep the journal locked
+            self._db.close()  # An open connection would keep the journal locked.
             raise
 
     def _build_unusable_journal_error(self, error: Exception) -> DataError:
+        """Build the error for a journal that cannot be opened."""
         if _is_database_locked_error(error):
             rule = f"another run uses {self._path}: let it end, or choose another --output."
             return DataError(rule)
@@ -161,7 +237,7 @@ class CellJournal:
     def _read_stored_fingerprint(self, run_fingerprint: str) -> Any:
         """Return the fingerprint stored in the journal.
 
-        If the journal is new, the function stores ``run_fingerprint`` and returns
+        If the journal is new, the method stores ``run_fingerprint`` and returns
         ``run_fingerprint``.
         """
         with self._db:
@@ -180,11 +256,11 @@ class CellJournal:
     def _accept_journal_with_smaller_budget(
         self, stored_fingerprint: Any, run_fingerprint: Mapping[str, Any]
     ) -> None:
-        """Accept a journal with a smaller work budget, and reject any other difference.
+        """Accept a smaller work budget, and reject any other difference.
 
-        If the fingerprints differ only in the work budget and the new budget is larger, the new
-        fingerprint is stored. The results in the journal remain valid because no result depends on
-        the budget. Otherwise the method raises ``DataError``.
+        If the fingerprints differ only in the work budget and the new budget is larger, the method
+        stores the new fingerprint. The results in the journal remain valid because no result
+        depends on the budget. Otherwise the method raises ``DataError``.
         """
         try:
             differ = find_fingerprint_differences(
@@ -208,18 +284,25 @@ class CellJournal:
         )
 
     def __enter__(self) -> CellJournal:
+        """Return the journal."""
         return self
 
     def __exit__(self, *_error: object) -> None:
+        """Close the journal."""
         self._db.close()
 
     def add_cells(self, cells: Iterable[StoredCellRow]) -> None:
-        """Record finished cells, all or none.
+        """Add finished cells to the journal in one transaction.
+
+        Parameters
+        ----------
+        cells : iterable of StoredCellRow
+            Finished cells. A cell replaces an existing cell with the same key.
 
         Raises
         ------
         DataError
-            If the disk takes no more.
+            If the cells cannot be written, for example because the disk is full.
         """
         try:
             with self._db:
@@ -230,7 +313,24 @@ class CellJournal:
             raise DataError(f"cannot add to {self._path}: {error}.") from error
 
     def statuses(self, cell_keys: np.ndarray) -> np.ndarray:
-        """The status of each cell; `pending` for a cell that is not in the journal."""
+        """Return the statuses of cells.
+
+        Parameters
+        ----------
+        cell_keys : ndarray of bytes, shape (n,)
+            Keys of the cells.
+
+        Returns
+        -------
+        ndarray of int8, shape (n,)
+            Codes of the statuses, in the order of ``cell_keys``. The status of a cell that is not
+            in the journal is ``PENDING``.
+
+        Raises
+        ------
+        DataError
+            If the journal cannot be read.
+        """
         codes = {status.name: int(status) for status in Status}
         statuses = np.full(len(cell_keys), int(Status.PENDING), dtype=np.int8)
         for places, rows in self._query_rows_of_cells(cell_keys, "status"):
@@ -238,12 +338,23 @@ class CellJournal:
         return statuses
 
     def read_cells(self, cell_keys: np.ndarray) -> CellColumns:
-        """Columns of these cells, in the order of `keys`.
+        """Read cells from the journal.
+
+        Parameters
+        ----------
+        cell_keys : ndarray of bytes, shape (n,)
+            Keys of the cells.
+
+        Returns
+        -------
+        CellColumns
+            Columns of the cells, in the order of ``cell_keys``. Cells that are not in the journal
+            are pending.
 
         Raises
         ------
         DataError
-            If a row is not what was written.
+            If the journal cannot be read, or if a row does not match its checksum.
         """
         columns = CellColumns.build_pending_cells(len(cell_keys), self._packing.packed_number_count)
         what = "key, status, message, work, seconds, numbers, checksum"
@@ -260,7 +371,10 @@ class CellJournal:
     def _query_rows_of_cells(
         self, cell_keys: np.ndarray, column_names: str
     ) -> Iterator[tuple[list[int], list[Any]]]:
-        """The cells that are known, a group at a time: places of their keys, and their rows."""
+        """Yield the rows of cells that are in the journal, in groups.
+
+        Each group is a list of indices into ``cell_keys`` and a list of rows.
+        """
         for start in range(0, len(cell_keys), _KEYS_PER_QUERY):
             wanted: list[bytes] = cell_keys[start : start + _KEYS_PER_QUERY].tolist()
             marks = ", ".join("?" * len(wanted))
@@ -279,7 +393,10 @@ class CellJournal:
 def _fill_cell_columns(
     columns: CellColumns, cell_indices: list[int], stored_rows: list[Any]
 ) -> None:
-    """Fill in rows; an error of Python's where one is not what was written."""
+    """Fill the columns with stored rows.
+
+    If a row is damaged, the function raises a KeyError, OverflowError, TypeError or ValueError.
+    """
     if any(_compute_checksum(*known) != checksum for *known, checksum in stored_rows):
         raise ValueError("checksum")
     _keys, status, message, work, seconds, numbers, _checksums = zip(*stored_rows, strict=True)
@@ -292,14 +409,14 @@ def _fill_cell_columns(
 
 @dataclass(frozen=True)
 class CellTimings:
-    """Times that cells took.
+    """Wall times of the cells in a journal.
 
-    Attributes
+    Parameters
     ----------
-    fingerprint : mapping
-        What else decided their numbers.
+    fingerprint : mapping of str to object
+        Fingerprint of the journal.
     seconds_by_cell_key : mapping of bytes to float
-        Wall time of each cell that was timed, by its key.
+        Wall time in s by cell key. Cells without a recorded time are omitted.
     """
 
     fingerprint: Mapping[str, Any]
@@ -307,7 +424,18 @@ class CellTimings:
 
 
 def read_timings(path: Path) -> CellTimings | None:
-    """Times of the cells of a journal; None where there is none that can be read just now."""
+    """Read the wall times of the cells in a journal.
+
+    Parameters
+    ----------
+    path : Path
+        Path of the journal.
+
+    Returns
+    -------
+    CellTimings or None
+        Wall times, or None if the journal does not exist, is damaged, or is locked by a run.
+    """
     try:
         uri = f"{path.resolve().as_uri()}?mode=ro"
         with contextlib.closing(sqlite3.connect(uri, uri=True, timeout=0.0)) as db:
@@ -319,7 +447,7 @@ def read_timings(path: Path) -> CellTimings | None:
 
 
 def _open_exclusively(path: Path | str) -> sqlite3.Connection:
-    """Open a database for this process alone, until it is closed or the process ends."""
+    """Open a database and lock it until it is closed or the process ends."""
     db = sqlite3.connect(path, timeout=_LOCK_TIMEOUT)
     try:
         db.execute("PRAGMA locking_mode = EXCLUSIVE")
@@ -332,12 +460,14 @@ def _open_exclusively(path: Path | str) -> sqlite3.Connection:
 
 
 def _is_database_locked_error(error: Exception) -> bool:
+    """Return True if another process has locked the database."""
     return getattr(error, "sqlite_errorcode", None) == sqlite3.SQLITE_BUSY
 
 
 def _remove_journal(path: Path) -> None:
-    """Remove a journal, unless another run uses it, and the rollback file that an interrupted write
-    left beside it.
+    """Delete a journal and its rollback file, unless a run uses the journal.
+
+    SQLite leaves a rollback file behind if a write is interrupted.
     """
     if path.exists():
         try:
@@ -357,8 +487,9 @@ def _compute_checksum(
     wall_time: float | None,
     packed_outputs: bytes,
 ) -> int:
+    """Compute the CRC-32 checksum of a row of the journal."""
     known = math.nan if wall_time is None else wall_time
-    # repr keeps texts apart, whatever they hold
+    # repr escapes quotes, so that different strings cannot produce the same text.
     text = f"{cell_key!r} {status!r} {message!r} {rhs_evaluations} {known!r} "
     return zlib.crc32(packed_outputs, zlib.crc32(text.encode()))
 
@@ -366,8 +497,20 @@ def _compute_checksum(
 def find_fingerprint_differences(
     first: Mapping[str, Any], second: Mapping[str, Any]
 ) -> dict[str, tuple[Any, Any]]:
-    """Entries in which two fingerprints differ: theirs and ours, by name. Either may come from a
-    file.
+    """Find the entries that differ between two fingerprints.
+
+    Both fingerprints are converted to JSON and back before the comparison, because a fingerprint
+    that was read from a file contains lists instead of tuples.
+
+    Parameters
+    ----------
+    first, second : mapping of str to object
+        Fingerprints to compare.
+
+    Returns
+    -------
+    dict of str to tuple of (object, object)
+        First and second value of each entry that differs. The value of a missing entry is None.
     """
     first, second = (json.loads(json.dumps(fingerprint)) for fingerprint in (first, second))
     return {

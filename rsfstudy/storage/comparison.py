@@ -1,5 +1,8 @@
-"""Compares results datasets: how the numbers of one lattice agree; two files side by side, whatever
-their lattices, with their declarations and what made them; and a cell by its place on the axes.
+"""Comparison of results datasets.
+
+``compare_same_lattice`` compares two datasets of the same study variable by variable.
+``compare_results`` compares any two results datasets, including their declarations, versions and
+machines. ``find_cell_number`` finds a cell by its coordinates.
 """
 
 from __future__ import annotations
@@ -24,7 +27,7 @@ from rsfstudy.storage.schema import is_of_single_scene, read_provenance
 from rsfstudy.vocabulary import TIMING_VARIABLES
 
 _AGREEMENT_COLUMNS = ["variable", "values", "identical", "largest_difference", "beyond_errors"]
-#: Of a fingerprint, what the declaration states too.
+#: Entries of a fingerprint that the declaration contains too.
 _FINGERPRINT_KEYS_ALSO_DECLARED = {"study", "measure", "rtol", "budget", "methods", "engine"}
 
 FirstAndSecondValue = tuple[Any, Any]
@@ -34,15 +37,26 @@ FirstAndSecondValue = tuple[Any, Any]
 
 
 def compare_same_lattice(first: xr.Dataset, second: xr.Dataset) -> pd.DataFrame:
-    """Agreement of two datasets of one study, variable by variable, in the cells that both have.
+    """Compare two datasets of the same study, variable by variable.
+
+    Only cells that are finished in both datasets are compared. Variables without the dimensions of
+    the lattice, such as reductions, are compared only if all cells are finished in both datasets.
+    Measured times are not compared.
+
+    Parameters
+    ----------
+    first, second : xarray.Dataset
+        Results of one study, or two motions of one scene.
 
     Returns
     -------
     pandas.DataFrame
-        ``variable``, ``values``, ``identical``, ``largest_difference`` and ``beyond_errors``, how
-        many differ by more than the sum of both error estimates, NaN where there are none; in
-        ``attrs["differs"]`` what decides a number and differs between them. Measured times, which
-        no two runs share, are left out.
+        Table with one row per variable. The column ``values`` is the number of compared values,
+        ``identical`` is the number of identical values, and ``largest_difference`` is the largest
+        absolute difference. The column ``beyond_errors`` is the number of values that differ by
+        more than the sum of both error estimates, or NaN if the variable has no error estimates.
+        For floating-point variables with flag values, every difference is beyond the errors. The
+        attribute ``differs`` in ``attrs`` contains the differences between the fingerprints.
     """
     if is_of_single_scene(first):
         return _compare_motions(first, second)
@@ -54,7 +68,7 @@ def compare_same_lattice(first: xr.Dataset, second: xr.Dataset) -> pd.DataFrame:
         if set(both.dims) <= set(values.dims):
             known = both.broadcast_like(values).transpose(*values.dims).values
             rows.append(_variable_agreement(name, first, second, known))
-        elif bool(both.all()):  # else it may be reduced from cells missing in one of them
+        elif bool(both.all()):  # Reductions may use cells that one dataset lacks.
             rows.append(_variable_agreement(name, first, second))
     return _agreement_table(
         rows, *(read_provenance(dataset)["fingerprint"] for dataset in (first, second))
@@ -62,7 +76,7 @@ def compare_same_lattice(first: xr.Dataset, second: xr.Dataset) -> pd.DataFrame:
 
 
 def _compare_motions(theirs: xr.Dataset, ours: xr.Dataset) -> pd.DataFrame:
-    """Compare two motions of one scene (see ``compare_same_lattice`` for studies)."""
+    """Compare two motions of one scene."""
     rows = [
         _variable_agreement(n, theirs, ours)
         for n, values in theirs.variables.items()
@@ -75,20 +89,24 @@ def _compare_motions(theirs: xr.Dataset, ours: xr.Dataset) -> pd.DataFrame:
 def _agreement_table(
     variable_rows: Sequence[dict[str, Any]], first: Mapping[str, Any], second: Mapping[str, Any]
 ) -> pd.DataFrame:
+    """Build the table of agreement, with the fingerprint differences."""
     frame = pd.DataFrame(variable_rows, columns=_AGREEMENT_COLUMNS)
     frame.attrs["differs"] = find_fingerprint_differences(first, second)
     return frame
 
 
 def _finished_cell_mask(dataset: xr.Dataset) -> xr.DataArray:
+    """Return a mask that is True for finished cells."""
     return dataset["status"] != int(Status.PENDING)
 
 
 def _variable_agreement(
     variable_name: Hashable, first: xr.Dataset, second: xr.Dataset, common_cell_mask: Any = ...
 ) -> dict[str, Any]:
-    """Agreement of a variable where it is known to both. Variables agree nowhere that differ in
-    shape, or of which one alone holds real numbers.
+    """Compare one variable in the cells that are finished in both datasets.
+
+    If the shapes differ, or if only one of the two variables contains floating-point numbers, the
+    number of identical values is 0.
     """
     a, b = first[variable_name], second.get(variable_name)
     found: dict[str, Any] = {"variable": variable_name, "values": a.size, "identical": 0}
@@ -104,9 +122,9 @@ def _variable_agreement(
     errors = [d[f"{variable_name}_error"] for d in (first, second) if f"{variable_name}_error" in d]
     if [error.shape for error in errors] == [a.shape, a.shape]:
         allowed = errors[0].values[common_cell_mask] + errors[1].values[common_cell_mask]
-        # a number that one of them lacks, or whose error is unknown, is beyond any estimate
+        # NaN compares as False, so a missing number or a missing error exceeds the estimates.
         found["beyond_errors"] = int((~same & ~(gap <= allowed)).sum())
-    elif "flag_values" in a.attrs:  # codes have no errors
+    elif "flag_values" in a.attrs:  # Codes have no error estimates.
         found["beyond_errors"] = int((~same).sum())
     return found
 
@@ -120,26 +138,28 @@ def _variable_agreement(
 class Comparison:
     """Differences between two results datasets.
 
-    Attributes
+    Parameters
     ----------
-    declaration : mapping of str to (object, object)
-        Parts of the declarations that differ, by their paths; None where one has no such part.
-    origin : mapping of str to (object, object)
-        Versions and machines that differ.
-    differing_axis_points : mapping of str to (list, list)
-        Points that only the first has, and only the second, of axes that differ.
+    declaration : mapping of str to tuple of (object, object)
+        First and second value of each declaration entry that differs, by the path of the entry. The
+        value of a missing entry is None.
+    origin : mapping of str to tuple of (object, object)
+        Versions, code digests and machines that differ.
+    differing_axis_points : mapping of str to tuple of (list, list)
+        Points that only the first dataset has, and points that only the second dataset has, for
+        each axis that differs.
     finished_cell_counts : tuple of int
-        Finished cells that both have, that only the first has, and only the second.
+        Number of cells that are finished in both datasets, only in the first dataset, and only in
+        the second dataset.
     statuses : pandas.DataFrame
-        One row for each cell that both have and that ended otherwise: its place on each axis,
-        ``first`` and ``second``.
+        Table of the cells that are finished in both datasets with different statuses. The columns
+        are the coordinates of the cell, ``first`` and ``second``.
     agreement_table : pandas.DataFrame
-        One row a variable that both have, over the cells that both have: ``variable``, ``values``,
-        ``identical``, ``largest_difference``, and ``beyond_errors``, how many differ by more than
-        the sum of both error estimates (NaN where there are none; a headline without an estimate
-        counts as exact).
+        Agreement of the variables in the cells that are finished in both datasets. The columns are
+        documented in ``compare_same_lattice``. If the main result has no error estimates, any
+        difference is beyond the errors.
     uncompared_variables : mapping of str to str
-        Variables that are not compared, and why.
+        Reasons why variables are not compared, by variable name.
     """
 
     declaration: Mapping[str, FirstAndSecondValue]
@@ -152,25 +172,41 @@ class Comparison:
 
     @property
     def beyond_errors(self) -> list[str]:
-        """Variables with numbers that differ by more than both error estimates allow."""
+        """Variables that differ by more than the sum of the errors."""
         return list(self.agreement_table["variable"][self.agreement_table["beyond_errors"] > 0])
 
     @property
     def agrees(self) -> bool:
-        """True where both have cells in common, which ended alike, with the same numbers within
-        their error estimates.
+        """True if the datasets agree in the cells that are finished in both.
+
+        The datasets agree if they have finished cells in common, if these cells have the same
+        statuses, and if no variable differs by more than the sum of the error estimates.
         """
         return self.finished_cell_counts[0] > 0 and self.statuses.empty and not self.beyond_errors
 
 
 def compare_results(first: xr.Dataset, second: xr.Dataset) -> Comparison:
-    """Compare two results datasets, cell by cell where both have the same place on every axis.
+    """Compare two results datasets in the cells with equal coordinates.
+
+    If only one dataset has an axis, only the cells at the fixed value of the other dataset are
+    compared.
+
+    Parameters
+    ----------
+    first, second : xarray.Dataset
+        Results of two studies, or two results of one study.
+
+    Returns
+    -------
+    Comparison
+        Differences between the datasets.
 
     Raises
     ------
     InvalidValue
-        Where an axis of one has no counterpart in the other, not even a fixed value; and where its
-        points have the same names in both and hold other values, as samples drawn anew do.
+        If a dataset lacks an axis and has no fixed value of the coordinate, or if points with the
+        same label have different field values. For example, two different random samples have
+        numbered points with different values.
     """
     both = [
         _add_axes_of_other_dataset(one, other) for one, other in ((first, second), (second, first))
@@ -205,7 +241,10 @@ def compare_results(first: xr.Dataset, second: xr.Dataset) -> Comparison:
 
 
 def _add_axes_of_other_dataset(dataset: xr.Dataset, other: xr.Dataset) -> xr.Dataset:
-    """A dataset with all axes of another: one that it lacks has its fixed value for only point."""
+    """Add the axes that only another dataset has.
+
+    Each added axis has one point, which is the fixed value of the coordinate in the dataset.
+    """
     cells = set(dataset["status"].dims)
     for dimension in other["status"].dims:
         if dimension in cells:
@@ -220,7 +259,10 @@ def _add_axes_of_other_dataset(dataset: xr.Dataset, other: xr.Dataset) -> xr.Dat
 
 
 def _alignment_labels(dataset: xr.Dataset) -> dict[str, Any]:
-    """Points of the dimensions to align by: rounding moves no point of an axis from another."""
+    """Round the coordinates to 12 digits, so that two datasets can be aligned.
+
+    A coordinate is not rounded if two of its points would become equal.
+    """
     labels = {}
     for name in map(str, dataset.dims):
         values = dataset[name]
@@ -234,7 +276,10 @@ def _alignment_labels(dataset: xr.Dataset) -> dict[str, Any]:
 
 
 def _check_same_axis_points(first: xr.Dataset, second: xr.Dataset) -> None:
-    """Refuse points of one name that hold other values of a field in the two, beyond rounding."""
+    """Check that points with the same label have the same field values.
+
+    Rounding errors are ignored.
+    """
     for name, one in first.coords.items():
         if not one.dims or name in one.dims or name not in second.coords:
             continue
@@ -250,7 +295,7 @@ def _check_same_axis_points(first: xr.Dataset, second: xr.Dataset) -> None:
 
 
 def _uncompared_variables(aligned_datasets: Sequence[xr.Dataset]) -> dict[str, str]:
-    """Variables that cannot be compared, or would compare other things than numbers of cells."""
+    """Find the variables that cannot be compared, and the reasons."""
     first, second = aligned_datasets
     unequal = {
         str(d) for d in first["status"].dims if set(first.indexes[d]) != set(second.indexes[d])
@@ -268,7 +313,10 @@ def _uncompared_variables(aligned_datasets: Sequence[xr.Dataset]) -> dict[str, s
 
 
 def _compare_numbers_of_shared_cells(shared_cells: Sequence[xr.Dataset]) -> pd.DataFrame:
-    """Agreement of the numbers; a headline without an error estimate is held to be exact."""
+    """Compare the numbers of the cells that both datasets have.
+
+    If the main result has no error estimates, any difference is beyond the errors.
+    """
     frame = compare_same_lattice(*shared_cells)
     about = find_primary_output(shared_cells[0])
     exact = (frame["variable"] == about) & frame["beyond_errors"].isna()
@@ -279,7 +327,7 @@ def _compare_numbers_of_shared_cells(shared_cells: Sequence[xr.Dataset]) -> pd.D
 def _compare_statuses_of_shared_cells(
     shared_cells: Sequence[xr.Dataset], common_cell_mask: xr.DataArray
 ) -> pd.DataFrame:
-    """The cells that ended otherwise, by their places on the axes."""
+    """Build a table of the cells with different statuses."""
     first, second = (one["status"].reset_coords(drop=True) for one in shared_cells)
     both = xr.Dataset({"first": first, "second": second, "known": common_cell_mask}).reset_coords(
         drop=True
@@ -290,7 +338,10 @@ def _compare_statuses_of_shared_cells(
 
 
 def _flatten_declaration(declaration_part: Any, path: str = "") -> Iterator[tuple[str, Any]]:
-    """The parts of a declaration by their paths; lists of plain values are parts as they are."""
+    """Yield the path and value of each entry of a declaration.
+
+    A list of plain values is a single entry.
+    """
     if isinstance(declaration_part, dict) and declaration_part:
         for name, value in declaration_part.items():
             yield from _flatten_declaration(value, f"{path}.{name}" if path else name)
@@ -305,7 +356,7 @@ def _flatten_declaration(declaration_part: Any, path: str = "") -> Iterator[tupl
 
 
 def _read_versions_and_machine(dataset: xr.Dataset) -> dict[str, Any]:
-    """Versions, code and machine that made a dataset."""
+    """Read the versions, code digests and machine of a dataset."""
     about: Mapping[str, Any] = read_provenance(dataset)
     decided = {
         n: v for n, v in about["fingerprint"].items() if n not in _FINGERPRINT_KEYS_ALSO_DECLARED
@@ -320,12 +371,25 @@ def _read_versions_and_machine(dataset: xr.Dataset) -> dict[str, Any]:
 
 
 def find_cell_number(dataset: xr.Dataset, coordinate_values: Mapping[str, Any]) -> int:
-    """The number of the cell at a place, in row-major order.
+    """Find the number of a cell from its coordinates.
+
+    Parameters
+    ----------
+    dataset : xarray.Dataset
+        Results of a study.
+    coordinate_values : mapping of str to object
+        Coordinate value for each dimension. Dimensions with a single point can be omitted. Numbers
+        must agree with a point of the axis within a relative tolerance of 1e-5.
+
+    Returns
+    -------
+    int
+        Number of the cell in row-major order.
 
     Raises
     ------
     InvalidValue
-        Where the place names no dimension, leaves one out, or is not on its axis.
+        If a dimension is unknown or missing, or if a value is not a point of its axis.
     """
     status = dataset["status"]
     for name in coordinate_values:
@@ -355,7 +419,10 @@ def find_cell_number(dataset: xr.Dataset, coordinate_values: Mapping[str, Any]) 
 
 
 def _find_index_on_axis(axis_values: np.ndarray, wanted_value: Any) -> int | None:
-    """Index of a value on an axis: an equal label, or the nearest number if it is close enough."""
+    """Find the index of an equal label, or of the nearest number.
+
+    The relative difference of the nearest number must be at most 1e-5.
+    """
     if axis_values.dtype.kind in "iuf":
         try:
             number = float({"true": 1.0, "false": 0.0}.get(str(wanted_value).lower(), wanted_value))

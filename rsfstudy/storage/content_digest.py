@@ -1,10 +1,10 @@
 """Digest of the contents of a dataset, stored in its NetCDF file.
 
-The digest covers the numbers, the strings and the declaration of the dataset. A second digest,
-at the end of the file, covers all bytes. The second digest is lost if the file is truncated or
-if another program saves the file, whereas the digest of the contents is an attribute and is
-preserved. HDF5 stores checksums of small attributes, names and shapes. HDF5 does not store
-checksums of the data, nor of attributes larger than 4 kB, such as a long declaration.
+The digest covers the numbers, the strings and the declaration of the dataset. A second digest, at
+the end of the file, covers all bytes. The second digest is lost if the file is truncated or if
+another program saves the file, whereas the digest of the contents is an attribute and is preserved.
+HDF5 stores checksums of small attributes, names and shapes. HDF5 does not store checksums of the
+data, nor of attributes larger than 4 kB, such as a long declaration.
 """
 
 from __future__ import annotations
@@ -19,14 +19,25 @@ import xarray as xr
 from rsfstudy.errors import DataError, shorten_text
 from rsfstudy.quantities import units_or_scale_of_variable
 
-#: The attribute of the file that holds the digest.
+#: Name of the file attribute that contains the digest.
 DIGEST_ATTRIBUTE = "content_digest"
-#: Attributes of the file that decide how rsfstudy interprets its numbers.
+#: Names of the file attributes that affect how rsfstudy interprets the numbers.
 _NAMES_OF_DIGESTED_ATTRIBUTES = ("declaration", "provenance", "scene", "end", "laboratory")
 
 
 def compute_content_digest(dataset: xr.Dataset) -> str:
-    """Compute the digests of all variables and of the declaration, as a JSON string."""
+    """Compute the digests of all variables and attributes as a JSON string.
+
+    Parameters
+    ----------
+    dataset : xarray.Dataset
+        Dataset to write.
+
+    Returns
+    -------
+    str
+        JSON object with one digest per variable and per digested attribute.
+    """
     return json.dumps(_compute_digests(dataset))
 
 
@@ -63,6 +74,7 @@ def check_content(dataset: xr.Dataset, path: str) -> None:
 
 
 def _build_damaged_file_error(path: str, part_name: str) -> DataError:
+    """Build the error for a file that does not match its digest."""
     return DataError(
         f"{path} is damaged, or was edited: {shorten_text(part_name)} is not what was "
         "written. Run the study "
@@ -74,7 +86,7 @@ def _build_damaged_file_error(path: str, part_name: str) -> DataError:
 def _compute_digests(dataset: xr.Dataset) -> dict[str, str]:
     """Compute one digest for each variable and each attribute.
 
-    The digest of a variable is preceded by its sizes, units and scale.
+    The digest of a variable is preceded by the sizes, units and scale of the variable.
     """
     texts = {
         name: str(dataset.attrs[name])
@@ -91,11 +103,12 @@ def _compute_digests(dataset: xr.Dataset) -> dict[str, str]:
 
 
 def _hash_bytes(content: bytes) -> str:
+    """Compute the BLAKE2b digest of bytes."""
     return hashlib.blake2b(content, digest_size=8).hexdigest()
 
 
 def _array_to_portable_bytes(values: np.ndarray) -> bytes:
-    """Convert an array to bytes that do not depend on the storage format of the file."""
+    """Convert an array to bytes that do not depend on the storage format."""
     if values.dtype.kind in "OUTS":
         return json.dumps([str(text) for text in values.flat]).encode()
     numbers = np.asarray(values, dtype="<f8")
@@ -103,7 +116,7 @@ def _array_to_portable_bytes(values: np.ndarray) -> bytes:
 
 
 def _parse_digest(text: object) -> Mapping[str, str]:
-    """Parse a digest. Return an empty mapping if the string is not a valid digest."""
+    """Parse a digest. Return an empty mapping if the string is invalid."""
     try:
         listed = json.loads(str(text))
     except (ValueError, RecursionError):

@@ -1,9 +1,9 @@
-"""Reading and writing of NetCDF files.
+"""Reading and writing of results files.
 
-A file is written under a temporary name, read back and compared with the dataset. Only then is
-the file renamed. Each file ends with a digest of all its bytes, which HDF5 ignores. The digest is
-checked before HDF5 opens the file, because HDF5 may hang on damaged bytes. If the digest is
-missing, because another program saved the file or because the file was truncated, the file is
+A NetCDF file is written under a temporary name, read back and compared with the dataset. Only then
+is the file renamed. Each NetCDF file ends with a digest of all its bytes, which HDF5 ignores. The
+digest is checked before HDF5 opens the file, because HDF5 may hang on damaged bytes. If the digest
+is missing, because another program saved the file or because the file was truncated, the file is
 checked against the digest of its contents (see ``content_digest``).
 """
 
@@ -30,7 +30,7 @@ from rsfstudy.storage import content_digest, schema
 from rsfstudy.storage.attribute_checks import check_motion_variables, check_variable_attributes
 from rsfstudy.storage.schema import FILE_LAYOUT_VERSION
 
-#: How Zarr stores are opened: lazily, and none of an older format.
+#: Options for opening a Zarr store lazily. Only version 3 of the Zarr format is supported.
 ZARR_OPEN_OPTIONS: Mapping[str, Any] = {
     "engine": "zarr",
     "chunks": None,
@@ -38,7 +38,7 @@ ZARR_OPEN_OPTIONS: Mapping[str, Any] = {
     "cache": False,
     "zarr_format": 3,
 }
-#: Codecs of our Zarr stores. Any other might run code that the store names.
+#: Codecs of the Zarr stores that rsfstudy writes. Other codecs could run arbitrary code.
 _ALLOWED_ZARR_CODECS = {"bytes", "vlen-utf8", "zstd"}
 _DIGEST_TRAILER_PREFIX = b"\nrsfstudy sha256 "
 _DIGEST_TRAILER_LENGTH = len(_DIGEST_TRAILER_PREFIX) + 64
@@ -46,20 +46,29 @@ _STORE_DIGEST_ATTRIBUTE = "digest"
 
 
 def write_dataset(dataset: xr.Dataset, path: Path) -> xr.Dataset:
-    """Write a dataset so that `path` always holds either the old file or the complete new one.
+    """Write a dataset to a NetCDF file.
 
-    A reader that has the old file open keeps its data. If a write is killed, the next one
-    overwrites the temporary file it left.
+    At any time, ``path`` contains either the old file or the complete new file. A program that has
+    opened the old file can continue to read the old data. If a process is killed during the write,
+    the next write overwrites the temporary file of the process.
+
+    Parameters
+    ----------
+    dataset : xarray.Dataset
+        Dataset to write.
+    path : Path
+        Path of the file. Missing directories are created.
 
     Returns
     -------
     xarray.Dataset
-        The dataset as the file holds it; ``encoding["source"]`` says where.
+        Dataset with the attributes that the file contains. The entry ``encoding["source"]`` is the
+        path of the file.
 
     Raises
     ------
     DataError
-        If the directory cannot be written, or what is read back differs from what was written.
+        If the file cannot be written, or if the data that were read back differ from the dataset.
     """
     clean = clean_attributes(dataset.assign_attrs({"layout": FILE_LAYOUT_VERSION, **dataset.attrs}))
     clean.attrs.pop(content_digest.DIGEST_ATTRIBUTE, None)
@@ -68,11 +77,11 @@ def write_dataset(dataset: xr.Dataset, path: Path) -> xr.Dataset:
     beside = path.with_name(f".{path.name}.new")
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
-        beside.unlink(missing_ok=True)  # were it a link or a pipe, writing would go elsewhere
-        # with a Dask client, xarray would wait for a lock of the cluster, perhaps for ever
+        beside.unlink(missing_ok=True)  # Writing through an existing link would change its target.
+        # With a Dask client, xarray would wait for a lock of the cluster, possibly forever.
         how: dict[str, Any] = {"engine": "netcdf4", "format": "NETCDF4"}
         with dask.config.set(scheduler="synchronous"), warnings.catch_warnings():
-            # of older versions of Dask, although the client is set aside on purpose
+            # Older versions of Dask warn that the client is not used, which is intended here.
             warnings.filterwarnings("ignore", "Running on a single-machine scheduler", UserWarning)
             stored.to_netcdf(beside, **how, encoding=encoding_without_fill_values(clean))
         with open(beside, "ab") as file:
@@ -84,19 +93,20 @@ def write_dataset(dataset: xr.Dataset, path: Path) -> xr.Dataset:
             os.fsync(file.fileno())
         os.replace(beside, path)
     except (OSError, RuntimeError) as error:
-        # HDF5 reports a full disk as a RuntimeError
+        # HDF5 reports a full disk as a RuntimeError.
         raise DataError(
             f"cannot write {path}: {error}. Nothing was replaced; make room, or choose another "
             "--output."
         ) from error
     finally:
-        with contextlib.suppress(OSError):  # where its directory is none, the error says so
+        with contextlib.suppress(OSError):  # The error above reports an invalid directory.
             beside.unlink(missing_ok=True)
     clean.encoding["source"] = str(path)
     return clean
 
 
 def _hash_file_contents(path: Path, byte_count: int) -> bytes:
+    """Compute the SHA-256 digest of the first bytes of a file."""
     digest = hashlib.sha256()
     with open(path, "rb") as file:
         while byte_count > 0 and (part := file.read(min(byte_count, 2**20))):
@@ -109,8 +119,19 @@ def open_zarr_store(path: Path) -> xr.Dataset:
     """Open a Zarr store lazily.
 
     Zarr stores attributes as JSON, which does not distinguish numeric types. The function therefore
-    converts flag values to the dtype of their variable. It also removes the dtype of strings from
-    the encoding, because older versions of xarray cannot write that dtype to a NetCDF file.
+    converts flag values to the dtype of their variable. The function also removes the dtype of
+    strings from the encoding, because older versions of xarray cannot write that dtype to a NetCDF
+    file.
+
+    Parameters
+    ----------
+    path : Path
+        Directory of the store.
+
+    Returns
+    -------
+    xarray.Dataset
+        Contents of the store.
     """
     dataset = xr.open_dataset(path, **ZARR_OPEN_OPTIONS)
     for variable in dataset.variables.values():
@@ -123,7 +144,13 @@ def open_zarr_store(path: Path) -> xr.Dataset:
 
 
 def write_store_digest(store: Path) -> None:
-    """Write the digest of all files of a Zarr store among its attributes."""
+    """Write the digest of all files of a Zarr store to its attributes.
+
+    Parameters
+    ----------
+    store : Path
+        Directory of the store.
+    """
     root = store / "zarr.json"
     about = json.loads(root.read_text())
     about["attributes"][_STORE_DIGEST_ATTRIBUTE] = _hash_store(store)
@@ -131,7 +158,10 @@ def write_store_digest(store: Path) -> None:
 
 
 def _hash_store(store: Path) -> str:
-    """Digest of the files of a store, without the one that its root holds."""
+    """Compute the digest of all files of a Zarr store.
+
+    The digest excludes the root attribute that contains the digest.
+    """
     digest = hashlib.sha256()
     for file in sorted(file for file in store.rglob("*") if file.is_file()):
         content = file.read_bytes()
@@ -144,7 +174,10 @@ def _hash_store(store: Path) -> str:
 
 
 def _check_store_digest(path: Path) -> bool:
-    """Check a Zarr store against its digest; whether it has one."""
+    """Check a Zarr store against its digest.
+
+    The function returns False if the store has no digest.
+    """
     attributes = json.loads((path / "zarr.json").read_text())["attributes"]
     if _STORE_DIGEST_ATTRIBUTE in attributes and attributes[_STORE_DIGEST_ATTRIBUTE] != _hash_store(
         path
@@ -154,7 +187,10 @@ def _check_store_digest(path: Path) -> bool:
 
 
 def _check_file_digest(path: Path) -> bool:
-    """Check a file against the digest of its bytes; whether it has one."""
+    """Check a file against the digest at its end.
+
+    The function returns False if the file has no digest.
+    """
     size = path.stat().st_size - _DIGEST_TRAILER_LENGTH
     with open(path, "rb") as file:
         file.seek(max(0, size))
@@ -167,13 +203,29 @@ def _check_file_digest(path: Path) -> bool:
 
 
 def read_dataset(path: Path) -> xr.Dataset:
-    """Load a results file, or that of one scene, into memory and close it; a Zarr store is opened,
-    not loaded.
+    """Read a results file, or a dataset of a single scene.
+
+    A NetCDF file is loaded into memory and closed. A Zarr store is opened lazily.
+
+    Parameters
+    ----------
+    path : Path
+        NetCDF file, or directory of a Zarr store.
+
+    Returns
+    -------
+    xarray.Dataset
+        Contents of the file or store.
 
     Raises
     ------
     DataError
-        If it is missing, unreadable, not written by rsfstudy, or damaged.
+        If the file does not exist, cannot be read, is damaged, or was not written by rsfstudy.
+
+    Warns
+    -----
+    RsfStudyWarning
+        If the results have no digest, because another program saved the file.
     """
     where = shorten_text(path)
     try:
@@ -190,14 +242,14 @@ def read_dataset(path: Path) -> xr.Dataset:
             dataset.attrs.pop(content_digest.DIGEST_ATTRIBUTE, None)
     except RsfStudyError:
         raise
-    except Exception as error:  # HDF5, Zarr and xarray raise almost anything on damaged data
+    except Exception as error:  # HDF5, Zarr and xarray raise errors of many types.
         raise DataError(f"{where} cannot be read: {shorten_text(error)}") from error
     dataset = copy_with_cf_encoding(dataset)
     try:
         check_variable_attributes(dataset)
         if schema.is_of_single_scene(dataset):
             check_motion_variables(dataset)
-            return dataset  # which users write by xarray, without a digest
+            return dataset  # Users save motions with xarray, which writes no digest.
         schema.check_results(dataset)
     except DataError as error:
         raise DataError(f"{where}: {error}") from error
@@ -225,7 +277,7 @@ def _check_readable_path(path: Path, file_description: str) -> None:
 
 
 def _check_zarr_codecs(path: Path) -> None:
-    """Refuse a Zarr store with a codec that our stores do not use."""
+    """Raise ``DataError`` if a Zarr store uses a codec that is not allowed."""
     for file in path.rglob("zarr.json"):
         about = json.loads(file.read_text())
         for codec in about.get("codecs", []):
@@ -237,8 +289,19 @@ def _check_zarr_codecs(path: Path) -> None:
 
 
 def clean_attributes(dataset: xr.Dataset) -> xr.Dataset:
-    """The dataset with attributes of the types that NetCDF keeps unchanged: text, numbers, and
-    arrays of two or more.
+    """Convert attributes to types that a NetCDF file preserves.
+
+    Parameters
+    ----------
+    dataset : xarray.Dataset
+        Dataset whose attributes are converted.
+
+    Returns
+    -------
+    xarray.Dataset
+        Copy of the dataset. In the attributes, Boolean values become the strings "true" and
+        "false", dictionaries become JSON, sequences become arrays, and sequences with one element
+        become scalars. Attributes that are None are removed.
     """
     clean = dataset.copy()
     clean.attrs = _clean_attribute_mapping(dataset.attrs)
@@ -248,6 +311,7 @@ def clean_attributes(dataset: xr.Dataset) -> xr.Dataset:
 
 
 def _clean_attribute_mapping(attributes: Mapping[Any, Any]) -> dict[str, Any]:
+    """Convert the attributes of a dataset or variable, without None."""
     return {
         str(name): _to_netcdf_value(value)
         for name, value in attributes.items()
@@ -256,6 +320,7 @@ def _clean_attribute_mapping(attributes: Mapping[Any, Any]) -> dict[str, Any]:
 
 
 def _to_netcdf_value(value: Any) -> Any:
+    """Convert the value of an attribute to a type that NetCDF preserves."""
     if isinstance(value, bool | np.bool_):
         return "true" if value else "false"
     if isinstance(value, dict):

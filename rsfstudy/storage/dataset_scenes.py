@@ -1,4 +1,7 @@
-"""The scene that a dataset is of: the one that it describes, or that of a cell that is selected."""
+"""Scenes of datasets.
+
+The attributes of a motion describe its scene. In the results of a study, each cell has a scene.
+"""
 
 from __future__ import annotations
 
@@ -21,12 +24,25 @@ from rsfstudy.study import Study
 
 
 def scene_of_dataset(dataset: xr.Dataset, study: Study | None) -> Scene:
-    """The scene that a dataset is of: of results of a study that of the one cell that is selected.
+    """Return the scene of a dataset.
+
+    Parameters
+    ----------
+    dataset : xarray.Dataset
+        Dataset of a single scene, or results of a study with one selected cell.
+    study : Study or None
+        Study that produced the dataset, or None if the dataset describes a single scene.
+
+    Returns
+    -------
+    Scene
+        Scene of the dataset or of the selected cell.
 
     Raises
     ------
     InvalidValue
-        Where no single cell is selected, or a part is a user's own and not known here.
+        If the results contain several cells, or if the scene contains a user-defined part that is
+        not registered.
     """
     if study is not None:
         return study.scene(selected_cell_number(dataset, study))
@@ -34,7 +50,25 @@ def scene_of_dataset(dataset: xr.Dataset, study: Study | None) -> Scene:
 
 
 def selected_cell_number(dataset: xr.Dataset, study: Study) -> int:
-    """The number of the cell that is selected."""
+    """Find the number of the selected cell.
+
+    Parameters
+    ----------
+    dataset : xarray.Dataset
+        Results of the study with one selected cell.
+    study : Study
+        Study that produced the results.
+
+    Returns
+    -------
+    int
+        Number of the cell in row-major order.
+
+    Raises
+    ------
+    InvalidValue
+        If a coordinate has several values, or if its value is not on the axis of the study.
+    """
     ours = xr.Dataset(coords=build_lattice_coordinates(study))
     places = []
     for name in study.dimensions:
@@ -51,14 +85,32 @@ def selected_cell_number(dataset: xr.Dataset, study: Study) -> int:
 
 
 def read_described_scene(dataset: xr.Dataset) -> Scene:
-    """The scene that the attributes of a dataset describe."""
+    """Build the scene from the attributes of a dataset.
+
+    Parameters
+    ----------
+    dataset : xarray.Dataset
+        Dataset of a single scene.
+
+    Returns
+    -------
+    Scene
+        Scene of the dataset.
+
+    Raises
+    ------
+    DataError
+        If the attributes are missing or invalid, or if the samples do not match their digest.
+    InvalidValue
+        If the scene contains a user-defined part that is not registered.
+    """
     plain = read_scene_fields(dataset)
     segments, loading = plain.pop("segments", ()), str(plain.get("loading"))
     digest = plain.pop("samples", "")
     own: dict[str, UserPart] = {
         name: part for slot in SLOTS for name, part in slot.user_parts.items()
     }
-    # protocols of one name differ: the segments tell which it was
+    # Protocols with the same name can differ, so the protocol is rebuilt from its segments.
     if segments and (loading not in own or isinstance(own[loading], UserLoading)):
         rebuilt = protocol(segments, loading)
         own[normalise_field_value("loading", rebuilt)] = rebuilt

@@ -1,4 +1,8 @@
-"""Assembles finished cells into one self-describing dataset."""
+"""Assembly of finished cells into a self-describing dataset.
+
+``assemble_dataset`` builds the variables, the coordinates and the root attributes. The Zarr writer
+calls the same builders for blocks of cells.
+"""
 
 from __future__ import annotations
 
@@ -33,7 +37,7 @@ _COMMENT_ON_RIG_UNITS = (
     " Axes are in the units that they state; sigma_star, slip_distance and reference_velocity are "
     "the scales of each cell."
 )
-#: Attributes that the user sets in the environment: RSFSTUDY_LICENSE and so on.
+#: Root attributes that users set with environment variables, for example ``RSFSTUDY_LICENSE``.
 _CREDIT_ATTRIBUTES_FROM_ENVIRONMENT = (
     "creator_name",
     "creator_email",
@@ -46,15 +50,21 @@ _CREDIT_ATTRIBUTES_FROM_ENVIRONMENT = (
 def assemble_dataset(
     study: Study, cell_columns: CellColumns, provenance: Mapping[str, Any]
 ) -> xr.Dataset:
-    """The lattice of a study.
+    """Assemble the dataset of a study.
 
     Parameters
     ----------
     study : Study
+        Study whose cells are assembled.
     cell_columns : CellColumns
-        What is known of each cell, in row-major order.
-    provenance : mapping
-        What else decided the numbers, as plain data.
+        Columns of all cells, in row-major order.
+    provenance : mapping of str to object
+        Provenance of the run, as plain data (see ``execution.provenance.collect_provenance``).
+
+    Returns
+    -------
+    xarray.Dataset
+        Dataset with one value per cell and output, before any reductions.
     """
     dataset = xr.Dataset(
         build_lattice_variables(study, cell_columns, study.shape), build_lattice_coordinates(study)
@@ -66,15 +76,24 @@ def assemble_dataset(
 def build_lattice_variables(
     study: Study, cell_columns: CellColumns, block_shape: tuple[int, ...]
 ) -> dict[Any, tuple[tuple[str, ...], np.ndarray, dict[str, Any]]]:
-    """Variables for a block of cells: the numbers of the measure, and how each cell ended.
+    """Build the variables of a block of cells.
+
+    The variables are the outputs of the measure, and the status, message, wall time and number of
+    right-hand-side evaluations of each cell.
 
     Parameters
     ----------
     study : Study
+        Study to which the cells belong.
     cell_columns : CellColumns
-        What is known of the cells, in row-major order.
+        Columns of the cells in the block, in row-major order.
     block_shape : tuple of int
         Shape of the block.
+
+    Returns
+    -------
+    dict of str to tuple
+        Dimensions, values and attributes of each variable.
     """
     layout, dims, own = OutputPacking(study.measure), study.dimensions, study.quantities
     described = {}
@@ -105,7 +124,22 @@ def build_lattice_variables(
 
 
 def build_lattice_coordinates(study: Study) -> dict[Any, Any]:
-    """Dimension coordinates, what follows from them, and the fixed values as scalars."""
+    """Build the coordinates of the lattice of a study.
+
+    The coordinates include the dimension coordinates, the fields that vary along each axis, and the
+    fixed scene fields as scalars. The tables of user-defined loadings and the inner coordinates of
+    the measure are included too.
+
+    Parameters
+    ----------
+    study : Study
+        Study that declares the lattice.
+
+    Returns
+    -------
+    dict of str to tuple or xarray.Variable
+        Coordinates by name, in a form that ``xarray.Dataset`` accepts.
+    """
     strides = np.cumprod([1, *study.shape[::-1]])[::-1][1:]
     coords: dict[Any, Any] = {}
     own = study.quantities
@@ -123,7 +157,7 @@ def build_lattice_coordinates(study: Study) -> dict[Any, Any]:
             about = {"units": "1", "long_name": f"number of the {axis.dimension.replace('_', ' ')}"}
             about |= {"drawn": json.dumps(axis.sampling_info)} if axis.sampling_info else {}
             coords[axis.dimension] = (axis.dimension, np.arange(len(axis), dtype=np.int32), about)
-        # an axis shows its own values, even where its first cells make no use of them
+        # An axis shows its own values, even if the scenes of its first cells do not use them.
         fixed = [{**study.measure.plain_fields, **scene} for scene in scenes]
         points = [{**fixed[n], **row} for n, row in zip(firsts[1], axis.rows, strict=True)]
         for name in axis.fields:
@@ -168,8 +202,10 @@ def build_lattice_coordinates(study: Study) -> dict[Any, Any]:
 
 
 def _to_storable_array(values: list[Any]) -> np.ndarray:
-    """Values of one field as NetCDF can hold them: text, flags as int8, numbers with NaN where a
-    value is missing.
+    """Convert the values of a field to an array that NetCDF can store.
+
+    Strings become an object array and Boolean values become int8. Otherwise the values become
+    floats, and None becomes NaN.
     """
     if isinstance(_first_value_not_none(values), str):
         return np.array([value or "" for value in values], dtype=object)
@@ -179,20 +215,22 @@ def _to_storable_array(values: list[Any]) -> np.ndarray:
 
 
 def _first_value_not_none(values: list[Any]) -> Any:
-    """The first value that is not None, if any."""
+    """Return the first value that is not None, or None."""
     return next((value for value in values if value is not None), None)
 
 
 def _variable_attributes(
     variable_name: str, study_quantities: Mapping[str, Quantity], example_value: Any = None
 ) -> dict[str, Any]:
-    """Attributes of a variable, whether the vocabulary or the study (`own`) describes it; `value`
-    is an example of what a coordinate holds.
+    """Build the attributes of a variable from the vocabulary or the study.
+
+    The argument ``example_value`` is a value of the variable, which determines if the variable has
+    units or flags.
     """
     about = find_quantity(variable_name, study_quantities)
     attrs: dict[str, Any] = {"long_name": about.long_name}
     if variable_name in study_quantities and about.symbol:
-        attrs["symbol"] = about.symbol  # which the vocabulary does not hold
+        attrs["symbol"] = about.symbol  # Symbols of studies are not in the vocabulary.
     if about.units and not isinstance(example_value, str | bool):
         attrs["units"] = about.units
     if about.scale:
@@ -206,8 +244,24 @@ def _variable_attributes(
 def root_attributes(
     study: Study, finished_cell_count: int, provenance: Mapping[str, Any]
 ) -> dict[str, Any]:
-    """Root attributes: what the lattice is, where it comes from, how many of its cells are `known`,
-    and the whole declaration.
+    """Build the root attributes of a dataset.
+
+    The attributes follow the CF and ACDD conventions. The attributes also contain the declaration
+    of the study and the provenance of the run as JSON.
+
+    Parameters
+    ----------
+    study : Study
+        Study that produced the dataset.
+    finished_cell_count : int
+        Number of finished cells.
+    provenance : mapping of str to object
+        Provenance of the run, as plain data.
+
+    Returns
+    -------
+    dict of str to object
+        Root attributes by name.
     """
     complete = finished_cell_count == study.size
     when, version = provenance["time"], provenance["versions"]["rsfstudy"]
@@ -236,6 +290,6 @@ def root_attributes(
             for name in _CREDIT_ATTRIBUTES_FROM_ENVIRONMENT
         },
     }
-    # a command, or the environment, may hold bytes that are no text
+    # The command line and environment variables may contain bytes that are not valid text.
     plain = {name: text.encode(errors="backslashreplace").decode() for name, text in texts.items()}
     return {**plain, "layout": FILE_LAYOUT_VERSION}

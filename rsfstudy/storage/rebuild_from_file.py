@@ -1,5 +1,8 @@
-"""Rebuilds a study from the declaration in its results. A declaration is plain data: no code from
-the results file is run.
+"""Reconstruction of a study from the declaration in its results file.
+
+``rebuild_study`` is the main function. A declaration contains only plain data, and no code from the
+results file is run. If a study contains user-defined code, the code is imported from the file that
+declares the study.
 """
 
 from __future__ import annotations
@@ -17,8 +20,6 @@ from rsfstudy import measures, reductions
 from rsfstudy.axes import Axis
 from rsfstudy.errors import DataError, InvalidValue, shorten_text
 from rsfstudy.measures import Measure
-
-# to be found by its name
 from rsfstudy.reductions import Reduction
 from rsfstudy.rig import Rig
 from rsfstudy.slider import SLOTS, UserPart, replace_names_by_user_parts
@@ -39,8 +40,30 @@ _NAME_STUDY_FILE_REMEDY = "Name the file that declares it: --study FILE (study=)
 
 
 def rebuild_study(results: xr.Dataset, study_file: str | Path | None = None) -> Study:
-    """The study that made a dataset, from the declaration in it; where it uses code of the user,
-    from the file that declares the study. Parts of a named study's own are those of rsfstudy.
+    """Rebuild the study that produced a results dataset.
+
+    If a named study contains user-defined parts, the parts are imported from the module of that
+    study.
+
+    Parameters
+    ----------
+    results : xarray.Dataset
+        Results of a study.
+    study_file : str or Path, optional
+        File that declares the study. The file is required if the study contains user-defined code.
+
+    Returns
+    -------
+    Study
+        Study with the declaration from the results.
+
+    Raises
+    ------
+    InvalidValue
+        If the study contains user-defined code and ``study_file`` is missing, or if ``study_file``
+        declares a different study.
+    DataError
+        If the declaration is invalid, or if the axes of the results do not match the declaration.
     """
     declared = schema.read_declaration(results)
     if (
@@ -76,12 +99,26 @@ def rebuild_study(results: xr.Dataset, study_file: str | Path | None = None) -> 
 
 
 def study_of_dataset(results: xr.Dataset) -> Study:
-    """The study that made a dataset, all of it, whatever is selected.
+    """Rebuild the complete study that produced a dataset.
+
+    The study contains all cells, even if only some cells of the dataset are selected.
+
+    Parameters
+    ----------
+    results : xarray.Dataset
+        Results of a study, or a selection of cells.
+
+    Returns
+    -------
+    Study
+        Study with the declaration from the results.
 
     Raises
     ------
     InvalidValue
-        Where the study has code of a user's own.
+        If the study contains user-defined code.
+    DataError
+        If the declaration is invalid.
     """
     declared, about = schema.read_declaration(results), schema.read_provenance(results)
     if has_user_code(results):
@@ -92,7 +129,22 @@ def study_of_dataset(results: xr.Dataset) -> Study:
 
 
 def has_user_code(results: xr.Dataset) -> bool:
-    """True where code of the user decided a dataset; loadings, which it holds, are data."""
+    """Return True if user-defined code affected the results.
+
+    User-defined loadings are data rather than code, because the results contain their samples or
+    segments. If the results contain loadings, the function searches the axes and the base scene for
+    other user-defined parts.
+
+    Parameters
+    ----------
+    results : xarray.Dataset
+        Results of a study.
+
+    Returns
+    -------
+    bool
+        True if the study contains user-defined code.
+    """
     if schema.read_provenance(results)["fingerprint"]["own_code"] == "none":
         return False
     held = stored_loadings.read_loadings(results)
@@ -103,7 +155,7 @@ def has_user_code(results: xr.Dataset) -> bool:
 
 
 def _check_axes(study: Study, results: xr.Dataset) -> None:
-    """Refuse results whose axes differ from those in their declaration."""
+    """Check that the axes of the results match the declaration."""
     ours, dims = xr.Dataset(coords=build_lattice_coordinates(study)), results["status"].dims
     if dims != study.dimensions:
         raise invalid_part_error("status", f"lies along {dims}, not the axes of the declaration")
@@ -117,23 +169,29 @@ def study_from_declaration(
     stored_loadings: Mapping[str, UserPart],
     study_with_user_code: Study | None = None,
 ) -> Study:
-    """The study with this declaration.
+    """Build a study from its declaration.
 
     Parameters
     ----------
-    declaration : Declaration
+    declaration : StoredDeclaration
+        Declaration from a results file.
     stored_loadings : mapping of str to UserPart
-        Loadings of the user's own, by name.
+        User-defined loadings from the results file, by name.
     study_with_user_code : Study, optional
-        Where to take the measure, the reductions and parts of the slider from, if they are
-        not part of rsfstudy; the measure with the plain fields that the declaration states.
+        Study that contains the user-defined code. Its measure, reductions and parts are used. The
+        plain fields of the measure are taken from the declaration.
+
+    Returns
+    -------
+    Study
+        Study with this declaration.
 
     Raises
     ------
     InvalidValue
-        Where its measure or a reduction is not part of rsfstudy.
+        If the measure or a reduction is not part of rsfstudy, and ``study_with_user_code`` is None.
     DataError
-        Where the declaration makes no study, naming the part.
+        If the declaration is invalid. The message contains the path of the invalid entry.
     """
     parts = msgspec.structs.asdict(declaration)
     own = {**_collect_known_user_parts(study_with_user_code), **stored_loadings}
@@ -161,20 +219,20 @@ def study_from_declaration(
 
 
 def _collect_known_user_parts(study: Study | None) -> Mapping[str, UserPart]:
-    """Parts that a user wrote, by name: those of the study, and all others defined in the files
-    that were loaded with it.
-    """
+    """Return the user-defined parts of a study and of its files."""
     others = {name: part for slot in SLOTS for name, part in slot.user_parts.items()}
     return {} if study is None else {**others, **study.user_parts}
 
 
 def _rebuild_axis(plain_axis: StoredAxis, user_parts: Mapping[str, UserPart]) -> Axis:
+    """Build an axis, and replace the names of user-defined parts."""
     named = schema.build_axis_from_stored(plain_axis)
     rows = [replace_names_by_user_parts(row, user_parts) for row in named.rows]
     return named.with_rows(rows, named.units, named.sampling_info)
 
 
 def _rebuild_rig(stated_quantities: Mapping[str, float]) -> Rig:
+    """Build a rig from its quantities."""
     unknown = sorted(set(stated_quantities) - {field.name for field in fields(Rig)})
     if unknown:
         raise invalid_part_error(f"declaration.laboratory.{unknown[0]}", "is unknown")
@@ -182,7 +240,27 @@ def _rebuild_rig(stated_quantities: Mapping[str, float]) -> Rig:
 
 
 def rebuild_measure(plain_measure: StoredMeasure, path_in_file: str) -> Measure:
-    """The measure with this description, which stands at `path` in a file."""
+    """Build a measure from its description.
+
+    Parameters
+    ----------
+    plain_measure : StoredMeasure
+        Description of the measure. The description of a nested measure has the key ``measure``.
+    path_in_file : str
+        Path of the description in the file, for error messages.
+
+    Returns
+    -------
+    Measure
+        Measure with this description.
+
+    Raises
+    ------
+    InvalidValue
+        If rsfstudy has no measure with this name.
+    DataError
+        If a field is missing, unknown or invalid.
+    """
     values: dict[str, Any] = dict(plain_measure)
     kind = _find_declared_class("measure", Measure, measures, values.pop("name"))
     given = dict(kind.fields_from_description(values, path_in_file))
@@ -193,8 +271,9 @@ def rebuild_measure(plain_measure: StoredMeasure, path_in_file: str) -> Measure:
 
 
 def _rebuild_reduction(plain_reduction: StoredReduction, path_in_file: str) -> Reduction:
+    """Build a reduction from its description."""
     values: dict[str, Any] = dict(plain_reduction)
-    if values["kind"] == "spread":  # what a range of a part of a coordinate was called
+    if values["kind"] == "spread":  # Older files use this name.
         values |= {"kind": "range", "over": values.pop("on", "")}
     kind = _find_declared_class("reduction", Reduction, reductions, values.pop("kind"))
     made: Reduction = build_dataclass_from_plain_data(values, kind, path_in_file)
@@ -204,11 +283,13 @@ def _rebuild_reduction(plain_reduction: StoredReduction, path_in_file: str) -> R
 def _find_declared_class(
     declaration_key: str, base_class: Any, exporting_package: ModuleType, declared_name: str
 ) -> Any:
-    """The class of rsfstudy that is derived from `base` and has a name in declarations; those in
-    the files of named studies are looked for where their package has none.
+    """Find a class of rsfstudy by its name in declarations.
+
+    If the package that exports the classes has no class with this name, the function also searches
+    the modules of the named studies.
     """
     for exported in exporting_package.__all__:
-        getattr(exporting_package, exported)  # loads the module that defines it
+        getattr(exporting_package, exported)  # This loads the module of the class.
     if declared_name not in _named_subclasses(base_class):
         for study in study_names():
             load_study(study)
@@ -222,9 +303,7 @@ def _find_declared_class(
 
 
 def _named_subclasses(base_class: Any) -> dict[str, Any]:
-    """The concrete classes of rsfstudy that are derived from `base`, by their names in
-    declarations.
-    """
+    """Return the concrete subclasses in rsfstudy by their declared names."""
     found: dict[str, Any] = {}
     for kind in base_class.__subclasses__():
         found |= _named_subclasses(kind)
@@ -235,8 +314,20 @@ def _named_subclasses(base_class: Any) -> dict[str, Any]:
 
 
 def find_primary_output(dataset: xr.Dataset) -> str | None:
-    """The number a dataset is about: what its measure says, or the first that was measured in each
-    cell, where the measure is a user's own; None where no cell has a plain number.
+    """Find the name of the main result of a dataset.
+
+    If rsfstudy has no such measure, or if the main result is not numeric, the function returns the
+    first numeric output with one value per cell.
+
+    Parameters
+    ----------
+    dataset : xarray.Dataset
+        Results of a study.
+
+    Returns
+    -------
+    str or None
+        Name of the main result, or None if there is no numeric output with one value per cell.
     """
     cells = set(dataset["status"].dims)
     plain = [

@@ -1,11 +1,16 @@
-"""The parts of a results file, and what each must be. A file is checked here before anything else
-uses it; an error names the part that is wrong by its path, as in ``declaration.claims[3].id``.
+"""Schema of results files.
 
-The classes describe the layout. A missing part is never replaced by a default: the results would
-then be those of another study. Plain data are held against them by msgspec: one wheel of half a
-megabyte without dependencies, imported in 17 ms (pydantic: four packages, ten megabytes, 50 ms;
-cattrs: three packages, 41 ms), strict unless told otherwise (cattrs makes a number of a text), with
-paths in its errors, and for the dataclasses that are there already.
+``check_results`` checks a file before any other function uses the file. Error messages contain the
+path of the invalid entry, for example ``declaration.claims[3].id``.
+
+The classes describe the layout. A missing entry is never replaced by a default value, because the
+file would then describe a different study.
+
+We convert and check plain data with msgspec for three reasons. First, msgspec is a single package
+of 0.5 MB without dependencies, and its import takes 17 ms (pydantic: four packages, 10 MB, 50 ms;
+cattrs: three packages, 41 ms). Second, msgspec is strict by default, whereas cattrs converts
+strings to numbers. Third, msgspec supports the existing dataclasses, and its error messages contain
+paths.
 """
 
 from __future__ import annotations
@@ -39,15 +44,28 @@ from rsfstudy.status import Status
 from rsfstudy.study import Claim
 from rsfstudy.vocabulary import QUANTITY_BY_NAME
 
-#: The layout of files as they are written. Those without a number are of layout 1, which had
-#: digests of variables among its attributes.
+#: Version of the file layout. Files without a version have layout 1, in which the digests of
+#: variables were stored as attributes.
 FILE_LAYOUT_VERSION = 2
-#: More would take minutes to look through, or not fit in memory.
+#: Maximum number of claims and of points per axis. Larger files would take minutes to check, or
+#: would not fit in memory.
 MAX_CLAIMS, MAX_AXIS_POINTS_OF_FILE = 10_000, 10_000_000
 
 
 class RootAttributes(TypedDict):
-    """Attributes of the whole file that rsfstudy uses."""
+    """Root attributes of a file that rsfstudy reads.
+
+    Attributes
+    ----------
+    id : str
+        Name of the study.
+    title : str
+        Title of the study.
+    completeness : str
+        "complete", or the number of finished cells.
+    reduced_despite : str
+        Number of failed cells that the reductions omit, or an empty string.
+    """
 
     id: str
     title: str
@@ -55,13 +73,24 @@ class RootAttributes(TypedDict):
     reduced_despite: str
 
 
-#: The fields of a scene, a part of the user's own by its name.
+#: Fields of a scene. User-defined parts are stored by their names.
 StoredScene = Mapping[str, float | str | bool | None]
 
 
 class StoredAxis(TypedDict):
-    """A dimension of the lattice: a list of values; or labels and the fields set at each; or the
-    values of each field, at points that are numbered.
+    """Axis of a lattice, as plain data.
+
+    Attributes
+    ----------
+    dimension : str
+        Name of the dimension.
+    values : sequence or mapping
+        List of values, mapping of labels to the fields at each point, or, for numbered points,
+        mapping of fields to their values.
+    units : mapping of str to str, optional
+        Units of the fields.
+    drawn : mapping of str to object, optional
+        Description of the random sampling.
     """
 
     dimension: str
@@ -74,7 +103,23 @@ class StoredAxis(TypedDict):
 
 
 def build_axis_from_stored(stored_axis: StoredAxis) -> Axis:
-    """An axis, on which parts of the user's own are named; raises DataError for what is none."""
+    """Build an axis from plain data.
+
+    Parameters
+    ----------
+    stored_axis : StoredAxis
+        Description of the axis.
+
+    Returns
+    -------
+    Axis
+        Axis on which user-defined parts are represented by their names.
+
+    Raises
+    ------
+    DataError
+        If the description is invalid.
+    """
     try:
         return Axis(
             stored_axis["dimension"],
@@ -89,13 +134,13 @@ def build_axis_from_stored(stored_axis: StoredAxis) -> Axis:
 
 
 class StoredMeasure(TypedDict):
-    """A measure; what else it holds depends on its name."""
+    """Measure, as plain data. Other entries depend on the measure."""
 
     name: str
 
 
 class StoredReduction(TypedDict):
-    """A reduction; what else it holds depends on its kind."""
+    """Reduction, as plain data. Other entries depend on its kind."""
 
     kind: str
     name: str
@@ -103,7 +148,39 @@ class StoredReduction(TypedDict):
 
 
 class StoredDeclaration(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """The attribute ``declaration``: the study that made the file."""
+    """Declaration of the study, which is the attribute ``declaration``.
+
+    Parameters
+    ----------
+    name : str
+        Name of the study.
+    title : str
+        Title of the study.
+    summary : str
+        Summary of the study.
+    version : int
+        Version of the study.
+    base : mapping of str to object
+        Fields of the scene that all cells share.
+    axes : sequence of StoredAxis
+        Axes of the lattice.
+    measure : StoredMeasure
+        Measure of each cell.
+    accuracy : Accuracy
+        Accuracy of each cell.
+    reductions : sequence of StoredReduction
+        Reductions of the lattice.
+    claims : sequence of Claim
+        Published values to compare with the results.
+    plot : str
+        Name of the figure.
+    references : sequence of str
+        Sources of the study.
+    overrides : mapping of str to object
+        Values that the user has overridden.
+    laboratory : mapping of str to float, optional
+        Quantities of the rig, if the study has a rig.
+    """
 
     name: str
     title: str
@@ -122,13 +199,34 @@ class StoredDeclaration(msgspec.Struct, frozen=True, forbid_unknown_fields=True)
 
 
 class StoredFingerprint(TypedDict):
-    """Code and versions that decided the numbers; what is not named here is only compared."""
+    """Code digests and versions that affect the results.
+
+    Other entries of a fingerprint are only compared, so they need no declared type.
+    """
 
     own_code: str
 
 
 class StoredProvenance(TypedDict):
-    """The attribute ``provenance``: where the file comes from."""
+    """Provenance of the results, which is the attribute ``provenance``.
+
+    Attributes
+    ----------
+    time : str
+        Time of the run in UTC.
+    command : str
+        Command or call of the user.
+    declared_in : str
+        File that declares the study, or an empty string.
+    versions : mapping of str to str
+        Versions of Python and of the main packages.
+    fingerprint : StoredFingerprint
+        Versions, settings and code digests that affect the results.
+    git : str
+        Commit of rsfstudy.
+    machine : str
+        Operating system, architecture and number of cores.
+    """
 
     time: str
     command: str
@@ -139,9 +237,9 @@ class StoredProvenance(TypedDict):
     machine: str
 
 
-#: NumPy's kinds of numbers and texts that variables may hold, and those that must be there.
+#: NumPy dtype kinds that are allowed in variables, and their description.
 _ALLOWED_DTYPE_KINDS = ("iufbOUT", "numbers or texts")
-#: What the scenes of files are that were written before there was a choice of pore fluid.
+#: Default values for scenes in older files, which were written before pore fluids were supported.
 _SCENE_DEFAULTS_OF_OLDER_FILES: Mapping[str, Any] = {
     **{name: None for part in BUILT_IN_PARTS.values() for name in field_names(part)},
     "fluid": "drained",
@@ -155,12 +253,17 @@ _REQUIRED_VARIABLES = {
 
 
 def check_results(dataset: xr.Dataset) -> None:
-    """Check every part of a results file that rsfstudy uses.
+    """Check all entries of a results file that rsfstudy uses.
+
+    Parameters
+    ----------
+    dataset : xarray.Dataset
+        Contents of the file.
 
     Raises
     ------
     DataError
-        Names the first part that is missing or wrong.
+        If an entry is missing or invalid. The message contains the path of the first such entry.
     """
     layout = dataset.attrs.get("layout", 1)
     if not isinstance(layout, int | np.integer) or not 1 <= layout <= FILE_LAYOUT_VERSION:
@@ -183,7 +286,7 @@ def check_results(dataset: xr.Dataset) -> None:
                 variable, f"lies along {dims}, and status along {dataset['status'].dims}"
             )
     for key, values in dataset.variables.items():
-        if key in QUANTITY_BY_NAME or key in dataset.coords:  # a notebook may have added others
+        if key in QUANTITY_BY_NAME or key in dataset.coords:  # Users may add other variables.
             _check_dtype_kind(str(key), values)
     for name in map(str, dataset["status"].dims):
         if name not in dataset.coords or dataset[name].dims != (name,):
@@ -196,17 +299,35 @@ def check_results(dataset: xr.Dataset) -> None:
 
 
 def is_of_single_scene(dataset: xr.Dataset) -> bool:
-    """True of a motion, a limit cycle or a critical step of one scene."""
+    """Return True if a dataset belongs to a single scene.
+
+    Parameters
+    ----------
+    dataset : xarray.Dataset
+        Dataset written by rsfstudy.
+
+    Returns
+    -------
+    bool
+        True for a motion, a limit cycle or a critical step. False for the results of a study.
+    """
     return "scene" in dataset.attrs and "declaration" not in dataset.attrs
 
 
 def check_is_of_study(dataset: xr.Dataset, file_description: str) -> None:
-    """Refuse what was asked of one scene, with what to do with it.
+    """Check that a dataset contains the results of a study.
+
+    Parameters
+    ----------
+    dataset : xarray.Dataset
+        Dataset written by rsfstudy.
+    file_description : str
+        Name of the dataset or file in the error message.
 
     Raises
     ------
     DataError
-        If the dataset is a motion, a limit cycle or a critical step.
+        If the dataset is a motion, a limit cycle or a critical step of a single scene.
     """
     if is_of_single_scene(dataset):
         title = shorten_text(dataset.attrs.get("title", "untitled"))
@@ -219,12 +340,22 @@ def check_is_of_study(dataset: xr.Dataset, file_description: str) -> None:
 
 
 def read_declaration(dataset: xr.Dataset) -> StoredDeclaration:
-    """The declaration of the study that made a dataset.
+    """Read the declaration of the study that produced a dataset.
+
+    Parameters
+    ----------
+    dataset : xarray.Dataset
+        Results of a study.
+
+    Returns
+    -------
+    StoredDeclaration
+        Declaration of the study.
 
     Raises
     ------
     DataError
-        If the dataset carries none, or not as rsfstudy writes it.
+        If the declaration is missing or invalid.
     """
     declared = parse_declaration(read_json_attribute(dataset, "declaration"))
     if read_provenance(dataset)["fingerprint"]["own_code"] == "none":
@@ -233,14 +364,30 @@ def read_declaration(dataset: xr.Dataset) -> StoredDeclaration:
 
 
 def parse_declaration(plain_data: Any) -> StoredDeclaration:
-    """A declaration from plain data; raises DataError where they are none."""
+    """Convert plain data to a declaration.
+
+    Parameters
+    ----------
+    plain_data : dict
+        Declaration as plain data.
+
+    Returns
+    -------
+    StoredDeclaration
+        Declaration of the study.
+
+    Raises
+    ------
+    DataError
+        If an entry is missing, unknown or invalid.
+    """
     declared: StoredDeclaration = convert_plain_data_to_type(
         plain_data, StoredDeclaration, "declaration"
     )
     for number, claim in enumerate(plain_data["claims"]):
         _check_mapping_keys(claim, _field_names(Claim), f"declaration.claims[{number}]")
     _check_mapping_keys(plain_data["accuracy"], _field_names(Accuracy), "declaration.accuracy")
-    # with what else they hold
+    # The conversion drops additional entries, so these values are taken from the plain data.
     whole = {name: plain_data[name] for name in ("axes", "measure", "reductions", "overrides")}
     return msgspec.structs.replace(declared, **whole)
 
@@ -250,21 +397,26 @@ def build_scene_from_stored(
     user_parts: Mapping[str, UserPart] = MappingProxyType({}),
     path_in_file: str = "declaration.base",
 ) -> Scene:
-    """A scene; by default the one that all cells share.
+    """Build a scene from plain data.
 
     Parameters
     ----------
-    stored_scene : mapping
-        Its fields.
-    user_parts : mapping of str to type
-        Its parts that are a user's own, by name.
-    path_in_file : str
-        Where it stands in its file.
+    stored_scene : mapping of str to object
+        Fields of the scene.
+    user_parts : mapping of str to UserPart, optional
+        User-defined parts by name.
+    path_in_file : str, default: "declaration.base"
+        Path of the scene in the file, for error messages.
+
+    Returns
+    -------
+    Scene
+        Scene with these fields.
 
     Raises
     ------
     DataError
-        Where the fields make no scene, naming the first that does not.
+        If a field is missing, unknown or invalid. The message contains the path of the field.
     """
     parts = [
         part
@@ -291,7 +443,20 @@ def build_scene_from_stored(
 def find_user_part_not_stored(
     declaration: StoredDeclaration, stored_loadings: Collection[str] = ()
 ) -> tuple[str, str] | None:
-    """Slot and name of a part that the user wrote, if any cell has one; not one that is held."""
+    """Find a user-defined part that the results file does not contain.
+
+    Parameters
+    ----------
+    declaration : StoredDeclaration
+        Declaration of the study.
+    stored_loadings : collection of str, optional
+        Names of the user-defined loadings that the file contains.
+
+    Returns
+    -------
+    tuple of (str, str) or None
+        Slot and name of the first such part, or None if there is no such part.
+    """
     rows: list[Mapping[str, Any]] = [declaration.base]
     for plain in declaration.axes:
         rows += build_axis_from_stored(plain).rows
@@ -303,12 +468,22 @@ def find_user_part_not_stored(
 
 
 def read_provenance(dataset: xr.Dataset) -> StoredProvenance:
-    """Provenance of a dataset.
+    """Read the provenance of a dataset.
+
+    Parameters
+    ----------
+    dataset : xarray.Dataset
+        Results of a study.
+
+    Returns
+    -------
+    StoredProvenance
+        Provenance of the results.
 
     Raises
     ------
     DataError
-        If the dataset does not say, or not as rsfstudy writes it.
+        If the provenance is missing or invalid.
     """
     origin: StoredProvenance = read_json_attribute(dataset, "provenance")
     convert_plain_data_to_type(origin, StoredProvenance, "provenance")
@@ -316,7 +491,23 @@ def read_provenance(dataset: xr.Dataset) -> StoredProvenance:
 
 
 def read_scene_fields(dataset: xr.Dataset) -> dict[str, Any]:
-    """The fields of the scene that the attributes of a dataset describe."""
+    """Read the fields of the scene that the attributes of a dataset describe.
+
+    Parameters
+    ----------
+    dataset : xarray.Dataset
+        Dataset of a single scene.
+
+    Returns
+    -------
+    dict of str to object
+        Fields of the scene.
+
+    Raises
+    ------
+    DataError
+        If the attribute ``scene`` is missing or invalid.
+    """
     return dict(
         convert_plain_data_to_type(
             read_json_attribute(dataset, "scene"), Mapping[str, Any], "scene"
@@ -325,7 +516,25 @@ def read_scene_fields(dataset: xr.Dataset) -> dict[str, Any]:
 
 
 def read_json_attribute(dataset: xr.Dataset, attribute_name: str) -> Any:
-    """Value that an attribute of a dataset holds as JSON; raises DataError where it does not."""
+    """Read a root attribute that contains JSON.
+
+    Parameters
+    ----------
+    dataset : xarray.Dataset
+        Dataset with the attribute.
+    attribute_name : str
+        Name of the attribute.
+
+    Returns
+    -------
+    object
+        Decoded value of the attribute.
+
+    Raises
+    ------
+    DataError
+        If the attribute is missing or is not valid JSON.
+    """
     if attribute_name not in dataset.attrs:
         raise invalid_part_error(attribute_name, "is missing")
     try:
@@ -335,7 +544,7 @@ def read_json_attribute(dataset: xr.Dataset, attribute_name: str) -> Any:
 
 
 def _check_dtype_kind(variable_name: str, values: xr.Variable) -> None:
-    """Refuse a variable that does not hold the kind of numbers or texts it must hold."""
+    """Raise ``DataError`` if a variable has the wrong kind of dtype."""
     kinds, wanted = _REQUIRED_VARIABLES.get(variable_name, _ALLOWED_DTYPE_KINDS)
     kind = values.dtype.kind
     if kind not in kinds:
@@ -348,7 +557,20 @@ def _check_dtype_kind(variable_name: str, values: xr.Variable) -> None:
 
 
 def invalid_part_error(path_in_file: str, reason: str) -> DataError:
-    """The error for a part that is not as rsfstudy writes it."""
+    """Build the error for an invalid entry of a results file.
+
+    Parameters
+    ----------
+    path_in_file : str
+        Path of the entry.
+    reason : str
+        Reason, which follows the path in the message.
+
+    Returns
+    -------
+    DataError
+        Error to raise.
+    """
     return DataError(
         f"{shorten_text(path_in_file).lstrip('.')} {reason}. It was not written by this "
         "version of rsfstudy, or "
@@ -357,22 +579,26 @@ def invalid_part_error(path_in_file: str, reason: str) -> DataError:
 
 
 def convert_plain_data_to_type(plain_data: Any, annotated_type: Any, path_in_file: str) -> Any:
-    """Plain data as the type that an annotation names.
+    """Convert plain data to an annotated type.
 
     Parameters
     ----------
     plain_data : object
-        What JSON gives.
+        Decoded JSON.
     annotated_type : type
-        A type, or another annotation of a field. Of a typed dictionary what it does not name is
-        left out.
+        Type or type annotation. If the type is a typed dictionary, unknown keys are dropped.
     path_in_file : str
-        Where the value stands in its file.
+        Path of the value in the file, for error messages.
+
+    Returns
+    -------
+    object
+        Value of the annotated type.
 
     Raises
     ------
     DataError
-        Where it cannot be converted; the text names the path.
+        If the value cannot be converted. The message contains the path of the value.
     """
     try:
         return msgspec.convert(plain_data, annotated_type)
@@ -390,7 +616,29 @@ def convert_plain_data_to_type(plain_data: Any, annotated_type: Any, path_in_fil
 def build_dataclass_from_plain_data(
     plain_data: Mapping[str, Any], dataclass_type: Any, path_in_file: str, **given_fields: Any
 ) -> Any:
-    """An object of a dataclass from all its fields and no others; some may be `given`."""
+    """Build an instance of a dataclass from plain data.
+
+    Parameters
+    ----------
+    plain_data : mapping of str to object
+        Values of the fields.
+    dataclass_type : type
+        Dataclass to instantiate.
+    path_in_file : str
+        Path of the data in the file, for error messages.
+    **given_fields : object
+        Values of fields that need no conversion.
+
+    Returns
+    -------
+    object
+        Instance of ``dataclass_type``.
+
+    Raises
+    ------
+    DataError
+        If a field is missing, unknown or invalid.
+    """
     kinds = {
         name: hint for name, hint in get_type_hints(dataclass_type).items() if name in plain_data
     }
@@ -411,13 +659,14 @@ def build_dataclass_from_plain_data(
 
 
 def _field_names(dataclass_type: Any) -> list[str]:
+    """Return the names of the fields of a dataclass."""
     return [field.name for field in fields(dataclass_type)]
 
 
 def _check_mapping_keys(
     mapping: Mapping[str, Any], expected_keys: Collection[str], path_in_file: str
 ) -> None:
-    """Refuse plain data that lack one of these, or have others."""
+    """Raise ``DataError`` if a mapping has missing or unknown keys."""
     for name in expected_keys:
         if name not in mapping:
             raise invalid_part_error(f"{path_in_file}.{name}", "is missing")

@@ -1,4 +1,8 @@
-"""Loadings of a user's own in results files: they are data, and stand there as variables."""
+"""Storage of user-defined loadings in results files.
+
+A user-defined loading is data rather than code. The results file contains a table with the samples
+or segments of each loading.
+"""
 
 from __future__ import annotations
 
@@ -20,7 +24,7 @@ from rsfstudy.slider import (
 )
 from rsfstudy.storage.schema import invalid_part_error
 
-#: What the columns are, by how many there are in each row, and what a row is.
+#: Name of a row, and description of the columns, of each kind of table.
 _DESCRIPTION_OF_SAMPLE_ROWS = (
     "sample",
     "time, load point velocity, fall and rate of normal stress",
@@ -30,13 +34,22 @@ _DESCRIPTION_OF_SEGMENT_ROWS = (
     "load point velocity and step, duration, and normal stress above sigma_star",
 )
 
-#: What tells of which kind samples are.
+#: Attributes that distinguish the kinds of sampled histories.
 _FLAGS_OF_SAMPLED_HISTORIES = ("of_stress", "of_pressure")
 
 
 def loading_variables(user_parts: Iterable[UserPart]) -> dict[str, xr.Variable]:
-    """Variables that hold the loadings among parts of the user's own, a row a sample or a segment
-    of what they are made of, in units of the slider.
+    """Build the variables that contain user-defined loadings.
+
+    Parameters
+    ----------
+    user_parts : iterable of UserPart
+        User-defined parts. Parts that are not loadings are ignored.
+
+    Returns
+    -------
+    dict of str to xarray.Variable
+        Variables by name. Each variable has one row per sample or segment, in dimensionless units.
     """
     found = {}
     for part in user_parts:
@@ -60,12 +73,22 @@ def loading_variables(user_parts: Iterable[UserPart]) -> dict[str, xr.Variable]:
 
 
 def read_loadings(results: xr.Dataset) -> Mapping[str, UserLoading]:
-    """The loadings that results hold, by name.
+    """Read the user-defined loadings from a dataset.
+
+    Parameters
+    ----------
+    results : xarray.Dataset
+        Results of a study.
+
+    Returns
+    -------
+    mapping of str to UserLoading
+        Loadings by name.
 
     Raises
     ------
     DataError
-        Where a variable that is said to hold one does not.
+        If a variable with the attribute ``loading`` is not a valid table.
     """
     found: dict[str, UserLoading] = {}
     for key, values in results.variables.items():

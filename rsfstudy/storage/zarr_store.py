@@ -1,7 +1,9 @@
-"""Zarr stores: for a lattice that does not fit in memory, written slab by slab.
+"""Writing of Zarr stores, for lattices that do not fit in memory.
 
-Needs the extra ``zarr``. A store is written under a temporary name, read back, and then renamed. An
-existing store is never replaced: a reader that has it open would mix old chunks with new ones.
+Zarr stores need the optional dependency ``rsfstudy[zarr]``. ``write_store`` writes a lattice slab
+by slab under a temporary name, reads each slab back, and finally renames the store. An existing
+store is never replaced, because a program that has opened the store would read a mixture of old and
+new chunks.
 """
 
 from __future__ import annotations
@@ -27,25 +29,43 @@ from rsfstudy.storage.lattice_datasets import (
 )
 from rsfstudy.study import Study
 
-#: Numbers in one piece, 32 MB of float64: whole rows along the first axis, one at least.
+#: Maximum number of values in a slab (32 MB of float64). A slab consists of complete rows along the
+#: first axis, and has at least one row.
 _NUMBERS_PER_SLAB = 4_000_000
-#: How slabs are written; the metadata are consolidated once, with the reductions.
+#: Options for writing a slab. The metadata are consolidated once, together with the reductions.
 _ZARR_WRITE_OPTIONS: Mapping[str, Any] = {"consolidated": False, "zarr_format": 3}
 
-#: What is known of some cells, in row-major order.
+#: Function that reads a slice of the cells, in row-major order.
 ReadCellsFunction = Callable[[slice], CellColumns]
 ReduceLatticeFunction = Callable[[xr.Dataset], xr.Dataset]
 
 
 def check_zarr_installed() -> None:
-    """Refuse the format where the package zarr is missing."""
+    """Check that the package zarr is installed.
+
+    Raises
+    ------
+    InvalidValue
+        If the package zarr is not installed.
+    """
     if importlib.util.find_spec("zarr") is None:
         remedy = "pip install 'rsfstudy[zarr]'."
         raise InvalidValue("format", "zarr", "needs a package", remedy=remedy)
 
 
 def check_store_does_not_exist(path: Path) -> None:
-    """Refuse to replace a store."""
+    """Check that a store does not exist.
+
+    Parameters
+    ----------
+    path : Path
+        Directory of the store.
+
+    Raises
+    ------
+    DataError
+        If the path exists.
+    """
     if path.exists():
         raise DataError(
             f"{path} is there already, and whoever has it open would read half of each. "
@@ -60,12 +80,30 @@ def write_store(
     apply_reductions: ReduceLatticeFunction,
     path: Path,
 ) -> xr.Dataset:
-    """Write the lattice of a study slab by slab, then its reductions, and open it.
+    """Write the lattice of a study and its reductions to a Zarr store.
+
+    Parameters
+    ----------
+    study : Study
+        Study whose results are written.
+    read_cells : callable
+        Function that returns the ``CellColumns`` of a slice of cells, in row-major order.
+    provenance : mapping of str to object
+        Provenance of the run, as plain data.
+    apply_reductions : callable
+        Function that adds the reductions to the lattice dataset.
+    path : Path
+        Directory of the store, which must not exist.
+
+    Returns
+    -------
+    xarray.Dataset
+        Contents of the store, opened lazily.
 
     Raises
     ------
     DataError
-        If the disk takes no more, or what is read back differs from what was written.
+        If the store cannot be written, or if the data that were read back differ from the lattice.
     """
     beside = path.with_name(f".{path.name}.new")
     try:
@@ -76,7 +114,8 @@ def write_store(
         reductions = _convert_strings_to_object_dtype(results.drop_vars(list(lattice.variables)))
         about = {**root_attributes(study, finished, provenance), **results.attrs}
         with warnings.catch_warnings():
-            # Zarr's format 3 does not specify consolidated metadata yet, but xarray looks for them.
+            # Version 3 of the Zarr format does not specify consolidated metadata yet, but xarray
+            # looks for them.
             warnings.filterwarnings("ignore", "Consolidated metadata")
             reductions.assign_attrs(about).to_zarr(beside, mode="a", zarr_format=3)
         write_store_digest(beside)
@@ -89,23 +128,26 @@ def write_store(
 
 
 def _convert_strings_to_object_dtype(dataset: xr.Dataset) -> xr.Dataset:
-    """Text of any length, which Zarr has a specification for, in place of that of a fixed one."""
+    """Convert fixed-length strings to variable-length strings.
+
+    The Zarr format specifies only strings of variable length.
+    """
     texts = {n: v.astype(object) for n, v in dataset.variables.items() if v.dtype.kind == "U"}
     return dataset.assign(texts).set_coords([name for name in texts if name in dataset.coords])
 
 
 def _write_lattice(study: Study, read_cells: ReadCellsFunction, path: Path) -> int:
-    """Write the variables of the lattice; the number of cells that are finished."""
+    """Write the variables of the lattice, and count the finished cells."""
     width, first, finished = (
         OutputPacking(study.measure).packed_number_count,
         study.dimensions[0],
         0,
     )
     length, *within = study.shape
-    row = math.prod(within)  # of cells
+    row = math.prod(within)  # number of cells
     rows = min(length, max(1, _NUMBERS_PER_SLAB // (width * row)))
     coords = _convert_strings_to_object_dtype(xr.Dataset(coords=build_lattice_coordinates(study)))
-    # a chunk of the store that is lost reads as pending
+    # The fill values are the values of pending cells, so a lost chunk is read as pending cells.
     pending = build_lattice_variables(
         study, CellColumns.build_pending_cells(1, width), (1,) * len(study.shape)
     )
