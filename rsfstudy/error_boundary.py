@@ -114,6 +114,13 @@ class CheckedKeywords:
     If a keyword argument of the constructor is unknown, the error lists the valid keywords. The
     check is needed because ``guard_methods`` is not applied to user-defined classes.
 
+    Parameters
+    ----------
+    *args : Any
+        Positional arguments of the subclass.
+    **keywords : Any
+        Keyword arguments of the subclass.
+
     Raises
     ------
     CallError

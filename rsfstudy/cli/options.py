@@ -102,7 +102,13 @@ class LazilyLoadedCommand(click.Command):
 
 
 class FilePath(click.Path):
-    """Parameter type for paths that are not empty and that the system accepts."""
+    """Parameter type for paths that are not empty and valid in the system.
+
+    Parameters
+    ----------
+    **path_settings : Any
+        Keyword arguments of ``click.Path``.
+    """
 
     def __init__(self, **path_settings: Any) -> None:
         """Create the parameter type from the settings of ``click.Path``."""
