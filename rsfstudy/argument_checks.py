@@ -48,8 +48,8 @@ _TYPE_DESCRIPTIONS: Mapping[Any, str] = {
 def check_argument_lengths(arguments: Mapping[str, Any]) -> None:
     """Reject a range or a repeated-value array that is too long.
 
-    The other checks iterate over the items of an argument and would not finish. The maximum length
-    is ``MAX_ITEMS``.
+    Other checks iterate over all items of an argument, which would take too long. The maximum
+    length is ``MAX_ITEMS``.
 
     Parameters
     ----------
@@ -74,7 +74,8 @@ def string_instead_of_list_error(
     """Return an error if a string was passed in place of a list of strings.
 
     A function that expects a list iterates over the characters of the string, so its own error
-    refers to a single character. Only the first such argument is reported.
+    refers to a single character. If there are several arguments of this kind, only the first
+    argument is reported.
 
     Parameters
     ----------
@@ -403,8 +404,8 @@ def _annotated_arguments(
 class _AnnotationNamespace(dict[str, Any]):
     """Namespace in which string annotations are evaluated.
 
-    The namespace contains the global names of the module. Missing names are looked up among the
-    known import aliases and among the classes of all rsfstudy modules that are loaded.
+    The namespace contains the global names of the module. Other names are looked up among the known
+    import aliases and among the classes of all rsfstudy modules that are loaded.
     """
 
     def __missing__(self, name: str) -> Any:
@@ -447,8 +448,8 @@ def _iterate_nested_values(value: object, nesting_levels: int) -> Iterator[Any]:
 def _is_too_long_lazy_sequence(value: Any) -> bool:
     """Return True if a lazy sequence has more than ``MAX_ITEMS`` items.
 
-    Lazy sequences are a ``range`` and an array with a stride of zero. Their memory does not grow
-    with the number of items.
+    Lazy sequences are a ``range`` and an array with a stride of zero. The memory of a lazy sequence
+    does not grow with the number of items.
     """
     if isinstance(value, range):
         return bool(value) and (value[-1] - value[0]) // value.step >= MAX_ITEMS

@@ -158,8 +158,8 @@ def _wrap_in_error_boundary(
     """Wrap a function in the error boundary.
 
     If ``is_constructor`` is True, NumPy numbers are converted to Python numbers, which can be
-    stored in files, and the arguments are also checked against their annotations. The check follows
-    the call, because the errors that the function itself raises are more specific.
+    stored in files, and the arguments are also checked against their annotations. The arguments are
+    checked after the call, because the errors that the function itself raises are more specific.
     """
     signature = inspect.signature(inspect.unwrap(function))
     name = function.__qualname__.removesuffix(".__init__").removesuffix(".__new__")

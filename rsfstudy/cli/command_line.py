@@ -59,7 +59,7 @@ class GroupInOrderOfDefinition(click.Group):
     def invoke(self, context: click.Context) -> Any:
         """Call a command, and convert Ctrl-C and signals to an error.
 
-        Click would print an empty line before the message.
+        Without the conversion, Click would print an empty line before its message.
 
         Parameters
         ----------
@@ -303,7 +303,7 @@ def report() -> None:
 
     The page contains verdicts, figures, slopes, failed cells and the provenance of each file. The
     page is a single file that can be viewed in a browser or printed. The exit status is 1 if a
-    results file cannot be read. The page then shows the reason.
+    results file cannot be read. In this case, the page shows the reason.
     """
 
 

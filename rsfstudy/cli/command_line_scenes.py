@@ -62,7 +62,7 @@ def _split_commas(
 def _parse_number_or_text(
     _context: click.Context, _option: click.Parameter, text: str | None
 ) -> Any:
-    """Convert the value of an option to a number unless it has units."""
+    """Convert the value of an option to a number if it has no units."""
     from rsfstudy.cli import assignment_parsing
 
     return None if text is None else assignment_parsing.parse_number_or_text(text)

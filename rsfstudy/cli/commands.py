@@ -162,7 +162,7 @@ def _run_studies_in_turn(
 ) -> int:
     """Run studies one after another, and continue after a failed study.
 
-    Only Ctrl-C or a signal ends the sequence.
+    The sequence ends early only after Ctrl-C or a signal.
     """
     ends: list[RunSummary] = []
     try:

@@ -184,7 +184,7 @@ def _format_normal_stresses_of_step(step: LoadingStep, is_shown: bool) -> dict[s
 def _check_output_may_be_replaced(
     output_path: Path, is_of_same_kind: Callable[[xr.Dataset], bool], kind_of_contents: str
 ) -> None:
-    """Raise ``InvalidValue`` if the output file has other contents."""
+    """Raise ``InvalidValue`` if the output file has another kind of data."""
     check_regular_file("--output", output_path)
     if not output_path.exists():
         return

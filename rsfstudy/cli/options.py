@@ -1,6 +1,6 @@
 """Options that several commands share.
 
-Modules that are slow to import are imported when an option is checked.
+Slow modules are imported only when the value of an option is checked.
 """
 
 from __future__ import annotations
@@ -102,7 +102,7 @@ class LazilyLoadedCommand(click.Command):
 
 
 class FilePath(click.Path):
-    """Parameter type for paths that are not empty and valid in the system.
+    """Parameter type for nonempty paths that the operating system accepts.
 
     Parameters
     ----------

@@ -100,7 +100,7 @@ def _print_row_as_list(row: Mapping[str, str], prose_columns: Collection[str], s
 def _longest_unbreakable_length(text: str, is_prose: bool) -> int:
     """Return the length of the longest part that must not be broken.
 
-    The parts of prose are words. Any other text is a single part.
+    Prose can be broken between words. Any other text must not be broken.
     """
     return max(map(cell_len, text.split() if is_prose else [text]), default=0)
 
