@@ -1,6 +1,6 @@
 """Command line ``rsfstudy``.
 
 The package defines options and commands, converts options to arguments of the functions of
-``rsfstudy``, prints the results, and returns exit statuses. The functions of the package compute no
-results themselves. No other package imports ``rsfstudy.cli``.
+``rsfstudy``, prints the results, and returns exit statuses. The package never computes results. No
+other package imports ``rsfstudy.cli``.
 """
