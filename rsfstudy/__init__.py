@@ -1,8 +1,8 @@
 """Parameter studies of a spring-slider with rate- and state-dependent friction.
 
-Named studies, and studies of your own, are declared as labelled dimensions over a scene, computed
-over a lattice by Dask workers, and land as self-describing NetCDF datasets that are reduced to
-boundaries and scaling slopes.
+A study varies the fields of a scene along labelled axes. Dask workers compute a measure in each
+cell of the resulting lattice. The results are written to self-describing NetCDF files and are
+reduced to stability boundaries and scaling slopes.
 """
 
 from __future__ import annotations
@@ -45,8 +45,8 @@ if TYPE_CHECKING:
     from rsfstudy.study.figure_declarations import Panel as Panel
     from rsfstudy.study.study import Study as Study
 
-#: What each module gives. It is loaded on first use, so that a worker does not import what only its
-#: driver needs.
+#: Exported names by module. A module is imported when one of its names is first used, so that
+#: worker processes do not import modules that only the main process needs.
 _LAZY_EXPORTS = {
     "slider.scene": ("Scene",),
     "slider.loading": ("Segment",),
@@ -81,13 +81,14 @@ _MODULE_BY_EXPORTED_NAME = {
     name: module for module, names in _LAZY_EXPORTS.items() for name in names
 }
 
-#: Documented modules, besides the names of this one.
+#: Documented submodules that ``rsfstudy`` provides in addition to the exported names.
 _DOCUMENTED_NAMESPACES = ("fitting", "measures", "parts", "plots", "reductions", "reduce")
 
 __all__ = sorted(_MODULE_BY_EXPORTED_NAME)
 
 
 def __getattr__(name: str) -> Any:
+    """Import an exported name or a documented namespace on first use."""
     if name in _DOCUMENTED_NAMESPACES:
         return importlib.import_module(f"{__name__}.{name}")
     if name in RENAMED[__name__]:
@@ -99,6 +100,7 @@ def __getattr__(name: str) -> Any:
 
 
 def __dir__() -> list[str]:
+    """Return the exported names."""
     return __all__
 
 

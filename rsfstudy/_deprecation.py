@@ -1,17 +1,18 @@
 """Former names of public functions, classes, members and keywords.
 
-A former name works for one release, with a ``DeprecationWarning`` that states the new name. This
-module and its uses are removed in version 1.0.0. Each entry of ``RENAMED`` maps former names to new
-names, in one of three places:
+A former name works for one release and emits a ``DeprecationWarning`` that contains the new name.
+The module and its uses will be removed in version 1.0.0. The dictionary ``RENAMED`` maps former
+names to new names. The keys of ``RENAMED`` have three forms:
 
 ``"package.module"``
     Names of a module. The module sets ``__getattr__ = renamed_names(__name__)``.
 ``"package.module:Class"``
     Members of a class, which has the decorator ``renamed_members``. If users may override the
-    members in a subclass, ``__init_subclass__`` of the class calls ``adopt_former_members``.
+    members in a subclass, the method ``__init_subclass__`` of the class calls
+    ``adopt_former_members``.
 ``"package.module:function()"``, ``"package.module:Class()"``
-    Keyword arguments of a function or of a constructor, which has the outermost decorator
-    ``renamed_keywords``.
+    Keyword arguments of a function or of a constructor. The outermost decorator of the function or
+    class is ``renamed_keywords``.
 """
 
 from __future__ import annotations
@@ -26,7 +27,7 @@ from typing import Any, TypeVar
 F = TypeVar("F", bound=Callable[..., Any])
 C = TypeVar("C", bound=type)
 
-#: New names by former names, by place.
+#: New names by former names, for each module, class, function or constructor.
 RENAMED: Mapping[str, Mapping[str, str]] = {
     "rsfstudy": {
         "Laboratory": "Rig",
@@ -426,7 +427,13 @@ RENAMED: Mapping[str, Mapping[str, str]] = {
 
 
 def user_stacklevel() -> int:
-    """Return the ``stacklevel`` with which a warning refers to the code of the user."""
+    """Return the ``stacklevel`` that attributes a warning to user code.
+
+    Returns
+    -------
+    int
+        Argument ``stacklevel`` of ``warnings.warn``, for the calling function.
+    """
     level, frame = 1, sys._getframe(1)
     while frame.f_back and frame.f_globals.get("__name__", "").partition(".")[0] == "rsfstudy":
         level, frame = level + 1, frame.f_back
@@ -434,7 +441,17 @@ def user_stacklevel() -> int:
 
 
 def warn_renamed(former_name: str, new_name: str, owner_name: str) -> None:
-    """Emit the deprecation warning for the former name of a member, keyword or module object."""
+    """Emit the deprecation warning for a former name.
+
+    Parameters
+    ----------
+    former_name : str
+        Former name of a member, a keyword or a module attribute.
+    new_name : str
+        New name.
+    owner_name : str
+        Name of the class, function or module, for the warning.
+    """
     text = (
         f"{former_name!r} of {owner_name} is now called {new_name!r}. The old name will be "
         "removed in 1.0.0."
@@ -443,7 +460,18 @@ def warn_renamed(former_name: str, new_name: str, owner_name: str) -> None:
 
 
 def renamed_names(module_name: str) -> Callable[[str], Any]:
-    """Return a module ``__getattr__`` that looks up the former names of the module."""
+    """Return a module ``__getattr__`` that looks up former names.
+
+    Parameters
+    ----------
+    module_name : str
+        Full name of the module, which must be a key of ``RENAMED``.
+
+    Returns
+    -------
+    callable
+        Function to assign to ``__getattr__`` in the module.
+    """
 
     def __getattr__(name: str) -> Any:  # noqa: N807
         if (new := RENAMED[module_name].get(name)) is None:
@@ -455,14 +483,40 @@ def renamed_names(module_name: str) -> Callable[[str], Any]:
 
 
 def renamed_members(owner_class: C, *, writable: bool = False) -> C:
-    """Add the former names of members to a class."""
+    """Add the former names of members to a class.
+
+    Parameters
+    ----------
+    owner_class : type
+        Class with renamed members. The class is modified in place.
+    writable : bool, default: False
+        If True, values can also be assigned under the former names.
+
+    Returns
+    -------
+    type
+        The modified class.
+    """
     for former, new in RENAMED[_key_of_class_or_function(owner_class)].items():
         setattr(owner_class, former, (_FormerField if writable else _FormerMember)(former, new))
     return owner_class
 
 
 def renamed_value(owner_class: type, member_name: str) -> str:
-    """Return the new name of a class member, and any name that is not a former name unchanged."""
+    """Return the new name of a class member.
+
+    Parameters
+    ----------
+    owner_class : type
+        Class with renamed members.
+    member_name : str
+        Former or new name of a member. A former name causes a deprecation warning.
+
+    Returns
+    -------
+    str
+        New name. A name that is not a former name is returned unchanged.
+    """
     new = RENAMED[_key_of_class_or_function(owner_class)].get(member_name, member_name)
     if new != member_name:
         warn_renamed(member_name, new, owner_class.__name__)
@@ -470,11 +524,16 @@ def renamed_value(owner_class: type, member_name: str) -> str:
 
 
 def adopt_former_members(subclass: type) -> None:
-    """Make members that a subclass defines under a former name available under the new name.
+    """Add new names for members that a subclass defines by former names.
 
     If the subclass also defines the new name, the former name is ignored. A dataclass field becomes
     a property if its new name is a property of the base class. Other dataclass fields keep their
     name and their meaning.
+
+    Parameters
+    ----------
+    subclass : type
+        Subclass of a class with renamed members. The subclass is modified in place.
     """
     for base in subclass.__mro__[1:]:
         for former, new in RENAMED.get(_key_of_class_or_function(base), {}).items():
@@ -492,14 +551,25 @@ def adopt_former_members(subclass: type) -> None:
 
 
 def renamed_keywords(function_or_class: F) -> F:
-    """Accept the former names of keyword arguments of a function or of a constructor."""
+    """Accept the former names of keyword arguments.
+
+    Parameters
+    ----------
+    function_or_class : callable or type
+        Function or class with renamed parameters.
+
+    Returns
+    -------
+    callable or type
+        Wrapped function, or the class with a wrapped constructor.
+    """
     table = RENAMED[f"{_key_of_class_or_function(function_or_class)}()"]
     owner: Any = function_or_class
     wrapped = owner.__init__ if isinstance(function_or_class, type) else function_or_class
 
     @functools.wraps(wrapped)
     def wrapper(*args: Any, **keywords: Any) -> Any:
-        # dataclasses.replace also passes the present values, under the new names
+        # The function dataclasses.replace passes the current values under the new names.
         for former in table.keys() & keywords.keys():
             warn_renamed(former, table[former], f"{function_or_class.__name__}()")
             keywords[table[former]] = keywords.pop(former)
@@ -515,15 +585,17 @@ class _FormerMember:
     """Descriptor that looks up a member by its new name."""
 
     def __init__(self, former_name: str, new_name: str) -> None:
+        """Store the former name and the new name."""
         self.former, self.new = former_name, new_name
 
     def __get__(self, instance: Any, owner: type) -> Any:
+        """Return the member with the new name."""
         annotated = any(self.former in vars(c).get("__annotations__", {}) for c in owner.__mro__)
-        if instance is None and annotated:  # dataclass looks for the default of a field
+        if instance is None and annotated:  # dataclass() looks up field defaults
             raise AttributeError(self.former)
         warn_renamed(self.former, self.new, owner.__name__)
         target = owner if instance is None else instance
-        # classes that define the former name can only get here through super()
+        # A class that defines the former name can reach this code only through super().
         defining = [c for c in owner.__mro__ if vars(c).get(self.former, self) is not self]
         return getattr(super(defining[-1], target) if defining else target, self.new)
 
@@ -532,6 +604,7 @@ class _FormerField(_FormerMember):
     """Descriptor of a field that can also be assigned under its former name."""
 
     def __set__(self, instance: Any, value: Any) -> None:
+        """Assign a value to the member with the new name."""
         warn_renamed(self.former, self.new, type(instance).__name__)
         setattr(instance, self.new, value)
 

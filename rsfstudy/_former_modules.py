@@ -1,4 +1,7 @@
-"""Former paths of modules, which stay importable with a DeprecationWarning until version 1.0.0."""
+"""Former module paths, which can still be imported until version 1.0.0.
+
+Importing a public module under its former path emits a ``DeprecationWarning``.
+"""
 
 from __future__ import annotations
 
@@ -11,8 +14,9 @@ from importlib.machinery import ModuleSpec
 from types import ModuleType
 from typing import Any
 
-#: For each former module or package below ``rsfstudy``: the module that has its names now, and the
-#: module to import them from. Former packages without names have two empty strings.
+#: Paths below ``rsfstudy`` by former module path. The first path is the module that now contains
+#: the names. The second path is the public module to import the names from. Both paths are empty
+#: for former packages without public names.
 FORMER_MODULES = {
     "analysis": ("", ""),
     "analysis.fitting": ("", ""),
@@ -52,7 +56,22 @@ class FormerModules(MetaPathFinder, Loader):
     def find_spec(
         self, fullname: str, path: Sequence[str] | None, target: ModuleType | None = None
     ) -> ModuleSpec | None:
-        """Return the specification of a module with a former path, and None for other modules."""
+        """Return the specification of a module with a former path.
+
+        Parameters
+        ----------
+        fullname : str
+            Full name of the module to import.
+        path : sequence of str or None
+            Search path of the parent package. This argument is ignored.
+        target : module, optional
+            Module object to reload. This argument is ignored.
+
+        Returns
+        -------
+        ModuleSpec or None
+            Specification of the module. The value is None if the name is not a former path.
+        """
         top, _, name = fullname.partition(".")
         if top != "rsfstudy" or name not in FORMER_MODULES:
             return None
@@ -64,26 +83,50 @@ class FormerModules(MetaPathFinder, Loader):
         return ModuleSpec(fullname, self, is_package=is_package)
 
     def create_module(self, spec: ModuleSpec) -> ModuleType:
-        """Return a module that reads its attributes from the module at the present path."""
+        """Return a module that forwards to the module at the new path.
+
+        Parameters
+        ----------
+        spec : ModuleSpec
+            Specification of the module with the former path.
+
+        Returns
+        -------
+        module
+            Module object for the former path.
+        """
         return _FormerModule(spec.name)
 
     def exec_module(self, module: ModuleType) -> None:
-        """Do nothing, because the module at the present path contains the code."""
+        """Do nothing, because the module at the new path contains the code.
+
+        Parameters
+        ----------
+        module : module
+            Module that ``create_module`` returned.
+        """
 
 
 class _FormerModule(ModuleType):
+    """Module that forwards attribute access to the module at the new path."""
+
     def __getattr__(self, name: str) -> Any:
+        """Look up an attribute in the module at the new path."""
         present, _public = FORMER_MODULES[self.__name__.partition(".")[2]]
         if not present or (name.startswith("__") and name != "__all__"):
             raise AttributeError(f"module {self.__name__!r} has no attribute {name!r}")
         return getattr(importlib.import_module(f"rsfstudy.{present}"), name)
 
     def __dir__(self) -> list[str]:
+        """Return the names in the module at the new path."""
         present, _public = FORMER_MODULES[self.__name__.partition(".")[2]]
         return dir(importlib.import_module(f"rsfstudy.{present}")) if present else []
 
 
 def install_former_module_finder() -> None:
-    """Add the import hook, before the finders of files."""
+    """Insert the import hook before the finders that search the file system.
+
+    The hook is inserted only once.
+    """
     if not any(isinstance(finder, FormerModules) for finder in sys.meta_path):
         sys.meta_path.insert(0, FormerModules())

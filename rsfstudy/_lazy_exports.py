@@ -1,4 +1,7 @@
-"""Lazy exports of packages: each module is imported when one of its names is first used."""
+"""Lazy exports of packages.
+
+A package imports a module when one of the exported names of the module is first used.
+"""
 
 from __future__ import annotations
 
@@ -18,10 +21,11 @@ def lazy_exports(
     Parameters
     ----------
     package_name : str
-        Name of the package. Its former names in ``RENAMED`` are looked up too.
+        Full name of the package. Former names of the package that ``RENAMED`` lists are looked up
+        too.
     names_by_module : mapping of str to iterable of str
-        Names that each module exports. Modules are given by their paths below ``rsfstudy``. Write
-        ``"name as other"`` to export a name as another one.
+        Exported names by module. A module is given by its path below ``rsfstudy``. The entry
+        ``"name as other"`` exports ``name`` under the name ``other``.
 
     Returns
     -------

@@ -1,7 +1,7 @@
 """Checks of arguments against the annotations of a signature.
 
-Public functions accept any object that behaves like the annotated type. If a public function
-fails with a Python exception, these checks find the argument that caused the failure.
+Public functions accept any object that behaves like the annotated type. If a public function fails
+with a Python exception, the checks find the argument that caused the failure.
 """
 
 from __future__ import annotations
@@ -21,18 +21,18 @@ from typing import Any, ForwardRef, Literal, TypeVar, Union
 
 from rsfstudy.errors import InvalidValue, shorten_text
 
-#: Largest number of items of a list that is passed as an argument. A `range` and an array that
-#: repeats one value can be longer than anything that fits in memory.
+#: Maximum number of items of a list that is passed as an argument. A ``range`` or an array that
+#: repeats a single value can be longer than any list that fits in memory.
 MAX_ITEMS = 2**20
-#: Number of items of an argument, and of levels of nesting, that the checks look at.
+#: Maximum numbers of items and of nesting levels of an argument that the checks examine.
 _MAX_CHECKED_ITEMS, _MAX_CHECKED_NESTING_LEVELS = 1000, 4
-#: Modules that annotations name by an alias.
+#: Modules by the import alias that annotations use.
 _MODULE_ALIASES = {"xr": "xarray", "pd": "pandas", "np": "numpy"}
-#: Messages of xarray about a dimension that an array does not have.
+#: Messages of xarray about a missing array dimension.
 _MISSING_DIMENSION_MESSAGE_PATTERN = re.compile(
     r"'(.+?)' (?:not found in array dimensions|is not a valid dimension)"
 )
-#: Names of plain types in messages.
+#: Descriptions of simple types in messages.
 _TYPE_DESCRIPTIONS: Mapping[Any, str] = {
     str: "a text",
     bool: "True or False",
@@ -46,9 +46,15 @@ _TYPE_DESCRIPTIONS: Mapping[Any, str] = {
 
 
 def check_argument_lengths(arguments: Mapping[str, Any]) -> None:
-    """Reject a range or a repeated-value array with more than ``MAX_ITEMS`` items.
+    """Reject a range or a repeated-value array that is too long.
 
-    The other checks iterate over such arguments and would not finish.
+    Other checks iterate over all items of an argument, which would take too long. The maximum
+    length is ``MAX_ITEMS``.
+
+    Parameters
+    ----------
+    arguments : mapping of str to object
+        Values by argument name.
 
     Raises
     ------
@@ -68,8 +74,22 @@ def string_instead_of_list_error(
     """Return an error if a string was passed in place of a list of strings.
 
     A function that expects a list iterates over the characters of the string, so its own error
-    refers to a single character. Only the first such argument is reported. The result is None if
-    there is no such argument.
+    refers to a single character. If there are several arguments of this kind, only the first
+    argument is reported.
+
+    Parameters
+    ----------
+    function : callable
+        Function that failed.
+    arguments : mapping of str to object
+        Arguments of the function, as in ``inspect.BoundArguments``.
+    error : Exception
+        Exception that the function raised.
+
+    Returns
+    -------
+    InvalidValue or None
+        Error that names the argument. The value is None if no string was passed in place of a list.
     """
     for name, value, annotation in _annotated_arguments(function, arguments):
         blamed = getattr(error, "value", None)
@@ -87,13 +107,13 @@ def string_instead_of_list_error(
 def type_mismatch_error(
     function: Callable[..., Any], arguments: Mapping[str, Any], remedy: str
 ) -> InvalidValue | None:
-    """Return an error for the first argument that does not match its annotation.
+    """Return an error for the first argument that has the wrong type.
 
     Parameters
     ----------
     function : callable
-        The function that failed.
-    arguments : mapping of str to value
+        Function that failed.
+    arguments : mapping of str to object
         Arguments of the function, as in ``inspect.BoundArguments``.
     remedy : str
         Last sentence of the message.
@@ -101,7 +121,7 @@ def type_mismatch_error(
     Returns
     -------
     InvalidValue or None
-        None if all arguments match their annotations.
+        Error that names the argument. The value is None if all arguments match their annotations.
     """
     for name, value, annotation in _annotated_arguments(function, arguments):
         if not matches_annotation(value, annotation):
@@ -113,11 +133,24 @@ def type_mismatch_error(
 def unusable_value_error(
     arguments: Mapping[str, Any], error: Exception, remedy: str
 ) -> InvalidValue | None:
-    """Return an error for the first argument whose value explains an exception.
+    """Return an error for the first argument that explains an exception.
 
-    Such values are non-finite or very large numbers, strings that UTF-8 cannot encode, invalid file
-    names, indices out of range, unknown names, and callables that raise exceptions. The result is
-    None if no argument explains the exception.
+    The function looks for non-finite or very large numbers, strings that UTF-8 cannot encode,
+    invalid file names, indices out of range, unknown names, and callables that raise exceptions.
+
+    Parameters
+    ----------
+    arguments : mapping of str to object
+        Values by argument name.
+    error : Exception
+        Exception that the function raised.
+    remedy : str
+        Last sentence of the message.
+
+    Returns
+    -------
+    InvalidValue or None
+        Error that names the argument. The value is None if no argument explains the exception.
     """
     for name, value in arguments.items():
         for part in _iterate_nested_values(value, _MAX_CHECKED_NESTING_LEVELS):
@@ -145,7 +178,7 @@ def unusable_value_error(
 
 
 def _find_missing_dimension(value: Any, error: Exception) -> str | None:
-    """Return the dimension that an exception of xarray reports as missing in an array."""
+    """Return the array dimension that xarray reports as missing."""
     found = (
         _MISSING_DIMENSION_MESSAGE_PATTERN.search(str(error))
         if hasattr(type(value), "to_dataset")
@@ -171,9 +204,9 @@ def _missing_name(error: Exception) -> object:
 
 
 def _was_raised_by(function: Callable[..., Any], error: Exception) -> bool:
-    """Return True if an exception was raised inside a function or by calling it.
+    """Return True if a function raised an exception.
 
-    A ``TypeError`` always counts, because the call may not match the signature.
+    The result is True for every ``TypeError``, because the call may not match the signature.
     """
     code, trace = getattr(function, "__code__", None), error.__traceback__
     while trace is not None:
@@ -184,7 +217,18 @@ def _was_raised_by(function: Callable[..., Any], error: Exception) -> bool:
 
 
 def convert_numpy_number(value: Any) -> Any:
-    """Return a NumPy number or Boolean as a Python object, and any other value unchanged."""
+    """Convert a NumPy number or Boolean to a Python object.
+
+    Parameters
+    ----------
+    value : object
+        Value of an argument.
+
+    Returns
+    -------
+    object
+        Python number or Boolean. Any other value is returned unchanged.
+    """
     kind = type(value)
     is_scalar = kind.__module__ == "numpy" and hasattr(kind, "item") and kind.__name__ != "ndarray"
     return value.item() if is_scalar and value.dtype.kind in "biuf" else value
@@ -196,7 +240,22 @@ def matches_annotation(
     """Return True if a value has the annotated type or behaves like this type.
 
     Lists, tuples and arrays are interchangeable, and so are Python and NumPy numbers. A Boolean is
-    not a number.
+    not accepted as a number.
+
+    Parameters
+    ----------
+    value : object
+        Value of an argument.
+    annotation : object
+        Evaluated annotation. ``Any`` and type variables match every value.
+    max_nesting : int, optional
+        Maximum depth of nested containers to check. Items at deeper levels are accepted. The
+        default is 4.
+
+    Returns
+    -------
+    bool
+        True if the value matches the annotation.
     """
     origin, arguments = typing.get_origin(annotation), typing.get_args(annotation)
     if annotation is Any or isinstance(annotation, TypeVar | ForwardRef | str) or not max_nesting:
@@ -217,7 +276,18 @@ def matches_annotation(
 
 
 def describe_type(annotation: Any) -> str:
-    """Return a description of an annotated type, such as "a number" or "a list"."""
+    """Return a description of an annotated type for messages.
+
+    Parameters
+    ----------
+    annotation : object
+        Evaluated annotation.
+
+    Returns
+    -------
+    str
+        Noun phrase such as "a number" or "a list".
+    """
     origin, arguments = typing.get_origin(annotation), typing.get_args(annotation)
     if origin in (Union, types.UnionType):
         words = list(dict.fromkeys(describe_type(each) for each in arguments))
@@ -245,11 +315,12 @@ def describe_type(annotation: Any) -> str:
 
 
 def _is_number_of_type(value: object, number_type: type) -> bool:
+    """Return True if a value is a number or Boolean of the given type."""
     name = type(value).__name__
-    is_flag = name in ("bool", "bool_")  # of Python or NumPy
+    is_flag = name in ("bool", "bool_")  # Python and NumPy Booleans
     if number_type is bool or is_flag:
         return number_type is bool and is_flag
-    if not isinstance(value, Real) or name == "timedelta64":  # an integer according to NumPy
+    if not isinstance(value, Real) or name == "timedelta64":  # a subclass of np.signedinteger
         return False
     return number_type is float or isinstance(value, Integral)
 
@@ -257,13 +328,13 @@ def _is_number_of_type(value: object, number_type: type) -> bool:
 def _is_matching_container(
     value: object, container_type: Any, item_annotations: tuple[Any, ...], nesting_levels: int
 ) -> bool:
-    """Return True if a value is a container of type ``container_type`` with matching items."""
+    """Return True if a value is a container with matching type and items."""
     if not isinstance(container_type, type) or issubclass(container_type, type):
         return isinstance(value, type)
     if container_type in (Callable, typing.get_origin(Callable[..., Any])):
         return callable(value)
     if issubclass(container_type, Mapping):
-        # a dataset is a mapping, but not one that a caller means
+        # A dataset is a mapping, but is never meant as a mapping argument.
         if not isinstance(value, Mapping) or hasattr(type(value), "data_vars"):
             return False
         pairs = itertools.islice(value.items(), _MAX_CHECKED_ITEMS)
@@ -290,10 +361,11 @@ def _is_matching_container(
 
 
 def _is_sequence_like(value: object, container_type: type) -> bool:
+    """Return True if a value can be used like the given container type."""
     if isinstance(value, str | bytes):
         return False
     dimensions = getattr(value, "ndim", None)
-    if isinstance(dimensions, int):  # an array or a series; the module numpy has a function
+    if isinstance(dimensions, int):  # the module numpy has a function ndim
         return dimensions > 0
     if issubclass(container_type, Sequence | tuple):
         return isinstance(value, Sequence)
@@ -315,7 +387,7 @@ def _annotated_arguments(
 ) -> Iterator[tuple[str, Any, Any]]:
     """Yield the name, value and annotation of each argument.
 
-    Arguments without an annotation and arguments that equal their default value are left out.
+    Arguments without an annotation and arguments that equal their default value are omitted.
     """
     for name, parameter in inspect.signature(function).parameters.items():
         if name not in arguments or parameter.annotation is parameter.empty or name == "self":
@@ -332,11 +404,12 @@ def _annotated_arguments(
 class _AnnotationNamespace(dict[str, Any]):
     """Namespace in which string annotations are evaluated.
 
-    The namespace contains the global names of the module. Missing names are looked up among the
-    known import aliases and among the classes of all rsfstudy modules that are loaded.
+    The namespace contains the global names of the module. Other names are looked up among the known
+    import aliases and among the classes of all rsfstudy modules that are loaded.
     """
 
     def __missing__(self, name: str) -> Any:
+        """Look up a name that is not a global name of the module."""
         module = sys.modules.get(_MODULE_ALIASES.get(name, ""))
         if module is not None:
             return module
@@ -348,7 +421,7 @@ class _AnnotationNamespace(dict[str, Any]):
 
 
 def _resolve_annotation(function: Callable[..., Any], annotation: Any) -> Any:
-    """Evaluate an annotation. Return ``Any`` if a name in the annotation is unknown."""
+    """Evaluate an annotation, or return ``Any`` if a name is unknown."""
     annotation = getattr(annotation, "__forward_arg__", annotation)
     if not isinstance(annotation, str):
         return annotation
@@ -373,10 +446,10 @@ def _iterate_nested_values(value: object, nesting_levels: int) -> Iterator[Any]:
 
 
 def _is_too_long_lazy_sequence(value: Any) -> bool:
-    """Return True if a lazy or repeated-value sequence exceeds ``MAX_ITEMS`` items.
+    """Return True if a lazy sequence has more than ``MAX_ITEMS`` items.
 
-    Such sequences are a ``range`` and an array with a stride of zero. Their memory does not grow
-    with the number of items.
+    Lazy sequences are a ``range`` and an array with a stride of zero. The memory of a lazy sequence
+    does not grow with the number of items.
     """
     if isinstance(value, range):
         return bool(value) and (value[-1] - value[0]) // value.step >= MAX_ITEMS
@@ -385,6 +458,7 @@ def _is_too_long_lazy_sequence(value: Any) -> bool:
 
 
 def _is_encodable(text: str) -> bool:
+    """Return True if UTF-8 can encode a string without null characters."""
     try:
         return "\0" not in text.encode().decode()
     except UnicodeError:

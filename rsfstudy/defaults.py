@@ -1,18 +1,20 @@
-"""What is so unless told otherwise. Nothing else is imported here: the command line states it in
-its help, which answers at once.
+"""Default values that the Python functions and the command line share.
+
+The module imports nothing else from the package, so that ``rsfstudy --help`` starts quickly.
 """
 
 from __future__ import annotations
 
 from pathlib import Path
 
-#: Directory of results.
+#: Default directory of results files.
 OUTPUT_DIRECTORY = Path("outputs")
-#: Formats of results; the first is the usual one.
+#: Formats of results files. The first format is the default.
 RESULT_FORMATS = ("netcdf", "zarr")
-#: Formats of figures, by the ending of the file; the first is the usual one.
+#: Formats of figures, which are also the file name extensions. The first format is the default.
 FIGURE_FORMATS = ("png", "pdf", "svg")
-#: CPU time in s a cell may take on a worker, far beyond what the usual work budget allows.
+#: CPU time limit in s for one cell on a worker. The default work budget is exhausted long before
+#: this time.
 CELL_TIME_LIMIT = 600.0
-#: Right-hand sides that a fit of a record may evaluate.
+#: Maximum number of right-hand-side evaluations of a fit to a record.
 FIT_BUDGET = 50_000_000

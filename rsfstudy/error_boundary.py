@@ -1,8 +1,8 @@
 """Error boundary of the public functions and classes.
 
-Every exception that leaves a public function is an error of rsfstudy. Its message contains the
-argument, the rule and the remedy. Calls from within rsfstudy bypass the boundary, so that the
-error refers to the function that the user called.
+Every exception that leaves a public function is an instance of an error class of rsfstudy. The
+message contains the argument, the rule and the remedy. Calls from within rsfstudy bypass the
+boundary, so that the error refers to the function that the user called.
 """
 
 from __future__ import annotations
@@ -30,11 +30,12 @@ P = ParamSpec("P")
 T = TypeVar("T")
 C = TypeVar("C", bound=type)
 
-#: Exceptions that leave the boundary as they are.
+#: Exceptions that the error boundary does not convert.
 _EXCEPTIONS_PASSED_UNCHANGED = (RsfStudyError, Warning, bdb.BdbQuit)
 #: Special methods that users call, in addition to methods without a leading underscore.
 _GUARDED_SPECIAL_METHODS = ("__init__", "__new__", "__call__", "__getitem__")
-#: Modules that call a function on behalf of their own caller.
+#: Modules that are skipped when the error boundary looks for the calling module, because they only
+#: pass the call on.
 _MODULES_CALLING_FOR_THEIR_CALLER = ("dataclasses", "functools", "rsfstudy._deprecation")
 
 
@@ -50,19 +51,23 @@ def error_boundary(
     ----------
     function : callable
         A public function or method.
-    is_called_internally : bool
-        If True, also guard calls from within rsfstudy.
-    unchanged_exceptions : tuple of type
-        Exceptions that are not converted. By default these are errors of rsfstudy, warnings, and
-        the exception with which a debugger quits.
+    is_called_internally : bool, default: False
+        If True, calls from within rsfstudy are guarded too.
+    unchanged_exceptions : tuple of type, optional
+        Exceptions that are not converted. The defaults are errors of rsfstudy, warnings, and the
+        exception that a debugger raises to quit.
 
     Returns
     -------
     callable
-        If the arguments do not match the signature, the wrapped function raises ``CallError``, a
-        TypeError that lists the parameters. Any other exception is converted to an
-        ``InvalidValue``, or to a ``DataError`` if a dataset caused the exception. The original
-        exception is the cause of the new exception.
+        Wrapped function.
+
+    Notes
+    -----
+    If the arguments do not match the signature, the wrapped function raises ``CallError``, which is
+    a ``TypeError`` that lists the parameters. Any other exception is converted to ``InvalidValue``,
+    or to ``DataError`` if a dataset caused the exception. The original exception is the cause of
+    the new exception.
     """
     return _wrap_in_error_boundary(
         function,
@@ -72,11 +77,21 @@ def error_boundary(
 
 
 def guard_methods(guarded_class: C) -> C:
-    """Apply the error boundary to the constructor and public methods of a class.
+    """Apply the error boundary to the constructor and the public methods.
 
-    The constructor also rejects arguments that do not match their annotations. Most dataclasses
-    store any argument, so a wrong argument would cause an error much later. Static methods are not
-    wrapped, because the engines compile the static methods of parts.
+    The wrapped constructor also rejects arguments that do not match their annotations. Most
+    dataclasses store any argument, so a wrong argument would cause an error much later. Static
+    methods are not wrapped, because the engines compile the static methods of parts.
+
+    Parameters
+    ----------
+    guarded_class : type
+        Class to wrap. This class is modified in place.
+
+    Returns
+    -------
+    type
+        The modified class.
     """
     for name, member in list(vars(guarded_class).items()):
         if name.startswith("_") and name not in _GUARDED_SPECIAL_METHODS:
@@ -94,10 +109,17 @@ def guard_methods(guarded_class: C) -> C:
 
 
 class CheckedKeywords:
-    """Base class for user-defined classes, such as measures.
+    """Base class for classes that users define, such as measures.
 
     If a keyword argument of the constructor is unknown, the error lists the valid keywords. The
     check is needed because ``guard_methods`` is not applied to user-defined classes.
+
+    Parameters
+    ----------
+    *args : Any
+        Positional arguments of the subclass.
+    **keywords : Any
+        Keyword arguments of the subclass.
 
     Raises
     ------
@@ -135,9 +157,9 @@ def _wrap_in_error_boundary(
 ) -> Callable[P, T]:
     """Wrap a function in the error boundary.
 
-    If ``is_constructor`` is True, NumPy numbers are converted to Python numbers, which files can
-    hold, and the arguments are also checked against their annotations. The check follows the call,
-    because the errors that the function itself raises are more specific.
+    If ``is_constructor`` is True, NumPy numbers are converted to Python numbers, which can be
+    stored in files, and the arguments are also checked against their annotations. The arguments are
+    checked after the call, because the errors that the function itself raises are more specific.
     """
     signature = inspect.signature(inspect.unwrap(function))
     name = function.__qualname__.removesuffix(".__init__").removesuffix(".__new__")
@@ -180,7 +202,7 @@ def _wrap_in_error_boundary(
             wrong = wrong or unusable_value_error(arguments, error, remedy)
             raise wrong or _failed_call_error(name, arguments, error) from error
         if is_constructor:
-            # the constructor may have converted arguments to other types
+            # The constructor may have converted the arguments to other types.
             made = getattr(arguments.get("self"), "__dict__", {})
             stored = {name: made.get(name, value) for name, value in arguments.items()}
             if wrong := type_mismatch_error(function, stored, remedy):
@@ -215,12 +237,12 @@ def _is_called_from_rsfstudy() -> bool:
 def _failed_call_error(
     callable_name: str, arguments: dict[str, Any], error: Exception
 ) -> RsfStudyError:
-    """Return the error for a failed call whose arguments have the correct types."""
+    """Return the error for a failed call if all arguments have valid types."""
     reason = format_exception(error)
     if any(map(_is_dataset_or_accessor, arguments.values())):
         rule = f"is not as rsfstudy made it ({reason.partition(': ')[2] or reason})"
         if isinstance(error, KeyError) and len(error.args) == 1:
-            # xarray lists all variables after the first sentence
+            # The message of xarray continues with a list of all variables.
             missing = str(error.args[0]).partition(". ")[0].removeprefix("No variable named ")
             if str(error.args[0]).startswith("No variable") or missing.isidentifier():
                 rule = f"has no {shorten_text(missing)}, which datasets of rsfstudy have"
@@ -243,18 +265,38 @@ def _is_dataset_or_accessor(value: object) -> bool:
 def format_exception(error: BaseException) -> str:
     """Format the type and the message of an exception.
 
-    If the message cannot be formatted, only the type is returned.
+    Parameters
+    ----------
+    error : BaseException
+        Exception to format.
+
+    Returns
+    -------
+    str
+        Type and message. If the message cannot be formatted, only the type is returned.
     """
     try:
         return f"{type(error).__name__}: {shorten_text(error)}"
-    except Exception:  # its text may raise as well
+    except Exception:  # str(error) may raise an exception
         return type(error).__name__
 
 
 def check_regular_file(argument_name: str, path: str | Path) -> None:
-    """Raise ``InvalidValue`` if a path exists but is not a regular file.
+    """Reject a path of a directory, a pipe or a device.
 
-    Reading from a pipe or a device might never return.
+    Reading from a pipe or a device might never return. A path that does not exist is accepted.
+
+    Parameters
+    ----------
+    argument_name : str
+        Name of the argument or option, for the error message.
+    path : str or Path
+        Path of a file.
+
+    Raises
+    ------
+    InvalidValue
+        If the path exists but is not a regular file, or if the path is not valid.
     """
     try:
         is_other = Path(path).exists() and not Path(path).is_file()

@@ -1,5 +1,7 @@
-"""The errors a user meets: each says the value, the rule it breaks, the choices and the remedy; and
-the warnings.
+"""Exceptions and warnings that users see.
+
+Each error message contains the value, the rule that the value breaks, the valid choices and the
+remedy.
 """
 
 from __future__ import annotations
@@ -13,19 +15,37 @@ from rsfstudy._deprecation import renamed_members, renamed_names
 
 __getattr__ = renamed_names(__name__)
 
-#: Most characters of a text, and most choices, that a message has room for; and the most that are
-#: listed beside those that look like what was given.
+#: Maximum number of characters of a value in a message, maximum number of listed choices, and
+#: maximum number of choices that are listed in addition to suggestions.
 _MAX_CHARACTERS_OF_VALUE, _MAX_CHOICES, _MAX_CHOICES_WITH_SUGGESTIONS = 200, 60, 20
-#: Most characters of a message.
+#: Maximum number of characters of a message.
 _MAX_MESSAGE_LENGTH = 5000
-#: Number and length of the choices that are compared with a value, which bounds the time.
+#: Maximum number and maximum length of the choices that are compared with a value. The limits bound
+#: the time of the comparison.
 _MAX_COMPARED_CHOICES, _MAX_CHOICE_LENGTH_FOR_SUGGESTION = 1000, 100
 
 
 class _ShortValueRepr(reprlib.Repr):
-    """Texts of values, of bounded length; numbers of NumPy are shown as numbers."""
+    """Formatter of values with limited length.
+
+    NumPy scalars are formatted as Python numbers.
+    """
 
     def repr1(self, x: object, level: int) -> str:
+        """Format a value at a nesting level.
+
+        Parameters
+        ----------
+        x : object
+            Value to format.
+        level : int
+            Remaining number of nesting levels.
+
+        Returns
+        -------
+        str
+            Formatted value.
+        """
         number = type(x).__module__ == "numpy" and not getattr(x, "ndim", 1)
         return super().repr1(x.item() if number and hasattr(x, "item") else x, level)
 
@@ -38,11 +58,13 @@ _short_value_repr.maxlist = _short_value_repr.maxtuple = _short_value_repr.maxdi
 
 
 class RsfStudyError(Exception):
-    """Anything rsfstudy refuses or cannot finish; its text is meant for the user: one line, however
-    long or odd the values that it shows.
+    """Base class of all errors of rsfstudy.
+
+    The message is a single line of limited length, in which control characters are escaped.
     """
 
     def __str__(self) -> str:
+        """Return the message as a single line of limited length."""
         return escape_control_characters(
             shorten_text(super().__str__().replace("\n", " "), _MAX_MESSAGE_LENGTH)
         )
@@ -50,21 +72,23 @@ class RsfStudyError(Exception):
 
 @renamed_members
 class InvalidValue(RsfStudyError, ValueError):
-    """A value that breaks a rule; of what is long, the message leaves the middle out.
+    """Error raised if a value breaks a rule.
+
+    Long values are abbreviated in the message.
 
     Parameters
     ----------
     name : str
-        The field, option or axis the value was given for.
+        Name of the field, option or axis.
     value : object
-        What was given.
+        Invalid value.
     rule : str
-        The rule it breaks, as in "must be positive".
+        Rule that the value breaks, for example "must be positive".
     choices : iterable of str, optional
-        The accepted values; the ones that look like `value` are suggested, alone where there are
-        many.
+        Valid values. The message suggests up to three similar choices. If there are many choices,
+        the message lists only the similar choices.
     remedy : str, optional
-        What to do instead.
+        Sentence that explains how to avoid the error.
     """
 
     def __init__(
@@ -76,6 +100,7 @@ class InvalidValue(RsfStudyError, ValueError):
         choices: Iterable[str] = (),
         remedy: str = "",
     ) -> None:
+        """Build the message from the value, the rule and the choices."""
         choices = list(choices)
         shown = _short_value_repr.repr(value)
         text = f"{shorten_text(name)} = {shown}: {rule}."
@@ -100,7 +125,18 @@ class InvalidValue(RsfStudyError, ValueError):
         self.value = value
 
     def with_location(self, place: str) -> InvalidValue:
-        """This error, with the place where it arose."""
+        """Return a copy of the error whose message begins with a location.
+
+        Parameters
+        ----------
+        place : str
+            Location of the invalid value, for example a file name and a line.
+
+        Returns
+        -------
+        InvalidValue
+            Copy with the same name and value.
+        """
         placed = InvalidValue.__new__(InvalidValue)
         Exception.__init__(placed, f"{shorten_text(place)}: {self}")
         placed.name, placed.value = self.name, self.value
@@ -112,26 +148,43 @@ class CallError(RsfStudyError, TypeError):
 
 
 class DataError(RsfStudyError):
-    """A file that is missing, damaged, or not a results file of rsfstudy."""
+    """Error raised if a file is missing, damaged, or not a results file."""
 
 
 class RunError(RsfStudyError):
-    """A run that could not start or could not finish."""
+    """Error raised if a run cannot start or cannot finish."""
 
 
 class Interrupted(RunError):
-    """A run that the user ended, or a signal."""
+    """Error raised if the user or a signal ends a run."""
 
     @property
     def exit_status(self) -> int:
-        """Exit status of the process: 128 and the number of the signal, but 1 after Ctrl-C."""
+        """Exit status of the process.
+
+        The exit status is 128 plus the signal number after a signal, and 1 after Ctrl-C.
+        """
         return self.__cause__.exit_status if isinstance(self.__cause__, SignalInterrupt) else 1
 
 
 class SignalInterrupt(KeyboardInterrupt):
-    """A signal that ends the process in order, as Ctrl-C does."""
+    """Exception raised if a signal ends the process.
+
+    The process is terminated in the same orderly way as after Ctrl-C.
+
+    Parameters
+    ----------
+    number : int
+        Signal number.
+
+    Attributes
+    ----------
+    exit_status : int
+        Exit status of the process, which is 128 plus the signal number.
+    """
 
     def __init__(self, number: int) -> None:
+        """Set the message and the exit status."""
         super().__init__(f"ended by {signal.Signals(number).name}")
         self.exit_status = 128 + number
 
@@ -144,26 +197,53 @@ class RsfStudyWarning(UserWarning):
     """
 
     def __str__(self) -> str:
+        """Return the shortened message with escaped control characters."""
         return escape_control_characters(shorten_text(super().__str__(), _MAX_MESSAGE_LENGTH))
 
 
 class NoResultWarning(RsfStudyWarning):
-    """What was asked of one scene has no number for an answer, nothing happens in it, or what
-    happens is no physics.
+    """Warning that a computation for one scene has no valid result.
+
+    Possible reasons are that the requested quantity has no numerical value, that the slider does
+    not move, or that the motion is unphysical.
     """
 
 
 class IncompleteWarning(RsfStudyWarning):
-    """A motion that ended early, or cells of a run that failed."""
+    """Warning that a motion ended early or that cells of a run failed."""
 
 
 def shorten_text(text: object, max_length: int = _MAX_CHARACTERS_OF_VALUE) -> str:
-    """A text without its middle where it is too long for a message."""
+    """Shorten a text by replacing its middle with an ellipsis.
+
+    Parameters
+    ----------
+    text : object
+        Text, or an object that is converted to a string.
+    max_length : int, default: 200
+        Maximum number of characters without the ellipsis.
+
+    Returns
+    -------
+    str
+        The text itself if it is short enough. Otherwise the beginning and the end of the text.
+    """
     whole, half = str(text), max_length // 2
     return whole if len(whole) <= max_length else f"{whole[:half]}...{whole[-half:]}"
 
 
 def escape_control_characters(text: str) -> str:
-    """Text with its control characters spelt out."""
+    """Replace control characters with visible escape sequences.
+
+    Parameters
+    ----------
+    text : str
+        Text of a message. Newline characters are kept.
+
+    Returns
+    -------
+    str
+        Text that can be printed safely on a terminal.
+    """
     characters = (c if c.isprintable() or c == "\n" else c.encode("unicode_escape") for c in text)
     return "".join(c if isinstance(c, str) else c.decode() for c in characters)

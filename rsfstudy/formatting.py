@@ -8,30 +8,62 @@ from typing import Any
 
 import numpy as np
 
-#: Most values of a list that are shown.
+#: Maximum number of values of a list that are printed without abbreviation.
 _MAX_LISTED_VALUES = 8
-#: Numbers of more digits than a reader wants.
+#: Decimal numbers with at least six decimal places, which are rounded in titles and messages.
 _LONG_DECIMAL_NUMBER_PATTERN = re.compile(r"(?<![\w.])\d+\.\d{6,}(?:e[+-]?\d+)?")
 
 
 def read_flag_meanings(attributes: Mapping[str, Any]) -> dict[float, str]:
     """Return the meaning of each flag value, from CF attributes.
 
-    The mapping is empty for a variable without flags.
+    Parameters
+    ----------
+    attributes : mapping of str to object
+        Attributes of a variable.
+
+    Returns
+    -------
+    dict of float to str
+        Meanings by flag value. The dictionary is empty for a variable without flags.
     """
     words = str(attributes.get("flag_meanings", "")).split()
     return dict(zip(np.ravel(attributes.get("flag_values", [])).tolist(), words, strict=False))
 
 
 def is_sequence_of_axis_values(value: Any) -> bool:
-    """True of several values, which an axis lays out."""
+    """Return True if a value is a list that can define an axis.
+
+    Parameters
+    ----------
+    value : object
+        Value of an override.
+
+    Returns
+    -------
+    bool
+        True for one-dimensional arrays and for sequences other than strings and bytes.
+    """
     if isinstance(value, np.ndarray):
         return value.ndim == 1
     return isinstance(value, Sequence) and not isinstance(value, str | bytes)
 
 
 def format_overrides(overrides: Mapping[str, Any]) -> str:
-    """Overrides as one types them, long lists and numbers cut short."""
+    """Format overrides as a user types them on the command line.
+
+    Long lists are abbreviated, and long decimal numbers are rounded to six significant digits.
+
+    Parameters
+    ----------
+    overrides : mapping of str to object
+        Value or list of values of each overridden field.
+
+    Returns
+    -------
+    str
+        Text such as ``b_over_a=2,3, law=slip``.
+    """
     texts = {
         name: value if isinstance(value, list) else [value] for name, value in overrides.items()
     }
@@ -40,7 +72,21 @@ def format_overrides(overrides: Mapping[str, Any]) -> str:
 
 
 def format_list(values: Sequence[Any], separator: str = ",") -> str:
-    """Values one after the other, long lists cut short."""
+    """Format a list of values, and abbreviate a long list.
+
+    Parameters
+    ----------
+    values : sequence
+        Values to format.
+    separator : str, default: ","
+        String between two values.
+
+    Returns
+    -------
+    str
+        All values if there are at most eight. Otherwise the first three values and the last value,
+        with an ellipsis between them.
+    """
     shown = [format_value(value) for value in values]
     return separator.join(
         shown if len(shown) <= _MAX_LISTED_VALUES else [*shown[:3], "...", shown[-1]]
@@ -48,17 +94,52 @@ def format_list(values: Sequence[Any], separator: str = ",") -> str:
 
 
 def pluralize(count: int, noun: str) -> str:
-    """How many there are, as in "1 cell"."""
+    """Format a count with a noun, such as "1 cell" or "2 cells".
+
+    Parameters
+    ----------
+    count : int
+        Number of objects.
+    noun : str
+        Noun in the singular. The plural is formed with "s".
+
+    Returns
+    -------
+    str
+        Count with a thousands separator, followed by the noun.
+    """
     return f"{count:,} {noun}{'s' * (count != 1)}"
 
 
 def format_value(value: Any) -> str:
-    """A value with the digits a reader wants."""
+    """Format a value, with at most six significant digits for floats.
+
+    Parameters
+    ----------
+    value : object
+        Value to format.
+
+    Returns
+    -------
+    str
+        Formatted value.
+    """
     return f"{value:.6g}" if isinstance(value, float | np.floating) else str(value)
 
 
 def format_nonempty_fields(fields: Mapping[str, Any]) -> str:
-    """Fields that have a value, with it."""
+    """Format the fields that are not None.
+
+    Parameters
+    ----------
+    fields : mapping of str to object
+        Values by field name.
+
+    Returns
+    -------
+    str
+        Text such as ``a = 0.01, law = slip``.
+    """
     return ", ".join(
         f"{n} = {format_value(value)}" for n, value in fields.items() if value is not None
     )

@@ -9,8 +9,22 @@ import xarray as xr
 
 
 def encoding_without_fill_values(dataset: xr.Dataset) -> dict[Hashable, dict[str, Any]]:
-    """Return an encoding without fill values for coordinates, flags and counts.
+    """Return an encoding that omits unwanted fill values.
 
+    Coordinates, flags and counts are written without the attribute ``_FillValue``.
+
+    Parameters
+    ----------
+    dataset : xarray.Dataset
+        Dataset to write.
+
+    Returns
+    -------
+    dict
+        Encoding by variable name, for ``xarray.Dataset.to_netcdf``.
+
+    Notes
+    -----
     xarray writes ``_FillValue = NaN`` for every floating-point variable. The CF conventions do not
     allow the attribute on coordinates. If an integer variable has the attribute, xarray converts
     the variable to floats when reading the file.
@@ -25,8 +39,19 @@ def encoding_without_fill_values(dataset: xr.Dataset) -> dict[Hashable, dict[str
 def copy_with_cf_encoding(dataset: xr.Dataset) -> xr.Dataset:
     """Return a copy of a dataset whose encoding omits unwanted fill values.
 
-    ``to_netcdf`` then writes no fill values for coordinates, flags and counts. The encoding belongs
-    to the variables, so selections and renamed copies of the dataset keep the encoding.
+    The method ``to_netcdf`` of the copy writes no fill values for coordinates, flags and counts.
+    The encoding belongs to the variables, so selections and renamed copies of the dataset keep the
+    encoding.
+
+    Parameters
+    ----------
+    dataset : xarray.Dataset
+        Dataset to copy.
+
+    Returns
+    -------
+    xarray.Dataset
+        Copy with the updated encoding.
     """
     encoded = dataset.copy()
     for name, encoding in encoding_without_fill_values(encoded).items():

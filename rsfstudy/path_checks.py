@@ -6,22 +6,24 @@ from pathlib import Path
 
 from rsfstudy.errors import InvalidValue
 
-#: Most bytes of a file name and of a path on the usual file systems.
+#: Maximum number of bytes of a file name and of a path on common file systems.
 MAX_NAME_BYTES, MAX_PATH_BYTES = 255, 4096
 
 
 def check_path(argument_name: str, path: str | Path) -> Path:
-    """Check that a path is valid, whether or not a file or directory exists there.
+    """Check that a path is valid, even if no file or directory exists there.
 
     Parameters
     ----------
     argument_name : str
         Name of the argument or option, for the error message.
     path : str or Path
+        Path of a file or directory.
 
     Returns
     -------
     Path
+        The path as a ``Path`` object.
 
     Raises
     ------
@@ -35,7 +37,7 @@ def check_path(argument_name: str, path: str | Path) -> Path:
         raise InvalidValue(argument_name, text, "is empty", remedy=remedy)
     try:
         parts = [len(part.encode()) for part in (text, *Path(text).parts)]
-    except UnicodeError as error:  # neither NetCDF nor the attributes of a file could hold it
+    except UnicodeError as error:  # NetCDF files cannot store such a path
         raise InvalidValue(argument_name, text, "must be a text that UTF-8 can hold") from error
     if "\0" in text:
         raise InvalidValue(argument_name, text, "must be a path, without the null character")

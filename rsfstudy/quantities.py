@@ -1,6 +1,4 @@
-"""Named quantities: symbol, units and what each is, wherever it is stated; and tables of them, in
-HTML.
-"""
+"""Named quantities with symbols and units, and HTML tables of quantities."""
 
 from __future__ import annotations
 
@@ -19,29 +17,38 @@ from rsfstudy.errors import InvalidValue, escape_control_characters
 
 __getattr__ = renamed_names(__name__)
 
-#: A heading of a table.
+#: Pattern of a column heading with a name and units.
 _HEADING_WITH_UNITS_PATTERN = re.compile(r"(\w+)\s*[\[(]([^\[\]()]*)[\])]")
 
 
 @guard_methods
 @dataclass(frozen=True)
 class Quantity:
-    """One named quantity.
+    """Named quantity with a symbol, units and a description.
 
-    Attributes
+    Parameters
     ----------
     name : str
-        Its name in datasets and Python.
+        Name of the quantity in datasets and in Python.
     symbol : str
-        Mathematical text for axis labels.
+        Mathematical symbol for axis labels, in LaTeX.
     units : str
-        UDUNITS string; "1" where dimensionless, and "" where units have no meaning.
+        Units in the syntax of UDUNITS. Use "1" for a dimensionless quantity, and an empty string if
+        the quantity is not numerical.
     long_name : str
-        A phrase that stands alone.
-    scale : str
-        What a dimensionless quantity is measured in: multiply by this to return to SI.
-    flags : tuple of str
-        What 0, 1, 2 and so on mean, of a number that stands for a word.
+        Description of the quantity, as a phrase that can be understood without context.
+    scale : str, default: ""
+        Scale of a dimensionless quantity, for example "D_c/V_*". The product of value and scale is
+        a quantity in SI units.
+    flags : tuple of str, default: ()
+        Meanings of the codes 0, 1, 2, ... of a categorical variable.
+
+    Examples
+    --------
+    >>> from rsfstudy.measures import Quantity
+    >>> recurrence = Quantity("recurrence", "$t_r$", "1", "recurrence interval", scale="D_c/V_*")
+    >>> recurrence.attributes
+    {'long_name': 'recurrence interval', 'units': '1', 'scale': 'D_c/V_*'}
     """
 
     name: str
@@ -53,13 +60,19 @@ class Quantity:
 
     @property
     def attributes(self) -> dict[str, Any]:
-        """The attributes of a variable of it: words, units, scale and flags, those that it has."""
+        """Attributes of a variable that holds the quantity.
+
+        Empty attributes are omitted.
+        """
         stated = {"long_name": self.long_name, "units": self.units, "scale": self.scale}
         return {key: text for key, text in stated.items() if text} | self.flag_attributes
 
     @property
     def flag_attributes(self) -> dict[str, Any]:
-        """The CF attributes that say what its values mean; none of a plain number."""
+        """CF attributes that define the flag values and their meanings.
+
+        The dictionary is empty if the quantity has no flags.
+        """
         values = [float(number) for number in range(len(self.flags))]
         return {"flag_values": values, "flag_meanings": " ".join(self.flags)} if self.flags else {}
 
@@ -68,22 +81,46 @@ class Quantity:
 @guard_methods
 @dataclass(frozen=True)
 class Output(Quantity):
-    """A number that a measure gives; the vocabulary, or its name, describes one that states no
-    more.
+    r"""Number or array that a measure computes.
 
-    Attributes
+    If only a name is given, the shared vocabulary describes the output. An output that the
+    vocabulary does not contain is described by its name.
+
+    Parameters
     ----------
-    dims : tuple of str
-        Inner dimensions that it has within one cell.
-    error : bool
-        Whether a numerical error estimate stands beside it, as ``<name>_error``.
-    optional : bool
-        Whether an ok outcome may leave it out, with its error; the message says why.
+    name : str
+        Name of the output in datasets and in Python.
+    symbol : str, default: ""
+        Mathematical symbol for axis labels, in LaTeX.
+    units : str, default: "1"
+        Units in the syntax of UDUNITS.
+    long_name : str, default: ""
+        Description of the output. The description is required if a symbol, units or a scale is
+        given.
+    scale : str, default: ""
+        Scale of a dimensionless output, for example "D_c/V_*". The product of value and scale is a
+        quantity in SI units.
+    flags : tuple of str, default: ()
+        Meanings of the codes 0, 1, 2, ... of a categorical output.
+    dims : tuple of str, default: ()
+        Dimensions of the output within one cell.
+    error : bool, default: False
+        If True, the measure also computes the numerical error estimate ``<name>_error``.
+    optional : bool, default: False
+        If True, a successful outcome may omit the output and its error estimate. The message of the
+        outcome then gives the reason.
 
     Raises
     ------
     InvalidValue
-        For a symbol, units or a scale of what is not said to be anything.
+        If a symbol, units or a scale is given without a long name.
+
+    Examples
+    --------
+    >>> from rsfstudy.measures import Output
+    >>> peak = Output("peak_friction", r"$\mu_{max}$", long_name="peak friction", error=True)
+    >>> peak.variable_names
+    ('peak_friction', 'peak_friction_error')
     """
 
     symbol: str = ""
@@ -94,49 +131,105 @@ class Output(Quantity):
     optional: bool = False
 
     def __post_init__(self) -> None:
+        """Check that a description accompanies a symbol, units or a scale."""
         if not self.long_name and (self.symbol or self.scale or self.units != "1"):
             rule = f"must say what {self.name} is, which states a symbol, units or a scale"
             raise InvalidValue("long_name", self.long_name, rule)
 
     @property
     def variable_names(self) -> tuple[str, ...]:
-        """Its name, and that of its error estimate if there is one."""
+        """Names of the output and of its error estimate, if any."""
         return (self.name, f"{self.name}_error") if self.error else (self.name,)
 
 
 def is_variable_name(name: object) -> bool:
-    """True if a text can name a variable: an identifier, as a file gives it back."""
+    """Return True if an object is a valid variable name.
+
+    Parameters
+    ----------
+    name : object
+        Candidate name.
+
+    Returns
+    -------
+    bool
+        True for Python identifiers in Unicode normalisation form C. NetCDF files normalise names to
+        this form.
+    """
     return isinstance(name, str) and name.isidentifier() and unicodedata.is_normalized("NFC", name)
 
 
 def format_unit_quotient(units_or_scales: Sequence[str]) -> str:
-    """Units, or scales, of a first quantity over others, as in ``s (um s-1)-1``;
-    `split_unit_quotient` gives the single ones again.
+    """Format the units of a quotient of quantities.
+
+    Parameters
+    ----------
+    units_or_scales : sequence of str
+        Units or scales of the numerator, followed by the units or scales of the denominators.
+        Denominators with the units "1" are omitted.
+
+    Returns
+    -------
+    str
+        Units such as ``s (um s-1)-1``. The inverse function is ``split_unit_quotient``.
     """
     first, *others = units_or_scales
     return first + "".join(f" ({each})-1" for each in others if each != "1")
 
 
 def split_unit_quotient(unit_quotient: str) -> list[str]:
-    """Units, or scales, of which something is in the first over the others."""
+    """Split the units of a quotient into numerator and denominators.
+
+    Parameters
+    ----------
+    unit_quotient : str
+        Units in the form that ``format_unit_quotient`` returns.
+
+    Returns
+    -------
+    list of str
+        Units or scales of the numerator, followed by the units or scales of the denominators.
+    """
     return [each.removesuffix(")-1") for each in unit_quotient.split(" (")]
 
 
 def units_or_scale_of_variable(attributes: Mapping[Any, Any]) -> str:
-    """What the numbers of a variable are in: units, or what those without units are measured in."""
+    """Return the units of a variable, with scales of dimensionless quantities.
+
+    Parameters
+    ----------
+    attributes : mapping
+        Attributes of the variable.
+
+    Returns
+    -------
+    str
+        Units. If the variable has a scale, the scale replaces the units of the numerator.
+    """
     units, scale = str(attributes.get("units", "")), str(attributes.get("scale", ""))
     return format_unit_quotient([scale, *split_unit_quotient(units)[1:]]) if scale else units
 
 
 def parse_heading(text: str) -> tuple[str, str] | None:
-    """Name and units that a heading such as ``velocity (um/s)`` states; None of another text."""
+    """Split a column heading into a name and units.
+
+    Parameters
+    ----------
+    text : str
+        Heading such as ``velocity (um/s)`` or ``velocity [um/s]``.
+
+    Returns
+    -------
+    tuple of str or None
+        Name and units. The value is None if the heading does not have this form.
+    """
     match = _HEADING_WITH_UNITS_PATTERN.fullmatch(text.strip())
     return (match[1], match[2].strip()) if match else None
 
 
-# ---- tables, as notebooks show them --------------------------------------------------------------
+# ---- HTML tables for notebooks -------------------------------------------------------------------
 
-#: Of a table of quantities.
+#: Column headings of a table of quantities.
 _QUANTITY_TABLE_HEADINGS = ("field", "symbol", "value", "unit", "meaning")
 _FUNCTION_NAMES_IN_FORMULAS = ("ln", "log", "exp")
 _HTML_TAGS_OF_SUB_AND_SUPERSCRIPTS = {"_": "sub", "^": "sup"}
@@ -144,12 +237,23 @@ _CELL_STYLE = 'style="text-align: left; vertical-align: top"'
 
 
 def escape_html(text: object) -> str:
-    """Escape a string for HTML, and make control characters visible."""
+    """Escape a string for HTML, and make control characters visible.
+
+    Parameters
+    ----------
+    text : object
+        Text, or an object that is converted to a string.
+
+    Returns
+    -------
+    str
+        Text that can be inserted in an HTML page.
+    """
     return escape(escape_control_characters(str(text)))
 
 
 class HtmlMarkup(str):
-    """A text that is HTML already."""
+    """String of HTML markup, which is not escaped again."""
 
     __slots__ = ()
 
@@ -157,15 +261,23 @@ class HtmlMarkup(str):
 def html_table(
     headings: Sequence[str], rows: Iterable[Sequence[object]], caption: str = ""
 ) -> HtmlMarkup:
-    """A table; texts are escaped, unless they are `HtmlMarkup`.
+    """Format a table in HTML.
+
+    All texts are escaped except ``HtmlMarkup`` objects.
 
     Parameters
     ----------
     headings : sequence of str
+        Column headings.
     rows : iterable of sequence
-        Texts and numbers, as many in each row as there are headings.
-    caption : str
-        What stands above it.
+        Rows of texts and numbers. Each row has one item per heading.
+    caption : str, default: ""
+        Text above the table.
+
+    Returns
+    -------
+    HtmlMarkup
+        Table with inline styles.
     """
     above = f"<p><b>{_format_html_table_cell(caption)}</b></p>" if caption else ""
     head = "".join(f"<th {_CELL_STYLE}>{_format_html_table_cell(text)}</th>" for text in headings)
@@ -180,7 +292,22 @@ def html_table(
 def html_quantities_table(
     rows: Iterable[tuple[Quantity, object]], caption: str = "", *, with_values: bool = True
 ) -> HtmlMarkup:
-    """A table of quantities, with their values unless ``with_values`` is False."""
+    """Format a table of quantities in HTML.
+
+    Parameters
+    ----------
+    rows : iterable of tuple
+        Pairs of a quantity and its value.
+    caption : str, default: ""
+        Text above the table.
+    with_values : bool, default: True
+        If False, the column of values is omitted.
+
+    Returns
+    -------
+    HtmlMarkup
+        Table with the columns field, symbol, value, unit and meaning.
+    """
     shown = [n for n, text in enumerate(_QUANTITY_TABLE_HEADINGS) if with_values or text != "value"]
     table = (_quantity_row(about, value) for about, value in rows)
     return html_table(
@@ -191,23 +318,48 @@ def html_quantities_table(
 
 
 def _quantity_row(about: Quantity, value: object) -> tuple[object, ...]:
-    """The row of a quantity, under `_QUANTITY_TABLE_HEADINGS`."""
+    """Return the table row of a quantity, in the order of the headings."""
     return about.name, html_symbol(about.symbol), value, html_unit(about), about.long_name
 
 
 class HtmlTableMixin:
-    """Base of what a notebook shows as a table of quantities."""
+    """Base class of objects that notebooks display as a table."""
 
     def quantities_with_values(self) -> Iterable[tuple[Quantity, object]]:
-        """The quantities, with their values."""
+        """Return the quantities to display, with their values.
+
+        Subclasses must override the method.
+
+        Returns
+        -------
+        iterable of tuple
+            Pairs of a quantity and its value.
+
+        Raises
+        ------
+        TypeError
+            If the subclass does not override the method.
+        """
         raise TypeError(f"{type(self).__name__} shows no quantities")
 
     def _repr_html_(self) -> str:
+        """Return the HTML table that notebooks display."""
         return html_quantities_table(self.quantities_with_values(), type(self).__name__)
 
 
 def html_symbol(formula: str) -> HtmlMarkup:
-    """A symbol as `Quantity` states it, without the need of MathJax."""
+    """Convert a symbol from LaTeX to HTML that needs no MathJax.
+
+    Parameters
+    ----------
+    formula : str
+        Symbol of a quantity. A text without dollar signs is only escaped.
+
+    Returns
+    -------
+    HtmlMarkup
+        Symbol in italics, with Greek letters, subscripts and superscripts.
+    """
     if "$" not in formula:
         return HtmlMarkup(escape_html(formula))
     text = escape_html(formula.strip("$"))
@@ -218,7 +370,19 @@ def html_symbol(formula: str) -> HtmlMarkup:
 
 
 def html_unit(quantity: Quantity) -> HtmlMarkup:
-    """Unit of a quantity, or its scale where it is dimensionless; empty for 1."""
+    """Format the unit of a quantity in HTML.
+
+    Parameters
+    ----------
+    quantity : Quantity
+        Quantity with units or a scale.
+
+    Returns
+    -------
+    HtmlMarkup
+        Scale of a dimensionless quantity, or the units. The text is empty if a dimensionless
+        quantity has no scale.
+    """
     if quantity.scale:
         scale = quantity.scale.replace("sigma", r"\sigma")
         return html_symbol(f"${scale}$")
@@ -226,7 +390,11 @@ def html_unit(quantity: Quantity) -> HtmlMarkup:
 
 
 def _html_character_entity(character_name: str) -> str:
-    """Letters and signs have the same names in HTML."""
+    """Return the character of a LaTeX command.
+
+    LaTeX and HTML use the same names for many letters and signs. Function names are returned
+    unchanged, and unknown commands are removed.
+    """
     return (
         character_name
         if character_name in _FUNCTION_NAMES_IN_FORMULAS
@@ -235,11 +403,13 @@ def _html_character_entity(character_name: str) -> str:
 
 
 def _format_html_script(match: re.Match[str]) -> str:
+    """Format a subscript or superscript in HTML."""
     tag = _HTML_TAGS_OF_SUB_AND_SUPERSCRIPTS[match[1]]
     return f"<{tag}>{match[2] if match[2] is not None else match[3]}</{tag}>"
 
 
 def _format_html_table_cell(value: Any) -> str:
+    """Format a value for a cell of an HTML table."""
     if isinstance(value, HtmlMarkup):
         return value
     if isinstance(value, bool):

@@ -1,4 +1,7 @@
-"""Statuses of a cell: an answer, a failure, or not computed yet."""
+"""Status codes of a cell.
+
+A status is an answer, a failure, or the mark of a cell that has not been computed yet.
+"""
 
 from __future__ import annotations
 
@@ -7,11 +10,21 @@ from enum import IntEnum, unique
 
 @unique
 class Status(IntEnum):
-    """Outcome of one cell; the integer is what the NetCDF flag variable holds."""
+    """Outcome of one cell.
+
+    Results files store the integer value of the status as a flag variable. Values from
+    ``WORK_BUDGET_SPENT`` onwards are not answers.
+
+    Attributes
+    ----------
+    meaning : str
+        Explanation of the status for users.
+    """
 
     meaning: str
 
     def __new__(cls, code: int, meaning: str) -> Status:
+        """Create a member from its integer code and its meaning."""
         member = int.__new__(cls, code)
         member._value_ = code
         member.meaning = meaning
@@ -42,7 +55,7 @@ class Status(IntEnum):
     NOT_IDENTIFIED = 18, "the record does not constrain a parameter, whose value is not meaningful"
     ERRORS_NOT_VALID = 19, "the values stand, but their standard errors are not valid"
 
-    # failures, from here on
+    # The statuses below are failures.
     WORK_BUDGET_SPENT = 20, "the work budget was spent before an answer was reached"
     INTEGRATION_FAILED = 21, "the integrator gave up or returned non-finite numbers"
     UNVERIFIED = 22, "two formulations disagree, or errors stay far above what was asked for"
@@ -54,19 +67,25 @@ class Status(IntEnum):
 
     @property
     def label(self) -> str:
-        """Name as the flag meaning of the NetCDF variable."""
+        """Name of the status in the NetCDF flag meanings."""
         return self.name.lower()
 
     @property
     def has_values(self) -> bool:
-        """True if the cell has usable values, with or without valid standard errors."""
+        """True if the cell has usable values.
+
+        The standard errors of the values may be invalid.
+        """
         return self in (Status.OK, Status.ERRORS_NOT_VALID)
 
     @property
     def is_answer(self) -> bool:
-        """True where the status answers the question, even if no number can."""
+        """True if the status answers the question of the study.
+
+        An answer may be a statement without a number, for example that a slider is always stable.
+        """
         return self < Status.WORK_BUDGET_SPENT
 
 
-#: Names of the statuses, by what files hold.
+#: Labels of the statuses by the integer that files store.
 STATUS_LABELS = {int(status): status.label for status in Status}

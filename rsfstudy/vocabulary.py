@@ -1,6 +1,8 @@
-"""Quantities that scenes, motions and results share: name, symbol, units and long name of each,
-for datasets, axis labels and tables; most stand in vocabulary.csv. What one measure alone gives is
-described in its own file.
+"""Shared vocabulary of the quantities in scenes, motions and results.
+
+Each quantity has a name, a symbol, units and a long name, which datasets, axis labels and tables
+use. Most quantities are defined in ``vocabulary.csv``. A quantity that only one measure computes is
+defined in the module of the measure.
 """
 
 from __future__ import annotations
@@ -18,8 +20,11 @@ from rsfstudy.slider import FIELD_QUANTITIES as SCENE
 
 
 def _read_vocabulary() -> Iterator[Quantity]:
-    """The quantities beside those of scenes, in the order in which datasets and pages name them:
-    of scenes and rigs; of measures, or along motions; of reductions; and of every lattice.
+    """Yield the quantities of ``vocabulary.csv``, which exclude scene fields.
+
+    The file lists quantities of scenes and rigs first, then quantities of measures and motions,
+    then quantities of reductions, and finally quantities that every lattice has. Datasets and pages
+    list the quantities in this order.
     """
     with resources.files(__package__).joinpath("vocabulary.csv").open(encoding="utf-8") as file:
         rows: Iterator[dict[str, Any]] = csv.DictReader(file)
@@ -43,7 +48,7 @@ _SUFFIX_DESCRIPTIONS = {
 
 _SUFFIXES_OF_COUNT_VARIABLES = ("points", "crossings")
 
-#: Times that were measured: no two runs share them.
+#: Variables with measured times, which differ between two runs of the same study.
 TIMING_VARIABLES = (
     "wall_time",
     "run_time",
@@ -55,7 +60,7 @@ TIMING_VARIABLES = (
     "time_per_evaluation_in_rupture",
 )
 
-#: Coordinates that follow from an axis: name -> (axis, formula).
+#: Coordinates that are computed from an axis. Each name maps to the axis and the formula.
 FORMULAS_OF_DERIVED_COORDINATES: dict[str, tuple[str, Callable[[float], float]]] = {
     "log_load_velocity_ratio": (
         "load_velocity_ratio",
@@ -69,7 +74,19 @@ FORMULAS_OF_DERIVED_COORDINATES: dict[str, tuple[str, Callable[[float], float]]]
 
 
 def coverage_content_type(variable_name: str) -> str:
-    """Kind of content of a variable, in the words of ISO 19115-1."""
+    """Return the content type of a variable, as a term of ISO 19115-1.
+
+    Parameters
+    ----------
+    variable_name : str
+        Name of the variable.
+
+    Returns
+    -------
+    str
+        ``"auxiliaryInformation"`` for costs and times, ``"qualityInformation"`` for statuses,
+        messages and error estimates, and ``"modelResult"`` for other variables.
+    """
     if variable_name in ("rhs_evaluations", *TIMING_VARIABLES):
         return "auxiliaryInformation"
     if variable_name in ("status", "message") or re.search(
@@ -82,15 +99,24 @@ def coverage_content_type(variable_name: str) -> str:
 def find_quantity(
     variable_name: str, extra_quantities: Mapping[str, Quantity] = MappingProxyType({})
 ) -> Quantity:
-    """Look a quantity up, deriving ``<name>_error`` and its like from ``<name>``.
+    """Find the quantity of a variable.
 
-    Names that neither `extra_quantities` nor the vocabulary holds describe themselves.
+    The quantity of a derived variable, such as ``<name>_error``, is built from the quantity
+    ``<name>``. If a name is unknown, the returned quantity is dimensionless and its long name is
+    the variable name.
 
     Parameters
     ----------
     variable_name : str
-    extra_quantities : mapping of str to Quantity
-        What a study says of its own numbers.
+        Name of the variable.
+    extra_quantities : mapping of str to Quantity, optional
+        Additional quantities, for example the outputs of a user-defined measure. These quantities
+        take precedence over the shared vocabulary.
+
+    Returns
+    -------
+    Quantity
+        Description of the variable.
     """
     if variable_name in extra_quantities:
         return extra_quantities[variable_name]

@@ -1,5 +1,6 @@
-"""Command line ``rsfstudy``: options, commands and printed output.
+"""Command line ``rsfstudy``.
 
-The package converts options to arguments of the functions of ``rsfstudy``, prints the results, and
-returns exit statuses. It never computes results, and no other package imports it.
+The package defines options and commands, converts options to arguments of the functions of
+``rsfstudy``, prints the results, and returns exit statuses. The package never computes results. No
+other package imports ``rsfstudy.cli``.
 """

@@ -1,4 +1,8 @@
-"""What is typed as AXIS=VALUES or AXIS=VALUE, for ``--set`` and ``--cell``."""
+"""Parsing of ``AXIS=VALUES`` assignments on the command line.
+
+The options ``--set``, ``--cell``, ``--columns`` and the options of a rig are converted to Python
+values.
+"""
 
 from __future__ import annotations
 
@@ -16,7 +20,25 @@ _FLAG_VALUE_BY_WORD = {"true": True, "yes": True, "false": False, "no": False}
 
 
 def parse_overrides(study: Study, settings: tuple[str, ...]) -> dict[str, Any]:
-    """Values of axes and fields of a study that ``--set`` states."""
+    """Parse the overrides of axes and fields of a study.
+
+    Parameters
+    ----------
+    study : Study
+        Study whose axes define the valid labels.
+    settings : tuple of str
+        Values of the option ``--set``.
+
+    Returns
+    -------
+    dict
+        Value or list of values by axis or field. CSV files of a loading are read.
+
+    Raises
+    ------
+    InvalidValue
+        If an assignment is malformed or a name is set twice.
+    """
     texts = {p for axis in study.axes for p in axis.point_names if axis.labels or "," in p}
     found = _parse_each_assignment(settings, lambda text: parse_axis_assignment(text, texts))
     if "loading" in found:
@@ -31,7 +53,23 @@ def parse_overrides(study: Study, settings: tuple[str, ...]) -> dict[str, Any]:
 
 
 def parse_fields(settings: tuple[str, ...]) -> dict[str, Any]:
-    """Fields of a scene that ``--set`` states."""
+    """Parse the fields of a scene.
+
+    Parameters
+    ----------
+    settings : tuple of str
+        Values of the option ``--set``, in the form ``FIELD=VALUE``.
+
+    Returns
+    -------
+    dict
+        Values by field name.
+
+    Raises
+    ------
+    InvalidValue
+        If an assignment is malformed or a field is set twice.
+    """
     rule = "must read FIELD=VALUE, as in law=slowness"
     given = _parse_each_assignment(settings, lambda text: split_assignment("--set", text, rule))
     return {name: parse_flag_number_or_text(text) for name, text in given.items()}
@@ -40,7 +78,7 @@ def parse_fields(settings: tuple[str, ...]) -> dict[str, Any]:
 def _parse_each_assignment(
     settings: tuple[str, ...], parse_assignment: Callable[[str], tuple[str, Any]]
 ) -> dict[str, Any]:
-    """What each of the settings states, no name twice."""
+    """Parse assignments, and reject a name that is set twice."""
     found: dict[str, Any] = {}
     for text in settings:
         name, given = parse_assignment(text)
@@ -51,21 +89,63 @@ def _parse_each_assignment(
 
 
 def parse_loading_file(file_path: Any, rig: Rig | None) -> Any:
-    """A value of `loading`: what a CSV file tells, which goes by the name of the file."""
+    """Read a loading from a CSV file.
+
+    Parameters
+    ----------
+    file_path : object
+        Value of the field ``loading``.
+    rig : Rig or None
+        Rig that defines the units of the file.
+
+    Returns
+    -------
+    object
+        Loading with the name of the file if the value is the path of a CSV file. Any other value is
+        returned unchanged.
+    """
     path = Path(str(file_path))
     return read_loading_file(path, rig) if path.suffix.lower() == ".csv" else file_path
 
 
 def read_loading_file(path: Path, rig: Rig | None) -> UserLoading:
-    """The loading that a table tells: a record where it has the column ``time``, else a
-    protocol.
+    """Read a loading from a table.
+
+    Parameters
+    ----------
+    path : Path
+        CSV file. A table with the column ``time`` is a record of the load point. Any other table is
+        a protocol.
+    rig : Rig or None
+        Rig that defines the units of the file.
+
+    Returns
+    -------
+    UserLoading
+        Loading with the name of the file.
     """
     read = history if "time" in read_table(path) else read_protocol
     return read(path, rig, name=path.stem)
 
 
 def parse_rig(option_texts: Mapping[str, str]) -> Rig:
-    """The rig that options state."""
+    """Create a rig from command line options.
+
+    Parameters
+    ----------
+    option_texts : mapping of str to str
+        Option values by name. Options that do not belong to the rig are ignored.
+
+    Returns
+    -------
+    Rig
+        Rig with the given quantities.
+
+    Raises
+    ------
+    InvalidValue
+        If a required quantity is missing.
+    """
     stated = {
         name: parse_number_or_text(text)
         for name, text in option_texts.items()
@@ -80,7 +160,23 @@ def parse_rig(option_texts: Mapping[str, str]) -> Rig:
 
 
 def parse_cell_coordinate(text: str) -> tuple[str, str]:
-    """One ``AXIS=VALUE``, the value as it is."""
+    """Split an ``AXIS=VALUE`` argument of the option ``--cell``.
+
+    Parameters
+    ----------
+    text : str
+        Argument of the option.
+
+    Returns
+    -------
+    tuple of str
+        Name of the axis and value. The value is not converted to a number.
+
+    Raises
+    ------
+    InvalidValue
+        If the text has no equals sign.
+    """
     name, equals, value = text.partition("=")
     if not equals:
         raise InvalidValue("--cell", text, "must read AXIS=VALUE, as in b_over_a=2")
@@ -88,7 +184,27 @@ def parse_cell_coordinate(text: str) -> tuple[str, str]:
 
 
 def split_assignment(option_name: str, text: str, rule: str) -> tuple[str, str]:
-    """Both sides of a text that reads NAME=VALUE; the rule names what it must read."""
+    """Split an assignment at the first equals sign.
+
+    Parameters
+    ----------
+    option_name : str
+        Name of the option, for the error message.
+    text : str
+        Assignment such as ``law=slowness``.
+    rule : str
+        Description of the expected form, for the error message.
+
+    Returns
+    -------
+    tuple of str
+        Name and value without surrounding spaces.
+
+    Raises
+    ------
+    InvalidValue
+        If the name, the equals sign or the value is missing.
+    """
     name, equals, given = (part.strip() for part in text.partition("="))
     if not (name and equals and given):
         raise InvalidValue(option_name, text, rule)
@@ -96,15 +212,48 @@ def split_assignment(option_name: str, text: str, rule: str) -> tuple[str, str]:
 
 
 def parse_column_assignments(text: str | None) -> dict[str, str] | None:
-    """Which heading stands above which quantity, of ``time=t (s),friction=mu``."""
+    """Parse the option ``--columns``.
+
+    Parameters
+    ----------
+    text : str or None
+        Comma-separated assignments such as ``time=t (s),friction=mu``.
+
+    Returns
+    -------
+    dict of str to str or None
+        Column headings by quantity. The value is None if the text is empty.
+
+    Raises
+    ------
+    InvalidValue
+        If an assignment is malformed.
+    """
     rule = "must read NAME=HEADING, as in 'time=t (s),friction=mu'"
     parts = (part for part in (text or "").split(",") if part.strip())
     return dict(split_assignment("--columns", part.strip(), rule) for part in parts) or None
 
 
 def parse_axis_assignment(text: str, known_labels: Collection[str]) -> tuple[str, Any]:
-    """One ``AXIS=VALUES``: a label, a single value, a comma list, start:stop:count, or
-    start:stop:count:log. Labels may hold commas.
+    """Parse an assignment of values to an axis.
+
+    Parameters
+    ----------
+    text : str
+        Assignment ``AXIS=VALUES``. The values are a label, a single value, a comma-separated list,
+        a range ``start:stop:count``, or a logarithmic range ``start:stop:count:log``.
+    known_labels : collection of str
+        Labels of the axes. A label may contain commas.
+
+    Returns
+    -------
+    tuple
+        Name of the axis, and a value or a list of values.
+
+    Raises
+    ------
+    InvalidValue
+        If the assignment is malformed or a value in the list is missing.
     """
     name, values = split_assignment("--set", text, "must read AXIS=VALUES, as in b_over_a=2,3,4")
     if values in known_labels:
@@ -122,7 +271,18 @@ def parse_axis_assignment(text: str, known_labels: Collection[str]) -> tuple[str
 
 
 def parse_flag_number_or_text(text: str) -> Any:
-    """A flag, a number, or else a text."""
+    """Convert a text to a Boolean or a number if possible.
+
+    Parameters
+    ----------
+    text : str
+        Text such as ``yes``, ``false``, ``0.01`` or ``slip``.
+
+    Returns
+    -------
+    bool, float or str
+        Converted value. Any other text is returned unchanged.
+    """
     return (
         _FLAG_VALUE_BY_WORD[text.lower()]
         if text.lower() in _FLAG_VALUE_BY_WORD
@@ -131,6 +291,17 @@ def parse_flag_number_or_text(text: str) -> Any:
 
 
 def parse_number_or_text(text: str) -> float | str:
-    """The number that a text is, or else the text."""
+    """Convert a text to a number if possible.
+
+    Parameters
+    ----------
+    text : str
+        Text such as ``0.01`` or ``10 um``.
+
+    Returns
+    -------
+    float or str
+        Number. Any other text is returned unchanged.
+    """
     read = parse_number(text)
     return text if read is None else read

@@ -1,5 +1,7 @@
-"""The command line: how each command is spelt, and what its help says. What a command does is
-loaded when it is called, so that help and the list of studies answer at once.
+"""Command line interface with all commands and their help texts.
+
+The function that runs a command is imported when the command is called. The help texts and the list
+of studies are therefore printed without delay.
 """
 
 from __future__ import annotations
@@ -30,21 +32,50 @@ from rsfstudy.errors import (
 from rsfstudy.study import study_titles
 
 EXIT_STATUS_OK, EXIT_STATUS_FAILED, EXIT_STATUS_WRONG_USAGE = 0, 1, 2
-#: Signals that end a command as Ctrl-C does.
+#: Signals that interrupt a command in the same way as Ctrl-C.
 _SIGNALS_THAT_END_COMMAND = (signal.SIGTERM, signal.SIGHUP)
 
 
 class GroupInOrderOfDefinition(click.Group):
-    """A group whose help names commands in the order of this file."""
+    """Command group that lists its commands in the order of definition."""
 
     command_class = options.LazilyLoadedCommand
 
     def list_commands(self, _context: click.Context) -> list[str]:
-        """Names of the commands."""
+        """Return the names of the commands.
+
+        Parameters
+        ----------
+        _context : click.Context
+            Context of the command line, which is not used.
+
+        Returns
+        -------
+        list of str
+            Names in the order of definition.
+        """
         return list(self.commands)
 
     def invoke(self, context: click.Context) -> Any:
-        """Call a command; Ctrl-C and signals end it with one line, without a blank one before."""
+        """Call a command, and convert Ctrl-C and signals to an error.
+
+        Without the conversion, Click would print an empty line before its message.
+
+        Parameters
+        ----------
+        context : click.Context
+            Context of the command line.
+
+        Returns
+        -------
+        object
+            Return value of the command.
+
+        Raises
+        ------
+        Interrupted
+            If the user or a signal interrupts the command.
+        """
         try:
             return super().invoke(context)
         except KeyboardInterrupt as error:
@@ -63,18 +94,20 @@ def cli() -> None:
 
 
 def main() -> None:
-    """Entry point: errors end in one message and an exit status, not in a traceback, unless the
-    environment has RSFSTUDY_TRACEBACK.
+    """Run the command line and exit with the status of the command.
+
+    Errors are printed as a single message without a traceback. If the environment variable
+    ``RSFSTUDY_TRACEBACK`` is set, the traceback of an unexpected exception is printed.
     """
     warnings.filterwarnings("always", category=UserWarning, module="rsfstudy")
     warnings.filterwarnings("ignore", category=IncompleteWarning)  # commands print it themselves
     warnings.showwarning = lambda message, *_place: _print_warning(message)
     logging.getLogger("matplotlib").addHandler(_LOG_HANDLER)
     for stream in (sys.stdout, sys.stderr):
-        if isinstance(stream, io.TextIOWrapper):  # which may be unable to say what a file says
+        if isinstance(stream, io.TextIOWrapper):  # the encoding may lack characters
             stream.reconfigure(errors="backslashreplace")
     for number in _SIGNALS_THAT_END_COMMAND:
-        if signal.getsignal(number) is signal.SIG_DFL:  # and not ignored, as by nohup
+        if signal.getsignal(number) is signal.SIG_DFL:  # nohup ignores SIGHUP
             signal.signal(number, _raise_signal_interrupt)
     try:
         sys.exit(cli(standalone_mode=False) or EXIT_STATUS_OK)
@@ -114,7 +147,10 @@ def _describe_unexpected_error(error: Exception) -> str:
 
 
 def _raise_signal_interrupt(signal_number: int, _frame: object) -> None:
-    """End the command; it then takes its own time whatever follows: `timeout` sends two signals."""
+    """Interrupt the command, and ignore all further signals.
+
+    The program ``timeout`` sends two signals, and the second signal must not interrupt the cleanup.
+    """
     for other in _SIGNALS_THAT_END_COMMAND:
         signal.signal(other, signal.SIG_IGN)
     raise SignalInterrupt(signal_number)
@@ -127,11 +163,18 @@ class _WarnOnceHandler(logging.Handler):
     """
 
     def __init__(self, level: int) -> None:
+        """Create a handler without printed messages."""
         super().__init__(level)
         self._printed: set[str] = set()
 
     def emit(self, record: logging.LogRecord) -> None:
-        """Print the message of a log record unless it has been printed before."""
+        """Print the message of a log record unless it has been printed before.
+
+        Parameters
+        ----------
+        record : logging.LogRecord
+            Log record.
+        """
         text = record.getMessage()
         if text not in self._printed:
             self._printed.add(text)
@@ -142,11 +185,13 @@ _LOG_HANDLER = _WarnOnceHandler(logging.WARNING)
 
 
 def _print_warning(message: Warning | str) -> None:
-    # not by the console, which knows nothing of a progress bar and would write over it
+    # The console is not used here, because the warning would overwrite a progress bar.
+    """Print a warning on the standard error."""
     print(escape_control_characters(shorten_text(f"warning: {message}", 5000)), file=sys.stderr)
 
 
 def _print_error(text: str) -> None:
+    """Print an error message on the standard error."""
     from rsfstudy.cli.console import stderr_console
 
     stderr_console.print(text)
@@ -155,7 +200,7 @@ def _print_error(text: str) -> None:
 @cli.command("list", cls=click.Command)
 @click.pass_context
 def list_studies(context: click.Context) -> None:
-    """Name the studies."""
+    """List the named studies with their titles."""
     text = context.make_formatter()
     text.write_dl(list(study_titles().items()))
     text.write_paragraph()
@@ -171,11 +216,12 @@ def list_studies(context: click.Context) -> None:
 @options.study_file_option
 @options.rig_options
 def show() -> None:
-    """Show a study before it is run, or what is in a results file.
+    """Show a study before a run, or summarise a results file.
 
-    Of a study, by its NAME or file: what varies, what is fixed and measured, and what it costs, as
-    long as its cells took last where they are kept in OUTPUT. Of a results file: its numbers, where
-    they come from, and how to reproduce each cell that failed.
+    For the name or the file of a study, the command prints the axes, the fixed fields, the measure
+    and the expected cost. The cost is the measured time if OUTPUT contains cells of an earlier run.
+    For a results file, the command prints the results, their provenance, and a command that
+    reproduces each failed cell.
     """
 
 
@@ -199,10 +245,11 @@ def show() -> None:
 @options.figure_options
 @options.rig_options
 def run() -> None:
-    """Run a study: results, figure, slopes and claims.
+    """Run a study and write its results and its figure.
 
-    Of a study, by its NAME or file: OUTPUT/NAME.nc, its figure OUTPUT/NAME.png, its reductions and
-    its claims. Cells that are finished already are kept: the same command goes on where it ended.
+    NAME is a named study or a Python file that declares a study. The command writes OUTPUT/NAME.nc
+    and the figure OUTPUT/NAME.png, and prints the reductions and the claims. If a run was
+    interrupted, the same command continues the run, because finished cells are kept.
     """
 
 
@@ -217,10 +264,10 @@ def run() -> None:
     help="Only this claim, as in C6, which must then apply to the results.",
 )
 def check() -> None:
-    """Hold results against published values.
+    """Compare results with published values.
 
-    Those of a named study, or of a results file. Fails where a verdict is not the one expected, a
-    cell failed, or no claim applies.
+    NAME is a named study or a results file. The exit status is 1 if a verdict differs from the
+    expected verdict, if a cell failed, or if no claim applies to the results.
     """
 
 
@@ -235,10 +282,11 @@ def check() -> None:
 @options.study_file_option
 @options.abscissa_option
 def plot() -> None:
-    """Draw the figure of results, or a motion, beside them.
+    """Draw the figure of a results file or of a motion.
 
-    Of a named study's results, or of a file, that of a motion too. A figure of your own is taken
-    from the file that --study names, which is run.
+    NAME is a named study or a file with results or a motion. By default, the figure is written to
+    the directory of the file. If the study defines its own figure, pass the Python file of the
+    study with --study. The command executes this file.
     """
 
 
@@ -251,10 +299,11 @@ def plot() -> None:
     help="The page.  [default: DIRECTORY/report.html]",
 )
 def report() -> None:
-    """Write one page of HTML of all results in a directory.
+    """Write an HTML page with all results in a directory.
 
-    With verdicts, figures, slopes, failed cells, and where each file comes from, for a browser or a
-    printer; it needs no other file. Fails where a file cannot be read, which the page tells.
+    The page contains verdicts, figures, slopes, failed cells and the provenance of each file. The
+    page is a single file that can be viewed in a browser or printed. The exit status is 1 if a
+    results file cannot be read. In this case, the page shows the reason.
     """
 
 
@@ -265,10 +314,10 @@ def report() -> None:
 def compare() -> None:
     """Compare two results files: declarations, versions and numbers.
 
-    The results of two studies can be compared by name. Cells are matched by their coordinates.
-    Two numbers agree if they differ by no more than the sum of both error estimates. The exit
-    status is 0 if all numbers and statuses agree, and 1 if a number or a status differs or if the
-    files have no cell in common.
+    The results of two studies can be compared by name. Cells are matched by their coordinates. Two
+    numbers agree if they differ by no more than the sum of both error estimates. The exit status is
+    0 if all numbers and statuses agree. The exit status is 1 if a number or a status differs, or if
+    the files have no cell in common.
     """
 
 
@@ -287,9 +336,9 @@ def compare() -> None:
 )
 @options.worker_options
 def rerun() -> None:
-    """Compute a results file anew, and compare every number.
+    """Compute a results file again, and compare all numbers.
 
-    It is computed from what the file says of itself. Fails where a number is not the same.
+    The study is restored from the results file. The exit status is 1 if a number differs.
     """
 
 
@@ -304,9 +353,10 @@ def rerun() -> None:
     help="The file to write; .csv and .mat take the place of its ending.  [default: beside FILE]",
 )
 def export() -> None:
-    """Write results, or a motion, for other programs.
+    """Export results or a motion to other programs.
 
-    As a table of CSV, a row a cell or a time, as a file of MATLAB, or both.
+    The command writes a CSV table, a MATLAB file, or both. The table has one row per cell of a
+    study or per time of a motion.
     """
 
 

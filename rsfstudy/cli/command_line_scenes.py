@@ -1,5 +1,6 @@
-"""The command line: how the commands are spelt that are about one motion: followed, recorded in a
-laboratory, or computed by other codes.
+"""Commands for single motions, laboratory records and benchmark problems.
+
+The module defines the options and help texts of ``simulate``, ``fit``, ``problems`` and ``verify``.
 """
 
 from __future__ import annotations
@@ -41,27 +42,27 @@ from rsfstudy.motion import DEFAULT_EVALUATION_BUDGET, DEFAULT_RTOL, ENGINES, SC
 )
 @click.option("--quiet", is_flag=True, help="Say how it ended, and not its peaks and events.")
 def simulate() -> None:
-    """Follow one motion of one slider, draw it and write it.
+    """Compute a single motion, and write its figure and its data.
 
-    The picture shows friction and slip rate along it, and its path on the phase plane.
+    The figure shows friction and slip rate along the motion, and the path in the phase plane.
 
-    Exit status 1 where the motion ends early, whatever the reason; 2 for wrong usage; 3 where it
-    passes the instability norm with neither mass nor radiation damping, beyond which it is no
-    physics; else 0.
+    The exit status is 1 if the motion ends early, and 2 for wrong usage. The exit status is 3 if
+    the slip rate exceeds the instability norm without inertia and without radiation damping,
+    because the motion is then unphysical. Otherwise the exit status is 0.
     """
 
 
 def _split_commas(
     _context: click.Context, _option: click.Parameter, text: str | None
 ) -> tuple[str, ...]:
-    """Parts of a comma list."""
+    """Split a comma-separated list."""
     return tuple(part.strip() for part in (text or "").split(",") if part.strip())
 
 
 def _parse_number_or_text(
     _context: click.Context, _option: click.Parameter, text: str | None
 ) -> Any:
-    """A number in units of records, or a text with units."""
+    """Convert the value of an option to a number if it has no units."""
     from rsfstudy.cli import assignment_parsing
 
     return None if text is None else assignment_parsing.parse_number_or_text(text)
@@ -70,7 +71,7 @@ def _parse_number_or_text(
 def _comma_list_option(
     *option_names: str, help_text: str, default: str | None = None, metavar: str = "TEXT"
 ) -> Callable[[F], F]:
-    """An option that is a comma list."""
+    """Create an option for a comma-separated list."""
     return click.option(
         *option_names, callback=_split_commas, default=default, metavar=metavar, help=help_text
     )
@@ -79,7 +80,10 @@ def _comma_list_option(
 def _quantity_option(
     option_name: str, help_text: str, default: str | None = None
 ) -> Callable[[F], F]:
-    """An option that is a number with its units; what help says of its default stands in words."""
+    """Create an option for a number with units.
+
+    The help text of the option describes the default.
+    """
     about: dict[str, Any] = {"default": default, "show_default": False, "help": help_text}
     return click.option(option_name, callback=_parse_number_or_text, **about)
 
@@ -163,11 +167,11 @@ def _quantity_option(
     "--output", Path("fit.png"), "File of the figure; the data stand beside it as NetCDF."
 )
 def fit() -> None:
-    """Fit friction parameters to RECORDS of velocity steps, with honest errors.
+    """Fit friction parameters to velocity steps in RECORDS.
 
-    Prints the detected steps and a table of a, b, D_c and their standard errors, which include
-    the correlation of the noise. Also prints which parameters the record does not constrain, and
-    writes a figure and a data file.
+    The command prints the detected steps and a table of a, b, D_c and their standard errors, which
+    include the correlation of the noise. The command also lists the parameters that the record does
+    not constrain, and writes a figure and a data file.
 
     The exit status is 1 if a fit has no values, values that are not verified or standard errors
     that are not valid, and 2 for wrong usage. Otherwise the exit status is 0, even if a parameter
@@ -178,9 +182,9 @@ def fit() -> None:
 @click.command(cls=options.LazilyLoadedCommand, does="commands_referee")
 @click.argument("directory", metavar="DIR", type=options.FilePath())
 def problems() -> None:
-    """Write the problems of the referee into a new directory.
+    """Write all benchmark problems to a new directory.
 
-    Each problem with its answer, a table to be filled, and an example in plain SciPy.
+    Each problem includes its reference solution, a table to fill in, and an example in plain SciPy.
     """
 
 
@@ -202,10 +206,11 @@ def problems() -> None:
 )
 @options.make_image_option("--figure", None, "Draw where they agree, into this .png, .pdf or .svg.")
 def verify() -> None:
-    """Hold answers of another code against those that are known.
+    """Compare solutions of another code with reference solutions.
 
-    Says of each quantity how many digits agree, from where on they part, and what would explain
-    it; and of all files one line to quote. Exit status 1 where a problem is not passed.
+    For each quantity, the command prints the number of correct digits, the first row with a larger
+    difference, and a possible explanation. The last line summarises all files. The exit status is 1
+    if a problem is not passed.
     """
 
 

@@ -1,5 +1,7 @@
-"""What the commands on studies and their results do; `command_line` says how each is spelt, and
-loads this when one is called.
+"""Implementation of the commands for studies and their results.
+
+The module ``command_line`` defines the options of the commands, and imports this module when a
+command is called.
 """
 
 from __future__ import annotations
@@ -55,7 +57,23 @@ _UNIT_OPTION_NAMES = ("stress", "length", "time")
 
 
 def show(options: CommandOptions) -> int:
-    """Show a study, or a results file."""
+    """Print a study or the summary of a results file.
+
+    Parameters
+    ----------
+    options : CommandOptions
+        Arguments and options of the command.
+
+    Returns
+    -------
+    int
+        Exit status.
+
+    Raises
+    ------
+    click.UsageError
+        If options change a results file.
+    """
     if Path(options.name).suffix not in _SUFFIXES_OF_RESULTS_FILES:
         printed_reports.print_study_declaration(
             _build_study_from_options(options.name, options), options.output
@@ -69,7 +87,18 @@ def show(options: CommandOptions) -> int:
 
 
 def run(options: CommandOptions) -> int:
-    """Run a study, or all."""
+    """Run a study or all studies.
+
+    Parameters
+    ----------
+    options : CommandOptions
+        Arguments and options of the command.
+
+    Returns
+    -------
+    int
+        Exit status.
+    """
     studies = [_build_study_from_options(name, options) for name in _selected_study_names(options)]
     left_out = (
         _skip_studies_without_engine(studies) if options.every and options.engine is None else []
@@ -99,7 +128,10 @@ def run(options: CommandOptions) -> int:
 def _run_study(
     study: Study, compute_dataset: Callable[[], xr.Dataset], options: CommandOptions
 ) -> RunSummary:
-    """Compute a study, draw it and print what came out, in short where others follow."""
+    """Compute a study, draw its figure and print a report.
+
+    The report is short if all studies are run.
+    """
     began = time.monotonic()
     dataset = compute_dataset()
     file = options.output / f"{study.name}.{_FILE_SUFFIX_BY_FORMAT[options.format]}"
@@ -113,7 +145,7 @@ def _run_study(
 
 
 def _skip_studies_without_engine(studies: Sequence[Study]) -> list[RunSummary]:
-    """Name the studies whose engine is not installed."""
+    """Print and return the studies whose engine is not installed."""
     ends = []
     for study in studies:
         if why := missing_packages(study.accuracy.engine):
@@ -128,7 +160,10 @@ def _run_studies_in_turn(
     options: CommandOptions,
     summaries_of_skipped: Sequence[RunSummary],
 ) -> int:
-    """Run one study after the other, even if some fail; only Ctrl-C ends them all."""
+    """Run studies one after another, and continue after a failed study.
+
+    The sequence ends early only after Ctrl-C or a signal.
+    """
     ends: list[RunSummary] = []
     try:
         for study, compute in studies_with_run_functions:
@@ -150,7 +185,18 @@ def _run_studies_in_turn(
 
 
 def rerun(options: CommandOptions) -> int:
-    """Compute a results file anew, or one cell of it."""
+    """Compute a results file or one of its cells again.
+
+    Parameters
+    ----------
+    options : CommandOptions
+        Arguments and options of the command.
+
+    Returns
+    -------
+    int
+        Exit status.
+    """
     if options.place:
         place = dict(map(assignment_parsing.parse_cell_coordinate, options.place))
         try:
@@ -158,7 +204,7 @@ def rerun(options: CommandOptions) -> int:
                 scene, outcome = recompute_cell(options.file, place, study=options.study)
         except RsfStudyError:
             raise
-        except Exception:  # it fails as it fails
+        except Exception:  # the traceback helps to debug the cell
             traceback.print_exc()
             return EXIT_STATUS_FAILED
         results = open_results(options.file)
@@ -176,7 +222,18 @@ def rerun(options: CommandOptions) -> int:
 
 
 def report(options: CommandOptions) -> int:
-    """Write a page of all results."""
+    """Write an HTML page of all results in a directory.
+
+    Parameters
+    ----------
+    options : CommandOptions
+        Arguments and options of the command.
+
+    Returns
+    -------
+    int
+        Exit status.
+    """
     page, unread = write_report(options.directory, options.output)
     stdout_console.print(f"wrote {page}", soft_wrap=True)
     for file in unread:
@@ -187,14 +244,36 @@ def report(options: CommandOptions) -> int:
 
 
 def compare(options: CommandOptions) -> int:
-    """Compare two results files."""
+    """Compare two results files.
+
+    Parameters
+    ----------
+    options : CommandOptions
+        Arguments and options of the command.
+
+    Returns
+    -------
+    int
+        Exit status.
+    """
     files = [find_results(name, options.output) for name in (options.first, options.second)]
     datasets = [open_results(file) for file in files]
     return printed_reports.print_comparison(files, datasets, compare_results(*datasets))
 
 
 def check(options: CommandOptions) -> int:
-    """Hold results against published values."""
+    """Compare results with published values.
+
+    Parameters
+    ----------
+    options : CommandOptions
+        Arguments and options of the command.
+
+    Returns
+    -------
+    int
+        Exit status.
+    """
     status, datasets = EXIT_STATUS_OK, []
     for name in _selected_study_names(options):
         if not options.every or (options.output / f"{name}.nc").exists():
@@ -212,7 +291,18 @@ def check(options: CommandOptions) -> int:
 
 
 def plot(options: CommandOptions) -> int:
-    """Draw results, or a motion."""
+    """Draw the figure of results or of a motion.
+
+    Parameters
+    ----------
+    options : CommandOptions
+        Arguments and options of the command.
+
+    Returns
+    -------
+    int
+        Exit status.
+    """
     status, target = EXIT_STATUS_OK, _figure_path_from_output_option(options)
     for name in _selected_study_names(options):
         results = find_results(name, OUTPUT_DIRECTORY if target else options.output)
@@ -233,7 +323,27 @@ def plot(options: CommandOptions) -> int:
 
 
 def export(options: CommandOptions) -> int:
-    """Write a file for other programs, or two."""
+    """Export results to a CSV file, a MATLAB file, or both.
+
+    Parameters
+    ----------
+    options : CommandOptions
+        Arguments and options of the command.
+
+    Returns
+    -------
+    int
+        Exit status.
+
+    Raises
+    ------
+    click.UsageError
+        If no file format is chosen.
+    InvalidValue
+        If an output file exists.
+    DataError
+        If an output file cannot be written.
+    """
     writers = {"csv": to_csv, "mat": to_mat}
     asked = [ending for ending in writers if getattr(options, ending)]
     if not asked:
@@ -255,25 +365,29 @@ def export(options: CommandOptions) -> int:
 
 
 def _read_results_file(file: Path, study_file: Path | None) -> xr.Dataset:
-    """What a file holds, once the parts of its scenes are known that a study file defines."""
+    """Read a results file.
+
+    If a study file is given, it is executed first, because it may define parts of the scenes.
+    """
     if study_file is not None:
         load_study(str(study_file))
     return read_dataset(file)
 
 
-# ---- what options say -----------------------------------------------------------------------
+# ---- options --------------------------------------------------------------------------------
 
 
 def _selected_study_names(options: CommandOptions) -> list[str]:
-    """The study or file that is named, or all studies."""
+    """Return the given study name or file, or the names of all studies."""
     if options.every == (options.name is not None):
         raise click.UsageError("name one study, or say --all")
     return list(study_names()) if options.every else [options.name]
 
 
 def _build_study_from_options(study_name: str, options: CommandOptions) -> Study:
-    """A study with the values that options set, on the rig that they state, whose stiffness takes
-    the place of those on an axis.
+    """Load a study, and apply the overrides and the rig of the options.
+
+    If the rig has a stiffness, this stiffness replaces the points of a stiffness axis.
     """
     study, stated = load_study(study_name), options.rig_option_texts
     varied = {field for axis in study.axes for field in axis.fields}
@@ -298,7 +412,10 @@ def _build_study_from_options(study_name: str, options: CommandOptions) -> Study
 def _open_worker_pool(
     options: CommandOptions, log_path: Path | None = None
 ) -> Iterator[WorkerPool]:
-    """Where cells are computed; `log` is where worker processes write errors."""
+    """Open the worker pool that computes the cells.
+
+    Worker processes write their errors to ``log_path``.
+    """
     if options.serial and options.scheduler:
         raise click.UsageError("--serial and --scheduler exclude each other")
     nowhere = contextlib.nullcontext()
@@ -312,15 +429,20 @@ def _open_worker_pool(
 
 
 def _default_figure_path(results_path: Path, options: CommandOptions) -> Path:
-    """The figure beside results, which may be no file."""
+    """Return the path of the figure in the directory of the results.
+
+    The results file itself need not exist.
+    """
     name = results_path.name.removesuffix(".nc").removesuffix(".zarr")
     words = [name, options.variable, options.form or FIGURE_FORMATS[0]]
     return results_path.with_name(".".join(filter(None, words)))
 
 
 def _figure_path_from_output_option(options: CommandOptions) -> Path | None:
-    """The file that --output names, if it is a figure and no directory; one that looks like another
-    kind of file must be a directory already.
+    """Return the path of ``--output`` if it is a figure file.
+
+    The result is None for a directory. If the path has the suffix of another file type, the path
+    must be an existing directory.
     """
     output: Path | None = options.output
     ending = "" if output is None else output.suffix[1:].lower()
@@ -339,7 +461,12 @@ def _figure_path_from_output_option(options: CommandOptions) -> Path | None:
 
 
 def _load_user_figure(dataset: xr.Dataset, study_file: Path | None) -> Any:
-    """What draws a figure that is not part of rsfstudy: the study file's own, or maps or lines."""
+    """Load the user-defined figure of a dataset.
+
+    The result is None if the study uses a figure of rsfstudy. If the figure cannot be loaded and
+    the user passed no study file, the function prints a note and returns "lines", so that maps or
+    lines are drawn.
+    """
     if read_declaration(dataset).plot in FIGURE_NAMES:
         return None
     try:
@@ -354,7 +481,11 @@ def _load_user_figure(dataset: xr.Dataset, study_file: Path | None) -> Any:
 def _save_figure(
     dataset: xr.Dataset, figure_path: Path, options: CommandOptions, user_figure: Any
 ) -> list[Path]:
-    """The figure, if it can be drawn; the results are there already."""
+    """Save the figure and return its path.
+
+    If the figure cannot be drawn, the function prints a message and returns an empty list, because
+    the results have already been written.
+    """
     try:
         save_figure(
             dataset, figure_path, user_figure, variable=options.variable, style=options.style
@@ -366,13 +497,29 @@ def _save_figure(
 
 
 def load_user_figure(results: xr.Dataset, study_file: str | Path | None = None) -> Any:
-    """The figure that a user wrote for a dataset, from the file that declares the study. The file
-    that the dataset names is not run unasked, because the results may come from a stranger.
+    """Load the user-defined figure of a dataset from a study file.
+
+    Parameters
+    ----------
+    results : xarray.Dataset
+        Results of the study.
+    study_file : str or Path, optional
+        Python file that declares the study. The file is executed.
+
+    Returns
+    -------
+    callable or None
+        Function that draws the figure. The value is None if the study uses a figure of rsfstudy.
 
     Raises
     ------
     InvalidValue
-        Where no file is given, or it has no such figure.
+        If no file is given, or if the file does not define the figure.
+
+    Notes
+    -----
+    The dataset contains the path of the study file, but the function never executes this path,
+    because the results may come from an untrusted source.
     """
     name, named_in = (
         read_declaration(results).plot,

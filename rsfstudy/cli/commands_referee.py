@@ -1,4 +1,7 @@
-"""What the commands `problems` and `verify` do, which check other codes."""
+"""Implementation of the commands ``problems`` and ``verify``.
+
+The commands check other codes with the benchmark problems of ``rsfstudy.referee``.
+"""
 
 from __future__ import annotations
 
@@ -20,15 +23,42 @@ from rsfstudy.referee import (
 
 
 def problems(options: CommandOptions) -> int:
-    """Write all problems."""
+    """Write all benchmark problems to a directory.
+
+    Parameters
+    ----------
+    options : CommandOptions
+        Arguments and options of the command.
+
+    Returns
+    -------
+    int
+        Exit status.
+    """
     count = write_problems(options.directory)
     stdout_console.print(f"wrote {count} problems into {options.directory}")
     return printed_reports.EXIT_STATUS_OK
 
 
 def verify(options: CommandOptions) -> int:
-    """Hold files against answers; FAILED where one does not pass."""
-    if math.isnan(options.digits):  # which click finds in every range
+    """Compare solution files with the reference solutions.
+
+    Parameters
+    ----------
+    options : CommandOptions
+        Arguments and options of the command.
+
+    Returns
+    -------
+    int
+        Exit status.
+
+    Raises
+    ------
+    InvalidValue
+        If the number of digits is NaN or the assignment of columns is malformed.
+    """
+    if math.isnan(options.digits):  # click accepts NaN for any range
         raise InvalidValue("--digits", options.digits, "must be a number, from 1 to 12")
     columns = assignment_parsing.parse_column_assignments(options.columns)
     problem = options.problem or ""
@@ -46,7 +76,7 @@ def verify(options: CommandOptions) -> int:
 
 
 def _print_verdict(answer_file: Path, comparison: AnswerComparison) -> None:
-    """Print how far each quantity agrees, and what would explain it."""
+    """Print the agreement of each quantity, and a possible explanation."""
     problem = comparison.problem
     name = f"problem {problem.number}" if problem.number else f"known to {problem.digits} digits"
     outcome = "passed" if comparison.has_required_digits else "not passed"
@@ -60,7 +90,11 @@ def _print_verdict(answer_file: Path, comparison: AnswerComparison) -> None:
 
 
 def _draw_agreement(comparisons: list[AnswerComparison], figure_path: Path) -> None:
-    """Digits along the rows of one problem, or by problem."""
+    """Draw the number of agreeing digits of each quantity.
+
+    If a single file is compared and its problem has an index column, the abscissa is the index.
+    Otherwise the abscissa is the number of the problem.
+    """
     from rsfstudy.plots import draw_agreement, style_context
 
     digits: dict[str, list[tuple[float, float]]] = {}

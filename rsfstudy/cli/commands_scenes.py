@@ -1,4 +1,4 @@
-"""What the commands `simulate` and `fit` do."""
+"""Implementation of the commands ``simulate`` and ``fit``."""
 
 from __future__ import annotations
 
@@ -30,11 +30,12 @@ from rsfstudy.rig import DISPLAY_BASE_UNITS
 from rsfstudy.status import Status
 from rsfstudy.storage import write_dataset
 
-#: Exit status where a motion passes the instability norm with neither mass nor damping.
+#: Exit status if the slip rate of a motion exceeds the instability norm without inertia and without
+#: radiation damping.
 _UNPHYSICAL_EXIT_STATUS = 3
-#: Most steps of a record that are listed.
+#: Maximum number of steps of a record that are printed.
 _MAX_LISTED_STEPS = 24
-#: Options that `rsfstudy.fit` takes as they are.
+#: Options that are passed to ``rsfstudy.fit`` unchanged.
 _OPTIONS_PASSED_TO_FIT = (
     "stiffness", "slip_distance", "laws", "free", "together", "before", "after", "windows",
     "noise", "loading", "averaging", "low_pass", "posterior", "budget", "engine",
@@ -42,7 +43,18 @@ _OPTIONS_PASSED_TO_FIT = (
 
 
 def simulate(options: CommandOptions) -> int:
-    """Follow one motion, draw it and write it."""
+    """Compute a single motion, draw its figure and write its data.
+
+    Parameters
+    ----------
+    options : CommandOptions
+        Arguments and options of the command.
+
+    Returns
+    -------
+    int
+        Exit status.
+    """
     _check_output_may_be_replaced(options.output.with_suffix(".nc"), is_motion, "motion")
     scene, laboratory = _build_scene_and_rig(options)
     duration, accuracy = _parse_duration(options.duration, laboratory), ("rtol", "budget", "engine")
@@ -59,7 +71,7 @@ def simulate(options: CommandOptions) -> int:
 
 
 def _build_scene_and_rig(options: CommandOptions) -> tuple[Scene, Rig | None]:
-    """The scene, and the rig if one is stated."""
+    """Build the scene, and the rig if the options define a rig."""
     fields, rig = assignment_parsing.parse_fields(options.settings), options.rig_option_texts
     if (velocity := rig.pop("load_velocity", None)) is not None:
         fields["load_velocity"] = assignment_parsing.parse_number_or_text(velocity)
@@ -72,7 +84,7 @@ def _build_scene_and_rig(options: CommandOptions) -> tuple[Scene, Rig | None]:
 
 
 def _parse_duration(text: str | None, rig: Rig | None) -> float | None:
-    """In D_c/V_*."""
+    """Convert a duration to units of D_c/V_*."""
     time = None if text is None else assignment_parsing.parse_number_or_text(text)
     if time is not None and rig is not None:
         return rig.dimensionless(time, name="--duration")
@@ -83,7 +95,7 @@ def _parse_duration(text: str | None, rig: Rig | None) -> float | None:
 
 
 def _write_motion_and_figure(motion: xr.Dataset, rig: Rig | None, options: CommandOptions) -> None:
-    """The picture, and the data beside it."""
+    """Write the figure and the data of a motion, and print a summary."""
     said = f"{motion.attrs['status']} {motion.attrs['message']}".strip()
     if not motion.sizes["time"]:
         stdout_console.print(f"{said}\nnothing moved: there is nothing to draw or to keep")
@@ -101,7 +113,18 @@ def _write_motion_and_figure(motion: xr.Dataset, rig: Rig | None, options: Comma
 
 
 def fit(options: CommandOptions) -> int:
-    """Fit records, print the parameters, draw the fits and write them."""
+    """Fit records, print the parameters, and write figure and data.
+
+    Parameters
+    ----------
+    options : CommandOptions
+        Arguments and options of the command.
+
+    Returns
+    -------
+    int
+        Exit status.
+    """
     data = options.output.with_suffix(".nc")
     _check_output_may_be_replaced(data, is_fit, "fit")
     columns = assignment_parsing.parse_column_assignments(options.columns)
@@ -126,6 +149,7 @@ def fit(options: CommandOptions) -> int:
 
 
 def _parse_step_number(text: str) -> int:
+    """Convert a step number of the option ``--step``."""
     if not text.isdecimal():
         raise InvalidValue("--step", text, "must be a whole number, or several: 1,2")
     return int(text)
@@ -160,7 +184,7 @@ def _format_normal_stresses_of_step(step: LoadingStep, is_shown: bool) -> dict[s
 def _check_output_may_be_replaced(
     output_path: Path, is_of_same_kind: Callable[[xr.Dataset], bool], kind_of_contents: str
 ) -> None:
-    """Raise ``InvalidValue`` if the output file exists and has different contents."""
+    """Raise ``InvalidValue`` if the output file has another kind of data."""
     check_regular_file("--output", output_path)
     if not output_path.exists():
         return
@@ -169,7 +193,7 @@ def _check_output_may_be_replaced(
             if is_of_same_kind(there):
                 return
     except (OSError, RuntimeError, ValueError):
-        pass  # whatever it is, it is none
+        pass  # the file has no dataset
     remedy = "Choose another --output, or move it away first."
     raise InvalidValue(
         "--output", str(output_path), f"is there already, and no {kind_of_contents}", remedy=remedy

@@ -1,4 +1,4 @@
-"""Consoles of the commands: plain text, on the standard output or the standard error."""
+"""Consoles for plain text on the standard output and the standard error."""
 
 from __future__ import annotations
 
@@ -9,22 +9,24 @@ from rich.text import Text
 
 from rsfstudy.errors import RunError, escape_control_characters, shorten_text
 
-#: Most characters of a text that is printed: what a file says may be without end.
+#: Maximum number of characters of a printed text, because texts in files can have any length.
 _MAX_PRINTED_CHARACTERS = 5000
-#: Bounds of the width: the environment may state any.
+#: Bounds of the console width, because the environment variable can have any value.
 _MIN_WIDTH, _MAX_WIDTH = 16, 1000
 
 
 class PlainConsole(Console):
-    """A console that prints any text literally, brackets included; only control characters, which
-    would steer the terminal, are spelt out.
+    """Console that prints text literally, including square brackets.
+
+    Control characters are printed as escape sequences, because they could change the state of the
+    terminal.
     """
 
     @property
     def size(self) -> ConsoleDimensions:
         """Terminal size, with the width limited to a fixed range.
 
-        The environment variable COLUMNS overrides the width of the terminal.
+        The environment variable ``COLUMNS`` overrides the width of the terminal.
         """
         found = super().size
         return ConsoleDimensions(min(max(found.width, _MIN_WIDTH), _MAX_WIDTH), found.height)
@@ -34,11 +36,39 @@ class PlainConsole(Console):
         self._width, self._height = size
 
     def render_str(self, text: str, **options: Any) -> Text:
-        """Text with control characters spelt out, and without its middle where it is endless."""
+        """Convert a string to printable text.
+
+        Long strings are shortened, and control characters are escaped.
+
+        Parameters
+        ----------
+        text : str
+            String to print.
+        **options : Any
+            Options of ``rich.console.Console.render_str``.
+
+        Returns
+        -------
+        rich.text.Text
+            Printable text.
+        """
         return super().render_str(make_text_printable(text), **options)
 
     def print(self, *objects: Any, **options: Any) -> None:
-        """Print; the output may go to a file on a full disk, which is a `RunError`."""
+        """Print objects to the console.
+
+        Parameters
+        ----------
+        *objects : Any
+            Objects to print.
+        **options : Any
+            Options of ``rich.console.Console.print``.
+
+        Raises
+        ------
+        RunError
+            If the output cannot be written, for example because the disk is full.
+        """
         try:
             super().print(*objects, **options)
         except OSError as error:
@@ -46,7 +76,18 @@ class PlainConsole(Console):
 
 
 def make_text_printable(text: str) -> str:
-    """Text with control characters spelt out, and without its middle where it is endless."""
+    """Shorten a long text, and escape its control characters.
+
+    Parameters
+    ----------
+    text : str
+        Text to print.
+
+    Returns
+    -------
+    str
+        Text with at most about 5,000 characters and visible escape sequences.
+    """
     return escape_control_characters(shorten_text(text, _MAX_PRINTED_CHARACTERS))
 
 

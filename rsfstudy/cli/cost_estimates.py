@@ -1,4 +1,8 @@
-"""Cost of a study, in words: as its cells took here last, else a guess that says it is one."""
+"""Descriptions of the cost of a study.
+
+The cost is based on the measured times of earlier cells. If there are no measured times, the
+description contains a rough estimate.
+"""
 
 from __future__ import annotations
 
@@ -12,26 +16,33 @@ from rsfstudy.execution import CellPlan, estimate_cost
 from rsfstudy.motion import COMPILED, SCIPY, check_engine_is_usable
 from rsfstudy.storage import CellTimings, read_timings
 
-#: How many times as long a call takes with SciPy as compiled, by measure. The page of benchmarks
-#: has 7 to 12 times, and 31 to 72 times, the more the more accurate.
+#: Typical speed-up of the compiled engine relative to SciPy, by measure. The page of benchmarks
+#: reports factors from 7 to 12 and from 31 to 72. The factors increase with the accuracy.
 _COMPILED_SPEEDUP_BY_MEASURE = {"critical_step": 10, "limit_cycle": 30}
-#: The measure that compares integrators of SciPy.
+#: Measure that compares the integrators of SciPy and therefore needs the SciPy engine.
 _SCIPY_ONLY_MEASURE = "work_precision"
-#: Time in s above which another engine is worth a word.
+#: Minimum computing time in s for which the faster engine is suggested.
 _MIN_TIME_FOR_HINT = 60.0
 
 
 def describe_study_cost(cell_plan: CellPlan, output_directory: Path) -> str:
-    """Work and time of a study on one core.
+    """Describe the work and the computing time of a study on one core.
 
     Parameters
     ----------
-    cell_plan : Plan
+    cell_plan : CellPlan
+        Cells of the study.
     output_directory : Path
-        Directory of its results: what is kept there tells how long cells took.
+        Directory of results. If the directory contains cells of an earlier run with the same
+        accuracy and engine, their measured times are used.
+
+    Returns
+    -------
+    str
+        Number of right-hand-side evaluations, and measured or estimated time.
     """
     work, guess = estimate_cost(cell_plan)
-    work = round(work, 2 - len(str(work)))  # more digits than two would claim too much
+    work = round(work, 2 - len(str(work)))  # more digits would not be significant
     text = f"about {work:,} right-hand sides at rtol {cell_plan.study.accuracy.rtol:g}; "
     kept = output_directory / f"{cell_plan.study.name}.cells.sqlite"
     took = read_timings(kept)
@@ -58,8 +69,21 @@ def describe_study_cost(cell_plan: CellPlan, output_directory: Path) -> str:
 
 
 def compiled_engine_hint(cell_plan: CellPlan, output_directory: Path) -> str:
-    """Advice to take the compiled engine; empty where it is not installed, where cells of another
-    engine are kept, or where little time is to be saved.
+    """Return a hint that the compiled engine is faster.
+
+    Parameters
+    ----------
+    cell_plan : CellPlan
+        Cells of the study.
+    output_directory : Path
+        Directory of results.
+
+    Returns
+    -------
+    str
+        Hint for the user. The text is empty if the study cannot use the compiled engine or already
+        uses it, if the directory contains cells of the study, or if the estimated time is at most
+        60 s.
     """
     measure, engine = cell_plan.study.measure.describe()["name"], cell_plan.study.accuracy.engine
     kept = output_directory / f"{cell_plan.study.name}.cells.sqlite"
@@ -81,7 +105,18 @@ def compiled_engine_hint(cell_plan: CellPlan, output_directory: Path) -> str:
 
 
 def format_duration(seconds: float) -> str:
-    """A time as one says it."""
+    """Format a duration with a suitable unit.
+
+    Parameters
+    ----------
+    seconds : float
+        Duration in s.
+
+    Returns
+    -------
+    str
+        Duration such as "2.5 s", "3 min 20 s" or "1 h 5 min".
+    """
     if seconds < 0.05:
         return "less than 0.1 s"
     if seconds < 9.95:
@@ -95,7 +130,7 @@ def format_duration(seconds: float) -> str:
 
 
 def _timed_at_same_accuracy_and_engine(cell_plan: CellPlan, cell_timings: CellTimings) -> bool:
-    """True if cells were computed as accurately as they are to be now, and by the same engine."""
+    """Return True if the timings belong to the same rtol and engine."""
     asked = cell_plan.study.accuracy
     return cell_timings.fingerprint.get("rtol") == asked.rtol and cell_timings.fingerprint.get(
         "engine"
@@ -103,7 +138,24 @@ def _timed_at_same_accuracy_and_engine(cell_plan: CellPlan, cell_timings: CellTi
 
 
 def missing_packages(name: str) -> str:
-    """Packages that an engine lacks, in words; empty where none."""
+    """Describe the missing packages of an engine.
+
+    Parameters
+    ----------
+    name : str
+        Name of the engine.
+
+    Returns
+    -------
+    str
+        Missing package and the command to install the package. The text is empty if the engine can
+        be used.
+
+    Raises
+    ------
+    InvalidValue
+        If the engine is unknown.
+    """
     try:
         check_engine_is_usable(name)
     except InvalidValue:

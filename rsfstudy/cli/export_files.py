@@ -1,4 +1,4 @@
-"""Files of results for other programs: CSV and MATLAB."""
+"""Export of results files to CSV and MATLAB."""
 
 from __future__ import annotations
 
@@ -15,8 +15,17 @@ from rsfstudy.quantities import units_or_scale_of_variable
 
 
 def to_csv(dataset: xr.Dataset, path: Path) -> None:
-    """Write the table of a dataset, whose header names units as `read_table` reads them; numbers
-    keep all their digits, and codes of cells are words.
+    """Write the table of a dataset to a CSV file.
+
+    The header contains the units in the form that ``read_table`` reads. Numbers are written with
+    full precision, and status codes are written as labels.
+
+    Parameters
+    ----------
+    dataset : xarray.Dataset
+        Results, a motion or a fit.
+    path : Path
+        CSV file to write.
     """
     table = dataset.rsf.to_dataframe()
     for name in table if "status" in dataset else ():
@@ -31,13 +40,23 @@ def to_csv(dataset: xr.Dataset, path: Path) -> None:
 
 
 def to_mat(dataset: xr.Dataset, path: Path) -> None:
-    """Write all variables of a dataset as a file of MATLAB, each with its dimensions in order, and
-    the structures ``units`` and ``dimensions`` that name those of each, and ``attributes``.
+    """Write all variables of a dataset to a MATLAB file.
+
+    The dimensions of each array keep their order. The structures ``units`` and ``dimensions``
+    contain the units and the names of the dimensions of each variable. The structure ``attributes``
+    contains the attributes of the dataset.
+
+    Parameters
+    ----------
+    dataset : xarray.Dataset
+        Results, a motion or a fit.
+    path : Path
+        MATLAB file to write.
 
     Raises
     ------
     InvalidValue
-        For a name that is none in MATLAB; those of rsfstudy are.
+        If a name is not valid in MATLAB. All names that rsfstudy defines are valid.
     """
     from scipy.io import savemat
 

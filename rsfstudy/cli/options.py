@@ -1,5 +1,6 @@
-"""Options that several commands take, and what is given of them. What needs more than click to
-check them is imported then.
+"""Options that several commands share.
+
+Slow modules are imported only when the value of an option is checked.
 """
 
 from __future__ import annotations
@@ -26,7 +27,7 @@ F = TypeVar("F", bound=Callable[..., Any])
 
 
 class CommandOptions(SimpleNamespace):
-    """Arguments and options of one call of a command, by their names."""
+    """Arguments and options of one command call, as attributes."""
 
     variable: str | None = None
     engine: Any = None
@@ -34,16 +35,27 @@ class CommandOptions(SimpleNamespace):
 
     @property
     def command_line(self) -> str:
-        """What was typed."""
+        """Command line that the user entered."""
         return shlex.join(["rsfstudy", *sys.argv[1:]])
 
     def select_options(self, *option_names: str) -> dict[str, Any]:
-        """Those of some names."""
+        """Return the values of selected options.
+
+        Parameters
+        ----------
+        *option_names : str
+            Names of the options.
+
+        Returns
+        -------
+        dict
+            Values by name.
+        """
         return {name: getattr(self, name) for name in option_names}
 
     @property
     def rig_option_texts(self) -> dict[str, str]:
-        """What is stated of a rig."""
+        """Rig options that the user specified, by name."""
         return {
             name: text
             for name in EXAMPLE_VALUES_OF_RIG_OPTIONS
@@ -52,44 +64,121 @@ class CommandOptions(SimpleNamespace):
 
 
 class LazilyLoadedCommand(click.Command):
-    """A command that is spelt here; what it does is the function of its name in a module of this
-    folder, which is given the options and returns the exit status.
+    """Command whose implementation is imported when the command is called.
+
+    The implementation is a function with the name of the command, in a module of ``rsfstudy.cli``.
+    The function takes the options and returns the exit status.
+
+    Parameters
+    ----------
+    *args : Any
+        Arguments of ``click.Command``.
+    does : str, default: "commands"
+        Name of the module with the implementation.
+    **command_settings : Any
+        Keyword arguments of ``click.Command``.
     """
 
     def __init__(self, *args: Any, does: str = "commands", **command_settings: Any) -> None:
+        """Create the command without importing the implementation."""
         super().__init__(*args, **command_settings)
         self._module_name = does
 
     def invoke(self, context: click.Context) -> Any:
-        """Load what the command does, and do it."""
+        """Import the implementation and call it with the options.
+
+        Parameters
+        ----------
+        context : click.Context
+            Context with the values of arguments and options.
+
+        Returns
+        -------
+        int
+            Exit status.
+        """
         module = importlib.import_module(f"rsfstudy.cli.{self._module_name}")
         return getattr(module, str(self.name))(CommandOptions(**context.params))
 
 
 class FilePath(click.Path):
-    """Parameter type for paths that are not empty and that the system accepts."""
+    """Parameter type for nonempty paths that the operating system accepts.
+
+    Parameters
+    ----------
+    **path_settings : Any
+        Keyword arguments of ``click.Path``.
+    """
 
     def __init__(self, **path_settings: Any) -> None:
+        """Create the parameter type from the settings of ``click.Path``."""
         super().__init__(path_type=Path, **path_settings)
 
     def convert(
         self, value: Any, param: click.Parameter | None, ctx: click.Context | None
     ) -> str | bytes | os.PathLike[str]:
-        """Convert a value to a path. Raise ``InvalidValue`` if the path is not valid."""
+        """Convert a value to a path.
+
+        Parameters
+        ----------
+        value : str or Path
+            Value of the parameter.
+        param : click.Parameter or None
+            Parameter, whose name is used in error messages.
+        ctx : click.Context or None
+            Context of the command.
+
+        Returns
+        -------
+        Path
+            Checked path.
+
+        Raises
+        ------
+        InvalidValue
+            If the path is not valid.
+        """
         name = param.opts[0] if isinstance(param, click.Option) else str(param and param.name)
         check_path(name, value)
         return super().convert(value, param, ctx)
 
 
 def combine_options(*option_decorators: Callable[[Any], Any]) -> Callable[[F], F]:
-    """Several options as one, in their order."""
+    """Combine several option decorators into one decorator.
+
+    Parameters
+    ----------
+    *option_decorators : callable
+        Decorators that ``click.option`` or ``click.argument`` returns. The help lists the options
+        in the given order.
+
+    Returns
+    -------
+    callable
+        Decorator for a command.
+    """
     return lambda command: functools.reduce(
         lambda c, each: each(c), reversed(option_decorators), command
     )
 
 
 def make_count_option(option_name: str, default: int | None, help_text: str) -> Callable[[F], F]:
-    """An option that is a whole number, 1 or more."""
+    """Create an option whose value is a positive integer.
+
+    Parameters
+    ----------
+    option_name : str
+        Name of the option with leading hyphens.
+    default : int or None
+        Default value.
+    help_text : str
+        Help text.
+
+    Returns
+    -------
+    callable
+        Decorator for a command.
+    """
     kind = click.IntRange(1)
     return click.option(option_name, type=kind, metavar="N", default=default, help=help_text)
 
@@ -97,7 +186,22 @@ def make_count_option(option_name: str, default: int | None, help_text: str) -> 
 def make_output_option(
     help_text: str, default: Path | None = None, **path_settings: bool
 ) -> Callable[[F], F]:
-    """The option that says where results go."""
+    """Create the option ``--output``.
+
+    Parameters
+    ----------
+    help_text : str
+        Help text.
+    default : Path, optional
+        Default path.
+    **path_settings : bool
+        Keyword arguments of ``click.Path``.
+
+    Returns
+    -------
+    callable
+        Decorator for a command.
+    """
     return click.option("--output", type=FilePath(**path_settings), default=default, help=help_text)
 
 
@@ -133,7 +237,7 @@ budget_option = make_count_option(
     "Right-hand sides a cell may evaluate; with more, cells that have an answer keep it.  "
     "[default: the study's, 500000]",
 )
-#: Where cells are computed.
+#: Options of the worker pool that computes the cells.
 worker_options = combine_options(
     make_count_option("--workers", 2, "Worker processes of this machine."),
     click.option("--serial", is_flag=True, help="Compute in this process."),
@@ -153,7 +257,7 @@ study_file_option = click.option(
     help="File that declares the study, if its measure, a part or the figure is its own.",
 )
 
-#: By their names in datasets.
+#: Variable names of abscissae that have a different name on the command line.
 _ABSCISSA_VARIABLES = {"displacement": "load_point_displacement"}
 abscissa_option = click.option(
     "--against",
@@ -182,7 +286,7 @@ def _check_style_option(
     return value
 
 
-#: How figures look.
+#: Options for the format and the style of figures.
 figure_options = combine_options(
     click.option(
         "--figure",
@@ -219,7 +323,22 @@ def _check_image_path(
 
 
 def make_image_option(option_name: str, default: Path | None, help_text: str) -> Callable[[F], F]:
-    """An option that names the file of a figure."""
+    """Create an option for the path of an image file.
+
+    Parameters
+    ----------
+    option_name : str
+        Name of the option with leading hyphens.
+    default : Path or None
+        Default path.
+    help_text : str
+        Help text.
+
+    Returns
+    -------
+    callable
+        Decorator for a command.
+    """
     kind = FilePath(dir_okay=False)
     return click.option(
         option_name, type=kind, callback=_check_image_path, default=default, help=help_text
@@ -227,11 +346,22 @@ def make_image_option(option_name: str, default: Path | None, help_text: str) ->
 
 
 def make_set_scene_fields_option(help_text: str) -> Callable[[F], F]:
-    """The option that sets fields of one scene."""
+    """Create the option ``--set`` for the fields of a single scene.
+
+    Parameters
+    ----------
+    help_text : str
+        Help text.
+
+    Returns
+    -------
+    callable
+        Decorator for a command.
+    """
     return click.option("--set", "settings", multiple=True, metavar="FIELD=VALUE", help=help_text)
 
 
-#: Quantities of a rig, with an example of each.
+#: Example values of the rig options, for the help texts.
 EXAMPLE_VALUES_OF_RIG_OPTIONS = {
     "normal_stress": "5 MPa",
     "slip_distance": "10 um",
@@ -246,7 +376,7 @@ EXAMPLE_VALUES_OF_RIG_OPTIONS = {
 
 
 _RIG_OPTION_HELP = "Of the rig, as in '{}'; a plain number is in SI units."
-#: The options that state a rig.
+#: Options that define a rig.
 rig_options = combine_options(
     *(
         click.option(f"--{n.replace('_', '-')}", help=_RIG_OPTION_HELP.format(e))

@@ -1,4 +1,8 @@
-"""What commands print: studies, how runs end, results, verdicts, and how two results compare."""
+"""Printed output of the commands.
+
+The module prints study declarations, run reports, results, verdicts of claims, and comparisons of
+two results files.
+"""
 
 from __future__ import annotations
 
@@ -52,13 +56,20 @@ if TYPE_CHECKING:
     from rsfstudy.plots import Figure
 
 EXIT_STATUS_OK, EXIT_STATUS_FAILED = 0, 1
-#: Most points of an axis, and most cells that ended otherwise; most characters of a value.
+#: Maximum number of printed points of an axis, maximum number of printed cells with different
+#: statuses, and maximum number of characters of a printed value.
 _MAX_PRINTED_AXIS_POINTS, _MAX_DIFFERING_CELLS, _MAX_VALUE_CHARACTERS = 40, 10, 60
 
 
 def print_study_declaration(study: Study, output_directory: Path) -> None:
-    """Print a study: its axes, what is fixed and measured, its cells and what they cost, by what is
-    kept in a directory of results.
+    """Print the declaration of a study and its expected cost.
+
+    Parameters
+    ----------
+    study : Study
+        Study to print.
+    output_directory : Path
+        Directory of results. Measured times in this directory are used for the cost.
     """
     stdout_console.print(f"{study.name}: {study.title}\n", style="bold")
     if study.summary:
@@ -102,7 +113,7 @@ def print_study_declaration(study: Study, output_directory: Path) -> None:
 
 
 def _format_axis_points(axis_points: Sequence[str]) -> str:
-    """The points of an axis, without the middle where they are many."""
+    """Format the points of an axis, and abbreviate a long list."""
     return ", ".join(
         axis_points
         if len(axis_points) <= _MAX_PRINTED_AXIS_POINTS
@@ -113,7 +124,19 @@ def _format_axis_points(axis_points: Sequence[str]) -> str:
 def print_expected_cost(
     study: Study, output_directory: Path, accuracy_was_changed: bool, suggest_faster_engine: bool
 ) -> None:
-    """Print what a run at another accuracy will cost, and what would be faster."""
+    """Print the expected cost of a run.
+
+    Parameters
+    ----------
+    study : Study
+        Study to run.
+    output_directory : Path
+        Directory of results.
+    accuracy_was_changed : bool
+        If True, print the cost relative to the default tolerance.
+    suggest_faster_engine : bool
+        If True, print a hint if the compiled engine would be much faster.
+    """
     plan = CellPlan(study)
     if accuracy_was_changed:
         ratio = study.measure.expected_work(study.accuracy) / study.measure.typical_work
@@ -127,24 +150,25 @@ def print_expected_cost(
         stderr_console.print(f"note: {text}")
 
 
-# ---- how runs end -------------------------------------------------------------------------------
+# ---- reports of runs ----------------------------------------------------------------------------
 
 
 @dataclass(frozen=True)
 class RunSummary:
-    """End of the run of a study, as the summary tells it.
+    """Summary of the run of one study.
 
     Parameters
     ----------
     study : str
+        Name of the study.
     time : str
-        Time it took.
-    status : str
-        "ok", or what went wrong.
-    verdicts : str
-        How many claims had which verdict.
-    colour : str
-        Of its status; "red" if anything went wrong.
+        Elapsed time.
+    status : str, default: "ok"
+        "ok", or a description of the failures.
+    verdicts : str, default: "-"
+        Number of claims with each verdict.
+    colour : str, default: "red"
+        Colour of the status. The value "red" marks a failure.
     """
 
     study: str
@@ -157,7 +181,24 @@ class RunSummary:
 def summarise_run(
     dataset: xr.Dataset, study_name: str, seconds: float, figure_was_drawn: bool
 ) -> RunSummary:
-    """End of a run, in few words."""
+    """Summarise a finished run.
+
+    Parameters
+    ----------
+    dataset : xarray.Dataset
+        Results of the study.
+    study_name : str
+        Name of the study.
+    seconds : float
+        Elapsed time in s.
+    figure_was_drawn : bool
+        False if drawing the figure failed.
+
+    Returns
+    -------
+    RunSummary
+        Summary of the run. The colour is "green" if there are no failures.
+    """
     verdicts, wrong = summarise_verdicts(dataset, check(dataset))
     text = ", ".join([*wrong, *["no figure"] * (not figure_was_drawn)])
     colour = "red" if text else "green"
@@ -169,7 +210,17 @@ def summarise_run(
 def print_run_report(
     dataset: xr.Dataset, summary_of_run: RunSummary, written_files: Sequence[Path]
 ) -> None:
-    """Print what a run ends with: slopes, claims, failures and where the files are."""
+    """Print reductions, claims, failed cells and output files of a run.
+
+    Parameters
+    ----------
+    dataset : xarray.Dataset
+        Results of the study.
+    summary_of_run : RunSummary
+        Summary of the run.
+    written_files : sequence of Path
+        Results file and figure.
+    """
     for piece in reduction_pieces(dataset):
         table_layout.print_summary_piece(piece)
     if slow := note_on_norms_near_load_velocity(dataset):
@@ -183,10 +234,19 @@ def print_run_report(
 def print_short_run_report(
     dataset: xr.Dataset, summary_of_run: RunSummary, written_files: Sequence[Path]
 ) -> None:
-    """Print a short report of one of several runs.
+    """Print a short report of the run of one of several studies.
 
-    The report has one line for each table of ``print_run_report``. It lists changed verdicts and
-    failed cells in full.
+    The report has one line for each table of ``print_run_report``. Changed verdicts and failed
+    cells are listed in full.
+
+    Parameters
+    ----------
+    dataset : xarray.Dataset
+        Results of the study.
+    summary_of_run : RunSummary
+        Summary of the run.
+    written_files : sequence of Path
+        Results file and figure.
     """
     stdout_console.print(
         f"{summary_of_run.study}: {dataset.attrs['title']}", style="bold", soft_wrap=True
@@ -204,7 +264,13 @@ def print_short_run_report(
 
 
 def print_run_summaries(run_summaries: Sequence[RunSummary]) -> None:
-    """Print how several runs ended."""
+    """Print a table with one row per study.
+
+    Parameters
+    ----------
+    run_summaries : sequence of RunSummary
+        Summaries of the runs.
+    """
     rows = [
         {n: getattr(end, n) for n in ("study", "time", "verdicts", "status")}
         for end in run_summaries
@@ -219,8 +285,19 @@ def print_run_summaries(run_summaries: Sequence[RunSummary]) -> None:
 
 
 def print_results_summary(dataset: xr.Dataset, results_file: str) -> int:
-    """Print what a file holds, whatever it is of, and where it comes from; FAILED where cells, fits
-    or a motion failed.
+    """Print the contents and the provenance of a results file.
+
+    Parameters
+    ----------
+    dataset : xarray.Dataset
+        Results of a study, a fit, or results of a single scene.
+    results_file : str
+        Path of the file, which is used in commands that reproduce failed cells.
+
+    Returns
+    -------
+    int
+        Exit status. The status is ``EXIT_STATUS_FAILED`` if a cell, a fit or a motion failed.
     """
     title = dataset.attrs.get("title", "answer for one scene")
     name = f"{dataset.attrs['id']}: " if "id" in dataset.attrs else ""
@@ -235,14 +312,40 @@ def print_results_summary(dataset: xr.Dataset, results_file: str) -> int:
 
 
 def exit_status_of_dataset(dataset: xr.Dataset) -> int:
-    """OK where every fit has numbers, or a motion ended as asked."""
+    """Return the exit status for a fit or for results of a single scene.
+
+    Parameters
+    ----------
+    dataset : xarray.Dataset
+        Fit, motion or other results of a single scene.
+
+    Returns
+    -------
+    int
+        ``EXIT_STATUS_OK`` if all fits are valid or if the status of the scene is ``ok``. Otherwise
+        ``EXIT_STATUS_FAILED``.
+    """
     if is_fit(dataset):
         return EXIT_STATUS_OK if all_fits_are_valid(dataset) else EXIT_STATUS_FAILED
     return EXIT_STATUS_OK if dataset.attrs["status"] == Status.OK.label else EXIT_STATUS_FAILED
 
 
 def print_failures(dataset: xr.Dataset, results_file: str = "") -> int:
-    """Print the cells that failed, and how to reproduce one alone; FAILED if there are any."""
+    """Print the failed cells and the commands that reproduce each of them.
+
+    Parameters
+    ----------
+    dataset : xarray.Dataset
+        Results of a study.
+    results_file : str, default: ""
+        Path of the results file. Without a path, the commands are not printed.
+
+    Returns
+    -------
+    int
+        Exit status. The status is ``EXIT_STATUS_FAILED`` if a cell failed or has not been computed
+        yet.
+    """
     if undone := count_pending(dataset):
         size = dataset["status"].size
         stdout_console.print(f"{undone} of {pluralize(size, 'cell')} not computed yet", style="red")
@@ -258,8 +361,26 @@ def print_failures(dataset: xr.Dataset, results_file: str = "") -> int:
 def print_recomputed_cell(
     scene: Scene, outcome: Outcome, stored_values: xr.Dataset, warning_texts: Sequence[str] = ()
 ) -> int:
-    """Print one cell: warnings, its scene, its numbers beside those of its file, and how it ended;
-    of an array how many values it has, and their range.
+    """Print a recomputed cell next to the stored values.
+
+    The function prints warnings, the scene, a table of numbers, and the status of the cell. For an
+    array, the table contains the number of values and their range.
+
+    Parameters
+    ----------
+    scene : Scene
+        Scene of the cell.
+    outcome : Outcome
+        New results.
+    stored_values : xarray.Dataset
+        Values of the cell in the results file.
+    warning_texts : sequence of str, optional
+        Warnings that were emitted during the computation.
+
+    Returns
+    -------
+    int
+        Exit status. The status is ``EXIT_STATUS_OK`` if the new status is an answer.
     """
     for text in warning_texts:
         stdout_console.print(text, style="yellow")
@@ -281,7 +402,7 @@ def print_recomputed_cell(
 
 
 def _format_number_or_array(value: Any) -> str:
-    """A number with all its digits, or how many there are and their range."""
+    """Format a number in full, or an array as its size and its range."""
     finite = np.asarray(value, dtype=float)[np.isfinite(np.asarray(value, dtype=float))]
     if not np.ndim(value) or not finite.size:
         return str(value)
@@ -289,7 +410,22 @@ def _format_number_or_array(value: Any) -> str:
 
 
 def write_figure(figure: Figure, path: Path, style: str | None = None) -> None:
-    """Write a figure into a file, which `DataError` names where it cannot be written."""
+    """Write a figure to an image file.
+
+    Parameters
+    ----------
+    figure : matplotlib.figure.Figure
+        Figure to write.
+    path : Path
+        Path of the file. The suffix determines the format.
+    style : str, optional
+        Style sheet of Matplotlib.
+
+    Raises
+    ------
+    DataError
+        If the file cannot be written.
+    """
     from rsfstudy.plots import render_figure, style_context, write_image
 
     try:
@@ -305,14 +441,26 @@ def write_figure(figure: Figure, path: Path, style: str | None = None) -> None:
 def print_claims_and_failed_cells(
     datasets: Sequence[xr.Dataset], claim_ids: Sequence[str] = ()
 ) -> int:
-    """Print the claims and the failed cells of studies; FAILED where a verdict is not the expected
-    one, a cell failed, or what was to be checked could not be.
+    """Print the claims and the failed cells of studies.
 
     Parameters
     ----------
     datasets : sequence of xarray.Dataset
-    claim_ids : sequence of str
-        Identifiers of claims; all of them must then apply. Else one of all claims must.
+        Results of one or more studies.
+    claim_ids : sequence of str, optional
+        Identifiers of the claims to check. By default, all claims are checked.
+
+    Returns
+    -------
+    int
+        Exit status. The status is ``EXIT_STATUS_FAILED`` if a verdict differs from the expected
+        verdict or if a cell failed. The status is also ``EXIT_STATUS_FAILED`` if a requested claim
+        does not apply to the results, or if no claim applies.
+
+    Raises
+    ------
+    InvalidValue
+        If an identifier does not belong to a claim of the results.
     """
     found = _collect_verdicts(datasets)
     for claim in claim_ids:
@@ -331,8 +479,10 @@ def print_claims_and_failed_cells(
 
 
 def _collect_verdicts(datasets: Sequence[xr.Dataset]) -> pd.DataFrame:
-    """The claims of a study, under what is not as it declares; or those of several studies in the
-    order of their identifiers.
+    """Return the claims of one study or of several studies.
+
+    For a single study, the function also prints the name of the study and its overrides. The claims
+    of several studies are sorted by the numbers in their identifiers.
     """
     if len(datasets) == 1:
         about = datasets[0].attrs
@@ -347,7 +497,10 @@ def _collect_verdicts(datasets: Sequence[xr.Dataset]) -> pd.DataFrame:
 
 
 def _print_verdicts(verdicts: pd.DataFrame) -> int:
-    """Print claims and how many were checked; FAILED where a verdict is not the expected one."""
+    """Print claims and the number of checked claims.
+
+    The exit status is ``EXIT_STATUS_FAILED`` if a verdict differs from the expected verdict.
+    """
     checked = int((verdicts["verdict"] != NOT_APPLICABLE_VERDICT).sum())
     if checked:
         table_layout.print_summary_piece(claims_table(verdicts))
@@ -358,7 +511,10 @@ def _print_verdicts(verdicts: pd.DataFrame) -> int:
 
 
 def _print_unexpected_verdicts(verdicts: pd.DataFrame) -> int:
-    """Print the verdicts that are not the expected ones; FAILED if there are any."""
+    """Print the verdicts that differ from the expected verdicts.
+
+    The exit status is ``EXIT_STATUS_FAILED`` if there are unexpected verdicts.
+    """
     others = verdicts[verdicts["moved"]]
     for row in others.itertuples(index=False):
         stdout_console.print(
@@ -367,11 +523,23 @@ def _print_unexpected_verdicts(verdicts: pd.DataFrame) -> int:
     return EXIT_STATUS_FAILED if len(others) else EXIT_STATUS_OK
 
 
-# ---- two results --------------------------------------------------------------------------------
+# ---- comparisons --------------------------------------------------------------------------------
 
 
 def print_rerun_agreement(agreement_table: pd.DataFrame) -> int:
-    """Print how a rerun agrees with its file; returns FAILED where a number is not the same."""
+    """Print the agreement of recomputed results with a results file.
+
+    Parameters
+    ----------
+    agreement_table : pandas.DataFrame
+        Agreement by variable, as ``rsfstudy.rerun`` returns it.
+
+    Returns
+    -------
+    int
+        Exit status. The status is ``EXIT_STATUS_FAILED`` if a number differs or if there are no
+        numbers to compare.
+    """
     for name, (theirs, ours) in agreement_table.attrs["differs"].items():
         stdout_console.print(f"{name}: {theirs} then, {ours} now", style="yellow")
     _print_agreement_table(agreement_table)
@@ -386,8 +554,22 @@ def print_rerun_agreement(agreement_table: pd.DataFrame) -> int:
 def print_comparison(
     files: Sequence[Path], datasets: Sequence[xr.Dataset], comparison: Comparison
 ) -> int:
-    """Print how two results files compare; FAILED where a number or a status differs beyond the
-    error estimates, or there is nothing to compare.
+    """Print the comparison of two results files.
+
+    Parameters
+    ----------
+    files : sequence of Path
+        Paths of both files.
+    datasets : sequence of xarray.Dataset
+        Contents of both files.
+    comparison : Comparison
+        Differences between the datasets.
+
+    Returns
+    -------
+    int
+        Exit status. The status is ``EXIT_STATUS_FAILED`` if a status differs, if a number differs
+        by more than the error estimates, or if the files have no finished cell in common.
     """
     for letter, file, dataset in zip("AB", files, datasets, strict=True):
         about = read_provenance(dataset)
@@ -434,7 +616,7 @@ def print_comparison(
 
 
 def _print_differing_statuses(differing_statuses: pd.DataFrame) -> None:
-    """Print the cells that ended otherwise."""
+    """Print the cells with different statuses in both files."""
     first = differing_statuses[:_MAX_DIFFERING_CELLS]
     places = first.drop(columns=["first", "second"]).to_dict("records")
     rows = [
@@ -451,7 +633,11 @@ def _print_differing_statuses(differing_statuses: pd.DataFrame) -> None:
 
 
 def _print_agreement_table(agreement_table: pd.DataFrame) -> None:
-    """Print how many numbers are the same, or differ beyond both error estimates."""
+    """Print the agreement of each variable.
+
+    The table lists the number of identical values, and the number of values that differ by more
+    than both error estimates.
+    """
     rows = [
         {
             "variable": row["variable"],
@@ -466,10 +652,21 @@ def _print_agreement_table(agreement_table: pd.DataFrame) -> None:
 
 
 def build_contents_table(dataset: xr.Dataset) -> TextTable:
-    """The results that a file holds, what they are and along what."""
+    """Return a table of the results that a dataset contains.
+
+    Parameters
+    ----------
+    dataset : xarray.Dataset
+        Results of a study.
+
+    Returns
+    -------
+    TextTable
+        Name, description and dimensions of each result.
+    """
     rows = [
         {
-            "it holds": str(name),  # what a notebook added may have no words
+            "it holds": str(name),  # users may add variables without long_name
             "what": f"{v.attrs.get('long_name', '')} ({', '.join(map(str, v.dims))})".strip(),
         }
         for name, v in dataset.data_vars.items()

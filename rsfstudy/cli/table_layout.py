@@ -1,5 +1,7 @@
-"""Tables on a terminal of any width. No number, name or heading is broken: where columns do not fit
-beside each other, each row becomes a list of headings and values.
+"""Tables for terminals of any width.
+
+Each column is at least as wide as its longest number, name or word. If the columns do not fit next
+to each other, each row is printed as a list of headings and values.
 """
 
 from __future__ import annotations
@@ -15,12 +17,18 @@ from rich.text import Text
 from rsfstudy.cli.console import make_text_printable, stdout_console
 from rsfstudy.reporting import TableMappingOrSentence, TextTable
 
-#: Characters between columns, and in which a column of sentences can be read.
+#: Number of characters between columns, and minimum width of a column of prose.
 _CHARACTERS_BETWEEN_COLUMNS, _MIN_WIDTH_OF_PROSE_COLUMN = 2, 20
 
 
 def print_summary_piece(summary_piece: TableMappingOrSentence) -> None:
-    """Print a table with its caption, what is what, or a sentence; nothing of what is empty."""
+    """Print a table, a list of headings and values, or a sentence.
+
+    Parameters
+    ----------
+    summary_piece : TextTable, mapping of str to str, or str
+        Text to print. Empty tables and empty mappings are not printed.
+    """
     if isinstance(summary_piece, str):
         stdout_console.print(summary_piece)
     elif isinstance(summary_piece, TextTable):
@@ -31,7 +39,7 @@ def print_summary_piece(summary_piece: TableMappingOrSentence) -> None:
 
 
 def _print_table(table: TextTable) -> None:
-    """Print a table; none without rows."""
+    """Print a table unless it has no rows."""
     if not table.rows:
         return
     if table.caption:
@@ -67,7 +75,10 @@ def _make_row_printable(row: Mapping[str, str]) -> dict[str, str]:
 
 
 def _print_row_as_list(row: Mapping[str, str], prose_columns: Collection[str], style: str) -> None:
-    """Print a row as headings and values, these below those where they do not fit beside them."""
+    """Print a row as a list of headings and values.
+
+    If a value does not fit next to its heading, all values are printed below their headings.
+    """
     wide = max(map(cell_len, row))
     room = stdout_console.width - wide - _CHARACTERS_BETWEEN_COLUMNS
     beside = all(
@@ -87,12 +98,18 @@ def _print_row_as_list(row: Mapping[str, str], prose_columns: Collection[str], s
 
 
 def _longest_unbreakable_length(text: str, is_prose: bool) -> int:
-    """Length of what must not be broken: a word of prose, else the text."""
+    """Return the length of the longest part that must not be broken.
+
+    Prose can be broken between words. Any other text must not be broken.
+    """
     return max(map(cell_len, text.split() if is_prose else [text]), default=0)
 
 
 def _min_column_width(heading: str, cell_texts: Sequence[str], is_prose: bool) -> int:
-    """Width that a column needs, whose heading may be broken between words."""
+    """Return the minimum width of a column.
+
+    Headings may be broken between words.
+    """
     needed = max(_longest_unbreakable_length(text, is_prose) for text in cell_texts)
     if is_prose:
         needed = max(needed, min(_MIN_WIDTH_OF_PROSE_COLUMN, max(map(cell_len, cell_texts))))
@@ -102,7 +119,11 @@ def _min_column_width(heading: str, cell_texts: Sequence[str], is_prose: bool) -
 def _distribute_widths(
     min_widths: Sequence[int], max_widths: Sequence[int], total_width: int
 ) -> list[int]:
-    """Widths of columns: what each needs, and the rest to the narrowest that want more."""
+    """Distribute the available width among columns.
+
+    Each column receives its minimum width. The remaining characters are assigned one by one to the
+    narrowest column that has not reached its maximum width.
+    """
     widths = list(min_widths)
     for _ in range(total_width - sum(min_widths)):
         wanting = [n for n, width in enumerate(widths) if width < max_widths[n]]
@@ -112,6 +133,7 @@ def _distribute_widths(
 
 
 def _is_number_text(text: str) -> bool:
+    """Return True if a text is a number, a dash or empty."""
     try:
         float(text.strip("<> ").replace(",", ""))
     except ValueError:
