@@ -227,7 +227,7 @@ RENAMED: Mapping[str, Mapping[str, str]] = {
         "log_norm_rate": "log_instability_rate",
         "is_disturbed": "is_perturbed",
         "begins_elsewhere": "starts_unsteady",
-        "numbers_of_friction": "friction_numbers",
+        "numbers_of_friction": "friction_parameter_values",
         "shown": "quantities_with_values",
         "functions": "equation_functions",
         "numbers": "parameter_values",

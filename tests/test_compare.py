@@ -43,7 +43,7 @@ def two(computed):
 
 
 def row(found, name=NUMBER):
-    return found.numbers.set_index("variable").loc[name]
+    return found.agreement_table.set_index("variable").loc[name]
 
 
 def test_the_same_agree(two):

@@ -44,21 +44,21 @@ FLOORS = (
 )
 #: Modules that may import a library which is slow to import.
 HOMES = {
-    "dask": {"execution/clusters", "storage/store", "storage/zarr_store"},
-    "distributed": {"execution/clusters", "execution/workers", "execution/worker_log"},
-    "llvmlite": {"motion/compiled/compile_cache", "motion/compiled/array_calls"},
+    "dask": {"execution/clusters", "storage/dataset_files", "storage/zarr_store"},
+    "distributed": {"execution/clusters", "execution/worker_pool", "execution/worker_log"},
+    "llvmlite": {"motion/compiled/compile_cache", "motion/compiled/array_operations"},
     "matplotlib": {"plots"},
     "numba": {
         "motion/compiled/compile_cache",
-        "motion/compiled/array_calls",
-        "motion/compiled/machine",
+        "motion/compiled/array_operations",
+        "motion/compiled/numba_backend",
     },
     "click": {"cli"},
     "pint": {"rig/units"},
     "rich": {"cli", "api/progress"},
-    "sqlite3": {"storage/journal"},
+    "sqlite3": {"storage/cell_journal"},
     "zarr": set(),  # xarray writes and reads Zarr stores.
-    "msgspec": {"storage/schema", "storage/rebuild", "referee/problem_files"},
+    "msgspec": {"storage/schema", "storage/rebuild_from_file", "referee/problem_files"},
 }
 
 

@@ -83,7 +83,7 @@ def test_tables_are_used():
         scene.nothing  # noqa: B018
     with pytest.raises(AttributeError, match="has no attribute 'nothing'"):
         importlib.import_module("rsfstudy.slider.parts").nothing  # noqa: B018
-    with pytest.warns(DeprecationWarning, match="'reading' of Point is now"):
+    with pytest.warns(DeprecationWarning, match="'reading' of MotionPoint is now"):
         assert maximum("reading").quantity == "apparent_friction"
     with pytest.warns(DeprecationWarning, match="of maximum\\(\\) is now") as caught:
         assert maximum(of="spring_stress", waits=True) == maximum("spring_stress", may_defer=True)

@@ -240,4 +240,4 @@ def test_a_worker_computes_the_cells_of_the_declaration(name, monkeypatch):
         assert plan.keys[place].tobytes() == key
         assert cell_key(scene, study.measure.with_(**changes)) == key
         assert cell == (scene, changes)
-        assert cell.scene.numbers == scene.parameter_values
+        assert cell.scene.parameter_values == scene.parameter_values

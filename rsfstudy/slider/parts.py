@@ -364,7 +364,7 @@ def _fields_appended_to_parameter_values(part_class: type[Part]) -> tuple[str, .
 
 
 def collect_parameter_values(part: Part, scene: SceneView) -> Numbers:
-    """Return the values of ``part.numbers``, followed by the appended fields.
+    """Return the values of ``part.parameter_values``, followed by the appended fields.
 
     Parameters
     ----------

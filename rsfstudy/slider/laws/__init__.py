@@ -277,7 +277,7 @@ class Law(LawBase):
     The parameters follow b in the order of their declaration, as ``p[LAW + 1]``, ``p[LAW + 2]`` and
     so on. Two methods are optional::
 
-        numbers(self, scene) -> tuple[float, ...]
+        parameter_values(self, scene) -> tuple[float, ...]
         check(self, scene) -> None
 
     Override ``parameter_values`` if ``evolution`` uses values other than the fields, such as
