@@ -3,7 +3,7 @@
 The package divides the cells of a study into batches and computes the batches in this process or on
 Dask workers. The package handles lost workers and resumes interrupted runs. Digests of the code and
 of the declaration determine if the cells in a journal are still valid (see ``provenance``). The
-package does not import the command-line interface, and does not format output for users.
+package never imports the command-line interface, and never formats output for users.
 """
 
 from __future__ import annotations

@@ -4,7 +4,7 @@
 a scene through its loading segments and regimes, and yields events. A ``Recording`` also stores the
 samples of the motion. To read the implementation, start with ``event_integration``, followed by
 ``motion_driver`` and ``motion_loop``. The engines are SciPy, Python and the compiled engine.
-Measures, which interpret the motions, are in ``rsfstudy.measures``.
+The package never interprets a motion: measures, in ``rsfstudy.measures``, do that.
 """
 
 from __future__ import annotations
