@@ -19,7 +19,7 @@ FORMER_MODULES = {
     "analysis.fitting.filters": ("fitting.filters", "fitting"),
     "analysis.fitting.record": ("fitting.record", "fitting"),
     "declare": ("", ""),
-    "declare.catalogue": ("study.catalogue", "study"),
+    "declare.catalogue": ("study.study_loader", "study"),
     "declare.figure": ("study.figure_declarations", "study"),
     "measures.critical_step": ("critical_steps.critical_step", "measures"),
     "measures.elasticities": ("measure_base.elasticities", "measures"),
@@ -42,7 +42,7 @@ FORMER_MODULES = {
     "rig.laboratory": ("rig.rig", "rig"),
     "rig.reductions": ("study.reductions.unit_conversion", "reductions"),
     "slider.places": ("slider.parameter_layout", "parts"),
-    "slider.protocol": ("slider.protocols", "slider"),
+    "slider.protocol": ("slider.user_loadings", "slider"),
 }
 
 

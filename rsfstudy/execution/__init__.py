@@ -24,11 +24,11 @@ else:
         __name__,
         {
             "execution.clusters": ("connect_to_cluster",),
-            "execution.plan": ("CellPlan", "estimate_cost"),
+            "execution.cell_plan": ("CellPlan", "estimate_cost"),
             "execution.preparation": ("prepare_study_run",),
             "execution.provenance": ("provenance_attributes", "run_fingerprint"),
-            "execution.runner": ("OutputOptions", "ProgressCallback"),
-            "execution.workers": ("WorkerPool",),
+            "execution.study_run": ("OutputOptions", "ProgressCallback"),
+            "execution.worker_pool": ("WorkerPool",),
         },
     )
 

@@ -40,10 +40,10 @@ else:
             "fitting.fit_measure": ("Fit",),
             "fitting.joint_model": ("fitted_fields", "split_window_number", "strip_window_number"),
             "fitting.record": ("RECORD_COLUMNS", "Record"),
-            "fitting.stress_drops": ("EVENT_QUANTITIES", "EventNumbers"),
-            "fitting.validity": ("describe_whiteness",),
+            "fitting.stress_drop_fits": ("EVENT_QUANTITIES", "EventNumbers"),
+            "fitting.fit_validity_checks": ("describe_whiteness",),
             "fitting.velocity_steps": ("LoadingStep", "noise_variance"),
-            "fitting.window": ("FitWindow",),
+            "fitting.fit_window": ("FitWindow",),
             "fitting.window_model": (
                 "LOGARITHMIC_PARAMETERS",
                 "PARAMETERS",

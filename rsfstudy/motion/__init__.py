@@ -90,7 +90,7 @@ else:
                 "RELATIVE_ROUNDING_ERROR",
                 "estimate_error",
             ),
-            "motion.driver": ("MotionDriver", "iterate_events_of_equations"),
+            "motion.motion_driver": ("MotionDriver", "iterate_events_of_equations"),
             "motion.engine_factory": ("check_engine_is_usable", "import_compiled_engine"),
             "motion.engines": (
                 "COMPILED",
@@ -119,15 +119,15 @@ else:
                 "restart_point",
                 "point_with_slip_rate",
             ),
-            "motion.integrate": ("integrate_events",),
-            "motion.meter": (
+            "motion.event_integration": ("integrate_events",),
+            "motion.work_meter": (
                 "MIN_LOCAL_TOLERANCE",
                 "MotionStopped",
                 "WorkMeter",
                 "larger_budget_remedy",
             ),
-            "motion.neglected_inertia": ("estimate_neglected_inertia_error",),
-            "motion.readings": (
+            "motion.neglected_inertia_error": ("estimate_neglected_inertia_error",),
+            "motion.recorded_motion_readings": (
                 "recorded_friction_coefficient",
                 "recorded_load_point_displacement",
                 "resample_motion_along_path",
@@ -142,7 +142,7 @@ else:
                 "recorded_row",
             ),
             "motion.regime_switching": ("inertia_matters_at",),
-            "motion.roots": ("build_root_finder",),
+            "motion.root_finding": ("build_root_finder",),
         },
     )
 

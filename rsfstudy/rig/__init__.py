@@ -44,7 +44,7 @@ else:
     __getattr__, __dir__ = lazy_exports(
         __name__,
         {
-            "rig.quantities": (
+            "rig.rig_quantities": (
                 "RATIO_FIELD_BY_DIMENSIONAL_NAME",
                 "RIG_QUANTITIES",
                 "in_display_units",
@@ -52,7 +52,7 @@ else:
             ),
             "rig.rig": ("Rig",),
             "rig.rig_scenes": ("LatticeScenesOnRig", "put_on_rig", "replace_rig_quantity"),
-            "rig.scales": (
+            "rig.dataset_scales": (
                 "DIMENSIONLESS_PREFIX",
                 "DISPLAY_BASE_UNITS",
                 "SCALES_ATTRIBUTE",
@@ -65,7 +65,7 @@ else:
                 "find_scale_of_variable",
             ),
             "rig.table_files": ("Column", "read_table"),
-            "rig.unit_axes": (
+            "rig.axes_with_units": (
                 "axis_name_and_units",
                 "convert_axis_to_stated_units",
                 "convert_values_to_units",

@@ -134,8 +134,8 @@ else:
     __getattr__, __dir__ = lazy_exports(
         __name__,
         {
-            "slider.assembly": ("find_inapplicable_fields", "replace_field_values"),
-            "slider.caching": ("cached_attribute", "cached_per_scene"),
+            "slider.scene_assembly": ("find_inapplicable_fields", "replace_field_values"),
+            "slider.scene_caching": ("cached_attribute", "cached_per_scene"),
             "slider.closed_forms": (
                 "CLOSED_FORMS",
                 "critical_stiffness as critical_stiffness_closed_form",
@@ -159,13 +159,13 @@ else:
             ),
             "slider.fluid": ("BUILT_IN_PARTS",),
             "slider.friction": ("FrictionFunctions",),
-            "slider.hints": ("hint_for_unknown_field",),
+            "slider.field_name_hints": ("hint_for_unknown_field",),
             "slider.loading": ("MIN_SEGMENT_DURATION",),
             "slider.parameter_layout": ("LARGEST_LOG_SLIP_RATE",),
             "slider.parts": ("Function", "Numbers", "field_names"),
-            "slider.point": ("MotionPoint",),
-            "slider.protocols": ("Protocol", "SEGMENT_KEYS", "UserLoading", "protocol"),
-            "slider.registry": (
+            "slider.motion_point": ("MotionPoint",),
+            "slider.user_loadings": ("Protocol", "SEGMENT_KEYS", "UserLoading", "protocol"),
+            "slider.part_registry": (
                 "FIELD_NAMES",
                 "FIELD_QUANTITIES",
                 "FIELD_TYPES",
@@ -183,7 +183,7 @@ else:
                 "scene_field_quantities",
                 "with_scene_field_signature",
             ),
-            "slider.sampled_history": (
+            "slider.sampled_loading": (
                 "STRESS_RATE_COLUMN",
                 "SampledHistory",
                 "build_sampled_history",

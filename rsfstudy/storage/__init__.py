@@ -61,7 +61,7 @@ else:
                 "find_cell_number",
             ),
             "storage.dataset_scenes": ("scene_of_dataset",),
-            "storage.journal": (
+            "storage.cell_journal": (
                 "CellColumns",
                 "StoredCellRow",
                 "CellTimings",
@@ -70,8 +70,12 @@ else:
                 "find_fingerprint_differences",
                 "read_timings",
             ),
-            "storage.lattice": ("assemble_dataset",),
-            "storage.rebuild": ("find_primary_output", "rebuild_study", "study_of_dataset"),
+            "storage.lattice_datasets": ("assemble_dataset",),
+            "storage.rebuild_from_file": (
+                "find_primary_output",
+                "rebuild_study",
+                "study_of_dataset",
+            ),
             "storage.schema": (
                 "build_axis_from_stored",
                 "build_scene_from_stored",
@@ -82,7 +86,7 @@ else:
                 "read_provenance",
                 "read_scene_fields",
             ),
-            "storage.store": ("clean_attributes", "read_dataset", "write_dataset"),
+            "storage.dataset_files": ("clean_attributes", "read_dataset", "write_dataset"),
             "storage.zarr_store": (
                 "check_store_does_not_exist",
                 "check_zarr_installed",

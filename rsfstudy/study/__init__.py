@@ -26,12 +26,12 @@ else:
     __getattr__, __dir__ = lazy_exports(
         __name__,
         {
-            "study.catalogue": ("load_study",),
-            "study.cell": ("Cell", "CellChanges"),
+            "study.study_loader": ("load_study",),
+            "study.lattice_cell": ("Cell", "CellChanges"),
             "study.claims": ("Claim", "NOT_APPLICABLE_VERDICT", "VERDICTS", "build_verdict_table"),
             "study.figure_declarations": ("DrawFunction", "Figure", "Panel", "name_of_figure"),
             "study.reductions.base": ("failed_cell_mask", "read_undocumented_quantities"),
-            "study.rig_studies": ("convert_study_to_rig_units",),
+            "study.studies_on_rig": ("convert_study_to_rig_units",),
             "study.study": ("Study",),
             "study.study_index": ("STUDIES_PACKAGE", "study_names", "study_titles"),
             "study.user_parts": ("find_named_user_parts",),

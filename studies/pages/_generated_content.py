@@ -278,7 +278,8 @@ def _slot(slot: part_registry.Slot) -> str:
     """Format the section of a slot."""
     rows = (
         (f"`{name}`" + (" (default)" if name == slot.default_part_name else ""),
-         first_paragraph(part), equation(part), ", ".join(f"`{own}`" for own in field_names(part)), f"`{SCENES[name]}`")
+         first_paragraph(part), equation(part),
+         ", ".join(f"`{own}`" for own in field_names(part)), f"`{SCENES[name]}`")
         for name, part in slot.built_in_parts.items()
     )  # fmt: skip
     made = markdown_table(("choice", "what it is", "equation", "its fields", "example"), rows)
