@@ -2,11 +2,11 @@
 
 A ``Scene`` describes a slider by five parts: a state evolution law, a normal stress condition, a
 pore fluid, the dynamics and the loading. The package checks scenes and provides their equations of
-motion, their steady states and the stability of steady sliding. It does not integrate the
-equations, does not read or write files, and depends only on Python, NumPy and SciPy.
+motion, their steady states and the stability of steady sliding. It never integrates the equations,
+never reads or writes files, and depends only on Python, NumPy and SciPy.
 
 Each part is a class in a module of ``laws``, ``normal_stress``, ``fluid``, ``dynamics`` or
-``loading``. We suggest to read the other modules in the following order:
+``loading``. We suggest reading the other modules in the following order:
 
 - ``scene`` combines the parts of a slider.
 - ``friction`` combines the law, the normal stress and the pore pressure into a relation between
@@ -23,18 +23,18 @@ The evolution of a state passes through the following functions, from the law to
 
 1. The method ``evolution`` of a law computes the change of the state per unit slip.
 2. `state_functions.wrap_single_state_evolution` converts the method to a function ``evolutions`` of
-tuples. A law with several states defines ``evolutions`` itself. The conversion is chosen by
-`scene_functions.build_scene_functions`.
+   tuples. A law with several states defines ``evolutions`` itself. The function
+   `scene_functions.build_scene_functions` decides if the conversion is needed.
 3. `friction.build_friction_functions` appends the unknowns of a fluid or a loading and stores the
-result as ``FrictionFunctions.evolutions``.
+   result as ``FrictionFunctions.evolutions``.
 4. `scene_functions` converts the evolution to rates:
-`scene_functions.build_displacement_rate_function` between ruptures, and
-`scene_functions.build_rigid_rate_function` for a rigid slider. For scenes with inertia,
-``dynamics.inertia.build_rupture_rate_function`` computes the rates in ruptures, and
-``dynamics.inertia.build_slip_rate_functions`` computes the slip rate between ruptures.
+   `scene_functions.build_displacement_rate_function` between ruptures, and
+   `scene_functions.build_rigid_rate_function` for a rigid slider. For scenes with inertia,
+   ``dynamics.inertia.build_rupture_rate_function`` computes the rates in ruptures, and
+   ``dynamics.inertia.build_slip_rate_functions`` computes the slip rate between ruptures.
 5. `equations` combines the rates, the unknowns and the parameters of a scene.
 6. The ``motion`` package converts the rates to functions that fill arrays, and passes these
-functions to a stepper. The stepper of SciPy calls ``Equations.rate_function`` directly.
+   functions to a stepper. The stepper of SciPy calls ``Equations.rate_function`` directly.
 
 The equations of doi:10.1007/s11589-014-0098-4 are implemented in the following modules:
 
@@ -45,8 +45,7 @@ The equations of doi:10.1007/s11589-014-0098-4 are implemented in the following 
     5         normal stress follows shear stress        normal_stress.variable
     6         motion with inertia                       dynamics.inertia
     15        quasi-static motion                       dynamics.quasi_static, scene_functions
-    7         critical stiffness                        stability
-    9         existence of steady sliding               steady_state
+    7, 9      critical stiffness, steady sliding        stability, steady_state
     8, 10, 11, 14   closed-form boundaries              closed_forms
     12, 13    stress and slip rate after a jump         friction, steady_state
     16, 17    rigid slider                              scene_functions, laws.slip, laws.slowness
