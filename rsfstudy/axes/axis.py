@@ -138,9 +138,9 @@ class Axis:
             Seed of the random number generator.
         method : {"sobol", "latin_hypercube", "random", "saltelli"}
             Scrambled Sobol points, a Latin hypercube, or independent random samples. The method
-            "saltelli" draws n Sobol points in twice the number of dimensions and combines these to
-            ``n (d + 2)`` samples of d quantities, which the reduction `SobolIndices` requires. The
-            default is "sobol".
+            "saltelli" draws n Sobol points in twice the number of dimensions and combines their
+            coordinates to ``n (d + 2)`` samples of d quantities. The reduction `SobolIndices`
+            requires this method. The default is "sobol".
         covariance : array_like, optional
             Covariance matrix of shape (d, d) in the order of `distribution`. Mean values have
             normal distributions with this covariance. For distributions, only the correlation is
@@ -173,9 +173,8 @@ class Axis:
         >>> len(axis), axis.fields
         (8, ('a', 'b_over_a'))
         """
-        from rsfstudy.axes import (
-            axis_samples,
-        )  # The import is slow, because it loads `scipy.stats`.
+        # The import is local because it loads `scipy.stats`, which is slow.
+        from rsfstudy.axes import axis_samples
 
         drawn, how = axis_samples.draw_samples(distribution, n, seed, method, covariance)
         return cls(dimension, axis_samples.compute_field_values(drawn, fields), units, how)

@@ -180,7 +180,7 @@ def _is_value_with_error(distribution: Any) -> bool:
 
 
 def _quantile_function(distribution: Any) -> Any:
-    """Return the quantile function of a distribution, or None without one."""
+    """Return the quantile function of a distribution, or None if it has none."""
     return (
         getattr(distribution, "ppf", None)
         if hasattr(distribution, "dist")
@@ -298,7 +298,7 @@ def read_table_columns_and_units(table: Any) -> tuple[dict[str, Any], dict[str, 
         raise InvalidValue("table", table, rule, remedy=remedy)
     found: dict[str, Any] = {}
     units: dict[str, str] = {}
-    # the keys of an xarray.Dataset are its data variables
+    # Iterate over data variables only, because coordinates are not columns.
     for key in getattr(table, "data_vars", table):
         heading, column = str(key), table[key]
         stated = getattr(column, "attrs", {}).get("units", getattr(column, "units", ""))

@@ -133,7 +133,7 @@ def _convert_rows_to_axis_units(
                 ours = _parse_units_of_value(value) if first_value_sets_units else ""
                 stated.setdefault(name, units.get(given) or ours or si)
             elif units.get(given):
-                factor_to_si(given, units[given])  # Raise an error if the field has no units.
+                factor_to_si(given, units[given])  # This call raises an error.
     for name, held in quantities.items():
         numbers = convert_values_to_units(name, [value for _row, value in held], stated[name])
         for (row, _value), number in zip(held, numbers, strict=True):

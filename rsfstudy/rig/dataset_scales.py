@@ -115,8 +115,7 @@ def _resolve_scale_of_dataset(
     variable = dataset[coordinate_name].variable.to_base_variable()
     held = variable * float(unit_factor(coordinate_name, variable.attrs.get("units", units), units))
     known = np.unique(held.values[np.isfinite(held.values)])
-    # All cells have the same scale, so the scale also applies to cells with NaN, which do not need
-    # it.
+    # If the scale does not vary, it also applies to cells in which the scale is NaN.
     if known.size == 1:
         held = xr.Variable((), known[0])
     if stated_value is not None and not np.allclose(

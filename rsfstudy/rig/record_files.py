@@ -28,7 +28,7 @@ from rsfstudy.rig.table_files import (
 )
 from rsfstudy.rig.units import convert_to_si, unit_factor
 
-#: SI units of the columns of a record, and factors that convert these to the units of `Record`.
+#: SI units of the columns of a record, and factors from SI units to the units of `Record`.
 _UNITS_AND_FACTORS_OF_RECORD_COLUMNS = {
     "time": ("s", 1.0),
     "displacement": ("m", 1e6),

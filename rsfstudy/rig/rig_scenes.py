@@ -175,7 +175,7 @@ class LatticeScenesOnRig:
             vary. If a field has the same name as an axis in units, its name here has the prefix
             ``dimensionless_``.
         """
-        # An axis with one point gets a second point, which shows if the values depend on the axis.
+        # An axis with one point gets a second point to find out if the values depend on the axis.
         alone = {axis.dimension for axis in self.axes if len(axis) == 1 and axis.is_single_field}
         along = [
             _add_second_axis_point(a) if a.dimension in alone else a for a in self.axes if a.units
@@ -216,8 +216,7 @@ class LatticeScenesOnRig:
 
 
 def _is_close_within_rounding(other_value: Any, value: Any) -> bool:
-    # Both values result from the same quantities, possibly by hand, so that they differ only by
-    # rounding errors.
+    # The user may have computed the value by hand, so the two values may differ by rounding errors.
     return isinstance(other_value, float) and math.isclose(other_value, value, rel_tol=1e-9)
 
 
@@ -268,7 +267,7 @@ def put_on_rig(
         ]
         converted.append(along.with_rows(rows, units, along.sampling_info))
     changes = derive_scene_fields_from_rig(rig.as_dict())
-    # The inertia and the damping of the rig replace those of the scene.
+    # The inertia and the damping of the rig replace the values of the scene.
     if {"inertia", "radiation_damping"} & set(changes):
         changes = {"inertia": False, "radiation_damping": 0.0, **changes}
     return base.with_(**changes), converted, every

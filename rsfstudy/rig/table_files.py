@@ -250,9 +250,8 @@ def select_columns_of_arrays(source: Any, columns: Mapping[str, Any]) -> dict[st
         numbers.
     """
     variables = source.variables if hasattr(source, "data_vars") else source
-    names = dict.fromkeys(
-        map(str, variables)
-    )  # A dictionary keeps the order and is fast to search.
+    # A dictionary keeps the order and is fast to search.
+    names = dict.fromkeys(map(str, variables))
     found = {}
     for key, told in columns.items():
         heading, units, scale, offset = parse_column_spec(told, names)

@@ -233,9 +233,9 @@ def _require_rupture_functions(scene: SceneView) -> RegimeFunctions:
 def equations_against_displacement(scene: SceneView) -> Equations:
     """Return the equations between ruptures with displacement as variable.
 
-    The displacement is slip plus load point displacement. Differences of these rates remain linear
-    in the distance from steady sliding over a longer range than differences of the rates along the
-    path.
+    The displacement is slip plus load point displacement. Close to steady sliding, the rates are
+    nearly linear functions of the unknowns. The range of this linear behaviour is wider than for
+    the rates along the path.
 
     Parameters
     ----------

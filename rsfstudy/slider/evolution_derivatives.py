@@ -11,15 +11,15 @@ from rsfstudy.slider.parts import Numbers
 from rsfstudy.slider.scene_view import SceneView
 from rsfstudy.slider.steady_state import SteadySliding
 
-#: Largest step of the differences, relative to the scale of each argument, and the weights of
-#: central differences of order eight.
+#: Largest step size of the finite differences, relative to the scale of each argument, and weights
+#: of central differences of order eight.
 _MAX_DIFFERENCE_STEP_OVER_SCALE = 0.05
 _DIFFERENCE_WEIGHTS = ((1, 4.0 / 5.0), (2, -1.0 / 5.0), (3, 4.0 / 105.0), (4, -1.0 / 280.0))
-#: Scale of a state relative to b, and the change of a steady state with ln V, relative to b, below
-#: which the scale of a state does not follow that change.
+#: Scale of a state relative to b, and smallest relative change of a steady state with ln V that
+#: determines the scale of the state.
 _STATE_SCALE_OVER_B, _MIN_STATE_CHANGE = 0.05, 1e-9
-#: Most halvings of a step, the relative difference between two steps that counts as converged, and
-#: the rounding error of a difference in units of the machine precision.
+#: Maximum number of step halvings, relative difference between two successive estimates at
+#: convergence, and relative rounding error of a finite difference.
 _MAX_HALVINGS, _CONVERGENCE_TOLERANCE, _ROUNDING_ERROR = 9, 1e-12, 8.0 * 2.0**-52
 
 Matrix = list[list[float]]
@@ -99,8 +99,8 @@ def compute_state_evolution_derivatives(
     shift = build_friction_relation(scene)(steady_state.frictional_stress)[2]
     arguments = [steady_state.log_slip_rate, shift, *steady_state.states]
     scales, columns, errors = _finite_difference_scales(scene, steady_state, shift), [], []
-    # Change of each argument that corresponds to one unit of ln V. Rounding errors are relative to
-    # these changes.
+    # Change of each argument that corresponds to one unit of ln V. Rounding errors scale with the
+    # change.
     units = [scales[0], *(scale / _STATE_SCALE_OVER_B for scale in scales[1:])]
     rounding = _ROUNDING_ERROR * (
         1.0 + max(abs(x) / y for x, y in zip(arguments, units, strict=True))
