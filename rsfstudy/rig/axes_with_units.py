@@ -236,7 +236,7 @@ def _axis_field_name(name: str, value: Any) -> str:
 
 
 def _axis_si_units(name: str, value: Any) -> str | None:
-    """Return the SI units of a value on an axis, or None without units."""
+    """Return the SI units of a value on an axis, if it has units."""
     if value is None or isinstance(value, bool):
         return None
     if name in RIG_NAME_BY_AXIS_NAME:

@@ -1,7 +1,7 @@
 """Conversion of datasets between dimensionless and physical units.
 
-The attribute ``scale`` of a variable, for example ``D_c/V_*``, names the unit in which the variable
-is dimensionless. `convert_dataset_units` is the main function. `read_si_scales` provides the scales
+The attribute ``scale`` of a variable, for example ``D_c/V_*``, is the unit that makes the variable
+dimensionless. `convert_dataset_units` is the main function. `read_si_scales` provides the scales
 that it needs.
 """
 
@@ -298,7 +298,8 @@ def has_units_unlike_its_study(dataset: xr.Dataset) -> bool:
     Returns
     -------
     bool
-        True if the results were converted to units other than MPa, um and s.
+        True if the results were converted to units other than MPa, um and s, or if the results have
+        units but no rig.
     """
     told = dataset.attrs.get(SCALES_ATTRIBUTE, "")
     as_shown = "sigma_star" in dataset.variables and all(

@@ -386,8 +386,8 @@ def _read_plain_table(
 ) -> tuple[np.ndarray | None, np.ndarray]:
     """Read a table that contains only finite numbers and its delimiters.
 
-    The function returns the numbers, or None if the table has to be read line by line, and the line
-    numbers.
+    The function returns the numbers and their line numbers. If the table has to be read line by
+    line, the function returns None instead of the numbers.
     """
     body = "".join(text.split("\n", header_line_count)[header_line_count:])
     lines = header_line_count + 1 + np.arange(body.count("\n") + (not body.endswith("\n")))

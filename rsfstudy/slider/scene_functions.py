@@ -28,7 +28,7 @@ While contacts heal, :math:`\ln V` decreases as the logarithm of displacement. W
 a rupture, :math:`\ln V` decreases as the logarithm of the remaining time. In both cases, a step in
 displacement or time would have to be a fraction of the elapsed or remaining interval. The same
 interval is only a few units of path length. The factor of 6 reduces the number of steps where slip
-is fastest, because the path then bends over six units of :math:`\ln V` instead of one. Factors from
+is fastest, because the path bends over six units of :math:`\ln V` instead of one unit. Factors from
 4 to 12 give similar results.
 
 The slip rate of a rigid slider is prescribed, and slip is the independent variable.

@@ -42,7 +42,7 @@ class SceneView(Protocol):
 
     @property
     def equation_functions(self) -> Any:
-        """Compiled or plain functions of the equations of motion."""
+        """Functions of the equations of motion."""
 
     @property
     def dynamics(self) -> Any:

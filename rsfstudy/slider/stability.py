@@ -179,8 +179,8 @@ def _find_critical_stiffnesses(
 ) -> list[float]:
     """Find all stiffnesses above a minimum with an imaginary growth rate.
 
-    The result is in ascending order. If inertia keeps the force balance from being satisfied at a
-    frequency, the function returns ``math.inf`` for this frequency.
+    The result is in ascending order. If inertia leaves no finite stiffness for a frequency, the
+    result contains ``math.inf``.
     """
     # For p = i omega, these polynomials depend on omega**2 only.
     (a_even, a_odd), (b_even, b_odd) = (
@@ -304,7 +304,7 @@ def linear_friction_response(
 def _state_weights_in_log_slip_rate(
     scene: SceneView, steady_state: SteadySliding
 ) -> tuple[list[float], float]:
-    """Return the weights of the states in a ln V.
+    """Return the weight of each state in the friction relation.
 
     The second returned value is the derivative of the shift with respect to the last state.
     """
