@@ -180,7 +180,7 @@ def _is_value_with_error(distribution: Any) -> bool:
 
 
 def _quantile_function(distribution: Any) -> Any:
-    """Return the quantile function of a distribution, or None if it has none."""
+    """Return the quantile function of a distribution, or None for other types."""
     return (
         getattr(distribution, "ppf", None)
         if hasattr(distribution, "dist")
