@@ -1,5 +1,7 @@
-"""One dimension of a lattice: a plain list of values, or points of several fields, that are
-labelled or numbered.
+"""Axis of a lattice: one dimension of a study.
+
+An axis holds a list of values of one field, or points that set several fields. Points have labels
+or are numbered from 0.
 """
 
 from __future__ import annotations
@@ -27,28 +29,45 @@ AxisRow = Mapping[str, Any]
 @guard_methods
 @dataclass(frozen=True, init=False)
 class Axis:
-    """One dimension of a lattice.
+    """Axis of a lattice.
 
     Parameters
     ----------
     dimension : str
-        Name of the dimension; for a plain axis the field it varies, of the scene or of the measure
-        (of the scene where both have one of that name).
+        Name of the dimension. If the axis varies a single field, the dimension has the name of the
+        field. The field belongs to the scene or to the measure of the study. If both have a field
+        of this name, the axis varies the field of the scene.
     values : sequence, mapping of str to mapping, or mapping of str to sequence
-        The values of that field, where a class stands for a part of the user's own; or, for a
-        zipped axis, a label for each point and the fields set there, as in
-        ``{"constant": {"normal_stress": "constant"}, ...}``, or the rig there; or, for points that
-        are numbered from 0, the values of each field: see `samples` and `cases`.
+        Values of a single field, which may include classes of user-defined parts. For a zipped
+        axis, pass a mapping from labels to the fields at each point, for example
+        ``{"constant": {"normal_stress": "constant"}, ...}``, or a mapping from labels to rigs. For
+        numbered points, pass a mapping from fields to lists of values. See also `samples` and
+        `cases`.
     units : mapping of str to str, optional
-        Units of the fields that are in units, in a study of a rig: see `Rig.axis`.
+        Units of the fields, in a study of a rig. See `Rig.axis`.
     sampling_info : mapping, optional
-        How the points were drawn, as plain data.
+        Description of the sampling method and its arguments, as numbers and strings.
 
     Raises
     ------
     InvalidValue
-        For an axis that is empty, repeats a value or holds a non-finite one. Numbered points may be
-        alike: draws are.
+        If the axis is empty, or if it contains repeated values or values that are not finite.
+        Numbered points may be equal, because random samples may be equal.
+
+    Examples
+    --------
+    >>> import rsfstudy
+    >>> axis = rsfstudy.Axis("b_over_a", [1.2, 1.5, 2.0])
+    >>> len(axis)
+    3
+    >>> zipped = rsfstudy.Axis(
+    ...     "material",
+    ...     {"granite": {"a": 0.008, "b_over_a": 1.5}, "gouge": {"a": 0.004, "b_over_a": 1.2}},
+    ... )
+    >>> zipped.fields
+    ('a', 'b_over_a')
+    >>> zipped.point_names
+    ['granite', 'gouge']
     """
 
     dimension: str
@@ -64,6 +83,7 @@ class Axis:
         units: Mapping[str, str] | None = None,
         sampling_info: Mapping[str, Any] | None = None,
     ) -> None:
+        """Create an axis from values or points."""
         if not is_variable_name(dimension):
             rule = "must be named by a Python identifier, its accents composed (NFC)"
             raise InvalidValue("axis", dimension, rule)
@@ -102,39 +122,59 @@ class Axis:
         units: Mapping[str, str] | None = None,
         dimension: str = "sample",
     ) -> Axis:
-        """Samples of several fields at once, as one dimension.
+        """Draw samples of several fields as one dimension.
 
         Parameters
         ----------
-        distribution : mapping of str to distribution
-            What is drawn, of `scipy.stats`, as in ``{"ln_a": norm(math.log(0.01), 0.1)}``; or an
-            estimate, of which `covariance` has the variance.
+        distribution : mapping of str to distribution or float
+            Frozen distributions of `scipy.stats` by name, for example
+            ``{"ln_a": norm(math.log(0.01), 0.1)}``. A float is a mean value, whose variance is
+            given by `covariance`.
         n : int
-            How many; a power of two where the method needs one. With one seed, the first n of 2 n
-            samples are those of before (not of a Latin hypercube): a run that goes on computes the
-            others alone.
-        seed : int
+            Number of samples. The methods "sobol" and "saltelli" require a power of two. Except for
+            a Latin hypercube, the first n of 2 n samples with the same seed are equal to the n
+            samples, so that a larger run only computes the additional samples.
+        seed : int, default: 0
+            Seed of the random number generator.
         method : {"sobol", "latin_hypercube", "random", "saltelli"}
-            Scrambled Sobol points, a Latin hypercube, or independent samples. By "saltelli" n Sobol
-            points of twice the dimensions make ``n (d + 2)`` samples of d quantities, from which
-            the reduction `SobolIndices` tells what matters.
+            Scrambled Sobol points, a Latin hypercube, or independent random samples. The method
+            "saltelli" draws n Sobol points in twice the number of dimensions and combines their
+            coordinates to ``n (d + 2)`` samples of d quantities. The reduction `SobolIndices`
+            requires this method. The default is "sobol".
         covariance : array_like, optional
-            Of what is drawn, in its order. Estimates are normal with these variances; of
-            distributions, which have variances of their own, it correlates the normal scores.
-        fields : mapping of str to str or function, optional
-            The fields that are set, each by the name of what is drawn, or a function of all that is
-            drawn: ``{"a": lambda d: np.exp(d["ln_a"])}``. By default all that is drawn.
+            Covariance matrix of shape (d, d) in the order of `distribution`. Mean values have
+            normal distributions with this covariance. For distributions, only the correlation is
+            used, and it applies to their normal scores.
+        fields : mapping of str to str or callable, optional
+            Fields to set. Each field is given by the name of a sampled quantity, or by a function
+            of all sampled quantities, for example ``{"a": lambda d: np.exp(d["ln_a"])}``. By
+            default, each sampled quantity sets the field of the same name.
         units : mapping of str to str, optional
-            Units of fields, in a study of a rig; SI units by default.
-        dimension : str
+            Units of the fields, in a study of a rig. The default is SI units.
+        dimension : str, default: "sample"
+            Name of the dimension.
+
+        Returns
+        -------
+        Axis
+            Axis with numbered points.
 
         Raises
         ------
         InvalidValue
-            For an impossible number, correlation or distribution; and where Sobol indices are asked
-            for of quantities that depend on each other.
+            If the number of samples, the covariance or a distribution is invalid, or if the method
+            is "saltelli" and the quantities are correlated.
+
+        Examples
+        --------
+        >>> from scipy.stats import norm, uniform
+        >>> import rsfstudy
+        >>> axis = rsfstudy.Axis.samples({"a": norm(0.01, 0.001), "b_over_a": uniform(1.2, 0.8)}, 8)
+        >>> len(axis), axis.fields
+        (8, ('a', 'b_over_a'))
         """
-        from rsfstudy.axes import axis_samples  # loads scipy.stats
+        # The import is local because it loads `scipy.stats`, which is slow.
+        from rsfstudy.axes import axis_samples
 
         drawn, how = axis_samples.draw_samples(distribution, n, seed, method, covariance)
         return cls(dimension, axis_samples.compute_field_values(drawn, fields), units, how)
@@ -148,16 +188,39 @@ class Axis:
         units: Mapping[str, str] | None = None,
         dimension: str = "case",
     ) -> Axis:
-        """The rows of a table, as one dimension.
+        """Use the rows of a table as the points of an axis.
 
         Parameters
         ----------
         table : mapping of str to sequence, DataFrame or Dataset
-            Columns by their names, or what `rsfstudy.read_table` read. Units that it states count:
-            those of a CSV file, of the attribute ``units`` of a variable, or of that of a
-            DataFrame, which maps columns to them; and of names such as ``slip_distance (um)``.
-        fields, units, dimension
-            As in `samples`.
+            Columns by name, or the output of `rsfstudy.read_table`. The units of a column are the
+            units in the CSV file, the attribute ``units`` of a variable, or the units in the name
+            of a column such as ``slip_distance (um)``. The attribute ``units`` of a data frame maps
+            columns to units.
+        fields : mapping of str to str or callable, optional
+            Fields to set, as in `samples`. By default, each column sets the field of the same name.
+        units : mapping of str to str, optional
+            Units of the fields, in a study of a rig. The default is the units of the table, or SI
+            units.
+        dimension : str, default: "case"
+            Name of the dimension.
+
+        Returns
+        -------
+        Axis
+            Axis with numbered points.
+
+        Raises
+        ------
+        InvalidValue
+            If the table is not a table of columns, or if its units contradict each other.
+
+        Examples
+        --------
+        >>> import rsfstudy
+        >>> axis = rsfstudy.Axis.cases({"a": [0.008, 0.01], "b_over_a": [1.5, 1.2]})
+        >>> dict(axis.rows[1])
+        {'a': 0.01, 'b_over_a': 1.2}
         """
         from rsfstudy.axes import axis_samples
 
@@ -186,7 +249,7 @@ class Axis:
                         raise wrong.with_location(f"{self.dimension} {number}")
                     raise InvalidValue(self.dimension, value, "must be finite")
         if self.has_numbered_points:
-            return  # of equal ones one is computed
+            return  # Equal points are allowed, because they are computed only once.
         seen: set[frozenset[tuple[str, Any]]] = set()
         for row in self.rows:
             key = frozenset(row.items())
@@ -197,17 +260,17 @@ class Axis:
 
     @cached_property
     def fields(self) -> tuple[str, ...]:
-        """Fields of the scene or of the measure that vary along the axis."""
+        """Names of the fields that vary along the axis."""
         return tuple(dict.fromkeys(name for row in self.rows for name in row))
 
     @property
     def has_numbered_points(self) -> bool:
-        """True if its points are numbered: samples, or cases."""
+        """True if the points are numbered, as for samples and cases."""
         return self.labels is None and self.dimension not in self.rows[0]
 
     @property
     def is_single_field(self) -> bool:
-        """True if its points are values of the field that it is named by."""
+        """True if the points are values of the field that names the axis."""
         return self.labels is None and not self.has_numbered_points
 
     def with_rows(
@@ -216,11 +279,26 @@ class Axis:
         units: Mapping[str, str],
         sampling_info: Mapping[str, Any] | None = None,
     ) -> Axis:
-        """An axis of this kind with other fields set at its points."""
+        """Create an axis of the same type with other fields at its points.
+
+        Parameters
+        ----------
+        rows : sequence of mapping
+            Fields at each point.
+        units : mapping of str to str
+            Units of the fields.
+        sampling_info : mapping, optional
+            Description of the sampling method.
+
+        Returns
+        -------
+        Axis
+            Axis with the same dimension and the same labels.
+        """
         return Axis(self.dimension, self._values_for_constructor(rows), units, sampling_info)
 
     def _values_for_constructor(self, rows: Sequence[AxisRow]) -> Any:
-        """What an axis of this kind with these rows is declared by."""
+        """Return the argument ``values`` of an axis of the same type."""
         if self.labels is not None:
             return {label: dict(row) for label, row in zip(self.labels, rows, strict=True)}
         if self.has_numbered_points:
@@ -228,10 +306,17 @@ class Axis:
         return [row.get(self.dimension) for row in rows]
 
     def __len__(self) -> int:
+        """Return the number of points."""
         return len(self.rows)
 
     def describe(self) -> dict[str, Any]:
-        """The axis as plain data."""
+        """Describe the axis by numbers, strings, lists and dictionaries.
+
+        Returns
+        -------
+        dict of str to object
+            Dimension, values, and optionally units and the sampling method.
+        """
         beside = {"units": dict(self.units), "drawn": dict(self.sampling_info)}
         stated = {name: about for name, about in beside.items() if about}
         return {
@@ -242,7 +327,7 @@ class Axis:
 
     @property
     def point_names(self) -> list[str]:
-        """What its points are called: labels, numbers, or values with their units."""
+        """Names of the points: labels, numbers, or values with units."""
         if self.has_numbered_points:
             return list(map(str, range(len(self))))
         units = self.units.get(self.dimension, "")
@@ -251,9 +336,21 @@ class Axis:
 
 
 def classify_rows_by_fields(axis_rows: Sequence[AxisRow]) -> np.ndarray:
-    """The kind of each row of an axis, counted from 0 in the order of the first of each. Rows are
-    of one kind if they set the same fields, to the same texts and flags, and of numbers to 0 or to
-    any others: then scenes with them are made of the same parts.
+    """Assign each row of an axis to a group of similar rows.
+
+    Rows of a group set the same fields. Their strings and flags are equal, and their numbers are
+    either all zero or all nonzero. Scenes with rows of the same group therefore have the same
+    parts.
+
+    Parameters
+    ----------
+    axis_rows : sequence of mapping
+        Rows of an axis.
+
+    Returns
+    -------
+    ndarray of int
+        Group of each row. Groups are numbered from 0 in the order of their first row.
     """
     known: dict[tuple[Any, ...], int] = {}
     return np.array(
@@ -269,9 +366,17 @@ def _fields_and_texts_of_row(axis_row: AxisRow) -> tuple[Any, ...]:
 
 
 def fields_of_axis_point(axis_point: Any) -> Any:
-    """Return the fields of a rig, or of another object with fields for an axis.
+    """Return the fields of a rig, or of another object with axis fields.
 
-    Any other point is returned as it is.
+    Parameters
+    ----------
+    axis_point : object
+        Point of a zipped axis.
+
+    Returns
+    -------
+    object
+        Mapping of fields to values. An object without axis fields is returned unchanged.
     """
     if hasattr(axis_point, "axis_fields"):
         return axis_point.axis_fields
@@ -282,7 +387,7 @@ def fields_of_axis_point(axis_point: Any) -> Any:
 
 
 def _rows_from_points(dimension: str, labelled_points: Mapping[str, Any]) -> tuple[AxisRow, ...]:
-    """The rows of a zipped axis: for each label the fields set there."""
+    """Create the rows of a zipped axis from the fields at each label."""
     rows = {label: fields_of_axis_point(point) for label, point in labelled_points.items()}
     for label, row in rows.items():
         check_storable_text(dimension, label)
@@ -296,7 +401,7 @@ def _rows_from_points(dimension: str, labelled_points: Mapping[str, Any]) -> tup
 def _rows_from_columns(
     dimension: str, values_by_field: Mapping[str, Sequence[Any]]
 ) -> tuple[AxisRow, ...]:
-    """The rows of an axis whose points are numbered: at each, a value of each field."""
+    """Create the rows of an axis with numbered points from its columns."""
     lengths = {name: len(column) for name, column in values_by_field.items()}
     for name, length in lengths.items():
         if not is_variable_name(name) or name == dimension:
@@ -312,12 +417,36 @@ def _rows_from_columns(
 
 
 def rows_to_field_columns(rows: Sequence[AxisRow]) -> dict[str, list[Any]]:
-    """Values of each field at points that all set the same fields."""
+    """Convert rows that set the same fields to columns.
+
+    Parameters
+    ----------
+    rows : sequence of mapping
+        Rows of an axis.
+
+    Returns
+    -------
+    dict of str to list
+        Values of each field.
+    """
     return {name: [row[name] for row in rows] for name in rows[0]}
 
 
 def check_storable_text(argument_name: str, text: object) -> None:
-    """A text that a file can hold."""
+    """Check that a value is a string that files can store.
+
+    Parameters
+    ----------
+    argument_name : str
+        Name of the argument for error messages.
+    text : object
+        Value to check.
+
+    Raises
+    ------
+    InvalidValue
+        If the value is not a string, contains a null character, or cannot be encoded as UTF-8.
+    """
     if not isinstance(text, str) or "\0" in text:
         raise InvalidValue(argument_name, text, "must be a text")
     try:
@@ -327,8 +456,25 @@ def check_storable_text(argument_name: str, text: object) -> None:
 
 
 def to_plain_value(field_name: str, value: Any) -> Any:
-    """A value of a field as Python's own number, flag or text: whole numbers as float, a part of
-    the user's own by its name.
+    """Convert a field value to a float, a bool or a string.
+
+    Parameters
+    ----------
+    field_name : str
+        Name of the field.
+    value : object
+        Value to convert. Integers become floats. A user-defined part becomes its name.
+
+    Returns
+    -------
+    object
+        Value as a built-in type. Values of other types are returned unchanged, and the axis rejects
+        these values.
+
+    Raises
+    ------
+    InvalidValue
+        If the value is an array with one or more dimensions.
     """
     value = normalise_field_value(field_name, value)
     if isinstance(value, np.ndarray) and value.ndim:

@@ -1,5 +1,7 @@
-"""Samples of several quantities at once: from distributions, by sequences that fill space evenly;
-and tables of cases.
+"""Samples of several quantities, and tables of cases, for axes.
+
+Samples are quantiles of distributions at points of the unit cube. See `Axis.samples` and
+`Axis.cases`.
 """
 
 from __future__ import annotations
@@ -15,22 +17,48 @@ from rsfstudy.argument_checks import MAX_ITEMS
 from rsfstudy.errors import InvalidValue
 from rsfstudy.quantities import parse_heading
 
-#: What a field is set by: a quantity that is drawn, or a function of all of them.
+#: Source of a field: the name of a sampled quantity, or a function of all sampled quantities.
 QuantityNameOrFunction = str | Callable[[Mapping[str, np.ndarray]], Any]
 
 SAMPLING_METHODS = ("sobol", "latin_hypercube", "random", "saltelli")
-#: Those that are made of Sobol points, whose number must be a power of two to be balanced.
+#: Methods that use Sobol points. Sobol points are balanced only if their number is a power of two.
 _SOBOL_METHODS = ("sobol", "saltelli")
-#: Probabilities nearer to 0 and 1 are none: a distribution without bounds would be infinite there.
+#: Smallest probability of a sample. Quantiles of unbounded distributions are infinite at 0 and 1.
 _MIN_SAMPLED_PROBABILITY = 2.0**-40
-#: Rounding error that an eigenvalue of a correlation, over the largest, may have.
+#: Tolerance for negative eigenvalues of a correlation matrix, which result from rounding errors.
 _EIGENVALUE_ROUNDING_ERROR = 1e-10
 
 
 def draw_samples(
     distributions: Mapping[str, Any], sample_count: int, seed: int, method: str, covariance: Any
 ) -> tuple[dict[str, np.ndarray], dict[str, Any]]:
-    """Samples of each quantity, and how they were drawn as plain data; see `Axis.samples`."""
+    """Draw samples of several quantities.
+
+    Parameters
+    ----------
+    distributions : mapping of str to distribution or float
+        Distributions or mean values by name.
+    sample_count : int
+        Number of samples.
+    seed : int
+        Seed of the random number generator.
+    method : str
+        Name of the sampling method.
+    covariance : array_like or None
+        Covariance matrix in the order of the distributions.
+
+    Returns
+    -------
+    samples : dict of str to ndarray
+        Samples of each quantity.
+    info : dict of str to object
+        Description of the method and its arguments.
+
+    Raises
+    ------
+    InvalidValue
+        If an argument is invalid. See `Axis.samples`.
+    """
     if not isinstance(distributions, Mapping) or not distributions:
         raise InvalidValue("distribution", distributions, "must map names to distributions")
     _check_sampling_arguments(distributions, sample_count, seed, method)
@@ -81,7 +109,7 @@ def _check_sampling_arguments(
 def _deviations_and_correlation(
     distributions: Mapping[str, Any], covariance: Any, method: str
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Standard deviations of what is drawn, and the correlation of their normal scores."""
+    """Compute the standard deviations and the correlation matrix."""
     count = len(distributions)
     estimates = [name for name, drawn in distributions.items() if _is_value_with_error(drawn)]
     if covariance is None:
@@ -115,7 +143,11 @@ def _deviations_and_correlation(
 
 
 def _matrix_square_root(correlation: np.ndarray) -> np.ndarray:
-    """The symmetric square root, which unlike other factors is one on every machine."""
+    """Compute the symmetric square root of a matrix.
+
+    Unlike other factors, the symmetric square root is unique, so all machines return the same
+    samples.
+    """
     values, vectors = np.linalg.eigh(correlation)
     return np.asarray((vectors * np.sqrt(np.maximum(values, 0.0))) @ vectors.T)
 
@@ -123,7 +155,7 @@ def _matrix_square_root(correlation: np.ndarray) -> np.ndarray:
 def _draw_uniform_samples(
     quantity_count: int, sample_count: int, seed: int, method: str
 ) -> np.ndarray:
-    """Points of the unit cube, of shape (samples, count)."""
+    """Draw points of the unit cube, of shape (samples, quantities)."""
     random = np.random.default_rng(seed)
     if method == "random":
         found = random.random((sample_count, quantity_count))
@@ -134,7 +166,7 @@ def _draw_uniform_samples(
             sample_count
         )
     if method == "saltelli":
-        # of each point: A, B, and A with one coordinate from B after the other
+        # Saltelli's scheme converts each point to A, B, and copies of A with one coordinate from B.
         ours, theirs = found[:, :quantity_count], found[:, quantity_count:]
         mixed = np.where(np.eye(quantity_count, dtype=bool), theirs[:, None, :], ours[:, None, :])
         found = np.concatenate([ours[:, None], theirs[:, None], mixed], axis=1)
@@ -148,7 +180,7 @@ def _is_value_with_error(distribution: Any) -> bool:
 
 
 def _quantile_function(distribution: Any) -> Any:
-    """The function that gives quantiles of a distribution; None of what is none."""
+    """Return the quantile function of a distribution, or None for other types."""
     return (
         getattr(distribution, "ppf", None)
         if hasattr(distribution, "dist")
@@ -159,10 +191,10 @@ def _quantile_function(distribution: Any) -> Any:
 def _compute_quantiles(
     quantity_name: str, distribution: Any, probabilities: np.ndarray
 ) -> np.ndarray:
-    """The quantiles of a distribution."""
+    """Compute the quantiles of a distribution, which must be finite."""
     try:
         found = np.asarray(_quantile_function(distribution)(probabilities), dtype=float)
-    except ValueError:  # of parameters that are arrays
+    except ValueError:  # The parameters are arrays.
         found = np.empty(0)
     if found.shape != probabilities.shape or not np.isfinite(found).all():
         raise InvalidValue(
@@ -174,7 +206,7 @@ def _compute_quantiles(
 
 
 def _describe_distribution(distribution: Any) -> Any:
-    """A distribution in words; an estimate as it is."""
+    """Describe a distribution by a string, or a mean value by a float."""
     if _is_value_with_error(distribution):
         return float(distribution)
     if not hasattr(distribution, "dist"):
@@ -189,7 +221,25 @@ def _describe_distribution(distribution: Any) -> Any:
 def compute_field_values(
     sampled_values: Mapping[str, Any], field_sources: Mapping[str, QuantityNameOrFunction] | None
 ) -> dict[str, Sequence[Any] | np.ndarray]:
-    """Values of each field that is set: by a quantity that is drawn, or a function of them all."""
+    """Compute the values of all fields from sampled quantities.
+
+    Parameters
+    ----------
+    sampled_values : mapping of str to array_like
+        Samples of each quantity.
+    field_sources : mapping of str to str or callable, or None
+        Source of each field. If None, each quantity sets the field of the same name.
+
+    Returns
+    -------
+    dict of str to sequence or ndarray
+        Values of each field.
+
+    Raises
+    ------
+    InvalidValue
+        If a source is unknown, or if a function does not return numbers.
+    """
     if field_sources is None:
         return dict(sampled_values)
     found = {}
@@ -223,14 +273,32 @@ def _evaluate_field_function(
 
 
 def read_table_columns_and_units(table: Any) -> tuple[dict[str, Any], dict[str, str]]:
-    """Columns of a table by their names, and the units that it states of them."""
+    """Read the columns of a table and their units.
+
+    Parameters
+    ----------
+    table : mapping of str to sequence, DataFrame or Dataset
+        Table with named columns.
+
+    Returns
+    -------
+    columns : dict of str to list
+        Values of each column.
+    units : dict of str to str
+        Units of the columns that have units.
+
+    Raises
+    ------
+    InvalidValue
+        If the object is not a table, if a column occurs twice, or if units contradict each other.
+    """
     if not hasattr(table, "keys") or getattr(table, "ndim", 2) != 2 or not len(table):
         rule = "is no table of columns"
         remedy = "Give a mapping of names to lists, a DataFrame, or rsfstudy.read_table(path)."
         raise InvalidValue("table", table, rule, remedy=remedy)
     found: dict[str, Any] = {}
     units: dict[str, str] = {}
-    # the keys of an xarray.Dataset are its data variables
+    # Iterate over data variables only, because coordinates are not columns.
     for key in getattr(table, "data_vars", table):
         heading, column = str(key), table[key]
         stated = getattr(column, "attrs", {}).get("units", getattr(column, "units", ""))

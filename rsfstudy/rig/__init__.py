@@ -1,6 +1,6 @@
 """Laboratory rigs: quantities in SI units, and scenes, axes and files in units.
 
-A rig states its stiffness, normal stress, slip distance and velocities in units. The package
+A ``Rig`` has a stiffness, a normal stress, a slip distance and velocities in units. The package
 converts these quantities to the dimensionless fields of scenes and back, and reads tables, load
 point protocols and records from files. It never integrates a motion and never fits a record.
 """

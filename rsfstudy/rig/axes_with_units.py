@@ -1,4 +1,7 @@
-"""Axes of studies of a rig, in units."""
+"""Axes with units for studies of a rig.
+
+`make_axis_with_units` is the main function.
+"""
 
 from __future__ import annotations
 
@@ -28,26 +31,42 @@ from rsfstudy.rig.units import (
 
 
 def make_axis_with_units(dimension: str, values: Any, units: str | Mapping[str, str] = "") -> Axis:
-    """An axis in the units that its first value states; a field that has none as it is.
+    """Create an axis with units.
+
+    The units of the axis are the units of its first value. A field without units becomes an
+    ordinary axis.
 
     Parameters
     ----------
     dimension : str
-        A quantity of a rig, or a field of a scene.
+        Name of a quantity of a rig, or of a field of a scene.
     values : sequence of quantity, str, or mapping
-        A text is ``first:last:count``, or ``first:last:count:log``, and units. A mapping has the
-        fields of each label, or a rig, and each field is in SI units then; or it is a table, as
-        `Axis.cases` takes one.
-    units : str, or mapping of str to str
-        Of plain numbers; of the columns of a table. SI units by default.
+        Values of the axis. A string is a range with units, ``first:last:count`` or
+        ``first:last:count:log``. A mapping contains the fields, or a rig, for each label, and all
+        its fields are converted to SI units. A mapping may also be a table, as in `Axis.cases`.
+    units : str, or mapping of str to str, optional
+        Units of plain numbers, or of the columns of a table. By default, plain numbers are in SI
+        units.
+
+    Returns
+    -------
+    Axis
+        Axis with units.
 
     Raises
     ------
     InvalidValue
-        For a value that is no quantity, of another kind, or of a rig and not positive.
+        If a value is not a quantity, if its units are incompatible, or if a quantity of a rig is
+        not positive.
+
+    Notes
+    -----
+    The names of two quantities differ between rigs and axes: the normal stress of a rig is named
+    ``sigma_star`` on axes, and a velocity with units is named without the suffix ``_ratio``.
     """
     if not is_variable_name(dimension):
-        return Axis(dimension, values)  # which refuses it
+        # The constructor raises an error that explains the rule for names.
+        return Axis(dimension, values)
     if hasattr(values, "keys"):
         if isinstance(values, Mapping) and any(
             isinstance(fields_of_axis_point(point), Mapping) for point in values.values()
@@ -65,7 +84,19 @@ def make_axis_with_units(dimension: str, values: Any, units: str | Mapping[str, 
 
 
 def convert_axis_to_stated_units(axis: Axis) -> Axis:
-    """An axis of a study of a rig, whose plain numbers are in SI units, as everywhere in a rig."""
+    """Convert the values of an axis to the units of the axis.
+
+    Parameters
+    ----------
+    axis : Axis
+        Axis of a study of a rig. Plain numbers are in SI units if the axis has no units for the
+        field.
+
+    Returns
+    -------
+    Axis
+        Axis of floats with units.
+    """
     if axis.is_single_field:
         return _single_field_axis(axis.rows, axis.units)
     rows, units = _convert_rows_to_axis_units(
@@ -75,7 +106,7 @@ def convert_axis_to_stated_units(axis: Axis) -> Axis:
 
 
 def _single_field_axis(rows: Sequence[AxisRow], units: Mapping[str, str]) -> Axis:
-    """An axis of one field."""
+    """Create an axis of one field with units."""
     found, stated = _convert_rows_to_axis_units(rows, units, first_value_sets_units=True)
     (name,) = found[0]
     return Axis(name, [row[name] for row in found], stated)
@@ -84,8 +115,10 @@ def _single_field_axis(rows: Sequence[AxisRow], units: Mapping[str, str]) -> Axi
 def _convert_rows_to_axis_units(
     rows: Sequence[AxisRow], units: Mapping[str, str], *, first_value_sets_units: bool
 ) -> tuple[list[dict[str, Any]], dict[str, str]]:
-    """Rows whose fields have the names and units that they have on axes, and these units: those of
-    the axis, those of the first value of a column, or SI units.
+    """Convert the rows of an axis to numbers, and return the units too.
+
+    The function uses the names of fields on axes. The units of a field are the units of the axis,
+    the units of the first value of the column, or SI units, in this order of priority.
     """
     found: list[dict[str, Any]] = [{} for _row in rows]
     stated: dict[str, str] = {}
@@ -100,7 +133,7 @@ def _convert_rows_to_axis_units(
                 ours = _parse_units_of_value(value) if first_value_sets_units else ""
                 stated.setdefault(name, units.get(given) or ours or si)
             elif units.get(given):
-                factor_to_si(given, units[given])  # which refuses what is none of a rig
+                factor_to_si(given, units[given])  # This call raises an error.
     for name, held in quantities.items():
         numbers = convert_values_to_units(name, [value for _row, value in held], stated[name])
         for (row, _value), number in zip(held, numbers, strict=True):
@@ -109,7 +142,28 @@ def _convert_rows_to_axis_units(
 
 
 def convert_values_to_units(quantity_name: str, values: Sequence[Any], units: str) -> list[float]:
-    """Values of a quantity in some units, which those have that are plain numbers."""
+    """Convert the values of a quantity to given units.
+
+    Parameters
+    ----------
+    quantity_name : str
+        Name of the quantity on axes.
+    values : sequence of quantity
+        Values to convert. Plain numbers are already in the given units.
+    units : str
+        Units of the result.
+
+    Returns
+    -------
+    list of float
+        Values in the given units.
+
+    Raises
+    ------
+    InvalidValue
+        If a value is not a quantity, if its units are incompatible, or if a quantity of a rig is
+        not positive.
+    """
     scale, found = factor_to_si(quantity_name, units), []
     kind = (
         "1/m"
@@ -138,27 +192,40 @@ def convert_values_to_units(quantity_name: str, values: Sequence[Any], units: st
 
 
 def _is_allowed_rig_number(quantity_name: str, number: Any) -> bool:
-    """False of a quantity of a rig that is not positive."""
+    """Return False for a quantity of a rig that is not positive."""
     return quantity_name not in RIG_NAME_BY_AXIS_NAME or (
         isinstance(number, float) and number > 0.0
     )
 
 
 def axis_name_and_units(name: str, value: Any) -> tuple[str, str | None]:
-    """The name and the SI units that a value has on an axis; the units are None where it is none in
-    units.
+    """Return the name of a field on an axis, and its SI units.
+
+    Parameters
+    ----------
+    name : str
+        Name of a quantity of a rig, or of a field of a scene.
+    value : object
+        Value of the field.
+
+    Returns
+    -------
+    name : str
+        Name of the field on axes.
+    units : str or None
+        SI units of the field. None if the value has no units.
     """
     name = _axis_field_name(name, value)
     return name, _axis_si_units(name, value)
 
 
 def _axis_field_name(name: str, value: Any) -> str:
-    """The name on an axis of what bears another in a rig or, as a ratio, in a scene."""
+    """Return the name on axes of a quantity of a rig or a field of a scene."""
     quantity = not isinstance(value, str) or split_number_and_units(value)[0] is not None
     if name in AXIS_NAME_BY_RIG_NAME and quantity:
         return AXIS_NAME_BY_RIG_NAME[name]
     if not is_variable_name(name):
-        return name  # which a scene refuses
+        return name  # The scene raises an error later.
     short = name.removesuffix("_ratio")
     return (
         short
@@ -169,7 +236,7 @@ def _axis_field_name(name: str, value: Any) -> str:
 
 
 def _axis_si_units(name: str, value: Any) -> str | None:
-    """SI units of a value on an axis; None where it is none in units."""
+    """Return the SI units of a value on an axis, if it has units."""
     if value is None or isinstance(value, bool):
         return None
     if name in RIG_NAME_BY_AXIS_NAME:
@@ -184,7 +251,26 @@ def _parse_units_of_value(value: Any) -> str:
 
 
 def factor_to_si(quantity_name: str, units: str) -> Fraction:
-    """Factor to SI units; of a stiffness that is friction over displacement to 1/m."""
+    """Compute the conversion factor from given units to SI units.
+
+    Parameters
+    ----------
+    quantity_name : str
+        Name of the quantity on axes.
+    units : str
+        Units to convert from. A stiffness may be friction divided by displacement, which is
+        converted to 1/m.
+
+    Returns
+    -------
+    Fraction
+        Value of 1 in SI units.
+
+    Raises
+    ------
+    InvalidValue
+        If the quantity has no units, or if the units are unknown or incompatible.
+    """
     if quantity_name == "stiffness" and is_friction_stiffness(f"1 {units}"):
         return unit_factor(quantity_name, units, "1/m")
     si = _axis_si_units(quantity_name, f"1 {units}")

@@ -1,4 +1,9 @@
-"""Datasets in other units: by their attribute ``scale``, which says what they are measured in."""
+"""Conversion of datasets between dimensionless and physical units.
+
+The attribute ``scale`` of a variable, for example ``D_c/V_*``, is the unit that makes the variable
+dimensionless. `convert_dataset_units` is the main function. `read_si_scales` provides the scales
+that it needs.
+"""
 
 from __future__ import annotations
 
@@ -15,29 +20,39 @@ from rsfstudy.netcdf_encoding import copy_with_cf_encoding
 from rsfstudy.quantities import format_unit_quotient, split_unit_quotient
 from rsfstudy.rig.units import unit_factor
 
-#: What ratios of the slider are, once they are in other units. Scenes have another `normal_stress`.
+#: Names of velocity ratios and normal stress ratios after conversion to units. The name
+#: ``normal_stress`` is not available, because scenes have a field of this name.
 _DIMENSIONAL_NAMES_OF_RATIOS = {
     "velocity_ratio": "velocity",
     "normal_stress_ratio": "effective_normal_stress",
 }
-#: Names of logarithms of slip rates, and how their descriptions begin and end.
+#: Pattern of the names of logarithms of slip rates, and pattern of the words to remove from the
+#: start and the end of their descriptions.
 _LOG_SLIP_RATE_PATTERN = re.compile(r"(\w+_)?log10_slip_rate")
 _LOG_SLIP_RATE_DESCRIPTION_PATTERN = re.compile(r"^decimal logarithm of (the )?| over V_star")
 
-#: What stands before the name of a field where that is the name of an axis in units.
+#: Prefix of a dimensionless field whose own name is the name of an axis with units.
 DIMENSIONLESS_PREFIX = "dimensionless_"
-#: Units in which results and motions of a rig are told, in tables and figures.
+#: Units of a rig in tables and figures.
 DISPLAY_BASE_UNITS = {"stress": "MPa", "length": "um", "time": "s"}
-#: Attribute of a dataset in other units that tells their scales.
+#: Name of the dataset attribute that lists the scales after a conversion.
 SCALES_ATTRIBUTE = "scales"
 
 
-#: Relative difference of two reference rates that are one: of rounding, and of what was printed.
+#: Tolerance for the comparison of two scales, which allows for rounding errors and printed digits.
 _REFERENCE_RATE_RTOL = 1e-9
 
 
 class UnitScale(NamedTuple):
-    """Value of 1 in some units; of each cell, where it varies among them."""
+    """Value of one dimensionless unit in physical units.
+
+    Parameters
+    ----------
+    factor : float or xarray.Variable
+        Value of 1. A variable contains one value per cell.
+    units : str
+        Physical units.
+    """
 
     factor: float | xr.Variable
     units: str
@@ -49,18 +64,32 @@ def read_si_scales(
     slip_distance: float | None = None,
     reference_rate: float | None = None,
 ) -> dict[str, UnitScale]:
-    """The scales of a dataset in SI units, cell by cell: those that it holds, else those stated.
+    r"""Determine the scales of a dataset in SI units.
+
+    The scales are read from the coordinates of the dataset. An argument replaces a scale that the
+    dataset does not contain.
 
     Parameters
     ----------
     dataset : xarray.Dataset
-    normal_stress, slip_distance, reference_rate : float, optional
-        sigma_* in Pa, D_c in m, and V_*/D_c in 1/s.
+        Results or a motion.
+    normal_stress : float, optional
+        Normal stress :math:`\sigma_*` in Pa.
+    slip_distance : float, optional
+        Slip distance :math:`D_c` in m.
+    reference_rate : float, optional
+        Reference rate :math:`V_*/D_c` in 1/s.
+
+    Returns
+    -------
+    dict of str to UnitScale
+        Scales by name, for example ``D_c``. The factors are variables if a scale varies between
+        cells.
 
     Raises
     ------
     InvalidValue
-        Where it does not hold one that is not stated, or another is stated.
+        If a scale is missing, or if an argument contradicts the dataset.
     """
     return build_si_scales(
         _resolve_scale_of_dataset(dataset, "sigma_star", "normal_stress", normal_stress, "Pa"),
@@ -86,7 +115,8 @@ def _resolve_scale_of_dataset(
     variable = dataset[coordinate_name].variable.to_base_variable()
     held = variable * float(unit_factor(coordinate_name, variable.attrs.get("units", units), units))
     known = np.unique(held.values[np.isfinite(held.values)])
-    if known.size == 1:  # that of the rig, which cells without need of it do not tell
+    # If the scale does not vary, it also applies to cells in which the scale is NaN.
+    if known.size == 1:
         held = xr.Variable((), known[0])
     if stated_value is not None and not np.allclose(
         held, stated_value, rtol=_REFERENCE_RATE_RTOL, atol=0.0
@@ -98,7 +128,18 @@ def _resolve_scale_of_dataset(
 
 
 def build_scales_of_rig(rig: Mapping[str, Any]) -> dict[str, UnitScale]:
-    """The scales of a rig, in SI units; of arrays of its quantities arrays."""
+    """Compute the scales of a rig in SI units.
+
+    Parameters
+    ----------
+    rig : mapping of str to float or ndarray
+        Quantities of the rig in SI units.
+
+    Returns
+    -------
+    dict of str to UnitScale
+        Scales by name. If the quantities are arrays, the factors are arrays.
+    """
     rate = rig["reference_velocity"] / rig["slip_distance"]
     return build_si_scales(rig["normal_stress"], rig["slip_distance"], rate)
 
@@ -110,8 +151,21 @@ def convert_dataset_units(
     length: str,
     time: str,
 ) -> xr.Dataset:
-    """A dataset in units of stress, length and time, by its scales in SI units; see
-    `apply_scales`.
+    """Convert a dataset to units of stress, length and time.
+
+    Parameters
+    ----------
+    dataset : xarray.Dataset
+        Dimensionless results or motion.
+    si_scales : mapping of str to UnitScale
+        Scales in SI units, from `read_si_scales`.
+    stress_unit, length_unit, time_unit : str
+        Units of the result.
+
+    Returns
+    -------
+    xarray.Dataset
+        Dataset in units. See `apply_scales_to_dataset`.
     """
     units = {
         "sigma_*": stress, "D_c": length, "D_c/V_*": time, "V_*/D_c": f"{time}-1",
@@ -134,21 +188,26 @@ def build_si_scales(
     slip_distance: float | xr.Variable,
     reference_rate: float | xr.Variable,
 ) -> dict[str, UnitScale]:
-    """The scales of dimensionless quantities in SI units, by the names that attributes have.
+    r"""Compute the scales of dimensionless quantities in SI units.
 
     Parameters
     ----------
     normal_stress : float or xarray.Variable
-        sigma_* in Pa.
+        Normal stress :math:`\sigma_*` in Pa.
     slip_distance : float or xarray.Variable
-        D_c in m.
+        Slip distance :math:`D_c` in m.
     reference_rate : float or xarray.Variable
-        V_*/D_c in 1/s.
+        Reference rate :math:`V_*/D_c` in 1/s.
+
+    Returns
+    -------
+    dict of str to UnitScale
+        Scales by name. The names are the values of the attribute ``scale``.
 
     Raises
     ------
     InvalidValue
-        For scales that are not positive and finite.
+        If a scale is not positive or not finite.
     """
     for of, value in (
         ("sigma_*", normal_stress), ("D_c", slip_distance), ("V_*/D_c", reference_rate),
@@ -174,7 +233,7 @@ def _check_scale_is_positive(scale_name: str, scale_factor: float | xr.Variable)
 
 
 def _format_number_or_range(values: float | xr.Variable) -> str:
-    """A number, or the least and the largest where it varies."""
+    """Format a number, or the minimum and maximum of an array."""
     ends = np.unique([np.min(values), np.max(values)])
     return " to ".join(f"{end:g}" for end in ends)
 
@@ -182,8 +241,20 @@ def _format_number_or_range(values: float | xr.Variable) -> str:
 def find_scale_of_variable(
     variable: xr.DataArray | xr.Variable, scales_by_name: Mapping[str, UnitScale]
 ) -> UnitScale | None:
-    """What 1 of a variable is, in its units: of ``D_c/V_* (V_*)-1``, that of the first over that of
-    the other; None of what says no scale, or one that is not known.
+    """Find the value of one dimensionless unit of a variable.
+
+    Parameters
+    ----------
+    variable : xarray.DataArray or xarray.Variable
+        Variable with an attribute ``scale``. The scale may be a quotient: for ``D_c/V_* (V_*)-1``,
+        the function divides the first scale by the second scale.
+    scales_by_name : mapping of str to UnitScale
+        Scales of the dataset.
+
+    Returns
+    -------
+    UnitScale or None
+        Scale of the variable. None if the variable has no scale, or an unknown scale.
     """
     named = split_unit_quotient(variable.attrs.get("scale", ""))
     known = {"1": UnitScale(1.0, "1"), **scales_by_name}
@@ -198,14 +269,37 @@ def find_scale_of_variable(
 
 
 def convert_to_display_units(dataset: xr.Dataset) -> xr.Dataset:
-    """Results of a rig as tables and figures show them, in MPa, um and s; others as they are."""
+    """Convert the results of a rig to MPa, um and s for tables and figures.
+
+    Parameters
+    ----------
+    dataset : xarray.Dataset
+        Results.
+
+    Returns
+    -------
+    xarray.Dataset
+        Results in units. A dataset without a rig is returned unchanged.
+    """
     if "sigma_star" not in dataset.variables or SCALES_ATTRIBUTE in dataset.attrs:
         return dataset
     return convert_dataset_units(dataset, read_si_scales(dataset), **DISPLAY_BASE_UNITS)
 
 
 def has_units_unlike_its_study(dataset: xr.Dataset) -> bool:
-    """True of results in units that figures of their study do not expect."""
+    """Return True if results have units that study figures do not expect.
+
+    Parameters
+    ----------
+    dataset : xarray.Dataset
+        Results.
+
+    Returns
+    -------
+    bool
+        True if the results were converted to units other than MPa, um and s, or if the results have
+        units but no rig.
+    """
     told = dataset.attrs.get(SCALES_ATTRIBUTE, "")
     as_shown = "sigma_star" in dataset.variables and all(
         f" {u}," in told for u in DISPLAY_BASE_UNITS.values()
@@ -216,18 +310,32 @@ def has_units_unlike_its_study(dataset: xr.Dataset) -> bool:
 def apply_scales_to_dataset(
     dataset: xr.Dataset, scales_by_name: Mapping[str, UnitScale]
 ) -> xr.Dataset:
-    """A dataset in other units, all of it.
+    """Multiply all variables of a dataset by their scales.
 
-    What says its ``scale`` is multiplied by it and says its units instead; its name no longer calls
-    it a ratio: ``critical_velocity``, ``load_velocity``, ``effective_normal_stress``. Beside the
-    logarithm of each slip rate stands the slip rate. Pure numbers stay as they are. What stands
-    beside an axis in units, without dimension, is left out. The attribute ``scales`` tells what was
-    1.
+    Parameters
+    ----------
+    dataset : xarray.Dataset
+        Dimensionless results or motion.
+    scales_by_name : mapping of str to UnitScale
+        Scales by name.
+
+    Returns
+    -------
+    xarray.Dataset
+        Dataset in units. The attribute ``scales`` lists the scales.
 
     Raises
     ------
     DataError
-        Where nothing says its scale, or that of an axis varies along another.
+        If no variable has a scale, or if the scale of an axis varies along another axis.
+
+    Notes
+    -----
+    The attribute ``units`` replaces the attribute ``scale`` of each variable. Names lose their
+    suffix ``_ratio``, which gives names such as ``critical_velocity``, ``load_velocity`` and
+    ``effective_normal_stress``. For each logarithm of a slip rate, the function adds the slip rate.
+    Variables without a scale do not change. A dimensionless coordinate is dropped if the dataset
+    also contains the same quantity in units.
     """
     beside = [
         n
@@ -247,7 +355,8 @@ def apply_scales_to_dataset(
         raise DataError(text)
     for name, scale in sizes.items():
         values = dataset[name].variable.to_base_variable()
-        converted = values * scale.factor if np.any(values) else values  # 0 has no dimensions
+        # Zero has the same value in all units, so it does not get the dimensions of the scale.
+        converted = values * scale.factor if np.any(values) else values
         if name in dataset.dims and converted.dims != (name,):
             other = next(dim for dim in converted.dims if dim != name)
             text = f"the scale of the axis {name} varies along {other}: select one place on that"
@@ -256,7 +365,8 @@ def apply_scales_to_dataset(
         kept = {key: value for key, value in values.attrs.items() if key not in gone}
         result[name] = (converted.dims, converted.values, kept | {"units": scale.units})
     held = {"sigma_star": "sigma_*", "slip_distance": "D_c", "reference_velocity": "V_*"}
-    for name in set(held) & set(dataset.coords) - set(dataset.dims):  # beside the axes
+    # Convert the scales that are coordinates but not axes.
+    for name in set(held) & set(dataset.coords) - set(dataset.dims):
         one = xr.Variable((), 1.0) * scales_by_name[held[name]].factor
         words = dataset[name].attrs | {"units": scales_by_name[held[name]].units}
         result[name] = one.dims, one.values, words
@@ -275,7 +385,18 @@ def apply_scales_to_dataset(
 
 
 def drop_ratio_from_name(variable_name: str) -> str:
-    """A name for what is no ratio any more."""
+    """Return the name of a variable after conversion to units.
+
+    Parameters
+    ----------
+    variable_name : str
+        Name of the dimensionless variable.
+
+    Returns
+    -------
+    str
+        Name without ``ratio`` and without the prefix ``dimensionless_``.
+    """
     variable_name = variable_name.removeprefix(DIMENSIONLESS_PREFIX)
     for ratio, quantity in _DIMENSIONAL_NAMES_OF_RATIOS.items():
         variable_name = variable_name.replace(ratio, quantity)
@@ -285,7 +406,25 @@ def drop_ratio_from_name(variable_name: str) -> str:
 def slip_rate_from_log(
     dataset: xr.Dataset, variable_name: str, factor: float | xr.Variable, units: str
 ) -> dict[str, xr.Variable]:
-    """The slip rate of a logarithm of one, and of its error, if there is one."""
+    """Compute slip rates from their decimal logarithms.
+
+    Parameters
+    ----------
+    dataset : xarray.Dataset
+        Dataset with the logarithm of a slip rate.
+    variable_name : str
+        Name of the logarithm.
+    factor : float or xarray.Variable
+        Value of :math:`V_*` in the given units.
+    units : str
+        Units of the slip rate.
+
+    Returns
+    -------
+    dict of str to xarray.Variable
+        Slip rate by name. If the dataset contains an error estimate of the logarithm, the
+        dictionary also contains the error estimate of the slip rate.
+    """
     log, plain = dataset[variable_name].variable, variable_name.replace("log10_", "")
     words = str(log.attrs.get("long_name", plain))
     about = {"long_name": re.sub(_LOG_SLIP_RATE_DESCRIPTION_PATTERN, "", words), "units": units}

@@ -1,5 +1,7 @@
-"""Loading histories, in whatever units: sampled ones from arrays, datasets and CSV files, and
-protocols from CSV files.
+"""Loading histories in any units.
+
+`history` creates a sampled loading history from arrays, datasets or CSV files. `read_protocol`
+reads a list of loading segments from a CSV file.
 """
 
 from __future__ import annotations
@@ -24,7 +26,7 @@ from rsfstudy.slider import (
     protocol,
 )
 
-#: What a record may hold, and the units of the slider.
+#: Names of the columns of a sampled history, and their units if no rig is given.
 _SLIDER_UNITS_OF_RECORD_COLUMNS = {
     "time": "D_c/V_*", "displacement": "D_c", "velocity": "V_*", "normal_stress": "sigma_*",
     "pore_pressure": "sigma_*",
@@ -40,38 +42,73 @@ def history(
     columns: Mapping[str, Any] | None = None,
     name: str = "history",
 ) -> SampledHistory:
-    """A loading history that was sampled: ``Scene(loading=history(record))``.
+    """Create a loading history from sampled data.
 
-    Linear between samples: a load point whose displacement was sampled moves at a steady velocity
-    from each sample to the next; one whose velocity was, by the mean of both; normal stress and
-    pore pressure change at steady rates. It begins with the first sample, before which the slider
-    slides steadily at V_*. After the last one the load point goes on at the last velocity, and
-    stress stays.
+    Pass the result to a scene, as in ``Scene(loading=history(record))``.
 
     Parameters
     ----------
     record : mapping, xarray.Dataset, str or Path
-        Arrays by name, or variables, or a CSV file whose first line names columns and units
-        (`read_table`): ``time``; ``displacement`` or ``velocity`` of the load point, which moves at
-        V_* without either; ``normal_stress``; and ``pore_pressure`` above that before the record.
-        Beside a fluid that dilates it is the pressure around the fault, into which fluid drains.
+        Arrays by name, a dataset, or the path of a CSV file whose first line contains the names and
+        the units of the columns (see `read_table`). The column ``time`` is required. The columns
+        ``displacement`` or ``velocity`` describe the load point, which moves at :math:`V_*` if both
+        are missing. The column ``normal_stress`` contains the normal stress, and the column
+        ``pore_pressure`` contains the change of pore pressure since the time before the record.
     rig : Rig, optional
-        The rig whose units are used. Without it all are those of the slider: ``D_c/V_*``, ``D_c``,
-        ``V_*``, ``sigma_*``.
+        Rig for the conversion of units. By default, all data are dimensionless, with the units
+        ``D_c/V_*``, ``D_c``, ``V_*`` and ``sigma_*``.
     columns : mapping of str to (str, str) or str, optional
-        What the columns are called in the record, and their units, as in ``{"time": ("t", "s")}``
-        or ``{"time": "t (s)"}``.
-        Without it arrays are in units of the slider, or in SI units where a rig is given;
-        variables have an attribute ``units``.
-    name : str
-        What the history is called in results.
+        Heading and units of each column, for example ``{"time": ("t", "s")}`` or
+        ``{"time": "t (s)"}``. By default, headings are equal to the names of the columns. Arrays
+        are in SI units if a rig is given, and dimensionless otherwise. The units of variables are
+        read from their attribute ``units``.
+    name : str, default: "history"
+        Name of the history in results.
+
+    Returns
+    -------
+    SampledHistory
+        Loading history.
 
     Raises
     ------
     InvalidValue
-        For missing units, a gap or NaN, a clock that stands still or runs back, and normal stress
-        that is not positive: with line and column, or the number of the sample; and so when a Scene
-        is made of a load point that moves back, unless it is `regularised`.
+        If units are missing, if a value is missing or not finite, if time does not increase, or if
+        the normal stress is not positive. The error message contains the line and column of the
+        file, or the number of the sample. If the load point moves backwards, only scenes with
+        ``regularised=True`` accept the history, and other scenes raise the error.
+
+    Notes
+    -----
+    The history starts with the first sample. Before the first sample, the slider slides steadily at
+    :math:`V_*`. After the last sample, the load point continues at the last velocity, and the
+    stress is constant.
+
+    The history is linear between samples. If the displacement is sampled, the load point moves at a
+    constant velocity from each sample to the next sample. If the velocity is sampled, the load
+    point moves at the mean velocity of the two samples. The normal stress and the pore pressure
+    change at constant rates.
+
+    If the scene has a fluid with dilatancy, the column ``pore_pressure`` is the pressure around the
+    fault, and fluid flows between the fault and its surroundings.
+
+    Examples
+    --------
+    >>> import rsfstudy
+    >>> loading = rsfstudy.history({"time": [0.0, 10.0, 20.0], "displacement": [0.0, 10.0, 30.0]})
+    >>> rsfstudy.Scene(loading=loading).load_velocity
+    2.0
+
+    The same history in units requires a rig:
+
+    >>> rig = rsfstudy.Rig(
+    ...     normal_stress="5 MPa", slip_distance="10 um", reference_velocity="1 um/s"
+    ... )
+    >>> record = {"t (s)": [0.0, 100.0, 200.0], "lp (um)": [0.0, 100.0, 300.0]}
+    >>> columns = {"time": "t (s)", "displacement": "lp (um)"}
+    >>> loading = rsfstudy.history(record, rig, columns=columns)
+    >>> round(rsfstudy.Scene(loading=loading).load_velocity, 9)
+    2.0
     """
     found = _read_columns(record, columns, rig)
     for key in found:
@@ -112,14 +149,14 @@ def history(
 def _read_columns(
     record: Any, columns: Mapping[str, Any] | None, rig: Rig | None
 ) -> dict[str, Column]:
-    """Columns of a record, of whatever kind."""
+    """Read the columns of a record of any type."""
     if isinstance(record, str | Path):
         return read_table(record, columns)
     is_dataset = hasattr(record, "data_vars")
     if not is_dataset and not isinstance(record, Mapping):
         remedy = 'Give {"time": ..., "displacement": ...}, a Dataset, or the path of a CSV file.'
         raise InvalidValue("record", record, "is no record", remedy=remedy)
-    if columns is None:  # a dataset may hold more
+    if columns is None:  # A dataset may contain other variables.
         names = (
             [n for n in record.variables if n in _SLIDER_UNITS_OF_RECORD_COLUMNS]
             if is_dataset
@@ -137,7 +174,7 @@ def _read_columns(
 def _convert_column_to_slider_units(
     quantity_name: str, column: Column, rig: Rig | None
 ) -> np.ndarray:
-    """Numbers of a column in units of the slider."""
+    """Convert a column to dimensionless units."""
     scale, units = _SLIDER_UNITS_OF_RECORD_COLUMNS[quantity_name], column.units
     if units == scale or (rig is None and units in ("", "1")):
         return column.values
@@ -151,8 +188,10 @@ def _convert_column_to_slider_units(
 def _load_point_velocity(
     record_values: Mapping[str, np.ndarray], record_columns: Mapping[str, Column]
 ) -> tuple[np.ndarray, tuple[str, float, str] | None]:
-    """Velocity of the load point from each sample on; and the sample by which it first moves back,
-    with its name and place.
+    """Compute the velocity of the load point after each sample.
+
+    The second returned value describes the first sample that moves the load point backwards by its
+    name, value and position. It is None if there is no such sample.
     """
     time, key = (
         record_values["time"],
@@ -182,27 +221,44 @@ def _load_point_velocity(
 @renamed_keywords
 @error_boundary
 def read_protocol(path: str | Path, rig: Rig | None = None, name: str = "protocol") -> Protocol:
-    """A loading history from a CSV file.
-
-    Its first line names the columns and their units, as in ``velocity (um/s), duration (s)``: a
-    velocity, and the duration or the distance of each segment (a field may be empty), and perhaps a
-    sudden ``step`` at its beginning, or the ``normal_stress`` during it. Units of the slider
-    (``V_*``, ``D_c``, ``D_c/V_*``, ``sigma_*``) need no rig.
+    r"""Read a loading protocol from a CSV file.
 
     Parameters
     ----------
     path : str or Path
+        Path of the file. The first line contains the names and units of the columns, for example
+        ``velocity (um/s), duration (s)``. Each of the other lines describes a segment by its
+        velocity and either its ``duration`` or its ``distance``. Optional columns are ``step``, a
+        sudden displacement at the start of the segment, and ``normal_stress``. A field may be
+        empty.
     rig : Rig, optional
-        The rig whose units are used.
-    name : str
-        What the protocol is called in results.
+        Rig for the conversion of units. A rig is not needed if all columns have the dimensionless
+        units ``V_*``, ``D_c``, ``D_c/V_*`` and ``sigma_*``.
+    name : str, default: "protocol"
+        Name of the protocol in results.
+
+    Returns
+    -------
+    Protocol
+        Loading history for ``Scene(loading=...)``.
 
     Raises
     ------
     DataError
-        Where there is no such file of text.
+        If the file does not exist or is not a text file.
     InvalidValue
-        For a header without units, or a field that is no number, with its line and column.
+        If the header contains no units, or if a field is not a number. The error message contains
+        the line and the column.
+
+    Examples
+    --------
+    >>> import pathlib, tempfile
+    >>> import rsfstudy
+    >>> path = pathlib.Path(tempfile.mkdtemp()) / "steps.csv"
+    >>> _ = path.write_text("velocity (V_*), distance (D_c)\n1, 10\n10, 20\n")
+    >>> test = rsfstudy.read_protocol(path)
+    >>> test.duration
+    12.0
     """
     columns = read_table(path)
     for key in columns:

@@ -1,4 +1,7 @@
-"""Records of a laboratory from text files, from xlook's binary files, and from arrays."""
+"""Laboratory records from text files, binary xlook files and arrays.
+
+`read_record` is the main function.
+"""
 
 from __future__ import annotations
 
@@ -25,7 +28,7 @@ from rsfstudy.rig.table_files import (
 )
 from rsfstudy.rig.units import convert_to_si, unit_factor
 
-#: SI units of what a record may hold, and what turns them into those of `Record`.
+#: SI units of the columns of a record, and factors from SI units to the units of `Record`.
 _UNITS_AND_FACTORS_OF_RECORD_COLUMNS = {
     "time": ("s", 1.0),
     "displacement": ("m", 1e6),
@@ -34,9 +37,9 @@ _UNITS_AND_FACTORS_OF_RECORD_COLUMNS = {
     "shear_stress": ("Pa", 1.0),
     "normal_stress": ("Pa", 1.0),
 }
-#: The usual units.
+#: Units in the examples of error messages. The other columns are in MPa.
 _USUAL_UNITS_OF_RECORD_COLUMNS = {"time": "s", "displacement": "um", "slip": "um"}
-#: How headings of the usual files begin.
+#: Patterns for the start of common headings of each column.
 _PATTERNS_OF_USUAL_HEADINGS = {
     "time": r"t(ime)?\b|time",
     "displacement": r"(load.*)?disp|lp(\b|_?disp)|l\.?p\.? disp|load.?point",
@@ -45,8 +48,8 @@ _PATTERNS_OF_USUAL_HEADINGS = {
     "shear_stress": r"shear|tau",
     "normal_stress": r"(eff\w*[ _])?norm|sigma",
 }
-#: Layout of xlook's files: bytes before the headers of columns and of each, how many there are, and
-#: where columns begin.
+#: Layout of xlook files: size of the file header, size of each column header, and number of column
+#: headers. The data follow the headers.
 _XLOOK_HEADER_BYTES, _XLOOK_COLUMN_HEADER_BYTES, _XLOOK_MAX_COLUMNS = 36, 84, 32
 _XLOOK_DATA_START = _XLOOK_HEADER_BYTES + _XLOOK_COLUMN_HEADER_BYTES * _XLOOK_MAX_COLUMNS
 
@@ -60,49 +63,62 @@ def read_record(
     stiffness: Any = None,
     name: str = "",
 ) -> Record:
-    """A record of an experiment, for `rsfstudy.fit`.
+    """Read a record of an experiment.
+
+    The result is the input of `rsfstudy.fit`.
 
     Parameters
     ----------
     source : str, Path, mapping or pandas.DataFrame
-        A text or CSV file, a binary file of xlook, or arrays by name: ``time``, ``displacement`` of
-        the load point, ``friction`` or ``shear_stress``, and ``normal_stress`` where it was
-        recorded. Plain arrays are in s, um, and MPa, and times of `numpy.datetime64` or
-        `numpy.timedelta64` are known as such; with units in their names, as in ``LP disp
-        (um)``, they are read as a file with such a header.
-    columns : mapping of str to str or (heading, units), optional
-        Heading in the file, and units, of each: ``{"time": "t (s)", "friction": "mu"}``, or ``("t",
-        "s")``. Without it headings are known by how they begin, and state their units, as in
-        ``Displ (um)``. Columns of xlook's files are named by their heading or number. Where numbers
-        are raw, a scale and an offset follow: ``"LP (um) * 0.1 + 5"``, or ``("LP", "um", 0.1, 5)``.
+        Path of a text file, a CSV file or a binary xlook file, or arrays by name. The names are
+        ``time``, ``displacement`` (of the load point), ``friction`` or ``shear_stress``, and
+        optionally ``normal_stress``. By default arrays are in s, um and MPa, and times may have the
+        type `numpy.datetime64` or `numpy.timedelta64`. If the names contain units, for example
+        ``LP disp (um)``, the names are interpreted as the headings of a file.
+    columns : mapping of str to str or tuple, optional
+        Heading and units of each column, for example ``{"time": "t (s)", "friction": "mu"}`` or
+        ``{"time": ("t", "s")}``. By default, common headings are recognised by their first letters,
+        and must contain units, as in ``Displ (um)``. Columns of xlook files are selected by their
+        headings or numbers. For raw data, add a scale and an offset, as in ``"LP (um) * 0.1 + 5"``
+        or ``("LP", "um", 0.1, 5)``.
     normal_stress : quantity, optional
-        By which shear stress is divided where no normal stress was recorded ("20 MPa").
+        Normal stress, for example ``"20 MPa"``, if the record has no column ``normal_stress``. The
+        friction is the shear stress divided by the normal stress.
     stiffness : quantity, optional
-        Stiffness of the machine ("0.05 MPa/um"), or over normal stress ("2e-3 1/um", a plain number
-        is in 1/um). It is needed if the record has ``slip``, from which elastic shortening of the
-        machine was subtracted, instead of ``displacement``. The displacement of the load point is
-        then slip plus shear stress over stiffness. Pass the same stiffness to `rsfstudy.fit`.
-    name : str
-        What it is called in results; by default as the file is, or "record".
+        Stiffness of the machine, for example ``"0.05 MPa/um"``, or stiffness divided by normal
+        stress, for example ``"2e-3 1/um"``. A plain number is in 1/um. The stiffness is required if
+        the record has a column ``slip``, from which elastic shortening of the machine was
+        subtracted, instead of ``displacement``. The displacement of the load point is then slip
+        plus shear stress divided by stiffness. Pass the same stiffness to `rsfstudy.fit`.
+    name : str, optional
+        Name of the record in results. By default, the name is the name of the file, or "record".
 
     Returns
     -------
     Record
-        ``columns`` (arrays in s, um, 1 and Pa), ``steps()`` of the load point, ``window(begins,
-        ends)``, ``with_steps(...)`` to state steps, and ``to_dataset()``.
+        Record with columns in s, um, 1 and Pa.
 
     Raises
     ------
     DataError
-        Where there is no such file.
+        If the file does not exist.
     InvalidValue
-        For missing columns or units, a field that is no number, with its line and column, a clock
-        that stands still or runs back, and normal stress that is not positive.
+        If columns or units are missing, if a field is not a number, if time does not increase, or
+        if the normal stress is not positive. The error message contains the line and the column.
 
     Examples
     --------
-    >>> record = rsfstudy.read_record("run.csv", normal_stress="20 MPa")
-    >>> record.steps().to_dataframe()
+    >>> import rsfstudy
+    >>> data = {
+    ...     "time (s)": [0.0, 1.0, 2.0],
+    ...     "LP disp (mm)": [0.0, 0.001, 0.002],
+    ...     "shear stress (MPa)": [3.0, 3.1, 3.2],
+    ... }
+    >>> record = rsfstudy.read_record(data, normal_stress="5 MPa")
+    >>> record.columns["displacement"].round(6)
+    array([0., 1., 2.])
+    >>> record.columns["friction"].round(6)
+    array([0.6 , 0.62, 0.64])
     """
     for key in columns or ():
         _check_column_name(key)
@@ -137,14 +153,17 @@ def _check_column_name(column_name: str) -> None:
 
 
 def _record_name_from_source(source: Any) -> str:
-    """That of a file, as an identifier."""
+    """Return the name of a file as an identifier."""
     stem = Path(source).stem if isinstance(source, str | Path) else "record"
     text = re.sub(r"\W", "_", stem, flags=re.ASCII)
     return text if text.isidentifier() else f"record_{text}"
 
 
 def _unit_factor_of_column(column_name: str, units: str) -> float:
-    """What turns a column into units of `Record`; without units it is in those of laboratories."""
+    """Compute the factor that converts a column to the units of `Record`.
+
+    Columns without units are in s, um and MPa.
+    """
     si, ours = _UNITS_AND_FACTORS_OF_RECORD_COLUMNS[column_name]
     if not units:
         return {"Pa": 1e6}.get(si, 1.0)
@@ -210,7 +229,7 @@ def _build_record(
 
 
 def _read_text_columns(path: Path, columns: Mapping[str, Any] | None) -> Mapping[str, Column]:
-    """Columns of a text file, by headings that are known or named."""
+    """Read the selected or recognised columns of a text file."""
 
     def select(headings: list[str], place: str) -> dict[str, ColumnSpec]:
         told = _complete_column_selection(columns or {}, headings, place)
@@ -220,7 +239,7 @@ def _read_text_columns(path: Path, columns: Mapping[str, Any] | None) -> Mapping
 
 
 def _read_array_columns(source: Any, columns: Mapping[str, Any] | None) -> Mapping[str, Column]:
-    """Columns of arrays by name, or by headings where they, or `columns`, state units."""
+    """Select columns of arrays by their names, or by headings with units."""
     headings = [*map(str, source)]
     check_heading_lengths(headings, "record")
     if columns is None and not any("(" in key or "[" in key for key in headings):
@@ -234,9 +253,7 @@ def _read_array_columns(source: Any, columns: Mapping[str, Any] | None) -> Mappi
 def _complete_column_selection(
     selected_columns: Mapping[str, Any], headings: list[str], file_description: str
 ) -> dict[str, Any]:
-    """Columns that are named, and those of the others that a record needs whose headings are of the
-    usual ones.
-    """
+    """Add required columns with common headings to the selected columns."""
     lacking = {"time", "displacement", "slip"} - set(selected_columns)
     if not {"friction", "shear_stress"} & set(selected_columns):
         lacking |= {"friction", "shear_stress", "normal_stress"} - set(selected_columns)
@@ -261,8 +278,11 @@ def _complete_column_selection(
 def _find_usual_heading(
     column_name: str, headings: list[str], file_description: str
 ) -> dict[str, str]:
-    """The column with the usual heading, if there is one: with the very name, or the only one that
-    begins as usual, and is measured in units of its kind.
+    """Find the column with a common heading for a quantity.
+
+    If several headings match, a heading with compatible units takes precedence, and then a heading
+    that is equal to the name of the quantity. The function raises an error if several columns
+    remain.
     """
     parts = {text: match for text in headings if (match := HEADING_PATTERN.fullmatch(text))}
     meant = [
@@ -287,7 +307,7 @@ def _find_usual_heading(
 
 
 def _has_compatible_units(column_name: str, units: str) -> bool:
-    """Whether units, where they are stated, are of the kind of a column."""
+    """Return True if the units are compatible with a column."""
     try:
         return _unit_factor_of_column(column_name, units) > 0.0
     except InvalidValue:
@@ -297,7 +317,10 @@ def _has_compatible_units(column_name: str, units: str) -> bool:
 def _parse_column_selection(
     column_name: str, column_specification: Any, headings: Sequence[str]
 ) -> ColumnSpec:
-    """A column that is named, which states its units: only those of friction go without saying."""
+    """Parse the selection of a column, and check that it contains units.
+
+    Only friction may omit its units.
+    """
     found = parse_column_spec(column_specification, headings)
     if not found.units and column_name != "friction" and isinstance(column_specification, str):
         whole = f"{found.heading} ({_USUAL_UNITS_OF_RECORD_COLUMNS.get(column_name, 'MPa')})"
@@ -320,8 +343,11 @@ def _is_binary(path: Path) -> bool:
 
 
 def _read_xlook_columns(path: Path, columns: Mapping[str, Any] | None) -> Mapping[str, Column]:
-    """Columns of a binary file of xlook: big-endian, headers of 84 bytes, then float32 one column
-    after the other. Its first column is the time that each sample takes.
+    """Read the columns of a binary xlook file.
+
+    The file is big-endian. After a file header and the column headers of 84 bytes, the columns
+    follow each other as float32 arrays. The column ``time`` of xlook files contains sampling
+    intervals, which the function sums.
     """
     data = path.read_bytes()
     if len(data) < _XLOOK_DATA_START:

@@ -1,4 +1,8 @@
-"""A rig: what its record states, turned into scenes, and results turned back."""
+"""Laboratory rig: conversion of scenes and results between units.
+
+`Rig.scene` creates dimensionless scenes from quantities in units. `Rig.in_units` converts
+dimensionless results to units.
+"""
 
 from __future__ import annotations
 
@@ -40,7 +44,7 @@ from rsfstudy.slider import Protocol, Scene, protocol, with_scene_field_signatur
 
 __getattr__ = renamed_names(__name__)
 
-#: Units of the slider of what a segment of a protocol states.
+#: Dimensionless units of the fields of a loading segment.
 SLIDER_UNITS_OF_SEGMENT_FIELDS = {
     "velocity": "V_*", "duration": "D_c/V_*", "distance": "D_c", "step": "D_c",
     "normal_stress": "sigma_*",
@@ -51,36 +55,61 @@ SLIDER_UNITS_OF_SEGMENT_FIELDS = {
 @guard_methods
 @dataclass(frozen=True, kw_only=True)
 class Rig(HtmlTableMixin):
-    """A rig, in its own units.
+    r"""Laboratory rig with quantities in units.
 
-    Every quantity is a plain number in SI units, a text with units ("5 MPa", "10 um", "1 um/s"), or
-    a quantity of pint. The usual units are known without pint.
+    Each quantity is a plain number in SI units, a string such as ``"5 MPa"``, ``"10 um"`` or
+    ``"1 um/s"``, or a `pint.Quantity`. Common units do not require pint.
 
     Parameters
     ----------
     normal_stress : quantity
-        sigma_* (Pa).
+        Normal stress :math:`\sigma_*` in Pa.
     slip_distance : quantity
-        D_c (m).
+        Slip distance :math:`D_c` in m.
     reference_velocity : quantity
-        V_* (m/s): that of the load point before the test.
+        Reference velocity :math:`V_*` in m/s, the velocity of the load point before the test.
     stiffness : quantity, optional
-        Of the machine with its sample, as stress over displacement (Pa/m); or as friction over
-        displacement (a text in 1/um, say), which is multiplied by normal stress.
+        Stiffness of the machine with its sample in Pa/m. A stiffness in units of friction divided
+        by displacement, for example ``"2e-3 1/um"``, is multiplied by the normal stress.
     period : quantity, optional
-        Period of free oscillation T (s), where mass acts; or
+        Period of free oscillation :math:`T` in s. Scenes of the rig have ``inertia=True`` if the
+        rig has a period or a mass.
     mass : quantity, optional
-        the mass that moves over the area of the fault (kg/m^2): ``T = 2 pi sqrt(mass/stiffness)``.
-        Scenes of a rig that states either have ``inertia=True``.
-    shear_modulus, density : quantity, optional
-        Of the medium (Pa; kg/m^3), where it radiates: damping ``sqrt(G rho)/2``, which stands in
-        for mass.
+        Mass per area of the fault in kg/m². The mass is an alternative to the period, and requires
+        a stiffness.
+    shear_modulus : quantity, optional
+        Shear modulus :math:`G` of the medium in Pa, for radiation damping.
+    density : quantity, optional
+        Density :math:`\rho` of the medium in kg/m³, for radiation damping. The shear modulus and
+        the density require each other.
 
     Raises
     ------
     InvalidValue
-        For what is no quantity, not positive, or of another kind; and where mass is stated without
-        stiffness, or twice.
+        If a value is not a quantity, if a value is not positive, if units are incompatible, if both
+        mass and period are given, if a mass is given without a stiffness, or if only one of shear
+        modulus and density is given.
+
+    Notes
+    -----
+    The period follows from the mass :math:`m` and the stiffness :math:`k`,
+    :math:`T = 2 \pi \sqrt{m/k}`. The coefficient of radiation damping,
+    :math:`\eta = \sqrt{G \rho}/2`, approximates the effect of inertia of the medium.
+
+    Examples
+    --------
+    >>> import rsfstudy
+    >>> rig = rsfstudy.Rig(
+    ...     normal_stress="5 MPa",
+    ...     slip_distance="10 um",
+    ...     reference_velocity="1 um/s",
+    ...     stiffness="0.05 MPa/um",
+    ... )
+    >>> scene = rig.scene(law="slip", a=0.01, b_over_a=1.5, hold_time="1000 s")
+    >>> round(scene.stiffness, 9)
+    0.1
+    >>> round(scene.parts.loading.hold_time, 9)
+    100.0
     """
 
     normal_stress: Any
@@ -93,6 +122,7 @@ class Rig(HtmlTableMixin):
     density: Any = None
 
     def __post_init__(self) -> None:
+        """Convert all quantities to SI units, and check them."""
         for name in ("normal_stress", "slip_distance", "reference_velocity"):
             if getattr(self, name) is None:
                 raise InvalidValue(name, None, "is required", remedy="Give a value with units.")
@@ -108,19 +138,46 @@ class Rig(HtmlTableMixin):
         check_rig_quantities_are_consistent(self.as_dict())
 
     def quantities_with_values(self) -> Iterator[tuple[Quantity, object]]:
-        """What the rig states, in SI units."""
+        """Iterate over the quantities of the rig.
+
+        Yields
+        ------
+        quantity : Quantity
+            Description of the quantity, with its symbol and SI units.
+        value : object
+            Value in SI units. Quantities that are not given are skipped.
+        """
         for name, value in self.as_dict().items():
             about = RIG_QUANTITIES[name]
             yield Quantity(name, about.symbol, about.si_units, about.meaning), value
 
     @property
     def scales(self) -> dict[str, UnitScale]:
-        """Scales of dimensionless quantities, in SI units."""
+        """Values of dimensionless units such as ``D_c/V_*`` in SI units."""
         return build_scales_of_rig(self.as_dict())
 
     def dimensionless(self, value: Any, scale: str = "D_c/V_*", name: str = "value") -> float:
-        """A quantity in units of a scale: of time, unless ``D_c``, ``V_*``, ``sigma_*`` or
-        ``sigma_*/D_c`` is asked for.
+        """Convert a quantity to a dimensionless number.
+
+        Parameters
+        ----------
+        value : quantity
+            Value to convert.
+        scale : {"D_c/V_*", "D_c", "V_*", "sigma_*", "V_*/D_c", "sigma_*/D_c"}
+            Dimensionless unit of the result. The default is the unit of time, ``D_c/V_*``.
+        name : str, default: "value"
+            Name of the quantity for error messages.
+
+        Returns
+        -------
+        float
+            Value in the dimensionless unit.
+
+        Raises
+        ------
+        InvalidValue
+            If the value is not a quantity, if its units are incompatible, or if the scale is
+            unknown.
         """
         if scale not in self.scales:
             raise InvalidValue("scale", scale, "is no scale of a rig", choices=self.scales)
@@ -131,17 +188,28 @@ class Rig(HtmlTableMixin):
 
     @with_scene_field_signature(*RATIO_FIELD_BY_DIMENSIONAL_NAME)
     def scene(self, **fields: Any) -> Scene:
-        """A scene of this rig.
+        """Create a scene of this rig.
 
         Parameters
         ----------
-        **fields
-            Those of `Scene`. One that is measured in a unit of the slider (`hold_time`,
-            `displacement_step` and so on) is a quantity here; a ratio stays a ratio, unless it has
-            units. `instability_norm` may be a slip rate ("10 mm/s"): the scene has the number that
-            this is with its period. ``inertia=False`` leaves out the mass that the rig states.
-            Normal stress is constant, or imposed where the loading changes it, unless a field says
-            otherwise.
+        **fields : dict
+            Fields of `Scene`. A field with a dimensionless unit, for example ``hold_time`` or
+            ``displacement_step``, is a quantity with units here. A velocity may be a ratio, as in
+            ``load_velocity_ratio=10``, or a quantity, as in ``load_velocity="10 um/s"``. The field
+            ``instability_norm`` may be a slip rate, for example ``"10 mm/s"``. Pass
+            ``inertia=False`` to ignore the mass or the period of the rig.
+
+        Returns
+        -------
+        Scene
+            Dimensionless scene. By default, the normal stress is constant, or imposed if the
+            loading changes the normal stress.
+
+        Raises
+        ------
+        InvalidValue
+            If a field is unknown or invalid, or if a velocity is given both as a ratio and as a
+            quantity.
         """
         if find_si_units_of_field("instability_norm", norm := fields.get("instability_norm")):
             scene = self.scene(**{n: v for n, v in fields.items() if n != "instability_norm"})
@@ -166,27 +234,58 @@ class Rig(HtmlTableMixin):
         return Scene(**fields)
 
     def axis(self, dimension: str, values: Any, units: Mapping[str, str] | None = None) -> Axis:
-        """An axis of a study of this rig, in the units stated; see
-        `rsfstudy.rig.axes_with_units.make_axis`.
+        """Create an axis for a study of this rig, in units.
 
         Parameters
         ----------
         dimension : str
-            A quantity of the rig (``"slip_distance"``, or ``"normal_stress"``, which is called
-            `sigma_star` there), or a field of a scene: ``"hold_time"``, ``"load_velocity"``.
+            Name of a quantity of the rig, for example ``"slip_distance"``, or of a field of a
+            scene, for example ``"hold_time"`` or ``"load_velocity"``. The normal stress of the rig
+            is named ``sigma_star`` on axes.
         values : sequence of quantity, str, or mapping
-            ``["10 s", "100 s"]``; ``"1:100:20:log um/s"``, which is first, last, how many, and how
-            spaced; or, for a zipped axis, the fields at each label, or the rig; or a table, as
-            `rsfstudy.Axis.cases` takes one.
+            Values such as ``["10 s", "100 s"]``, or a range such as ``"1:100:20:log um/s"``, which
+            contains the first value, the last value, the number of values and the spacing. For a
+            zipped axis, pass a mapping of labels to fields or to rigs. A table is interpreted as in
+            `rsfstudy.Axis.cases`.
         units : mapping of str to str, optional
-            Of columns of a table that do not state them; SI units by default.
+            Units of columns of a table that have no units. The default is SI units.
+
+        Returns
+        -------
+        Axis
+            Axis in the units of its first value.
+
+        Raises
+        ------
+        InvalidValue
+            If a value is not a quantity, if its units are incompatible, or if a quantity of the rig
+            is not positive.
         """
         return axes_with_units.make_axis_with_units(dimension, values, units or "")
 
     def protocol(
         self, segments: Sequence[Segment | Mapping[str, Any]], name: str = "protocol"
     ) -> Protocol:
-        """A loading history whose segments state quantities: see `rsfstudy.protocol`."""
+        """Create a loading history from segments with units.
+
+        Parameters
+        ----------
+        segments : sequence of Segment or mapping
+            Segments in chronological order, as in `rsfstudy.protocol`. The values of mappings are
+            quantities with units.
+        name : str, default: "protocol"
+            Name of the protocol in results.
+
+        Returns
+        -------
+        Protocol
+            Loading history for the field ``loading`` of a scene.
+
+        Raises
+        ------
+        InvalidValue
+            If a segment is invalid, or if its units are incompatible.
+        """
         if isinstance(segments, list | tuple):
             segments = [self._convert_to_segment(n, s) for n, s in enumerate(segments, start=1)]
         return protocol(segments, name)
@@ -194,22 +293,35 @@ class Rig(HtmlTableMixin):
     def in_units(
         self, dataset: xr.Dataset, *, stress: str = "Pa", length: str = "m", time: str = "s"
     ) -> xr.Dataset:
-        """Results or a motion in units of the rig, which its attributes name; all of it, as
-        `rsfstudy.to_si` says.
+        """Convert results or a motion to units of the rig.
 
         Parameters
         ----------
         dataset : xarray.Dataset
-            In units of the slider.
-        stress, length, time : str
-            As in ``stress="MPa", length="um"``; velocities and stiffnesses follow.
+            Dimensionless results or motion of a scene of this rig.
+        stress : str, default: "Pa"
+            Unit of stress, for example ``"MPa"``.
+        length : str, default: "m"
+            Unit of length, for example ``"um"``.
+        time : str, default: "s"
+            Unit of time. The units of velocities and stiffnesses follow from the three units.
+
+        Returns
+        -------
+        xarray.Dataset
+            Dataset in units. The attribute ``laboratory`` contains the quantities of the rig.
 
         Raises
         ------
         InvalidValue
-            For units of another kind, and results of other rigs, or at another reference rate.
+            If the units are incompatible, or if the dataset belongs to another rig or has another
+            reference rate.
         DataError
-            For a dataset that is in other units already, or not of rsfstudy.
+            If the dataset is already in units, or if rsfstudy has not created the dataset.
+
+        See Also
+        --------
+        rsfstudy.to_si : Convert results to SI units.
         """
         rate = self.reference_velocity / self.slip_distance
         si = read_si_scales(dataset, self.normal_stress, self.slip_distance, rate)
@@ -217,20 +329,26 @@ class Rig(HtmlTableMixin):
         return found.assign_attrs(laboratory=json.dumps(self.as_dict()))
 
     def as_dict(self) -> dict[str, float]:
-        """Quantities that were stated, in SI units."""
+        """Return the quantities of the rig in SI units.
+
+        Returns
+        -------
+        dict of str to float
+            Quantities by name, without the quantities that are not given.
+        """
         found = {f.name: getattr(self, f.name) for f in fields(self)}
         return {name: value for name, value in found.items() if value is not None}
 
     @property
     def axis_fields(self) -> dict[str, float]:
-        """Quantities that were stated, by the names that they have on axes, in SI units."""
+        """Quantities of the rig in SI units, by their names on axes."""
         return {
             AXIS_NAME_BY_RIG_NAME.get(name, name): value for name, value in self.as_dict().items()
         }
 
     @property
     def _normal_stress_in_pa(self) -> float | None:
-        """sigma_* in Pa, once it is known."""
+        """Normal stress in Pa, or None before the conversion to SI units."""
         return self.normal_stress if isinstance(self.normal_stress, float) else None
 
     def _convert_to_scene_field(self, field_name: str, value: Any) -> Any:
@@ -246,7 +364,7 @@ class Rig(HtmlTableMixin):
 
     def _convert_to_segment(self, segment_number: int, segment_fields: Any) -> Any:
         if not isinstance(segment_fields, Mapping):
-            return segment_fields  # a Segment is in units of the slider
+            return segment_fields  # A Segment is dimensionless.
         try:
             return {
                 key: self.dimensionless(value, SLIDER_UNITS_OF_SEGMENT_FIELDS[key], key)
@@ -259,7 +377,22 @@ class Rig(HtmlTableMixin):
 
 
 def compute_instability_norm(rig: Rig, norm_or_slip_rate: Any, scene: Scene) -> float:
-    """The norm V T/(2 pi D_c) of a scene of a rig, where it may be stated as the slip rate V."""
+    r"""Compute the norm of instability for a scene of a rig.
+
+    Parameters
+    ----------
+    rig : Rig
+        Rig of the scene.
+    norm_or_slip_rate : quantity
+        Norm :math:`V T/(2 \pi D_c)` as a number, or the corresponding slip rate :math:`V`.
+    scene : Scene
+        Scene, which determines the period.
+
+    Returns
+    -------
+    float
+        Norm of instability.
+    """
     try:
         return convert_to_si("instability_norm", norm_or_slip_rate, "1")
     except InvalidValue:

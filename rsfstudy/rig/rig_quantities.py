@@ -1,4 +1,4 @@
-"""The quantities of a rig, and the fields of a scene that are measured in units of them."""
+"""Quantities of a rig, and fields of a scene with dimensionless units."""
 
 from __future__ import annotations
 
@@ -15,8 +15,18 @@ from rsfstudy.slider import FIELD_QUANTITIES
 
 
 class RigQuantity(NamedTuple):
-    """What a rig may state: SI units, the range that is usual, beyond which it warns, a
-    symbol, and what it is.
+    """Properties of a quantity of a rig.
+
+    Parameters
+    ----------
+    si_units : str
+        SI units.
+    min_usual, max_usual : float
+        Range of common values in SI units. Values outside this range cause a warning.
+    symbol : str
+        Symbol in LaTeX.
+    meaning : str
+        Description of the quantity.
     """
 
     si_units: str
@@ -38,22 +48,22 @@ RIG_QUANTITIES: Mapping[str, RigQuantity] = {
     "shear_modulus": RigQuantity("Pa", 1e5, 1e12, "$G$", "shear modulus of the medium"),
     "density": RigQuantity("kg/m^3", 1e2, 2e4, r"$\rho$", "density of the medium"),
 }
-#: What it must state: the scales of all else.
+#: Quantities that every rig must have, because they determine the scales of all other quantities.
 REQUIRED_QUANTITIES = ("normal_stress", "slip_distance", "reference_velocity")
-#: What axes call those that are fields of scenes in another sense.
+#: Names on axes of quantities whose own names are also names of scene fields.
 AXIS_NAME_BY_RIG_NAME = {"normal_stress": "sigma_star"}
-#: Quantities by the names that they have on axes.
+#: Names of quantities by their names on axes.
 RIG_NAME_BY_AXIS_NAME = {AXIS_NAME_BY_RIG_NAME.get(name, name): name for name in RIG_QUANTITIES}
-#: SI units of fields of a scene, by what they are measured in or their own units.
+#: SI units by the scale or the units of a scene field.
 SI_UNIT_BY_SCALE = {
     "sigma_*": "Pa", "D_c": "m", "V_*": "m/s", "D_c/V_*": "s", "sigma_*/D_c": "Pa/m",
     "V_*/D_c": "1/s", "s": "s", "s-1": "1/s",
 }  # fmt: skip
-#: Units in which what a rig states is shown, by its SI units.
+#: Display units by SI units.
 DISPLAY_UNIT_BY_SI_UNIT = {"Pa": "MPa", "m": "um", "m/s": "um/s", "Pa/m": "MPa/um"}
-#: What fields of scenes are.
+#: Descriptions of scene fields by name.
 SCENE_QUANTITY_BY_FIELD_NAME = {about.name: about for about in FIELD_QUANTITIES}
-#: Slip rates of a scene, by the names that they have where they are no ratios.
+#: Names of velocity ratios of a scene by the names of the corresponding velocities.
 RATIO_FIELD_BY_DIMENSIONAL_NAME = {
     name.removesuffix("_ratio"): name
     for name, about in SCENE_QUANTITY_BY_FIELD_NAME.items()
@@ -64,12 +74,27 @@ RATIO_FIELD_BY_DIMENSIONAL_NAME = {
 def convert_rig_value_and_warn_if_unusual(
     quantity_name: str, value: Any, normal_stress: float | None = None
 ) -> float:
-    """A quantity of a rig in SI units; warns of what is unusual.
+    """Convert a quantity of a rig to SI units, and warn about unusual values.
+
+    Parameters
+    ----------
+    quantity_name : str
+        Name of the quantity.
+    value : quantity
+        Value of the quantity.
+    normal_stress : float, optional
+        Normal stress in Pa, for a stiffness in units of friction divided by displacement.
+
+    Returns
+    -------
+    float
+        Value in SI units.
 
     Raises
     ------
     InvalidValue
-        For what is no quantity, of another kind, or not positive.
+        If the value is not a quantity, if its units are incompatible, or if the value is not
+        positive.
     """
     units, least, most, *_words = RIG_QUANTITIES[quantity_name]
     found = convert_rig_value_to_si(quantity_name, value, units, normal_stress)
@@ -84,7 +109,30 @@ def convert_rig_value_and_warn_if_unusual(
 def convert_rig_value_to_si(
     quantity_name: str, value: Any, units: str, normal_stress: float | None
 ) -> float:
-    """A quantity in SI units; a stiffness may be of friction, over the normal stress in Pa."""
+    """Convert a quantity of a rig to SI units.
+
+    Parameters
+    ----------
+    quantity_name : str
+        Name of the quantity.
+    value : quantity
+        Value of the quantity.
+    units : str
+        SI units of the quantity.
+    normal_stress : float or None
+        Normal stress in Pa. A stiffness in units of friction divided by displacement is multiplied
+        by the normal stress.
+
+    Returns
+    -------
+    float
+        Value in SI units.
+
+    Raises
+    ------
+    InvalidValue
+        If the value is not a quantity, or if its units are incompatible.
+    """
     try:
         return convert_to_si(quantity_name, value, units)
     except InvalidValue:
@@ -94,7 +142,18 @@ def convert_rig_value_to_si(
 
 
 def is_friction_stiffness(stiffness: Any) -> bool:
-    """True if a stiffness is friction over displacement, in 1/length."""
+    """Return True if a stiffness is friction divided by displacement.
+
+    Parameters
+    ----------
+    stiffness : quantity
+        Stiffness to check.
+
+    Returns
+    -------
+    bool
+        True if the units are compatible with 1/m.
+    """
     if not isinstance(stiffness, str) and not hasattr(stiffness, "magnitude"):
         return False
     try:
@@ -105,12 +164,18 @@ def is_friction_stiffness(stiffness: Any) -> bool:
 
 
 def check_rig_quantities_are_consistent(rig_values: Mapping[str, Any]) -> None:
-    """Refuse quantities that do not go with one another.
+    """Check that the quantities of a rig do not contradict each other.
+
+    Parameters
+    ----------
+    rig_values : mapping of str to float
+        Quantities of the rig in SI units.
 
     Raises
     ------
     InvalidValue
-        For mass beside period, mass without stiffness, and one of shear modulus and density.
+        If both mass and period are given, if a mass is given without a stiffness, or if only one of
+        shear modulus and density is given.
     """
     if "mass" in rig_values and "period" in rig_values:
         rule = f"give mass or period (here {rig_values['period']:g} s), not both"
@@ -130,7 +195,20 @@ def check_rig_quantities_are_consistent(rig_values: Mapping[str, Any]) -> None:
 def in_display_units(
     rig: Mapping[str, float], without: Collection[str] = ()
 ) -> dict[str, tuple[float, str]]:
-    """Numbers and units in which what a rig states is shown, but for what these axes vary."""
+    """Convert the quantities of a rig to display units.
+
+    Parameters
+    ----------
+    rig : mapping of str to float
+        Quantities of the rig in SI units.
+    without : collection of str, optional
+        Names of quantities to omit, because axes vary these quantities.
+
+    Returns
+    -------
+    dict of str to (float, str)
+        Value and units of each quantity.
+    """
     units = {
         n: RIG_QUANTITIES[n].si_units for n in rig if AXIS_NAME_BY_RIG_NAME.get(n, n) not in without
     }
@@ -142,7 +220,19 @@ def in_display_units(
 
 
 def derive_scene_fields_from_rig(rig_values: Mapping[str, Any]) -> dict[str, Any]:
-    """The fields of a scene that a rig decides; arrays where its quantities are."""
+    """Compute the scene fields that a rig determines.
+
+    Parameters
+    ----------
+    rig_values : mapping of str to float or ndarray
+        Quantities of the rig in SI units.
+
+    Returns
+    -------
+    dict of str to float or ndarray
+        Fields such as ``stiffness``, ``reference_rate`` and ``radiation_damping``. If the
+        quantities are arrays, the fields are arrays.
+    """
     found = {"reference_rate": rig_values["reference_velocity"] / rig_values["slip_distance"]}
     if "stiffness" in rig_values:
         found["stiffness"] = (
@@ -162,7 +252,18 @@ def derive_scene_fields_from_rig(rig_values: Mapping[str, Any]) -> dict[str, Any
 
 
 def is_dimensionless_field_with_scale(field_name: str) -> bool:
-    """True of a field of a scene that is measured in a unit of the slider, and no ratio."""
+    """Return True if a scene field has a dimensionless unit.
+
+    Parameters
+    ----------
+    field_name : str
+        Name of the field.
+
+    Returns
+    -------
+    bool
+        True for fields such as ``hold_time``. Ratios and fields without a scale return False.
+    """
     return (
         field_name in SCENE_QUANTITY_BY_FIELD_NAME
         and bool(SCENE_QUANTITY_BY_FIELD_NAME[field_name].scale)
@@ -171,8 +272,19 @@ def is_dimensionless_field_with_scale(field_name: str) -> bool:
 
 
 def find_si_units_of_field(field_name: str, value: Any) -> str | None:
-    """SI units of a value of a field of a scene; None where it is none in units: a ratio that is a
-    plain number, or a field of another kind.
+    """Return the SI units for a value of a scene field.
+
+    Parameters
+    ----------
+    field_name : str
+        Name of the field.
+    value : object
+        Value of the field.
+
+    Returns
+    -------
+    str or None
+        SI units. None if the value has no units, for example if a ratio is a plain number.
     """
     about = SCENE_QUANTITY_BY_FIELD_NAME.get(field_name)
     plain = isinstance(value, int | float | np.number)

@@ -1,4 +1,7 @@
-"""Lattices over rigs: the fields of scenes that each cell has by axes in units."""
+"""Scenes of the lattice cells in a study of a rig.
+
+`LatticeScenesOnRig` converts axes in units to fields of scenes.
+"""
 
 from __future__ import annotations
 
@@ -34,23 +37,25 @@ from rsfstudy.slider import Scene
 
 @dataclass(frozen=True)
 class LatticeScenesOnRig:
-    """The cells of a study of a rig: axes in units, turned into fields of scenes.
+    """Converter from axes in units to the scene fields of lattice cells.
 
-    What the base scene has in units of its rig (all but ratios) stays what it is in SI units where
-    an axis varies a scale.
+    Fields of the base scene with dimensionless units keep their values in SI units if an axis
+    varies a scale, for example the slip distance. Ratios keep their dimensionless values.
 
     Parameters
     ----------
     rig : Rig
-        What is fixed.
+        Rig with the quantities that all cells share.
     base_scene : Scene
-        A scene of it.
+        Base scene, created by `Rig.scene`.
     axes : sequence of Axis
+        Axes of the study.
 
     Raises
     ------
     InvalidValue
-        For a scene that is not of that rig, and for axes that leave out what it states.
+        If the base scene does not belong to the rig, or if a rig on an axis lacks a quantity that
+        the rig of the study has.
     """
 
     rig: Rig
@@ -58,6 +63,7 @@ class LatticeScenesOnRig:
     axes: Sequence[Axis]
 
     def __post_init__(self) -> None:
+        """Check that the base scene and the axes belong to the rig."""
         theirs = self.base_scene.as_dict()
         for name, value in derive_scene_fields_from_rig(self.rig.as_dict()).items():
             if name != "inertia" and not _is_close_within_rounding(theirs.get(name), value):
@@ -75,11 +81,27 @@ class LatticeScenesOnRig:
 
     @property
     def units(self) -> dict[str, str]:
-        """Units of the fields that axes state in units, by the names that they have there."""
+        """Units of the fields on axes in units, by their names on axes."""
         return {name: units for along in self.axes for name, units in along.units.items()}
 
     def compute_rig_quantities(self, axis_row: AxisRow) -> dict[str, Any]:
-        """The quantities of the rig in SI units, where axes have these values or arrays."""
+        """Compute the quantities of the rig at values of the axes.
+
+        Parameters
+        ----------
+        axis_row : mapping of str to value or ndarray
+            Values on the axes by field. Arrays are evaluated elementwise.
+
+        Returns
+        -------
+        dict of str to float or ndarray
+            Quantities of the rig in SI units.
+
+        Raises
+        ------
+        InvalidValue
+            If the quantities contradict each other.
+        """
         found, units = dict(self.rig.as_dict()), self.units
         for name in RIG_NAME_BY_AXIS_NAME:
             if name in units and axis_row.get(name) is not None:
@@ -93,18 +115,25 @@ class LatticeScenesOnRig:
         return found
 
     def compute_scene_fields(self, axis_row: AxisRow) -> dict[str, Any]:
-        """The fields of scenes that differ from the base, where axes have these values.
+        """Compute the scene fields at values of the axes.
 
         Parameters
         ----------
-        axis_row : mapping of str to value, or to ndarray of float
+        axis_row : mapping of str to value or ndarray
+            Values on the axes by field. Arrays are evaluated elementwise.
+
+        Returns
+        -------
+        dict of str to object
+            Fields that may differ from the base scene.
         """
         units, rig = self.units, self.compute_rig_quantities(axis_row)
         here, found = scale_factors_of_rig(rig), {}
         if set(RIG_NAME_BY_AXIS_NAME) & set(units) & set(axis_row):
             found = self._base_fields_constant_in_si(here) | derive_scene_fields_from_rig(rig)
             if "period" in self.rig.as_dict() and not self.base_scene.has_mass:
-                found.pop("inertia", None)  # it was left out
+                # The base scene ignores the inertia of the rig.
+                found.pop("inertia", None)
         for name, value in axis_row.items():
             field = RATIO_FIELD_BY_DIMENSIONAL_NAME.get(name, name)
             if name not in units:
@@ -118,7 +147,7 @@ class LatticeScenesOnRig:
     def _base_fields_constant_in_si(
         self, scale_factors_of_cell: Mapping[str, Any]
     ) -> dict[str, Any]:
-        """Fields of the base that stay what they are in SI units."""
+        """Return fields of the base scene with fixed values in SI units."""
         base = scale_factors_of_rig(self.rig.as_dict())
         held = {
             name: value
@@ -129,22 +158,24 @@ class LatticeScenesOnRig:
             for name, value in self.base_scene.as_dict().items()
             if is_dimensionless_field_with_scale(name) and isinstance(value, float) and value != 0.0
         }
-        if "radiation_damping" in held:  # eta is held: its stress goes with V_*
+        # The damping coefficient eta is fixed, and its stress is proportional to V_*.
+        if "radiation_damping" in held:
             held["radiation_damping"] = held["radiation_damping"] * (
                 scale_factors_of_cell["V_*"] / base["V_*"]
             )
         return held
 
     def build_scale_coordinates(self) -> dict[str, tuple[tuple[str, ...], np.ndarray]]:
-        """Dimensionless fields and scales, over the dimensions that they depend on.
+        """Compute the dimensionless fields and scales of all cells.
 
         Returns
         -------
-        dict
-            By name, dimensions and values; a field that bears the name of an axis in units is
-            called ``dimensionless_...`` here.
+        dict of str to (tuple of str, ndarray)
+            Dimensions and values by name. Each array has only the dimensions along which its values
+            vary. If a field has the same name as an axis in units, its name here has the prefix
+            ``dimensionless_``.
         """
-        # of an axis of one point a second one tells what depends on it
+        # An axis with one point gets a second point to find out if the values depend on the axis.
         alone = {axis.dimension for axis in self.axes if len(axis) == 1 and axis.is_single_field}
         along = [
             _add_second_axis_point(a) if a.dimension in alone else a for a in self.axes if a.units
@@ -185,28 +216,32 @@ class LatticeScenesOnRig:
 
 
 def _is_close_within_rounding(other_value: Any, value: Any) -> bool:
-    # both were made of the same numbers, by hand perhaps: what rounding leaves is far below
+    # The user may have computed the value by hand, so the two values may differ by rounding errors.
     return isinstance(other_value, float) and math.isclose(other_value, value, rel_tol=1e-9)
 
 
 def put_on_rig(
     rig: Rig, base: Scene, axes: Sequence[Axis]
 ) -> tuple[Scene, list[Axis], dict[str, float]]:
-    """Convert a dimensionless scene and axes to those of a rig, with axes in its units.
+    """Convert a dimensionless scene and its axes to units of a rig.
 
     Parameters
     ----------
     rig : Rig
+        Rig to use.
     base : Scene
+        Dimensionless scene.
     axes : sequence of Axis
+        Dimensionless axes.
 
     Returns
     -------
     base : Scene
-        The scene with the fields that the rig states in place of its own.
+        Scene with the fields that the rig determines.
     axes : list of Axis
+        Axes in units.
     sizes : dict of str to float
-        Factor by which the values of each field were multiplied.
+        Factor that multiplied the values of each field.
     """
     sizes_of = scale_factors_of_rig(rig.as_dict())
     converted: list[Axis] = []
@@ -232,7 +267,8 @@ def put_on_rig(
         ]
         converted.append(along.with_rows(rows, units, along.sampling_info))
     changes = derive_scene_fields_from_rig(rig.as_dict())
-    if {"inertia", "radiation_damping"} & set(changes):  # in place of what the study has
+    # The inertia and the damping of the rig replace the values of the scene.
+    if {"inertia", "radiation_damping"} & set(changes):
         changes = {"inertia": False, "radiation_damping": 0.0, **changes}
     return base.with_(**changes), converted, every
 
@@ -245,16 +281,20 @@ def replace_rig_quantity(
     Parameters
     ----------
     rig : Rig
+        Rig of the scene.
     base_scene : Scene
-        A scene of the rig.
+        Scene of the rig.
     quantity_name : str
         Name of the quantity, as on an axis in units.
     value : object
-        Value of the quantity, as on such an axis.
+        Value of the quantity, as on an axis in units.
 
     Returns
     -------
-    Rig, Scene
+    rig : Rig
+        Changed rig.
+    scene : Scene
+        Changed scene.
     """
     if quantity_name == "instability_norm":
         return rig, base_scene.with_(
@@ -274,12 +314,23 @@ def replace_rig_quantity(
 
 
 def scale_factors_of_rig(rig_values: Mapping[str, Any]) -> dict[str, Any]:
-    """Value of 1 in SI units, by what quantities are measured in."""
+    """Compute the values of the dimensionless units of a rig.
+
+    Parameters
+    ----------
+    rig_values : mapping of str to float or ndarray
+        Quantities of the rig in SI units.
+
+    Returns
+    -------
+    dict of str to float or ndarray
+        Value of each dimensionless unit in SI units.
+    """
     return {name: scale.factor for name, scale in build_scales_of_rig(rig_values).items()}
 
 
 def _add_second_axis_point(axis: Axis) -> Axis:
-    """An axis of one point, with another near it."""
+    """Add a second point to an axis that has one point."""
     (row,) = axis.rows
     near = {
         name: 1.01 * value if isinstance(value, float) else value for name, value in row.items()
@@ -290,7 +341,7 @@ def _add_second_axis_point(axis: Axis) -> Axis:
 def _drop_constant_dimensions(
     axes: Sequence[Axis], values: np.ndarray
 ) -> tuple[tuple[str, ...], np.ndarray]:
-    """Values without the dimensions along which they are the same."""
+    """Remove the dimensions along which the values are constant."""
     kept: list[str] = []
     for place, axis in reversed(list(enumerate(axes))):
         first = values.take([0], axis=place)
@@ -302,7 +353,18 @@ def _drop_constant_dimensions(
 
 
 def group_rows_by_fields_set(axes: Sequence[Axis]) -> Iterator[tuple[np.ndarray, ...]]:
-    """Rows on each axis that are of one kind, for each combination of kinds."""
+    """Iterate over groups of axis rows that set the same fields.
+
+    Parameters
+    ----------
+    axes : sequence of Axis
+        Axes to group.
+
+    Yields
+    ------
+    tuple of ndarray of int
+        Indices of rows on each axis, for one combination of groups.
+    """
     every = [classify_rows_by_fields(axis.rows) for axis in axes]
     for kind in np.ndindex(*(int(of.max()) + 1 for of in every)):
         yield tuple(np.flatnonzero(of == n) for of, n in zip(every, kind, strict=True))

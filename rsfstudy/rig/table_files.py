@@ -1,4 +1,7 @@
-"""Tables of numbers with units, from CSV files."""
+"""Tables of numbers with units, from CSV files.
+
+`read_table` is the main function.
+"""
 
 from __future__ import annotations
 
@@ -21,23 +24,33 @@ from rsfstudy.rig.units import parse_number
 
 __getattr__ = renamed_names(__name__)
 
-#: What numbers without surprises are made of.
+#: Characters of tables that `numpy.loadtxt` can parse.
 _PLAIN_TABLE_CHARACTERS = frozenset("0123456789+-.eE \t\r\n")
 _EXAMPLE_OF_TABLE_HEADER = "velocity (um/s), distance (um), a (1)"
 _NUMBER_PATTERN = r"\s*((?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*"
-#: A heading with the scale and the offset of what is below it.
+#: Heading followed by a scale and an offset.
 _SCALED_COLUMN_PATTERN = re.compile(
     rf"(.*\S)\s*\*\s*(-?){_NUMBER_PATTERN}(?:([-+]){_NUMBER_PATTERN})?"
 )
-#: A heading, with its units in brackets or without.
+#: Heading with optional units in brackets.
 HEADING_PATTERN = re.compile(r"\s*([^(\[]+?)\s*(?:[(\[]([^)\]]*)[)\]])?\s*")
-#: Most characters of a heading; the patterns take quadratic time on longer texts.
+#: Maximum length of a heading. The patterns need quadratic time for longer strings.
 _MAX_HEADING_LENGTH = 200
 
 
 class ColumnSpec(NamedTuple):
-    """A column that is wanted of a file: its heading, its units, and what raw numbers are
-    multiplied by and then added to.
+    """Selection of a column in a file.
+
+    Parameters
+    ----------
+    heading : str
+        Heading of the column.
+    units : str, default: ""
+        Units of the column.
+    scale : float, default: 1.0
+        Factor that multiplies raw numbers.
+    offset : float, default: 0.0
+        Offset to add after the multiplication.
     """
 
     heading: str
@@ -46,12 +59,23 @@ class ColumnSpec(NamedTuple):
     offset: float = 0.0
 
 
-#: A function of the headings and of their place, which chooses columns.
+#: Function of the headings and their location in the file, which returns the selected columns.
 ColumnChooser = Callable[[list[str], str], dict[str, ColumnSpec]]
 
 
 def check_heading_length(heading: str) -> None:
-    """Raise ``InvalidValue`` if a heading is too long to be parsed."""
+    """Raise an error if a heading is too long to be parsed.
+
+    Parameters
+    ----------
+    heading : str
+        Heading to check.
+
+    Raises
+    ------
+    InvalidValue
+        If the heading is too long.
+    """
     if len(heading) > _MAX_HEADING_LENGTH:
         rule = f"must have at most {_MAX_HEADING_LENGTH} characters (it has {len(heading):,})"
         raise InvalidValue(
@@ -62,7 +86,17 @@ def check_heading_length(heading: str) -> None:
 def check_heading_lengths(headings: Iterable[str], file_description: str) -> None:
     """Check the length of all headings of a file.
 
-    Errors report ``file_description`` and the number of the column.
+    Parameters
+    ----------
+    headings : iterable of str
+        Headings in the order of the columns.
+    file_description : str
+        Name of the file for error messages.
+
+    Raises
+    ------
+    InvalidValue
+        If a heading is too long. The error message contains the number of the column.
     """
     for column, heading in enumerate(headings, start=1):
         try:
@@ -72,7 +106,7 @@ def check_heading_lengths(headings: Iterable[str], file_description: str) -> Non
 
 
 def _parse_listed_column_spec(column_choice: Any) -> ColumnSpec:
-    """Return the choice of a column that is a list of its heading, units, scale and offset."""
+    """Parse a selection that lists heading, units, scale and offset."""
     rule = "must be a heading, or a list of a heading, its units, a scale and an offset"
     remedy = "Write ('Time (s)', 's', 0.001), for example."
     wrong = InvalidValue("column", column_choice, rule, remedy=remedy)
@@ -84,7 +118,7 @@ def _parse_listed_column_spec(column_choice: Any) -> ColumnSpec:
     ):
         raise wrong
     heading, units, *numbers = (*column_choice, "")[: max(2, len(column_choice))]
-    # columns of an xlook file have numbers
+    # Columns of xlook files may be selected by their numbers.
     if not isinstance(heading, str | int) or not isinstance(units, str):
         raise wrong
     check_heading_length(str(heading))
@@ -95,20 +129,25 @@ def _parse_listed_column_spec(column_choice: Any) -> ColumnSpec:
 
 
 def parse_column_spec(column_choice: Any, headings: Collection[str]) -> ColumnSpec:
-    """Parse the choice of a column.
+    """Parse the selection of a column.
 
     Parameters
     ----------
     column_choice : str or sequence
-        Heading, units, scale and offset; or a text such as ``lp (um) * 0.1 + 5``, with or without
-        units in brackets, whether or not the heading in the file contains them.
+        A sequence of heading, units, scale and offset, or a string such as ``lp (um) * 0.1 + 5``.
+        The units in brackets are optional, even if the heading in the file contains units.
     headings : collection of str
-        The headings of the file.
+        Headings of the file.
+
+    Returns
+    -------
+    ColumnSpec
+        Selected column.
 
     Raises
     ------
     InvalidValue
-        If the choice is neither, or if the heading is too long.
+        If the selection has another type, or if the heading is too long.
     """
     if not isinstance(column_choice, str):
         return _parse_listed_column_spec(column_choice)
@@ -126,20 +165,20 @@ def parse_column_spec(column_choice: Any, headings: Collection[str]) -> ColumnSp
 
 @renamed_members
 class Column(NamedTuple):
-    """A column of a table.
+    """Column of a table.
 
-    Attributes
+    Parameters
     ----------
     values : ndarray
-        Its numbers; NaN where a field is empty.
+        Values of shape (rows,). Empty fields are NaN.
     units : str
-        What they are measured in.
-    column_number : int
-        Its place in the file, from 1.
-    line_numbers : ndarray
-        The line of the file that each number stands in.
-    path : str
-        The file.
+        Units of the values.
+    column_number : int, default: 0
+        Number of the column in the file, counted from 1.
+    line_numbers : ndarray, optional
+        Line number in the file of each value.
+    path : str, default: ""
+        Path of the file. Empty if the column does not come from a file.
     """
 
     values: np.ndarray
@@ -149,13 +188,39 @@ class Column(NamedTuple):
     path: str = ""
 
     def location(self, row: int) -> str:
-        """Where a number stands."""
+        """Return the location of a value for error messages.
+
+        Parameters
+        ----------
+        row : int
+            Index of the value.
+
+        Returns
+        -------
+        str
+            File, line and column, or the number of the sample.
+        """
         if not self.path:
             return f"sample {row + 1}"
         return f"{self.path}, line {self.line_numbers[row]}, column {self.column_number}"
 
     def check_values(self, quantity_name: str, invalid_mask: np.ndarray, rule: str) -> None:
-        """Raise `InvalidValue` for the first number that is wrong, with its place."""
+        """Raise an error for the first invalid value.
+
+        Parameters
+        ----------
+        quantity_name : str
+            Name of the quantity.
+        invalid_mask : ndarray of bool
+            True for each invalid value.
+        rule : str
+            Rule that invalid values violate.
+
+        Raises
+        ------
+        InvalidValue
+            If a value is invalid. The error message contains the location of the value.
+        """
         if invalid_mask.any():
             row = int(np.argmax(invalid_mask))
             raise InvalidValue(quantity_name, float(self.values[row]), rule).with_location(
@@ -164,17 +229,29 @@ class Column(NamedTuple):
 
 
 def select_columns_of_arrays(source: Any, columns: Mapping[str, Any]) -> dict[str, Column]:
-    """Columns of arrays, of variables or of a DataFrame, by name; units of variables are those that
-    their attributes state.
+    """Select columns of a mapping, a dataset or a data frame.
 
     Parameters
     ----------
     source : mapping of str to array, xarray.Dataset or pandas.DataFrame
+        Arrays by name. The units of variables are read from their attribute ``units``.
     columns : mapping of str to str, tuple or ColumnSpec
-        What is wanted, as `parse_column_spec` takes it.
+        Selection of each column, as in `parse_column_spec`.
+
+    Returns
+    -------
+    dict of str to Column
+        Columns by name.
+
+    Raises
+    ------
+    InvalidValue
+        If a column is missing, has more than one dimension, or contains values that are not real
+        numbers.
     """
     variables = source.variables if hasattr(source, "data_vars") else source
-    names = dict.fromkeys(map(str, variables))  # keeps the order, and is fast to search
+    # A dictionary keeps the order and is fast to search.
+    names = dict.fromkeys(map(str, variables))
     found = {}
     for key, told in columns.items():
         heading, units, scale, offset = parse_column_spec(told, names)
@@ -189,8 +266,10 @@ def select_columns_of_arrays(source: Any, columns: Mapping[str, Any]) -> dict[st
 
 
 def _to_floats_and_units(column_name: str, values: Any) -> tuple[np.ndarray, str]:
-    """Numbers of an array, NaN where it is masked, and their units if its type tells them: those of
-    times are s, from the first of dates on.
+    """Convert an array to floats, and return the units if the type has units.
+
+    Masked values become NaN. Times are converted to seconds. Dates are converted to seconds after
+    the first date.
     """
     kind = getattr(getattr(values, "dtype", None), "kind", "")
     if kind == "c":
@@ -209,25 +288,45 @@ def _to_floats_and_units(column_name: str, values: Any) -> tuple[np.ndarray, str
 def read_table(
     path: str | Path, columns: Mapping[str, Any] | ColumnChooser | None = None
 ) -> dict[str, Column]:
-    """Columns of a CSV file, or of a text with tabs, by their names: numbers, units, and where each
-    stands.
+    r"""Read columns of a CSV file or of a text file.
+
+    The columns may be separated by commas, semicolons, tabs or blanks.
 
     Parameters
     ----------
     path : str or Path
+        Path of the file.
     columns : mapping of str to (str, str) or str, optional
-        Name, heading in the file and units of each column that is wanted, as in ``{"time":
-        ("t", "s")}`` or ``{"time": "t (s)"}``. Without it the first line names all columns with
-        their units, as in ``velocity (um/s), distance (um)``. Or a function that gives each
-        `ColumnSpec`, of the headings and of the place where they stand.
+        Heading and units of each column, for example ``{"time": ("t", "s")}`` or
+        ``{"time": "t (s)"}``. By default, all columns are read, and the first line must contain
+        their names and units, as in ``velocity (um/s), distance (um)``. You can also pass a
+        function that takes the list of headings and a description of their location, and returns a
+        mapping of names to selections.
+
+    Returns
+    -------
+    dict of str to Column
+        Columns by name. Each column has an array ``values`` and a string ``units``.
 
     Raises
     ------
     DataError
-        Where there is no such file of text.
+        If the file does not exist or is not a text file.
     InvalidValue
-        For a header that does not name the columns, or a field that is no number, with its line
-        and column.
+        If the header does not contain the selected columns, or if a field is not a number. The
+        error message contains the line and the column.
+
+    Examples
+    --------
+    >>> import pathlib, tempfile
+    >>> import rsfstudy
+    >>> path = pathlib.Path(tempfile.mkdtemp()) / "table.csv"
+    >>> _ = path.write_text("velocity (um/s), distance (um)\n1, 100\n10, 200\n")
+    >>> table = rsfstudy.read_table(path)
+    >>> table["velocity"].values
+    array([ 1., 10.])
+    >>> table["distance"].units
+    'um'
     """
     check_regular_file("table", path)
     try:
@@ -285,8 +384,10 @@ def read_table(
 def _read_plain_table(
     text: str, delimiter: str, header_line_count: int, column_count: int
 ) -> tuple[np.ndarray | None, np.ndarray]:
-    """Numbers of a plain table behind the line of its header, and their lines; None where a field
-    is no finite number, or where they stand is to be looked for line by line.
+    """Read a table that contains only finite numbers and its delimiters.
+
+    The function returns the numbers and their line numbers. If the table has to be read line by
+    line, the function returns None instead of the numbers.
     """
     body = "".join(text.split("\n", header_line_count)[header_line_count:])
     lines = header_line_count + 1 + np.arange(body.count("\n") + (not body.endswith("\n")))
@@ -305,7 +406,7 @@ def _read_plain_table(
 
 
 def _detect_delimiter(header: str) -> str:
-    """What stands between columns: tabs, semicolons, commas, or blanks."""
+    """Detect the delimiter: a tab, a semicolon, a comma or a blank."""
     return next(
         (mark for mark in "\t;," if mark in header), " " if not {"(", "["} & {*header} else ","
     )
@@ -314,7 +415,7 @@ def _detect_delimiter(header: str) -> str:
 def _choose_all_columns_of_header(
     headings: list[str], file_description: str
 ) -> dict[str, ColumnSpec]:
-    """All columns by their names, by a header that states them with their units."""
+    """Select all columns of a header with names and units."""
     found: dict[str, ColumnSpec] = {}
     for n, heading in enumerate(headings, start=1):
         stated = parse_heading(heading)

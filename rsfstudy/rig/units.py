@@ -1,8 +1,9 @@
-"""Numbers with units: the usual ones of a rig are known here, all others to pint.
+"""Conversion of quantities with units to SI units.
 
-A quantity is one number and one unit, in one grammar for both: pint is asked for names of units
-only, since it would take numbers among them for factors. Factors are fractions, and a conversion is
-rounded once: 0.01 mm and 10 um are one number.
+A quantity is a number followed by a unit, for example ``5 MPa``. The module converts common units,
+and uses pint for other units. Pint receives only names of units, because it would interpret numbers
+in a unit as factors. Conversion factors are fractions, so that a conversion is rounded only once:
+0.01 mm and 10 um give the same number.
 """
 
 from __future__ import annotations
@@ -19,7 +20,7 @@ import numpy as np
 from rsfstudy.axes import to_plain_value
 from rsfstudy.errors import InvalidValue
 
-#: A factor to SI, and the exponents of kilogram, metre and second.
+#: Factor to SI units, and exponents of kilogram, metre and second.
 SiFactorAndExponents = tuple[Fraction, tuple[int, int, int]]
 
 _STRESS_EXPONENTS, _FORCE_EXPONENTS, _LENGTH_EXPONENTS, _TIME_EXPONENTS = (
@@ -54,13 +55,14 @@ _KNOWN_UNITS: Mapping[str, SiFactorAndExponents] = {
 _NUMBER_PATTERN = re.compile(
     r"[-+]?(?:[0-9]+(?:\.[0-9]*)?|\.[0-9]+)(?:[eE][-+]?[0-9]+)?|nan|[-+]?inf"
 )
-#: A name with its power: of one digit, so that no power overflows.
+#: Name of a unit with its power. The power has one digit, so that no factor overflows.
 _UNIT_WITH_POWER_PATTERN = (
     r"([A-Za-z\u00b5\u03bc](?:[A-Za-z\u00b5\u03bc0-9_]*[A-Za-z\u00b5\u03bc])?)"
     r"(?:(?:\^|\*\*)?([-+]?[1-9]))?"
 )
 _UNIT_WITH_SIGNED_POWER_PATTERN = re.compile(rf"(/?)\s*{_UNIT_WITH_POWER_PATTERN}")
-#: A product, over others one by one: what ``Pa/m s`` means is not agreed upon.
+#: Product of units, divided by further units. Each divisor has its own slash, because units such as
+#: ``Pa/m s`` are ambiguous.
 _UNIT_PATTERN = re.compile(
     rf"(?:1(?=\s*/)|{_UNIT_WITH_POWER_PATTERN}(?:(?:\s*[*.\u00b7]\s*|\s+){_UNIT_WITH_POWER_PATTERN})*)?(?:\s*/\s*{_UNIT_WITH_POWER_PATTERN})*"
 )
@@ -69,31 +71,67 @@ _LOG_RANGE_SYNTAX_REMEDY = (
     "For logarithmic spacing write start:stop:count:log, as in hold_time=1:1e5:30:log."
 )
 _MAX_POINTS_OF_RANGE = 1_000_000
-#: Most characters of a quantity; the patterns above take quadratic time on longer texts.
+#: Maximum length of a quantity. The patterns above need quadratic time for longer strings.
 _MAX_QUANTITY_LENGTH = 200
 _PINT_INSTALL_ADVICE = "Install pint (pip install 'rsfstudy[units]')"
 
 
 def parse_number(text: str) -> float | None:
-    """The number that a text is, in the digits and with the point of ASCII; None of others."""
+    """Parse a number with ASCII digits and a decimal point.
+
+    Parameters
+    ----------
+    text : str
+        String to parse.
+
+    Returns
+    -------
+    float or None
+        Number. None if the string is not a number.
+    """
     return float(text) if _NUMBER_PATTERN.fullmatch(text.strip()) else None
 
 
 def split_number_and_units(text: str) -> tuple[float | None, str]:
-    """The number that a text begins with, if it does, and the units that follow."""
+    """Split a string into a number and the units after it.
+
+    Parameters
+    ----------
+    text : str
+        String to split.
+
+    Returns
+    -------
+    number : float or None
+        Number. None if the string does not start with a number.
+    units : str
+        Units. The string is empty if there is no number.
+    """
     match = _NUMBER_PATTERN.match(text.strip())
     return (float(match[0]), text.strip()[match.end() :].strip()) if match else (None, "")
 
 
 def expand_range(argument_name: str, text: str, range_text: str) -> list[float] | list[str]:
-    """Numbers by their first, their last, how many there are and, perhaps, ``log``; with their
-    units, where such follow.
+    """Expand a range to a list of numbers.
 
     Parameters
     ----------
-    argument_name, text : str
-        What errors name.
+    argument_name : str
+        Name of the argument for error messages.
+    text : str
+        Complete argument for error messages.
     range_text : str
+        Range as ``first:last:count`` or ``first:last:count:log``, optionally followed by units.
+
+    Returns
+    -------
+    list of float or list of str
+        Numbers, or strings with units if the range has units.
+
+    Raises
+    ------
+    InvalidValue
+        If the string is not a range.
     """
     *before, last = range_text.split(":")
     last, _, units = last.strip().partition(" ")
@@ -123,28 +161,53 @@ def _expand_range_of_numbers(
 
 
 def convert_to_si(quantity_name: str, value: Any, units: str) -> float:
-    """A quantity in SI units.
+    """Convert a quantity to SI units.
 
     Parameters
     ----------
     quantity_name : str
-        What it is the value of.
+        Name of the quantity for error messages.
     value : float, str or pint.Quantity
-        A plain number is in SI units already; a text is one number and one unit, as in "5 MPa",
-        "0.1 MPa/um" or "1 um s^-1".
+        Value to convert. A plain number is already in SI units. A string is a number followed by a
+        unit, for example "5 MPa", "0.1 MPa/um" or "1 um s^-1".
     units : str
-        The SI units.
+        SI units of the quantity.
+
+    Returns
+    -------
+    float
+        Value in SI units.
 
     Raises
     ------
     InvalidValue
-        For what is no finite number, and for units that are unknown or of another kind.
+        If the value is not a finite number, or if its units are unknown or incompatible.
     """
     return float(convert_to_si_as_fraction(quantity_name, value, units))
 
 
 def convert_to_si_as_fraction(quantity_name: str, value: Any, units: str) -> Fraction:
-    """A quantity in SI units before it is rounded; raises as `convert_to_si`."""
+    """Convert a quantity to SI units without rounding.
+
+    Parameters
+    ----------
+    quantity_name : str
+        Name of the quantity for error messages.
+    value : float, str or pint.Quantity
+        Value to convert, as in `convert_to_si`.
+    units : str
+        SI units of the quantity.
+
+    Returns
+    -------
+    Fraction
+        Value in SI units.
+
+    Raises
+    ------
+    InvalidValue
+        If the value is not a finite number, or if its units are unknown or incompatible.
+    """
     if isinstance(value, str):
         found: Any = _parse_quantity(quantity_name, value, units)
     elif hasattr(value, "to") and hasattr(value, "magnitude"):
@@ -160,13 +223,50 @@ def convert_to_si_as_fraction(quantity_name: str, value: Any, units: str) -> Fra
 
 
 def unit_factor(quantity_name: str, stated_units: str, target_units: str) -> Fraction:
-    """Factor from the units that were stated to SI units; raises as `convert_to_si`."""
+    """Compute the conversion factor between two units.
+
+    Parameters
+    ----------
+    quantity_name : str
+        Name of the quantity for error messages.
+    stated_units : str
+        Units to convert from.
+    target_units : str
+        SI units to convert to.
+
+    Returns
+    -------
+    Fraction
+        Conversion factor.
+
+    Raises
+    ------
+    InvalidValue
+        If the units are unknown or incompatible.
+    """
     return convert_to_si_as_fraction(quantity_name, f"1 {stated_units}", target_units)
 
 
 def multiply_exactly(values: Any, factor: Fraction) -> Any:
-    """A number or an array in other units, each as a text of its digits would be."""
-    if isinstance(values, np.ndarray):  # with what stands in it many times
+    """Multiply numbers by a conversion factor with a single rounding.
+
+    The function uses the decimal digits of each number, so that a number in a file and the same
+    number in a string give the same result.
+
+    Parameters
+    ----------
+    values : float or ndarray
+        Numbers to multiply.
+    factor : Fraction
+        Conversion factor.
+
+    Returns
+    -------
+    float or ndarray
+        Products.
+    """
+    # Arrays of coordinates often repeat their values, so each value is multiplied once.
+    if isinstance(values, np.ndarray):
         each, places = np.unique(values, return_inverse=True)
         return np.array([multiply_exactly(x, factor) for x in each.tolist()])[places].reshape(
             values.shape
@@ -179,7 +279,7 @@ def multiply_exactly(values: Any, factor: Fraction) -> Any:
 
 
 def _fraction_of_shortest_digits(number: float) -> Fraction:
-    """The shortest digits that round to a number: of as many as were written there may be any."""
+    """Return the fraction with the fewest digits that rounds to a number."""
     return Fraction(repr(float(number)))
 
 
@@ -230,7 +330,10 @@ def _incompatible_units_error(quantity_name: str, value: Any, units: str) -> Inv
 
 
 def _parse_unit_powers(unit_text: str) -> list[tuple[str, int]] | None:
-    """The units that a text multiplies and divides, with their powers; None where it does not."""
+    """Parse a product or quotient of units into units and powers.
+
+    The function returns None if the string has another form.
+    """
     if not _UNIT_PATTERN.fullmatch(unit_text):
         return None
     found = _UNIT_WITH_SIGNED_POWER_PATTERN.findall(unit_text)
@@ -238,7 +341,7 @@ def _parse_unit_powers(unit_text: str) -> list[tuple[str, int]] | None:
 
 
 def _multiply_known_units(units_and_powers: Iterable[tuple[str, int]]) -> SiFactorAndExponents:
-    """Units that are known here, multiplied."""
+    """Return the product of known units."""
     scale, exponents = Fraction(1), [0, 0, 0]
     for name, power in units_and_powers:
         size, of = _KNOWN_UNITS[name]
@@ -262,21 +365,20 @@ def _compute_factor_with_pint(
     registry = pint.get_application_registry()
     try:
         unit = math.prod(registry.parse_units(unit) ** power for unit, power in units_and_powers)
-    except Exception as error:  # of its own, and of Python's parser
+    except Exception as error:  # Both pint and the parser of Python may raise other errors.
         remedy = (
             _suggest_unit_with_other_capitals(units_and_powers) or f"Write it as in '2.5 {units}'."
         )
         rule = f"has units that pint does not know ({error})"
         raise InvalidValue(quantity_name, text, rule, remedy=remedy) from error
+    # Zero does not convert to zero if the unit is logarithmic or has an offset.
     if _convert_pint_quantity(quantity_name, text, registry.Quantity(0.0, unit), units) != 0.0:
-        raise _incompatible_units_error(
-            quantity_name, text, units
-        )  # a logarithm, of which none is a multiple
+        raise _incompatible_units_error(quantity_name, text, units)
     return float(_convert_pint_quantity(quantity_name, text, registry.Quantity(1.0, unit), units))
 
 
 def _suggest_unit_with_other_capitals(units_and_powers: Iterable[tuple[str, int]]) -> str:
-    """The units that differ from what was written by capital letters only, if there are any."""
+    """Suggest units that differ only by upper-case and lower-case letters."""
     for name, _power in units_and_powers:
         meant = [known for known in _KNOWN_UNITS if known.lower() == name.lower() and known != name]
         if meant:
@@ -285,7 +387,7 @@ def _suggest_unit_with_other_capitals(units_and_powers: Iterable[tuple[str, int]
 
 
 def _convert_pint_quantity(quantity_name: str, value: Any, quantity: Any, units: str) -> Any:
-    """Magnitude of a quantity of pint in SI units."""
+    """Return the magnitude of a pint quantity in SI units."""
     try:
         magnitude = quantity.to(units).magnitude
     except Exception as error:

@@ -2,46 +2,53 @@
 
 A ``Scene`` describes a slider by five parts: a state evolution law, a normal stress condition, a
 pore fluid, the dynamics and the loading. The package checks scenes and provides their equations of
-motion, their steady states and the stability of these. It never integrates the equations, never
-reads or writes a file, and needs nothing but Python, NumPy and SciPy.
+motion, their steady states and the stability of steady sliding. It never integrates the equations,
+never reads or writes files, and depends only on Python, NumPy and SciPy.
 
-A slider is five choices, each one file of `laws`, `normal_stress`, `fluid`, `dynamics` and
-`loading`; a `scene` says which. Read in this order: `friction` puts law, normal stress and pore
-pressure into one relation between stress, slip rate and state, with `states` beside it; a file of
-`dynamics` says how slip rate follows; `scene_functions` makes equations of motion of both, for
-whatever parts a scene has; `equations` gives what an integrator takes. Their numbers stand where
-`parameter_layout` says. `steady_state` asks the same relation for steady sliding and its stability.
-`closed_forms` are what others have published.
+Each part is a class in a module of ``laws``, ``normal_stress``, ``fluid``, ``dynamics`` or
+``loading``. We suggest reading the other modules in the following order:
 
-From a law to a motion, each hop a function that the next one holds:
+- ``scene`` combines the parts of a slider.
+- ``friction`` combines the law, the normal stress and the pore pressure into a relation between
+  stress, slip rate and states. Its helper functions for states are in ``state_functions``.
+- ``scene_functions`` combines friction with the dynamics, which determine the slip rate, into
+  equations of motion for any combination of parts.
+- ``equations`` provides the unknowns, rates and parameters that an integrator needs. The layout of
+  the parameters is defined in ``parameter_layout``.
+- ``steady_state`` and ``stability`` compute steady sliding and its linear stability from the
+  friction relation.
+- ``closed_forms`` contains published closed-form solutions.
 
-1. ``evolution`` of a file in `laws`: the change of the state per unit slip.
-2. `states.evolutions_from_single_state` makes ``evolutions`` of it, which takes a tuple of states
-   and returns one; a law of several states states that itself.
-   `scene_functions.build_scene_functions` chooses.
-3. `friction.build_friction_functions` adds the unknowns of a fluid or a loading behind those of the
-   law: ``FrictionFunctions.evolutions``.
-4. `scene_functions` makes rates of it: `scene_functions.displacement_rate_function` between
-   ruptures, and of a rigid slider `scene_functions.rigid_rate_function`. In a rupture
-   ``dynamics.inertia.build_rupture_rate_function`` calls it; between ruptures with mass,
-   ``dynamics.inertia.build_slip_rate_functions`` as well.
-5. `equations` puts the rates of a scene, its unknowns and its numbers together.
-6. `motion.inplace` makes functions of them that fill arrays; a stepper calls these (the one of
-   SciPy calls ``Equations.rate_function`` itself), and `motion.loop` the stepper, step by step.
+The evolution of a state passes through the following functions, from the law to the integrator:
 
-Where the equations of the paper are:
+1. The method ``evolution`` of a law computes the change of the state per unit slip.
+2. `state_functions.wrap_single_state_evolution` converts the method to a function ``evolutions`` of
+   tuples. A law with several states defines ``evolutions`` itself. The function
+   `scene_functions.build_scene_functions` decides if the conversion is needed.
+3. `friction.build_friction_functions` appends the unknowns of a fluid or a loading and stores the
+   result as ``FrictionFunctions.evolutions``.
+4. `scene_functions` converts the evolution to rates:
+   `scene_functions.build_displacement_rate_function` between ruptures, and
+   `scene_functions.build_rigid_rate_function` for a rigid slider. For scenes with inertia,
+   ``dynamics.inertia.build_rupture_rate_function`` computes the rates in ruptures, and
+   ``dynamics.inertia.build_slip_rate_functions`` computes the slip rate between ruptures.
+5. `equations` combines the rates, the unknowns and the parameters of a scene.
+6. The ``motion`` package converts the rates to functions that fill arrays, and passes these
+   functions to a stepper. The stepper of SciPy calls ``Equations.rate_function`` directly.
+
+The equations of doi:10.1007/s11589-014-0098-4 are implemented in the following modules:
 
     1a, 4a    friction                                  friction
     1b        slip law                                  laws.slip
     4b        slowness law                              laws.slowness
     1b to 3   effect of normal stress on the state      normal_stress.variable
     5         normal stress follows shear stress        normal_stress.variable
-    6         motion with mass                          dynamics.inertia
+    6         motion with inertia                       dynamics.inertia
     15        quasi-static motion                       dynamics.quasi_static, scene_functions
-    7, 9      critical stiffness, no steady sliding     steady_state
-    8, 10, 11, 14   closed forms of boundaries          closed_forms
+    7, 9      critical stiffness, steady sliding        stability, steady_state
+    8, 10, 11, 14   closed-form boundaries              closed_forms
     12, 13    stress and slip rate after a jump         friction, steady_state
-    16, 17    a rigid slider                            scene_functions, laws.slip, laws.slowness
+    16, 17    rigid slider                              scene_functions, laws.slip, laws.slowness
 """
 
 from __future__ import annotations

@@ -1,4 +1,7 @@
-"""Published closed forms, by name: what reductions and figures hold results against."""
+"""Closed-form solutions from the literature.
+
+Figures and reductions compare computed results with the formulas in ``CLOSED_FORMS``.
+"""
 
 from __future__ import annotations
 
@@ -8,25 +11,25 @@ from dataclasses import dataclass
 
 from scipy.optimize import brentq
 
-#: Points at which normal stress is looked at for a critical fall, and the smallest and the largest
-#: of them as sigma_*/sigma - 1.
+#: Number of points at which the search for a critical normal stress step evaluates the residual,
+#: and the smallest and largest values of sigma_*/sigma - 1.
 _STRESS_FALL_COUNT, _MIN_STRESS_FALL, _MAX_STRESS_FALL = 400, 1e-9, 1e3
 
 
 @dataclass(frozen=True)
 class ClosedForm:
-    """A formula of fields of a scene.
+    """Published formula that depends on fields of a scene.
 
-    Attributes
+    Parameters
     ----------
     formula : str
-        The formula.
+        Formula for display.
     scene_field_names : tuple of str
-        Names of the fields it takes, in order.
+        Names of the scene fields that the formula depends on, in the order of the arguments.
     function : callable
-        The formula as a function of those fields.
+        Function that evaluates the formula.
     literature_citation : str
-        Where it is published.
+        Reference for the formula.
     """
 
     formula: str
@@ -38,18 +41,36 @@ class ClosedForm:
 def critical_stiffness(
     log_slip_rate: float, mu_star: float, a: float, b: float, cot_phi: float, alpha: float
 ) -> float:
-    """Critical stiffness ``k_cr D_c/sigma_*`` as an explicit function of V, without mass: ``(b - a)
-    sigma_* (1 - mu_* cot(phi)) / {D_c (1 - mu_ss cot(phi)) [1 - (mu_ss - alpha) cot(phi)]}`` with
-    ``mu_ss = mu_* - (b - a) ln(V/V_*)`` (He et al. 1998).
+    r"""Compute the critical stiffness without inertia in closed form.
 
     Parameters
     ----------
     log_slip_rate : float
-        ln(V/V_*).
-    mu_star, a, b : float
-        Friction coefficient at V_*, direct effect and evolution effect.
-    cot_phi, alpha : float
-        d sigma/d tau, 0 where normal stress is constant, and its effect on the state variable.
+        Natural logarithm of the slip rate, :math:`\ln(V/V_*)`.
+    mu_star : float
+        Friction coefficient :math:`\mu_*` at the reference velocity.
+    a, b : float
+        Parameters of the direct effect and the evolution effect.
+    cot_phi : float
+        Derivative of normal stress with respect to shear stress, :math:`\cot\phi`. It is 0 if the
+        normal stress is constant.
+    alpha : float
+        Effect of normal stress on the state variable.
+
+    Returns
+    -------
+    float
+        Critical stiffness :math:`k_{cr} D_c/\sigma_*`.
+
+    Notes
+    -----
+    With the steady friction coefficient :math:`\mu_{ss} = \mu_* - (b - a) \ln(V/V_*)`, the critical
+    stiffness (He et al. 1998) is
+
+    .. math::
+
+        k_{cr} = \frac{(b - a) \sigma_* (1 - \mu_* \cot\phi)}{D_c (1 - \mu_{ss} \cot\phi) [1 -
+        (\mu_{ss} - \alpha) \cot\phi]}.
 
     References
     ----------
@@ -64,19 +85,32 @@ def critical_stiffness(
 def critical_displacement_step(
     b_over_a: float, law_exponent: float = 0.0, stiffness_ratio: float = 0.0
 ) -> float:
-    """Critical displacement step of the family of laws, over D_c; NaN where there is none.
-
-    ``a/(b-a) [-ln(1 - eps r)]/(eps r)`` with r = k/k_cr, at constant normal stress, under a load
-    point that is held and with an infinite norm; ``a/(b-a)`` by the slip law, eps = 0.
+    r"""Compute the critical displacement step of the family of laws.
 
     Parameters
     ----------
     b_over_a : float
-        b/a, above 1.
-    law_exponent : float
-        eps of the family, from 0 (slip law) to 1 (slowness law).
-    stiffness_ratio : float
-        k/k_cr.
+        Ratio :math:`b/a`, which is greater than 1.
+    law_exponent : float, default: 0.0
+        Exponent :math:`\epsilon` of the family, from 0 (slip law) to 1 (slowness law).
+    stiffness_ratio : float, default: 0.0
+        Stiffness ratio :math:`r = k/k_{cr}`.
+
+    Returns
+    -------
+    float
+        Critical step in units of :math:`D_c`. NaN if there is no critical step.
+
+    Notes
+    -----
+    The normal stress is constant, the load point does not move after the step, and the norm of
+    instability is infinite. The critical step is
+
+    .. math::
+
+        \frac{a}{b - a} \, \frac{-\ln(1 - \epsilon r)}{\epsilon r}.
+
+    For the slip law, :math:`\epsilon = 0`, the critical step is :math:`a/(b - a)`.
 
     References
     ----------
@@ -90,15 +124,34 @@ def critical_displacement_step(
 
 
 def critical_velocity_step(b_over_a: float, law_exponent: float = 0.0) -> float:
-    """Critical V_0/V_* of the family of laws at critical stiffness; NaN where there is none.
+    r"""Compute the critical velocity step at the critical stiffness.
 
-    ``V_0/V_* = 1 + a/[(1 - eps)(b - a)]``, at constant normal stress and with an infinite norm.
-    With q = exp(-eps u) and y = V_0/V the motion follows a system of Lotka-Volterra equations,
-    which the line from V_* through its saddle (1 - eps, 0) does not leave.
+    Parameters
+    ----------
+    b_over_a : float
+        Ratio :math:`b/a`, which is greater than 1.
+    law_exponent : float, default: 0.0
+        Exponent :math:`\epsilon` of the family of laws, from 0 (slip law) to 1 (slowness law).
+
+    Returns
+    -------
+    float
+        Critical velocity ratio :math:`V_0/V_*`. NaN if there is no critical velocity.
+
+    Notes
+    -----
+    The normal stress is constant and the norm of instability is infinite. The critical velocity
+    ratio is
+
+    .. math:: \frac{V_0}{V_*} = 1 + \frac{a}{(1 - \epsilon)(b - a)}.
+
+    With :math:`q = \exp(-\epsilon u)` and :math:`y = V_0/V`, the motion follows Lotka-Volterra
+    equations. The straight line from :math:`V_*` through the saddle point :math:`(1 - \epsilon, 0)`
+    is an invariant of these equations.
 
     References
     ----------
-    Gu, Rice, Ruina and Tse (1984), J. Mech. Phys. Solids 32, 167-196, for the slip law, eps = 0.
+    Gu, Rice, Ruina and Tse (1984), J. Mech. Phys. Solids 32, 167-196, for the slip law.
     """
     if math.isnan(law_exponent) or law_exponent >= 1.0:
         return math.nan
@@ -106,8 +159,27 @@ def critical_velocity_step(b_over_a: float, law_exponent: float = 0.0) -> float:
 
 
 def effective_friction(mu_star: float, b_over_a: float, alpha: float) -> float:
-    """Effective friction, which makes of a small change of normal stress one of Coulomb stress:
-    ``mu' = mu_* - alpha (1 - a/b)``, because a fall of normal stress also strengthens the state.
+    r"""Compute the effective friction coefficient for Coulomb stress changes.
+
+    Parameters
+    ----------
+    mu_star : float
+        Friction coefficient :math:`\mu_*` at the reference velocity.
+    b_over_a : float
+        Ratio :math:`b/a`.
+    alpha : float
+        Effect of normal stress on the state variable.
+
+    Returns
+    -------
+    float
+        Effective friction coefficient :math:`\mu' = \mu_* - \alpha (1 - a/b)`.
+
+    Notes
+    -----
+    The effective friction coefficient converts a small change of normal stress to an equivalent
+    change of shear stress. The coefficient is smaller than :math:`\mu_*` because a decrease of
+    normal stress also increases the state variable.
 
     References
     ----------
@@ -117,8 +189,21 @@ def effective_friction(mu_star: float, b_over_a: float, alpha: float) -> float:
 
 
 def steady_state_offset_at_instability(law_exponent: float, stiffness_ratio: float) -> float:
-    """``u = Theta/b + ln V`` at which the family of laws falls no faster than a spring pulls,
-    ``h(u) = -stiffness_ratio``; infinite where it never does.
+    r"""Compute the state offset at the onset of instability.
+
+    Parameters
+    ----------
+    law_exponent : float
+        Exponent of the family of laws, from 0 (slip law) to 1 (slowness law).
+    stiffness_ratio : float
+        Stiffness ratio :math:`k/k_{cr}`.
+
+    Returns
+    -------
+    float
+        Offset :math:`u = \Theta/b + \ln V` that solves :math:`h(u) = -k/k_{cr}`. At this offset,
+        friction decreases with slip as fast as the spring stress. The result is infinite if there
+        is no solution.
     """
     product = law_exponent * stiffness_ratio
     if product >= 1.0:
@@ -129,8 +214,31 @@ def steady_state_offset_at_instability(law_exponent: float, stiffness_ratio: flo
 def steady_state_offset_after_normal_stress_fall(
     mu_star: float, a: float, b_over_a: float, alpha: float, normal_stress_ratio: float
 ) -> float:
-    """``u = Theta/b + ln V`` just after steady sliding at V_* has its normal stress changed to
-    sigma_*/quotient: ``mu_* (q - 1)/a - alpha (1/a - 1/b) ln q``.
+    r"""Compute the state offset immediately after a drop of normal stress.
+
+    Parameters
+    ----------
+    mu_star : float
+        Friction coefficient :math:`\mu_*` at the reference velocity.
+    a : float
+        Parameter of the direct effect.
+    b_over_a : float
+        Ratio :math:`b/a`.
+    alpha : float
+        Effect of normal stress on the state variable.
+    normal_stress_ratio : float
+        Ratio :math:`q = \sigma_*/\sigma` of the normal stresses before and after the drop.
+
+    Returns
+    -------
+    float
+        Offset :math:`u = \Theta/b + \ln V`.
+
+    Notes
+    -----
+    For steady sliding at :math:`V_*` before the drop,
+
+    .. math:: u = \frac{\mu_* (q - 1)}{a} - \alpha \left(\frac{1}{a} - \frac{1}{b}\right) \ln q.
     """
     taken = alpha * (1.0 - 1.0 / b_over_a) * math.log(normal_stress_ratio)
     return (mu_star * (normal_stress_ratio - 1.0) - taken) / a
@@ -144,12 +252,35 @@ def critical_normal_stress_step(
     law_exponent: float,
     stiffness_ratio: float,
 ) -> float:
-    """Critical fall of imposed normal stress, over sigma_* and negative, by the family of laws:
-    where `offset_after_stress_fall` first is at the `instability_threshold` of ``q k/k_cr``; NaN
-    where it never is.
+    r"""Compute the critical drop of normal stress for the family of laws.
 
-    With the load point at rest u obeys ``du/d(slip) = (1 - b/a)[h(u) + q k/k_cr]`` over D_c: where
-    it begins above the threshold, slip rate grows without bound.
+    Parameters
+    ----------
+    mu_star : float
+        Friction coefficient :math:`\mu_*` at the reference velocity.
+    a : float
+        Parameter of the direct effect.
+    b_over_a : float
+        Ratio :math:`b/a`.
+    alpha : float
+        Effect of normal stress on the state variable.
+    law_exponent : float
+        Exponent of the family of laws, from 0 (slip law) to 1 (slowness law).
+    stiffness_ratio : float
+        Stiffness ratio :math:`k/k_{cr}`.
+
+    Returns
+    -------
+    float
+        Critical change of the imposed normal stress in units of :math:`\sigma_*`. The value is
+        negative. NaN if no drop of normal stress causes an instability.
+
+    Notes
+    -----
+    While the load point does not move, the offset obeys
+    :math:`du/d\delta = (1 - b/a) [h(u) + q k/k_{cr}]/D_c`. If the offset after the drop exceeds the
+    root of :math:`h(u) = -q k/k_{cr}`, the slip rate grows without bound. The function searches for
+    the smallest drop whose offset reaches this root.
     """
 
     def excess_over_threshold(growth: float) -> float:

@@ -1,4 +1,8 @@
-"""Equations of one scene as an integrator takes them: unknowns, scales, rates and points."""
+"""Equations of motion of one scene, in the form that integrators use.
+
+`equations_between_ruptures` and `equations_in_rupture` are the main functions. Each function
+returns `Equations` with the names and scales of the unknowns, the rates and the parameters.
+"""
 
 from __future__ import annotations
 
@@ -13,33 +17,36 @@ from rsfstudy.slider.scene_caching import cached_per_scene
 from rsfstudy.slider.scene_functions import RegimeFunctions, SceneFunctions, build_scene_functions
 from rsfstudy.slider.scene_view import SceneView
 
-#: The regime of the full equations of a scene with mass, and that of a rigid slider.
+#: Names of two regimes: the equations with inertia, and the equations of a rigid slider.
 RUPTURE_REGIME, RIGID_REGIME = "inertial", "rigid"
 
 
 @renamed_members
 class Equations(NamedTuple):
-    """A system of ordinary differential equations in its own clock, on which it does not depend.
+    r"""Autonomous system of ordinary differential equations of a scene.
 
-    Attributes
+    The rates do not depend on the independent variable.
+
+    Parameters
     ----------
     regime : str
-        Name of the form.
+        Name of the regime.
     unknown_names : tuple of str
         Names of the unknowns.
     unknown_scales : tuple of float
-        The change of each unknown that weighs as much as a change of 1 in ln V.
+        Scale of each unknown. A change of an unknown by its scale is as important as a change of 1
+        in :math:`\ln V`.
     rate_function : callable
-        ``rate(state, p) -> tuple``: derivatives of the unknowns.
+        Function ``rate(state, p) -> tuple`` that returns the derivatives of the unknowns.
     point_function : callable
-        ``point(state, derivatives, p) -> MotionPoint``.
+        Function ``point(state, derivatives, p) -> MotionPoint``.
     parameters : tuple of float
-        The numbers of the scene.
-    state_count : int
-        How many states the scene has.
-    force_balance_function : callable or None
-        ``force_balance_function(spring, psis, p)``: ln(V/V_*), frictional stress and the state lost
-        to stress; between ruptures only.
+        Parameters ``p`` of the scene.
+    state_count : int, default: 1
+        Number of states of the scene.
+    force_balance_function : callable, optional
+        Function ``force_balance_function(spring, psis, p)`` that returns :math:`\ln(V/V_*)`, the
+        frictional stress and the shift of the state. It is None in ruptures and for rigid sliders.
     """
 
     regime: str
@@ -52,16 +59,38 @@ class Equations(NamedTuple):
     force_balance_function: Function | None = None
 
     def evaluate_rates(self, unknown_values: Numbers) -> Numbers:
-        """Derivatives of the unknowns."""
+        """Evaluate the derivatives of the unknowns.
+
+        Parameters
+        ----------
+        unknown_values : tuple of float
+            Values of the unknowns.
+
+        Returns
+        -------
+        tuple of float
+            Derivatives of the unknowns.
+        """
         return self.rate_function(unknown_values, self.parameters)
 
     @property
     def is_rigid(self) -> bool:
-        """True if slip is the clock."""
+        """True if slip is the independent variable."""
         return self.regime == RIGID_REGIME
 
     def evaluate_point(self, unknown_values: Numbers) -> MotionPoint:
-        """The point of the motion at a state."""
+        """Evaluate all quantities of a motion for values of the unknowns.
+
+        Parameters
+        ----------
+        unknown_values : tuple of float
+            Values of the unknowns.
+
+        Returns
+        -------
+        MotionPoint
+            Point of the motion.
+        """
         return self.point_function(
             unknown_values, self.rate_function(unknown_values, self.parameters), self.parameters
         )
@@ -69,8 +98,22 @@ class Equations(NamedTuple):
 
 @cached_per_scene
 def equations_between_ruptures(scene: SceneView, *, with_time: bool) -> Equations:
-    """The form of a scene where mass, if it has any, hardly acts: unknowns f and Psi (or the states
-    of a law that has several), and time as a passenger where a `clock` is wanted.
+    """Return the equations of a scene between ruptures.
+
+    Between ruptures, the effect of inertia is small or zero. The unknowns are the spring stress f
+    and the states.
+
+    Parameters
+    ----------
+    scene : Scene
+        Scene to integrate.
+    with_time : bool
+        Whether to append time to the unknowns.
+
+    Returns
+    -------
+    Equations
+        Equations along the path.
     """
     return _build_slow_equations(
         scene, scene.equation_functions, scene.dynamics.regime, with_time=with_time
@@ -79,7 +122,20 @@ def equations_between_ruptures(scene: SceneView, *, with_time: bool) -> Equation
 
 @cached_per_scene
 def equations_without_mass(scene: SceneView, *, with_time: bool) -> Equations:
-    """The form between ruptures with mass left out altogether."""
+    """Return the equations of a scene without inertia.
+
+    Parameters
+    ----------
+    scene : Scene
+        Scene to integrate. The function ignores the inertia of the scene.
+    with_time : bool
+        Whether to append time to the unknowns.
+
+    Returns
+    -------
+    Equations
+        Quasi-static equations along the path.
+    """
     if scene.dynamics.build_rupture_rate_function is None:
         return equations_between_ruptures(scene, with_time=with_time)
     return _build_slow_equations(
@@ -117,7 +173,7 @@ def _append_time_if_requested(
     *,
     with_time: bool,
 ) -> tuple[tuple[str, ...], Numbers, Function]:
-    """Unknowns, scales and rate of a form; with time, of its clock, as a passenger."""
+    """Return the unknowns, scales and rates, with time if requested."""
     if not with_time:
         return unknown_names, unknown_scales, regime_functions.rates_along_path
     return (
@@ -128,7 +184,7 @@ def _append_time_if_requested(
 
 
 def _state_names(scene: SceneView) -> tuple[str, ...]:
-    """Names of the states."""
+    """Return the names of the states."""
     count = scene.parts.law.state_count
     of_law = ["psi"] if count == 1 else [f"psi_{i + 1}" for i in range(count)]
     return (*of_law, *(unknown.name for unknown in scene.pressure_source.unknowns))
@@ -136,8 +192,27 @@ def _state_names(scene: SceneView) -> tuple[str, ...]:
 
 @cached_per_scene
 def equations_in_rupture(scene: SceneView, *, with_time: bool = False) -> Equations:
-    """The full equations of a scene with mass: f, ln(V/V_*) and g, and the states but the first;
-    and inertial time, in T/(2 pi), as a passenger where a `clock` is wanted.
+    r"""Return the equations of a scene with inertia.
+
+    The unknowns are the spring stress f, the log rate :math:`\ln(V/V_*)`, the frictional stress g
+    and all states except the first.
+
+    Parameters
+    ----------
+    scene : Scene
+        Scene with inertia.
+    with_time : bool, default: False
+        Whether to append inertial time, in units of :math:`T/(2 \pi)`, to the unknowns.
+
+    Returns
+    -------
+    Equations
+        Equations along the path.
+
+    Raises
+    ------
+    TypeError
+        If the scene has no inertia.
     """
     a, form, others = scene.a, _require_rupture_functions(scene), _state_names(scene)[1:]
     unknowns = ("spring_stress", "log_slip_rate", "friction", *others)
@@ -156,8 +231,21 @@ def _require_rupture_functions(scene: SceneView) -> RegimeFunctions:
 
 
 def equations_against_displacement(scene: SceneView) -> Equations:
-    """The form between ruptures against slip plus load point displacement: differences of its rates
-    are linear in departures farther from steady sliding than those along the path.
+    """Return the equations between ruptures with displacement as variable.
+
+    The displacement is slip plus load point displacement. Close to steady sliding, the rates are
+    nearly linear functions of the unknowns. The range of this linear behaviour is wider than for
+    the rates along the path.
+
+    Parameters
+    ----------
+    scene : Scene
+        Scene to integrate.
+
+    Returns
+    -------
+    Equations
+        Equations with displacement as the independent variable.
     """
     along = equations_between_ruptures(scene, with_time=False)
     return along._replace(
@@ -166,14 +254,46 @@ def equations_against_displacement(scene: SceneView) -> Equations:
 
 
 def equations_against_inertial_time(scene: SceneView) -> Equations:
-    """The full equations in inertial time T/(2 pi)."""
+    r"""Return the equations of a scene with inertia as functions of time.
+
+    Parameters
+    ----------
+    scene : Scene
+        Scene with inertia.
+
+    Returns
+    -------
+    Equations
+        Equations with time in units of :math:`T/(2 \pi)` as the independent variable.
+
+    Raises
+    ------
+    TypeError
+        If the scene has no inertia.
+    """
     return equations_in_rupture(scene)._replace(
         rate_function=_require_rupture_functions(scene).rates_against_clock
     )
 
 
 def equations_at_imposed_slip_rate(scene: SceneView, log_slip_rate: float) -> Equations:
-    """A rigid slider at prescribed ln(V/V_*), against slip: g, and the states but the first."""
+    r"""Return the equations of a rigid slider at a prescribed slip rate.
+
+    The unknowns are the frictional stress g and all states except the first. Slip is the
+    independent variable.
+
+    Parameters
+    ----------
+    scene : Scene
+        Scene of the slider.
+    log_slip_rate : float
+        Natural logarithm of the slip rate, :math:`\ln(V/V_*)`.
+
+    Returns
+    -------
+    Equations
+        Equations whose last parameter is the log rate.
+    """
     forms, unknowns = scene.equation_functions, ("friction", *_state_names(scene)[1:])
     scales, p = (scene.a,) * len(unknowns), (*scene.parameter_values, log_slip_rate)
     return Equations(
@@ -190,8 +310,20 @@ def equations_at_imposed_slip_rate(scene: SceneView, log_slip_rate: float) -> Eq
 def build_friction_relation(
     scene: SceneView, states: Numbers = ()
 ) -> Callable[[float], tuple[float, float, float, float]]:
-    """The friction relation of a scene: g -> (strength, slope, shift, slope of the shift); at the
-    pore pressure of steady sliding, unless states are given.
+    """Return the friction relation of a scene as a function of stress.
+
+    Parameters
+    ----------
+    scene : Scene
+        Scene with friction parameters.
+    states : tuple of float, optional
+        States, which determine the pore pressure. By default the pore pressure is the pore pressure
+        of steady sliding.
+
+    Returns
+    -------
+    callable
+        Function ``g -> (strength, slope, shift, shift_slope)``.
     """
     strength, p = (
         scene.equation_functions.friction_functions.strength,
@@ -204,8 +336,22 @@ def build_friction_relation(
 def effective_normal_stress_at(
     scene: SceneView, frictional_stress: float, states: Numbers = ()
 ) -> float:
-    """Effective normal stress over sigma_* under a deviation of frictional stress, at steady
-    sliding unless states are given.
+    r"""Compute the effective normal stress for a given frictional stress.
+
+    Parameters
+    ----------
+    scene : Scene
+        Scene with friction parameters.
+    frictional_stress : float
+        Deviation of frictional stress in :math:`\sigma_*`.
+    states : tuple of float, optional
+        States, which determine the pore pressure. By default the pore pressure is the pore pressure
+        of steady sliding.
+
+    Returns
+    -------
+    float
+        Effective normal stress in :math:`\sigma_*`.
     """
     at = states or (0.0,) * scene.state_count
     stress = scene.equation_functions.friction_functions.effective_normal_stress(
@@ -215,8 +361,23 @@ def effective_normal_stress_at(
 
 
 def quasi_static_log_slip_rate(scene: SceneView, spring_stress: float, state_sum: float) -> float:
-    """ln(V/V_*) for a spring stress and state (the sum, of several) where mass does not act, and
-    there is no pore pressure.
+    r"""Compute the slip rate from the spring stress and the state.
+
+    The function ignores inertia and assumes that there is no pore pressure.
+
+    Parameters
+    ----------
+    scene : Scene
+        Scene with friction parameters.
+    spring_stress : float
+        Deviation of the spring stress in :math:`\sigma_*`.
+    state_sum : float
+        State :math:`\Psi`, or the sum of the states of a law with several states.
+
+    Returns
+    -------
+    float
+        Natural logarithm of the slip rate, :math:`\ln(V/V_*)`.
     """
     forms = (
         build_scene_functions(scene, QuasiStatic()) if scene.has_mass else scene.equation_functions
@@ -226,7 +387,19 @@ def quasi_static_log_slip_rate(scene: SceneView, spring_stress: float, state_sum
 
 
 def build_state_evolution_function(scene: SceneView) -> Callable[[float, Numbers, float], Numbers]:
-    """The law of a scene: (ln(V/V_*), Psi, shift) -> change of each state per unit slip."""
+    """Return the state evolution of a scene as a function.
+
+    Parameters
+    ----------
+    scene : Scene
+        Scene with friction parameters.
+
+    Returns
+    -------
+    callable
+        Function ``(log_slip_rate, psis, shift)`` that returns the change of each state per unit
+        slip in :math:`D_c`.
+    """
     evolutions, p = (
         scene.equation_functions.friction_functions.evolutions,
         scene.friction_parameter_values,
@@ -235,6 +408,21 @@ def build_state_evolution_function(scene: SceneView) -> Callable[[float, Numbers
 
 
 def compute_steady_states(scene: SceneView, log_slip_rate: float, state_shift: float) -> Numbers:
-    """The states of steady sliding at ln(V/V_*), of which stress has taken `shift`."""
+    r"""Compute the states of steady sliding at a slip rate.
+
+    Parameters
+    ----------
+    scene : Scene
+        Scene with friction parameters.
+    log_slip_rate : float
+        Natural logarithm of the slip rate, :math:`\ln(V/V_*)`.
+    state_shift : float
+        Decrease of the state variable due to stress.
+
+    Returns
+    -------
+    tuple of float
+        States :math:`\Psi_i`.
+    """
     p = scene.friction_parameter_values
     return scene.equation_functions.friction_functions.steady_states(log_slip_rate, state_shift, p)

@@ -11,27 +11,27 @@ from rsfstudy.slider.parts import Numbers
 from rsfstudy.slider.scene_view import SceneView
 from rsfstudy.slider.steady_state import SteadySliding
 
-#: Largest step of the differences, relative to the scale of each argument, and the weights of
-#: central differences of order eight.
+#: Largest step size of the finite differences, relative to the scale of each argument, and weights
+#: of central differences of order eight.
 _MAX_DIFFERENCE_STEP_OVER_SCALE = 0.05
 _DIFFERENCE_WEIGHTS = ((1, 4.0 / 5.0), (2, -1.0 / 5.0), (3, 4.0 / 105.0), (4, -1.0 / 280.0))
-#: Scale of a state relative to b, and the change of a steady state with ln V, relative to b, below
-#: which the scale of a state does not follow that change.
+#: Scale of a state relative to b, and smallest relative change of a steady state with ln V that
+#: determines the scale of the state.
 _STATE_SCALE_OVER_B, _MIN_STATE_CHANGE = 0.05, 1e-9
-#: Most halvings of a step, the relative difference between two steps that counts as converged, and
-#: the rounding error of a difference in units of the machine precision.
+#: Maximum number of step halvings, relative difference between two successive estimates at
+#: convergence, and relative rounding error of a finite difference.
 _MAX_HALVINGS, _CONVERGENCE_TOLERANCE, _ROUNDING_ERROR = 9, 1e-12, 8.0 * 2.0**-52
 
 Matrix = list[list[float]]
 
 
 class StateEvolutionDerivatives(NamedTuple):
-    """Derivatives of the state evolution per unit slip in steady sliding.
+    r"""Derivatives of the state evolution per unit slip in steady sliding.
 
-    Attributes
+    Parameters
     ----------
     with_respect_to_log_slip_rate, with_respect_to_state_shift : list of float
-        Derivatives with respect to ln V and to the shift, of shape (states,).
+        Derivatives with respect to :math:`\ln V` and to the shift, of shape (states,).
     with_respect_to_states : list of list of float
         Derivatives with respect to each state, of shape (states, states).
     relative_error : float
@@ -44,11 +44,19 @@ class StateEvolutionDerivatives(NamedTuple):
     relative_error: float
 
     def with_relative_change(self, relative_change: float) -> StateEvolutionDerivatives:
-        """Return a copy in which all derivatives are changed by a relative amount.
+        r"""Return a copy with a relative change of all derivatives.
 
-        The derivatives with respect to ln V and to the shift are multiplied by ``1 +
-        relative_change``. The derivatives with respect to the states are multiplied by ``1 -
-        relative_change``.
+        Parameters
+        ----------
+        relative_change : float
+            Relative change of the derivatives. The derivatives with respect to :math:`\ln V` and to
+            the shift are multiplied by ``1 + relative_change``. The derivatives with respect to the
+            states are multiplied by ``1 - relative_change``.
+
+        Returns
+        -------
+        StateEvolutionDerivatives
+            Changed copy.
         """
         by_log_slip_rate, by_shift = (
             [x * (1.0 + relative_change) for x in row] for row in self[:2]
@@ -66,10 +74,23 @@ class StateEvolutionDerivatives(NamedTuple):
 def compute_state_evolution_derivatives(
     scene: SceneView, steady_state: SteadySliding
 ) -> StateEvolutionDerivatives:
-    """Compute the derivatives of the state evolution in steady sliding.
+    r"""Compute the derivatives of the state evolution in steady sliding.
 
-    The step of the finite differences is halved until two successive estimates agree. Laws whose
-    evolution varies over a fraction of a unit of ln V are therefore resolved.
+    The step size of the finite differences is halved until two successive estimates agree. The
+    derivatives are therefore accurate even if the evolution of a law varies over a fraction of a
+    unit of :math:`\ln V`.
+
+    Parameters
+    ----------
+    scene : Scene
+        Scene with friction parameters.
+    steady_state : SteadySliding
+        Steady sliding of the scene.
+
+    Returns
+    -------
+    StateEvolutionDerivatives
+        Derivatives with an error estimate.
     """
     evolutions, p = (
         scene.equation_functions.friction_functions.evolutions,
@@ -78,7 +99,8 @@ def compute_state_evolution_derivatives(
     shift = build_friction_relation(scene)(steady_state.frictional_stress)[2]
     arguments = [steady_state.log_slip_rate, shift, *steady_state.states]
     scales, columns, errors = _finite_difference_scales(scene, steady_state, shift), [], []
-    # changes that count as much as a unit of ln V, to which rounding errors are relative
+    # Change of each argument that corresponds to one unit of ln V. Rounding errors scale with the
+    # change.
     units = [scales[0], *(scale / _STATE_SCALE_OVER_B for scale in scales[1:])]
     rounding = _ROUNDING_ERROR * (
         1.0 + max(abs(x) / y for x, y in zip(arguments, units, strict=True))
@@ -157,7 +179,7 @@ def _finite_difference_scales(
 ) -> list[float]:
     """Return the scales of ln V, the shift and each state for finite differences."""
     size = _STATE_SCALE_OVER_B * scene.a * scene.parts.law.state_change_over_a
-    # b of several states may be next to nothing where each has a large one
+    # The total b of several states may be close to zero although the b of each state is large.
     of_shift = (
         size if scene.parts.law.state_count > 1 else _STATE_SCALE_OVER_B * abs(scene.b) or size
     )

@@ -1,4 +1,7 @@
-"""Synonyms: names that others give to the fields of a scene and its laws."""
+"""Hints for unknown field names and law names of a scene.
+
+The module maps common synonyms to the names that rsfstudy uses.
+"""
 
 from __future__ import annotations
 
@@ -20,7 +23,7 @@ _DURATION_HINT = "It belongs to rsfstudy.simulate(scene, duration=...)."
 
 
 def _rig_quantity_hint(symbol: str, name: str) -> str:
-    """The remedy for a quantity of a rig."""
+    """Return a hint for a quantity that belongs to a rig."""
     return (
         f"{symbol} is {name} of a rig: Rig({name}=...), or an axis or another value of a "
         "study that has one."
@@ -31,7 +34,7 @@ def _map_each_name_to(space_separated_names: str, value: str) -> dict[str, str]:
     return dict.fromkeys(space_separated_names.split(), value)
 
 
-#: What to do instead of stating a field by another name.
+#: Hints for field names that scenes do not have.
 _HINT_BY_WRONG_FIELD_NAME: Mapping[str, str] = {
     **_map_each_name_to("k K kappa spring_constant", f"Write {_STIFFNESS_HINT}."),
     **_map_each_name_to("b B", "Write b_over_a, which is b/a."),
@@ -68,7 +71,7 @@ _HINT_BY_WRONG_FIELD_NAME: Mapping[str, str] = {
     **_map_each_name_to("evolution evolution_law state_law friction_law", "Write law."),
     **_map_each_name_to("duration t_end tmax", _DURATION_HINT),
 }
-#: Laws by their other names.
+#: Names of laws by their synonyms.
 _LAW_NAME_BY_ALIAS: Mapping[str, str] = {
     **_map_each_name_to(
         "aging ageing dieterich dieterich_ruina dr aging_law ageing_law", "slowness"
@@ -82,12 +85,34 @@ _LAW_NAME_BY_ALIAS: Mapping[str, str] = {
 
 
 def hint_for_unknown_field(field_name: str) -> str:
-    """Remedy for a field of this name; empty where nobody knows."""
+    """Return a hint for an unknown field name.
+
+    Parameters
+    ----------
+    field_name : str
+        Name that the user passed.
+
+    Returns
+    -------
+    str
+        Hint for the error message. The string is empty if there is no hint.
+    """
     return _HINT_BY_WRONG_FIELD_NAME.get(field_name, "")
 
 
 def canonical_law_name(law_name: str) -> str:
-    """The name of a law here, where others call it by this one; else the value itself."""
+    """Return the name of a law for one of its synonyms.
+
+    Parameters
+    ----------
+    law_name : str
+        Name or synonym of a law.
+
+    Returns
+    -------
+    str
+        Name of the law. An unknown name is returned unchanged.
+    """
     return _LAW_NAME_BY_ALIAS.get(_normalise_name(law_name), law_name)
 
 
@@ -96,7 +121,22 @@ def _normalise_name(law_name: str) -> str:
 
 
 def hint_for_unknown_choice(slot_name: str, value: Any, choices: Iterable[str]) -> str:
-    """Remedy for this choice in a slot; empty where nobody knows."""
+    """Return a hint for an unknown choice of a slot.
+
+    Parameters
+    ----------
+    slot_name : str
+        Name of the slot, for example ``law``.
+    value : object
+        Value that the user passed.
+    choices : iterable of str
+        Valid choices of the slot.
+
+    Returns
+    -------
+    str
+        Hint for the error message. The string is empty if there is no hint.
+    """
     if slot_name == "normal_stress" and re.match(r"[\d.]", str(value)):
         return _rig_quantity_hint("sigma_*", slot_name)
     if not isinstance(value, str):
@@ -110,7 +150,20 @@ def hint_for_unknown_choice(slot_name: str, value: Any, choices: Iterable[str]) 
 def hint_for_value_without_field_name(
     value: Any, choices_by_slot_name: Mapping[str, Iterable[str]]
 ) -> str:
-    """Remedy for a value that was given to a scene without a name."""
+    """Return a hint for a positional argument of a scene.
+
+    Parameters
+    ----------
+    value : object
+        Value that the user passed without a field name.
+    choices_by_slot_name : mapping of str to iterable of str
+        Valid choices of each slot.
+
+    Returns
+    -------
+    str
+        Hint for the error message.
+    """
     for slot, choices in choices_by_slot_name.items() if isinstance(value, str) else ():
         found = hint_for_unknown_choice(slot, value, choices)
         if found:

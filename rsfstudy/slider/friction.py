@@ -1,26 +1,35 @@
-"""Friction: what ties stress, slip rate and states together. Read this first, then
-`states` and `scene_functions`.
+r"""Friction relation between stress, slip rate and states.
 
-With g = (tau - tau_*)/sigma_*, the deviation of frictional stress, s = sigma/sigma_*, and the state
-freed of stress, Psi = Theta + shift(g),
+Read this module before ``state_functions`` and ``scene_functions``. With the deviation of
+frictional stress :math:`g = (\tau - \tau_*)/\sigma_*`, the normal stress ratio
+:math:`s = \sigma/\sigma_*` and the state :math:`\Psi = \Theta + \mathrm{shift}(g)`, the friction
+law :math:`\tau = \sigma [\mu_* + a \ln(V/V_*) + \Theta]` becomes
 
-    a ln(V/V_*) + Psi = strength(g),    strength(g) = (mu_* + g)/s(g) - mu_* + shift(g),
+.. math::
 
-which is tau = sigma (mu_* + a ln(V/V_*) + Theta), and nothing else. The shift is what stress takes
-from the state variable, such as alpha ln s. Psi is continuous across any sudden change of stress,
-and dPsi/dt is the evolution law alone. Of a law with several states, Psi is the sum of all.
+    a \ln(V/V_*) + \Psi = \mathrm{strength}(g), \qquad
+    \mathrm{strength}(g) = \frac{\mu_* + g}{s(g)} - \mu_* + \mathrm{shift}(g).
 
-Pore pressure P, over sigma_*, takes from normal stress: s = sigma/sigma_* - P is what friction and
-the effects of stress on the state know of it. P stands last among the states, behind those of the
-law, which alone are part of Theta. What a loading goes on imposing is the same with a P of its own;
-the pressure that it imposes around a fluid stands first behind the law.
+The shift is the decrease of the state variable :math:`\Theta` due to stress, for example
+:math:`\alpha \ln s`. The state :math:`\Psi` is continuous across any sudden change of stress, and
+its evolution depends only on the evolution law. If a law has several states, :math:`\Psi` is the
+sum of all states.
 
-A load point that runs ahead of its mean motion by D imposes shear stress K D. Of such a scene f and
-g are those without it, which friction, and it alone, adds: mass and waves know of f - g.
+The pore pressure :math:`P`, divided by :math:`\sigma_*`, reduces the effective normal stress, so
+:math:`s = \sigma/\sigma_* - P`. Friction and the effects of stress on the state depend on the
+effective normal stress only. The pressure :math:`P` is the last element of the tuple of states,
+after the states of the law. A loading that imposes stress adds an unknown pressure in the same way.
+If the scene also has a fluid, the pressure around the fault is the first element after the states
+of the law.
 
-Functions here take the functions of the parts of a scene, and return one that is made of them: the
-plainest that holds all effects there are. What they return takes floats, and the numbers of a scene
-as ``p`` (see `parameter_layout`); it holds none of them, and serves every scene of the same parts.
+If the displacement of the load point exceeds its mean motion by :math:`D`, the spring adds the
+shear stress :math:`K D`. The variables f and g exclude this stress, and the functions of friction
+add it. Inertia and radiation damping depend only on the difference f - g, in which the added stress
+cancels.
+
+The functions of this module combine the functions of the parts of a scene. Each combination
+contains only the effects that the scene has. The resulting functions take floats and the parameter
+tuple ``p`` (see ``parameter_layout``), so all scenes with the same parts share them.
 """
 
 from __future__ import annotations
@@ -47,46 +56,51 @@ from rsfstudy.slider.state_functions import (
     build_sum_function,
 )
 
-#: Friction coefficient below which none is told from zero, where slip reverses.
+#: Smallest magnitude of the friction coefficient if slip may reverse. The limit keeps the logarithm
+#: finite at zero stress.
 _MIN_NONZERO_FRICTION_COEFFICIENT = 1e-280
 
 
 @renamed_members
 class FrictionFunctions(NamedTuple):
-    """The functions of friction.
+    """Functions that define the friction of a scene.
 
-    Attributes
+    Parameters
     ----------
     strength : callable
-        ``(g, psis, p) -> (strength, its slope, shift, its slope)``, slopes being derivatives with
-        respect to g. The first of the states may be missing.
-    effective_normal_stress, rig_normal_stress : callable
-        ``(g, psis, p) -> (s - 1, its slope)`` of effective normal stress, and of normal stress less
-        the pore pressure outside the fault, which is what a rig knows of.
+        Function ``(g, psis, p) -> (strength, slope, shift, shift_slope)``. The slopes are
+        derivatives with respect to g. The first state may be missing from ``psis``.
+    effective_normal_stress : callable
+        Function ``(g, psis, p) -> (s - 1, slope)`` of the effective normal stress.
+    rig_normal_stress : callable
+        Function ``(g, psis, p) -> (s - 1, slope)`` of the normal stress minus the pore pressure
+        outside the fault. A laboratory rig measures this stress.
     boundary_pressure : callable
-        ``(psis) -> P`` outside the fault.
+        Function ``(psis) -> P`` of the pore pressure outside the fault.
     evolutions : callable
-        ``(log_slip_rate, psis, shift, fraction, p)``: changes of all states per unit slip in D_c,
-        times a fraction.
+        Function ``(log_slip_rate, psis, shift, fraction, p)`` that returns the change of all states
+        per unit slip in :math:`D_c`, multiplied by a fraction.
     steady_states : callable
-        ``(log_slip_rate, shift, p)``: all states in steady sliding.
+        Function ``(log_slip_rate, shift, p)`` that returns all states in steady sliding.
     state_sum : callable
-        ``(psis) -> Psi``, the sum of the states of the law.
+        Function ``(psis) -> float`` that returns the sum of the states of the law.
     state_contribution : callable
-        ``(changes, g, psis, p)``: what changes of the states take from a ln(V/V_*), so that
-        ``a d ln V = strength'(g) dg - state_contribution``.
+        Function ``(changes, g, psis, p)`` that returns the contribution of state changes to the
+        friction relation, so that ``a d ln V = strength'(g) dg - state_contribution``.
     pressure_derivatives : callable
-        ``(g, psis, p)``: derivatives of strength and of shift with respect to P.
+        Function ``(g, psis, p)`` that returns the derivatives of strength and of the shift with
+        respect to the pore pressure.
     states_from_strength : callable
-        ``(strength, log_slip_rate, others, p)``: all states; the first is what the others leave.
+        Function ``(strength, log_slip_rate, others, p)`` that returns all states. The first state
+        follows from the strength and the other states.
     load_point_stress : callable
-        ``(psis, p) -> K D`` that is no part of g, and
+        Function ``(psis, p)`` that returns the shear stress :math:`K D`, which g excludes.
     load_point_stress_change : callable
-        its change, ``(changes)``.
+        Function ``(changes)`` that returns the change of the shear stress :math:`K D`.
     state_count : int
-        How many states there are.
+        Number of states.
     indices_of_states_in_distance : tuple of int
-        Places of the states that count for the distance from steady sliding.
+        Indices of the states that contribute to the distance from steady sliding.
     """
 
     strength: Function
@@ -109,7 +123,20 @@ class FrictionFunctions(NamedTuple):
 
 
 def zero_normal_stress_excess(frictional_stress: float, p: Numbers) -> tuple[float, float]:
-    """No excess of normal stress over its reference value, and no slope."""
+    r"""Return zero excess of normal stress and zero slope.
+
+    Parameters
+    ----------
+    frictional_stress : float
+        Deviation of frictional stress in :math:`\sigma_*`. It is ignored.
+    p : tuple of float
+        Parameters of the scene. They are ignored.
+
+    Returns
+    -------
+    excess, slope : float
+        Normal stress ratio minus one, and its derivative.
+    """
     return 0.0, 0.0
 
 
@@ -117,8 +144,20 @@ def zero_normal_stress_excess(frictional_stress: float, p: Numbers) -> tuple[flo
 def build_effective_normal_stress_function(
     total_normal_stress_function: Function, pressure_index: int
 ) -> Function:
-    """``(g, psis, p) -> (s - 1, its slope)``, made of ``(g, p) -> (sigma/sigma_* - 1, its slope)``
-    and the pore pressure at a place among the states, from their end; 0 where there is none.
+    """Return a function that computes the effective normal stress.
+
+    Parameters
+    ----------
+    total_normal_stress_function : callable
+        Function ``(g, p) -> (sigma/sigma_* - 1, slope)``.
+    pressure_index : int
+        Negative index of the pore pressure in the tuple of states, or 0 if the scene has no pore
+        pressure.
+
+    Returns
+    -------
+    callable
+        Function ``(g, psis, p) -> (s - 1, slope)``.
     """
 
     def total_normal_stress(g: float, psis: Numbers, p: Numbers) -> tuple[float, float]:
@@ -136,7 +175,18 @@ def build_effective_normal_stress_function(
 
 @cache
 def build_pressure_function(pressure_index: int) -> Function:
-    """``(psis) -> P`` at a place; 0 where there is none."""
+    """Return a function that reads the pore pressure from the states.
+
+    Parameters
+    ----------
+    pressure_index : int
+        Negative index of the pressure in the tuple of states, or 0 if there is no pressure.
+
+    Returns
+    -------
+    callable
+        Function ``(psis) -> P``.
+    """
 
     def pressure(psis: Numbers) -> float:
         return psis[pressure_index]
@@ -145,7 +195,18 @@ def build_pressure_function(pressure_index: int) -> Function:
 
 
 def zero_pressure(states: Numbers) -> float:
-    """P where there is none."""
+    """Return zero pore pressure.
+
+    Parameters
+    ----------
+    states : tuple of float
+        States of the scene. They are ignored.
+
+    Returns
+    -------
+    float
+        Zero.
+    """
     return 0.0
 
 
@@ -155,7 +216,24 @@ FrictionRelationValues = tuple[float, float, float, float]
 def friction_relation_at_constant_normal_stress(
     frictional_stress: float, states: Numbers, p: Numbers
 ) -> FrictionRelationValues:
-    """The friction relation at constant normal stress, of a state that stress does not change."""
+    r"""Evaluate the friction relation at constant normal stress.
+
+    The function applies to scenes in which stress does not change the state variable.
+
+    Parameters
+    ----------
+    frictional_stress : float
+        Deviation of frictional stress in :math:`\sigma_*`.
+    states : tuple of float
+        States of the scene. They are ignored.
+    p : tuple of float
+        Parameters of the scene. They are ignored.
+
+    Returns
+    -------
+    strength, slope, shift, shift_slope : float
+        Strength and shift, each with its derivative.
+    """
     return frictional_stress, 1.0, 0.0, 0.0
 
 
@@ -165,19 +243,55 @@ def zero_state_effect(
     normal_stress_derivative: float,
     p: Numbers,
 ) -> tuple[float, float]:
-    """The shift and its slope where stress does not change the state."""
+    r"""Return a shift of zero for states that do not depend on stress.
+
+    Parameters
+    ----------
+    frictional_stress : float
+        Deviation of frictional stress in :math:`\sigma_*`.
+    normal_stress_ratio : float
+        Normal stress ratio :math:`s`.
+    normal_stress_derivative : float
+        Derivative of the normal stress ratio with respect to frictional stress.
+    p : tuple of float
+        Parameters of the scene.
+
+    Returns
+    -------
+    shift, slope : float
+        Zero and zero.
+    """
     return 0.0, 0.0
 
 
 def build_strength_function(
     normal_stress_function: Function, state_effect_function: Function
 ) -> Function:
-    """The friction relation ``(g, psis, p) -> (strength, its slope, shift, its slope)``, of normal
-    stress that changes, and of the effect of stress on the state.
+    r"""Return the friction relation for variable normal stress.
 
-    ``tau/sigma - mu_*`` keeps its digits where s is proportional to g, however large it is: with
-    the bend s - 1 - s' g it is ``[g (1 - mu_* s') - mu_* bend]/s``, its derivative with respect to
-    g ``(1 - mu_* s' + bend)/s**2``.
+    Parameters
+    ----------
+    normal_stress_function : callable
+        Function ``(g, psis, p) -> (s - 1, slope)`` of the effective normal stress.
+    state_effect_function : callable
+        Function ``(g, ratio, change, p) -> (shift, slope)`` of the effect of stress on the state.
+
+    Returns
+    -------
+    callable
+        Function ``(g, psis, p) -> (strength, slope, shift, shift_slope)``.
+
+    Notes
+    -----
+    With :math:`q = s - 1 - s' g`, the function evaluates
+
+    .. math::
+
+        \frac{\tau}{\sigma} - \mu_* = \frac{g (1 - \mu_* s') - \mu_* q}{s}, \qquad
+        \frac{\partial}{\partial g} \frac{\tau}{\sigma} = \frac{1 - \mu_* s' + q}{s^2}.
+
+    If :math:`s - 1` is proportional to :math:`g`, :math:`q` is zero. The formula then keeps its
+    relative accuracy for arbitrarily large :math:`g`.
     """
 
     def strength(g: float, psis: Numbers, p: Numbers) -> FrictionRelationValues:
@@ -197,10 +311,29 @@ def shear_stress_effect_on_state(
     normal_stress_derivative: float,
     p: Numbers,
 ) -> tuple[float, float]:
-    """State variable lost to the present shear stress, and its derivative.
+    r"""Compute the effect of shear stress on the state variable.
 
-    ``dTheta = -c dtau/sigma`` integrates to a shift of ``c g ln(s)/(s - 1)`` where the normal
-    stress ratio s changes in proportion to g, and of c g where it does not change.
+    Parameters
+    ----------
+    frictional_stress : float
+        Deviation of frictional stress in :math:`\sigma_*`.
+    normal_stress_ratio : float
+        Normal stress ratio :math:`s`.
+    normal_stress_derivative : float
+        Derivative of the normal stress ratio with respect to frictional stress. It is ignored.
+    p : tuple of float
+        Parameters of the scene.
+
+    Returns
+    -------
+    shift, slope : float
+        Decrease of the state variable due to the present shear stress, and its derivative.
+
+    Notes
+    -----
+    The integral of :math:`d\Theta = -c \, d\tau/\sigma` is the shift :math:`c g \ln(s)/(s - 1)` if
+    the normal stress ratio :math:`s` changes in proportion to :math:`g`. If the normal stress is
+    constant, the shift is :math:`c g`.
 
     References
     ----------
@@ -212,7 +345,18 @@ def shear_stress_effect_on_state(
 
 
 def sum_state_effects(first_effect: Function, second_effect: Function) -> Function:
-    """Two effects of stress on the state at once: ``(g, ratio, change, p) -> (shift, slope)``."""
+    """Return a function that adds two effects of stress on the state.
+
+    Parameters
+    ----------
+    first_effect, second_effect : callable
+        Functions ``(g, ratio, change, p) -> (shift, slope)``.
+
+    Returns
+    -------
+    callable
+        Function ``(g, ratio, change, p) -> (shift, slope)``.
+    """
 
     def combined_effect(g: float, ratio: float, change: float, p: Numbers) -> tuple[float, float]:
         shift, slope = first_effect(g, ratio, change, p)
@@ -223,14 +367,31 @@ def sum_state_effects(first_effect: Function, second_effect: Function) -> Functi
 
 
 def make_slip_reversible(forward_relation: Function) -> Function:
-    """The relation of slip that may reverse, of that of slip forward: ln(V/V_*) is that of the
-    magnitude of V.
+    r"""Return the friction relation of a fault that may slip backwards.
 
-    ``V = 2 V_* exp[-(mu_* + Theta)/a] sinh[tau/(a sigma)]`` has the sign of tau and reads
+    Parameters
+    ----------
+    forward_relation : callable
+        Friction relation for forward slip,
+        ``(g, psis, p) -> (strength, slope, shift, shift_slope)``.
 
-        a ln(|V|/V_*) = |tau|/sigma + a ln[1 - exp(-2 |tau|/(a sigma))] - mu_* - Theta,
+    Returns
+    -------
+    callable
+        Friction relation in which the log rate is the logarithm of :math:`|V|/V_*`.
 
-    which differs from slip forward by exp(-2 mu/a), 10^-46 of it.
+    Notes
+    -----
+    The regularised law :math:`V = 2 V_* \exp[-(\mu_* + \Theta)/a] \sinh[\tau/(a \sigma)]` gives the
+    slip rate the sign of the shear stress. The friction relation becomes
+
+    .. math::
+
+        a \ln\frac{|V|}{V_*} = \frac{|\tau|}{\sigma} + a \ln\left[1 - e^{-2 |\tau|/(a
+        \sigma)}\right] - \mu_* - \Theta.
+
+    For forward slip, the relative difference from the usual law is about :math:`e^{-2 \mu/a}`, or
+    1e-46 for typical parameters.
 
     References
     ----------
@@ -252,11 +413,27 @@ def make_slip_reversible(forward_relation: Function) -> Function:
 def build_pressure_derivatives_function(
     normal_stress_function: Function, state_effect_function: Function
 ) -> Function:
-    """Derivatives of strength, ``(mu_* + g)/s**2`` and that of the shift, and of the shift with
-    respect to P, at constant frictional stress.
+    r"""Return a function that differentiates strength by pore pressure.
 
-    By the chain rule, the shift has its slope along a change of normal stress of -1 less that along
-    none.
+    Parameters
+    ----------
+    normal_stress_function : callable
+        Function ``(g, psis, p) -> (s - 1, slope)`` of the effective normal stress.
+    state_effect_function : callable
+        Function ``(g, ratio, change, p) -> (shift, slope)`` of the effect of stress on the state.
+
+    Returns
+    -------
+    callable
+        Function ``(g, psis, p)`` that returns the derivatives of strength and of the shift with
+        respect to pore pressure, at constant frictional stress.
+
+    Notes
+    -----
+    The derivative of strength is :math:`(\mu_* + g)/s^2` plus the derivative of the shift. By the
+    chain rule, the derivative of the shift is the difference between two slopes of the shift. The
+    first slope assumes a normal stress derivative of -1, and the second slope assumes a normal
+    stress derivative of 0.
     """
 
     def pressure_derivatives(g: float, psis: Numbers, p: Numbers) -> tuple[float, float]:
@@ -269,17 +446,54 @@ def build_pressure_derivatives_function(
 
 
 def zero_load_point_stress(states: Numbers, p: Numbers) -> float:
-    """K D where the load point moves steadily."""
+    """Return zero stress for a load point that moves steadily.
+
+    Parameters
+    ----------
+    states : tuple of float
+        States of the scene. They are ignored.
+    p : tuple of float
+        Parameters of the scene. They are ignored.
+
+    Returns
+    -------
+    float
+        Zero.
+    """
     return 0.0
 
 
 def load_point_stress(states: Numbers, p: Numbers) -> float:
-    """K D of an oscillation, which begins where D is 0."""
+    r"""Compute the shear stress due to an oscillation of the load point.
+
+    Parameters
+    ----------
+    states : tuple of float
+        States of the scene. The last element is the unknown of the loading.
+    p : tuple of float
+        Parameters of the scene.
+
+    Returns
+    -------
+    float
+        Shear stress :math:`K D` in :math:`\sigma_*`. It is zero at the start of the oscillation.
+    """
     return states[-1] - p[LOADING + 2]
 
 
 def wrap_with_load_point_stress(friction_function: Function) -> Function:
-    """A function ``(g, psis, p)`` of frictional stress, of g without `load_point_stress`."""
+    """Return a friction function that adds the stress of the load point.
+
+    Parameters
+    ----------
+    friction_function : callable
+        Function ``(g, psis, p)`` of the total frictional stress.
+
+    Returns
+    -------
+    callable
+        Function ``(g, psis, p)`` in which g excludes the stress of `load_point_stress`.
+    """
 
     def function_with_load_point_stress(g: float, psis: Numbers, p: Numbers) -> Numbers:
         return friction_function(g + load_point_stress(psis, p), psis, p)
@@ -288,7 +502,19 @@ def wrap_with_load_point_stress(friction_function: Function) -> Function:
 
 
 def build_load_point_derivatives_function(strength_function: Function) -> Function:
-    """Derivatives of strength and of the shift with respect to K D, which are those by g."""
+    """Return a function that differentiates strength by load point stress.
+
+    Parameters
+    ----------
+    strength_function : callable
+        Friction relation ``(g, psis, p) -> (strength, slope, shift, shift_slope)``.
+
+    Returns
+    -------
+    callable
+        Function ``(g, psis, p)`` that returns the derivatives of strength and of the shift with
+        respect to :math:`K D`. The derivatives are equal to the derivatives with respect to g.
+    """
 
     def load_point_derivatives(g: float, psis: Numbers, p: Numbers) -> tuple[float, float]:
         _value, slope, _shift, shift_slope = strength_function(g, psis, p)
@@ -301,32 +527,34 @@ def build_load_point_derivatives_function(strength_function: Function) -> Functi
 
 
 class FrictionTerms(NamedTuple):
-    """Friction as the parts of a scene state it (see their bases): functions, and how many states a
-    law has and what may change normal stress beside shear stress.
+    """Contributions of the parts of a scene to friction.
 
-    Attributes
+    Parameters
     ----------
     law_state_count : int
-        How many states the law has.
+        Number of states of the law.
     evolutions, steady_states : callable
-        Of the law.
+        Evolution and steady states of the law.
     state_effects : tuple of callable
-        By how much stress lowers the state: of normal stress, of the law, of shear stress.
+        Functions that compute the decrease of the state variable due to stress. The normal stress
+        condition, the law and the shear stress can each contribute a function.
     allows_reversed_slip : bool
-        Whether slip may reverse.
+        True if slip may reverse.
     normal_stress : callable or None
-        Of the case of normal stress.
+        Function of the normal stress condition. None if shear stress does not change normal stress.
     auxiliary_unknown_count : int
-        How many states end in P.
+        Number of unknowns of the fluid or the loading. The last unknown is the pore pressure, or
+        the stress of the load point.
     auxiliary_rates, auxiliary_steady_states : callable or None
-        Theirs: auxiliary rates, and what they are in steady sliding.
+        Rates and steady values of the auxiliary unknowns.
     boundary_pressure_index : int
-        Place of the pressure outside the fault, which a rig knows of, among all states and from
-        their end: -1 where P is that; 0 where there is none.
-    has_load_point_unknown : bool
-        Whether the unknown that stands last is shear stress K D, and no pressure.
-    state_indices_excluded_from_distance : tuple of int
-        Places, among all states, of those that do not count for the distance from steady sliding.
+        Negative index of the pressure outside the fault in the tuple of states. The index is -1 if
+        the pore pressure is the pressure outside the fault, and 0 if the loading imposes no
+        pressure.
+    has_load_point_unknown : bool, default: False
+        True if the last unknown is the shear stress :math:`K D` instead of a pressure.
+    state_indices_excluded_from_distance : tuple of int, optional
+        Indices of the states that do not contribute to the distance from steady sliding.
     """
 
     law_state_count: int
@@ -345,7 +573,18 @@ class FrictionTerms(NamedTuple):
 
 @cache
 def build_friction_functions(friction_terms: FrictionTerms) -> FrictionFunctions:
-    """Friction, made of what the parts of a scene say of it."""
+    """Build the friction functions from the contributions of all parts.
+
+    Parameters
+    ----------
+    friction_terms : FrictionTerms
+        Contributions of the parts of a scene.
+
+    Returns
+    -------
+    FrictionFunctions
+        Functions of friction. The result is cached.
+    """
     effect = (
         reduce(sum_state_effects, friction_terms.state_effects)
         if friction_terms.state_effects

@@ -1,4 +1,4 @@
-"""What is found once for each scene."""
+"""Caches for values that are computed once per scene."""
 
 from __future__ import annotations
 
@@ -14,11 +14,14 @@ if TYPE_CHECKING:
 else:
 
     class cached_attribute(cached_property):  # noqa: N801
-        """A cached property whose first reading takes no lock: that of Python before 3.12 costs a
-        microsecond, and a scene has a dozen.
+        """Cached property that does not acquire a lock.
+
+        Before Python 3.12, the first access to a `functools.cached_property` acquires a lock, which
+        takes about a microsecond. A scene has about a dozen cached properties.
         """
 
         def __get__(self, instance: Any, owner: type | None = None) -> Any:
+            """Return the value of the attribute, and cache the value."""
             if instance is None:
                 return self
             value = instance.__dict__[self.attrname] = self.func(instance)
@@ -28,12 +31,25 @@ else:
 def cached_per_scene(
     function: Callable[Concatenate[Any, P], T],
 ) -> Callable[Concatenate[Any, P], T]:
-    """A function of a scene that is called once for each scene and what is stated beside it."""
+    """Cache the results of a function in the scene that it is called with.
+
+    Parameters
+    ----------
+    function : callable
+        Function whose first argument is a scene. Its other arguments must be hashable.
+
+    Returns
+    -------
+    callable
+        Function that calls `function` once for each scene and each combination of the other
+        arguments.
+    """
 
     @wraps(function)
     def wrapper(scene: Any, /, *stated: P.args, **named: P.kwargs) -> T:
         made, key = scene.cache, (function, *stated, *named.values())
-        found = made.get(key)  # a key may take long to hash
+        # The key is used only once for a lookup, because hashing a key can be slow.
+        found = made.get(key)
         if found is None:
             found = made[key] = function(scene, *stated, **named)
         return found

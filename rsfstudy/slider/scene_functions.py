@@ -1,24 +1,37 @@
-"""The equations of motion of a scene, made of its friction (read that first) and its dynamics.
+r"""Equations of motion of a scene, built from its friction and its dynamics.
 
-Between ruptures spring stress f and the state Psi (or the states of a law that has several) are all
-that changes, against slip plus load point displacement, ds = (V + V_0) dt:
+`build_scene_functions` is the main function. Read ``friction`` first.
 
-    df/ds = K (V_0 - V)/(V + V_0),   dPsi/ds = V/(V + V_0) dPsi/d(delta),   dt/ds = 1/(V + V_0),
+Between ruptures, the unknowns are the spring stress :math:`f` and the states :math:`\Psi`. The
+independent variable :math:`\delta` is slip plus load point displacement,
+:math:`d\delta = (V + V_0) \, dt`:
 
-with x = ln(V/V_*) and x_0 = ln(V_0/V_*). How x follows from f and Psi is for the dynamics to say
-(see `dynamics`). In ruptures, the full equations tell all changes against inertial time.
+.. math::
 
-Both are integrated along the path in displacement, or inertial time, and ln V together,
-d(sigma)**2 = ds**2 + (dx/6)**2, with K (V_0 - V)/(V + V_0) - dPsi/ds over a for dx/ds. While
-contact heals, or slip comes to its end after a rupture, ln V falls as the logarithm of s or of what
-is left of the time: a step in either would have to be a part of all that has passed, or is to come;
-along the path it is a few units of ln V. Where slip is fastest, a path that bends within one unit
-of ln V would cost more steps than one that bends within six (four to twelve do as well).
+    \frac{df}{d\delta} = \frac{K (V_0 - V)}{V + V_0}, \qquad
+    \frac{d\Psi}{d\delta} = \frac{V}{V + V_0} \frac{d\Psi}{d(\mathrm{slip})}, \qquad
+    \frac{dt}{d\delta} = \frac{1}{V + V_0}.
 
-A rigid slider has its slip rate prescribed, and slip for a clock.
+The dynamics of the scene determine the slip rate from :math:`f` and :math:`\Psi`. In ruptures, the
+independent variable of the full equations is inertial time.
 
-Functions here take functions and return one of floats, as in `friction`; `build_scene_functions`
-puts all of them together.
+Both systems are integrated along the path length :math:`\lambda`, which combines displacement (or
+inertial time) with :math:`x = \ln(V/V_*)`:
+
+.. math::
+
+    d\lambda^2 = d\delta^2 + (dx/6)^2, \qquad
+    \frac{dx}{d\delta} \approx \frac{1}{a} \left[\frac{K (V_0 - V)}{V + V_0} -
+    \frac{d\Psi}{d\delta}\right].
+
+While contacts heal, :math:`\ln V` decreases as the logarithm of displacement. When slip ends after
+a rupture, :math:`\ln V` decreases as the logarithm of the remaining time. In both cases, a step in
+displacement or time would have to be a fraction of the elapsed or remaining interval. The same
+interval is only a few units of path length. The factor of 6 reduces the number of steps where slip
+is fastest, because the path bends over six units of :math:`\ln V` instead of one unit. Factors from
+4 to 12 give similar results.
+
+The slip rate of a rigid slider is prescribed, and slip is the independent variable.
 """
 
 from __future__ import annotations
@@ -43,16 +56,18 @@ from rsfstudy.slider.state_functions import (
 if TYPE_CHECKING:
     from rsfstudy.slider.dynamics import Dynamics
 
-#: ln(V/V_*) below which slip counts as stopped, 10^-290: a motion ends there if nothing loads it.
+#: Lower limit of ln(V/V_*), at 10^-290. A motion without loading ends at this slip rate.
 STOPPED_LOG_SLIP_RATE = -290.0 * math.log(10.0)
 
-#: Where slip is slower than V_0 by this in ln V, contact is stationary: the state then changes by
-#: less than exp(-100) of itself over all the slip there is.
+#: Largest difference between ln V_0 and ln V that the rates resolve. At lower slip rates the
+#: contact is stationary, because the remaining slip changes the state by a relative amount below
+#: exp(-100).
 STATIONARY_CONTACT_LOG_VELOCITY_RATIO = 100.0
 
-#: Units of ln V that are as long a way as slip of D_c, or inertial time.
+#: Change of ln V that is as long as one unit of displacement (D_c) or inertial time along the path.
 LOG_RATE_PER_PATH_LENGTH = 6.0
-#: From where on the square of a slant, and 1 more than that, are the same number.
+#: Largest slope whose square is computed. Adding 1 to the square of a larger slope has no effect in
+#: double precision.
 MAX_FINITE_PATH_SLOPE = 1e9
 
 
@@ -62,12 +77,30 @@ VelocityRatios = tuple[float, float, float]
 
 
 def velocity_ratios(log_slip_rate: float, p: Numbers) -> VelocityRatios:
-    """ln(V/V_*), V_0/V, and the fraction V/(V + V_0) that slip has in slip and load point
-    displacement together.
+    r"""Compute the log rate and the ratios of the two velocities.
 
-    Where slip is much slower than the load point, ln V is that of stationary contact: evolution per
-    unit slip may grow like 1/V there, so that its product with the fraction has a limit, whose
-    factors would underflow and overflow.
+    Parameters
+    ----------
+    log_slip_rate : float
+        Natural logarithm of the slip rate, :math:`\ln(V/V_*)`.
+    p : tuple of float
+        Parameters of the scene.
+
+    Returns
+    -------
+    log_slip_rate : float
+        Log rate :math:`\ln(V/V_*)`, limited from below.
+    load_ratio : float
+        Velocity ratio :math:`V_0/V`.
+    slip_fraction : float
+        Fraction of slip in the total displacement, :math:`V/(V + V_0)`.
+
+    Notes
+    -----
+    The lower limit of the log rate is the log rate of a stationary contact. At low slip rates, the
+    evolution per unit slip may grow in proportion to :math:`1/V`. The product of the evolution and
+    the slip fraction has a limit, but without the lower limit of the log rate the first factor
+    would overflow and the second factor would underflow.
     """
     least = p[LOG_LOAD_VELOCITY] - STATIONARY_CONTACT_LOG_VELOCITY_RATIO
     x = least if log_slip_rate < least else log_slip_rate
@@ -76,7 +109,20 @@ def velocity_ratios(log_slip_rate: float, p: Numbers) -> VelocityRatios:
 
 
 def time_per_displacement(velocity_ratio_values: VelocityRatios, p: Numbers) -> float:
-    """Time over slip and load point displacement together, ``1/(V + V_0)``."""
+    """Compute the derivative of time with respect to displacement.
+
+    Parameters
+    ----------
+    velocity_ratio_values : tuple of float
+        Output of `velocity_ratios`.
+    p : tuple of float
+        Parameters of the scene.
+
+    Returns
+    -------
+    float
+        Value of :math:`1/(V + V_0)` in units of :math:`1/V_*`.
+    """
     x, slower, fraction = velocity_ratio_values
     if p[LOAD_VELOCITY] != 0.0:
         return slower * fraction / abs(p[LOAD_VELOCITY])
@@ -84,7 +130,19 @@ def time_per_displacement(velocity_ratio_values: VelocityRatios, p: Numbers) -> 
 
 
 def displacement_per_path_length(path_slope: float) -> float:
-    """Displacement along a path that is so steep: its square may overflow where slip stops."""
+    """Compute the derivative of displacement with respect to path length.
+
+    Parameters
+    ----------
+    path_slope : float
+        Slope of the path. The square of the slope may overflow where slip stops, so the function
+        does not square very large slopes.
+
+    Returns
+    -------
+    float
+        Displacement per unit path length.
+    """
     if abs(path_slope) > MAX_FINITE_PATH_SLOPE:
         return 1.0 / abs(path_slope)
     return 1.0 / math.sqrt(1.0 + path_slope * path_slope)
@@ -99,10 +157,29 @@ def build_displacement_rate_function(
     *,
     allows_reversed_slip: bool,
 ) -> Function:
-    """``(state, p) -> (df/ds, dPsi/ds, velocity ratios)``.
+    r"""Return a function for the rates with respect to displacement.
 
-    Where slip may reverse, so may the load point, and displacement is the magnitudes of both
-    together: ``df/ds = K (V_0 - V)/(|V| + |V_0|)``, V having the sign of shear stress.
+    Parameters
+    ----------
+    friction_functions : FrictionFunctions
+        Friction of the scene.
+    force_balance_function : callable
+        Function ``(spring, psis, p)`` that returns :math:`\ln(V/V_*)`, the frictional stress and
+        the shift of the state.
+    allows_reversed_slip : bool
+        Whether slip and the load point may reverse.
+
+    Returns
+    -------
+    callable
+        Function ``(state, p)`` that returns the rate of the spring stress, the rates of the states
+        and the output of `velocity_ratios`.
+
+    Notes
+    -----
+    If slip may reverse, the displacement is the sum of the magnitudes of slip and load point
+    displacement, and :math:`df/d\delta = K (V_0 - V)/(|V| + |V_0|)`. The slip rate :math:`V` has
+    the sign of the shear stress.
     """
     evolutions, imposed, end = (
         friction_functions.evolutions,
@@ -131,8 +208,20 @@ def build_displacement_rate_function(
 def build_rate_functions_between_ruptures(
     friction_functions: FrictionFunctions, displacement_rate_function: Function
 ) -> tuple[Function, Function, Function]:
-    """``(state, p) -> tuple``: derivatives of f and the states against displacement, along the
-    path, and along the path with time as a passenger.
+    """Return the rate functions of a scene between ruptures.
+
+    Parameters
+    ----------
+    friction_functions : FrictionFunctions
+        Friction of the scene.
+    displacement_rate_function : callable
+        Output of `build_displacement_rate_function`.
+
+    Returns
+    -------
+    rates_by_displacement, rates_along_path, rates_along_path_with_time : callable
+        Functions ``(state, p) -> tuple`` that return the derivatives of the spring stress and the
+        states. The third function appends the derivative of time.
     """
     state_sum, times = (
         friction_functions.state_sum,
@@ -166,8 +255,20 @@ def build_rate_functions_between_ruptures(
 def build_rate_functions_in_rupture(
     friction_functions: FrictionFunctions, rupture_rate_function: Function
 ) -> tuple[Function, Function, Function]:
-    """``(state, p) -> tuple``: derivatives of the unknowns f, x, g and the states but the first
-    against inertial time, along the path in that and ln V, and so with that time as a passenger.
+    """Return the rate functions of a scene in ruptures.
+
+    Parameters
+    ----------
+    friction_functions : FrictionFunctions
+        Friction of the scene.
+    rupture_rate_function : callable
+        Function ``(state, p)`` that returns the derivatives with respect to inertial time.
+
+    Returns
+    -------
+    rates_by_time, rates_along_path, rates_along_path_with_time : callable
+        Functions ``(state, p) -> tuple`` that return the derivatives of f, x, g and all states
+        except the first. The third function appends the derivative of inertial time.
     """
     end = 2 + friction_functions.state_count
     times = build_tuple_scaling_function(end)
@@ -185,8 +286,23 @@ def build_rate_functions_in_rupture(
 
 
 def build_rigid_rate_function(friction_functions: FrictionFunctions) -> Function:
-    """``(state, p) -> tuple``: derivatives of g and the states but the first, against slip at the
-    ln(V/V_*) that stands last in `p`: ``strength'(g) dg = dPsi``.
+    r"""Return the rate function of a rigid slider.
+
+    Parameters
+    ----------
+    friction_functions : FrictionFunctions
+        Friction of the scene.
+
+    Returns
+    -------
+    callable
+        Function ``(state, p) -> tuple`` that returns the derivatives of g and all states except the
+        first with respect to slip. The log rate :math:`\ln(V/V_*)` is the last element of ``p``.
+
+    Notes
+    -----
+    At a constant slip rate, the friction relation gives
+    :math:`\mathrm{strength}'(g) \, dg = d\Psi`.
     """
     strength, states_at = friction_functions.strength, friction_functions.states_from_strength
     evolutions, contribution = friction_functions.evolutions, friction_functions.state_contribution
@@ -204,11 +320,24 @@ def build_rigid_rate_function(friction_functions: FrictionFunctions) -> Function
 
 
 def build_point_assembling_function(friction_functions: FrictionFunctions) -> Function:
-    """``(x, growth, forces, states, changes, shift, p) -> MotionPoint`` at x = ln(V/V_*), which
-    grows so: of forces, f and its change, g and its change; the states, their changes, and what
-    stress has taken from them.
+    r"""Return a function that computes all quantities of a point.
 
-    A rig reads the friction coefficient ``(mu_* + f)/s``, s outside the fault.
+    Parameters
+    ----------
+    friction_functions : FrictionFunctions
+        Friction of the scene.
+
+    Returns
+    -------
+    callable
+        Function ``(x, growth, forces, states, changes, shift, p) -> MotionPoint``. The arguments
+        are :math:`x = \ln(V/V_*)` and its derivative, a tuple of f, its derivative, g and its
+        derivative, the states and their derivatives, the shift of the state and the parameters.
+
+    Notes
+    -----
+    The friction coefficient that a laboratory rig measures is :math:`(\mu_* + f)/s`, with the
+    normal stress ratio :math:`s` outside the fault.
     """
     steady_states, state_sum, counted = (
         friction_functions.steady_states,
@@ -270,8 +399,29 @@ def build_point_function_between_ruptures(
     log_slip_rate_growth_function: Function,
     assemble_point: Function,
 ) -> Function:
-    """``(state, rates, p) -> MotionPoint`` between ruptures, where ``a dx = strength'(g) dg -
-    contribution`` says how g changes.
+    r"""Return a function that computes points between ruptures.
+
+    Parameters
+    ----------
+    friction_functions : FrictionFunctions
+        Friction of the scene.
+    force_balance_function : callable
+        Function ``(spring, psis, p)`` that returns :math:`\ln(V/V_*)`, the frictional stress and
+        the shift of the state.
+    log_slip_rate_growth_function : callable
+        Function ``(unknowns, rates, x, g, p)`` that returns the derivative of :math:`\ln V`.
+    assemble_point : callable
+        Output of `build_point_assembling_function`.
+
+    Returns
+    -------
+    callable
+        Function ``(state, rates, p) -> MotionPoint``.
+
+    Notes
+    -----
+    The derivative of g follows from the friction relation,
+    ``a dx = strength'(g) dg - contribution``.
     """
     strength, contribution, end = (
         friction_functions.strength,
@@ -294,7 +444,20 @@ def build_point_function_between_ruptures(
 def build_point_function_in_rupture(
     friction_functions: FrictionFunctions, assemble_point: Function
 ) -> Function:
-    """``(state, rates, p) -> MotionPoint`` of the full equations."""
+    """Return a function that computes points in ruptures.
+
+    Parameters
+    ----------
+    friction_functions : FrictionFunctions
+        Friction of the scene.
+    assemble_point : callable
+        Output of `build_point_assembling_function`.
+
+    Returns
+    -------
+    callable
+        Function ``(state, rates, p) -> MotionPoint`` for the full equations.
+    """
     strength, states_at, end = (
         friction_functions.strength,
         friction_functions.states_from_strength,
@@ -313,7 +476,21 @@ def build_point_function_in_rupture(
 def build_rigid_point_function(
     friction_functions: FrictionFunctions, assemble_point: Function
 ) -> Function:
-    """``(state, rates, p) -> MotionPoint`` of a rigid slider, whose f is g."""
+    """Return a function that computes points of a rigid slider.
+
+    Parameters
+    ----------
+    friction_functions : FrictionFunctions
+        Friction of the scene.
+    assemble_point : callable
+        Output of `build_point_assembling_function`.
+
+    Returns
+    -------
+    callable
+        Function ``(state, rates, p) -> MotionPoint``. The spring stress f of a rigid slider is
+        equal to the frictional stress g.
+    """
     strength, states_at = friction_functions.strength, friction_functions.states_from_strength
 
     def point(state: Numbers, rates: Numbers, p: Numbers) -> MotionPoint:
@@ -329,15 +506,20 @@ def build_rigid_point_function(
 
 
 class RegimeFunctions(NamedTuple):
-    """Equations of a scene between ruptures, or the full ones in them.
+    """Rates and points of a scene in one regime.
 
-    Attributes
+    Parameters
     ----------
-    rates_against_clock, rates_along_path, rates_along_path_with_time : callable
-        ``(state, p)``: derivatives of the unknowns against slip and load point displacement
-        together, or inertial time; along the path; and so with time as a passenger.
-    build_point_assembling_function : callable
-        ``(state, derivatives, p) -> MotionPoint``.
+    rates_against_clock : callable
+        Function ``(state, p)`` that returns the derivatives of the unknowns with respect to
+        displacement or inertial time.
+    rates_along_path : callable
+        Function ``(state, p)`` that returns the derivatives of the unknowns along the path.
+    rates_along_path_with_time : callable
+        Function ``(state, p)`` that returns the derivatives along the path, including the
+        derivative of time.
+    point_function : callable
+        Function ``(state, derivatives, p) -> MotionPoint``.
     """
 
     rates_against_clock: Function
@@ -347,20 +529,23 @@ class RegimeFunctions(NamedTuple):
 
 
 class SceneFunctions(NamedTuple):
-    """The functions of a scene.
+    r"""Functions of the equations of a scene.
 
-    Attributes
+    Parameters
     ----------
     friction_functions : FrictionFunctions
-        What they are made of.
+        Functions of friction.
     force_balance_function : callable
-        ``(spring, psis, p)``: ln(V/V_*), frictional stress and the state lost to stress, between
-        ruptures.
+        Function ``(spring, psis, p)`` that returns :math:`\ln(V/V_*)`, the frictional stress and
+        the shift of the state between ruptures.
     functions_between_ruptures : RegimeFunctions
+        Equations between ruptures.
     functions_in_rupture : RegimeFunctions or None
-        Where mass acts.
-    build_rigid_rate_function, build_rigid_point_function : callable
-        Those of a rigid slider, against slip.
+        Full equations. None if the scene has no inertia.
+    rigid_rate_function : callable
+        Rates of a rigid slider with respect to slip.
+    rigid_point_function : callable
+        Points of a rigid slider.
     """
 
     friction_functions: FrictionFunctions
@@ -377,7 +562,24 @@ def assemble_scene_functions(
     slip_rate_functions_builder: Callable[[FrictionFunctions], tuple[Function, Function]],
     rupture_rate_function_builder: Callable[[FrictionFunctions], Function] | None,
 ) -> SceneFunctions:
-    """The functions of a combination of parts; the same ones whenever it is asked for."""
+    """Assemble the functions of a combination of parts.
+
+    Parameters
+    ----------
+    friction_terms : FrictionTerms
+        Contributions of the parts to friction.
+    slip_rate_functions_builder : callable
+        Function that returns the force balance and the growth of the log rate for a
+        `FrictionFunctions` object.
+    rupture_rate_function_builder : callable or None
+        Function that returns the rates in ruptures for a `FrictionFunctions` object. None if the
+        dynamics have no inertia.
+
+    Returns
+    -------
+    SceneFunctions
+        Functions of the scene. The result is cached.
+    """
     made = build_friction_functions(friction_terms)
     balance, growth = slip_rate_functions_builder(made)
     against = build_displacement_rate_function(
@@ -394,14 +596,38 @@ def assemble_scene_functions(
 
 
 def state_indices_excluded_from_distance(scene: SceneView) -> tuple[int, ...]:
-    """Return the indices of states excluded from the distance from steady sliding."""
+    """Return the indices of states excluded from the distance.
+
+    Parameters
+    ----------
+    scene : Scene
+        Scene with states.
+
+    Returns
+    -------
+    tuple of int
+        Indices of the states that do not contribute to the distance from steady sliding.
+    """
     law, source = scene.parts.law, scene.pressure_source
     unknowns = enumerate(source.unknowns, start=law.state_count)
     return tuple(n for n, about in unknowns if about.name in source.excluded_from_distance)
 
 
 def build_scene_functions(scene: SceneView, dynamics: Dynamics | None = None) -> SceneFunctions:
-    """The functions of a scene, with other dynamics than its own where some are given."""
+    """Build the functions of a scene.
+
+    Parameters
+    ----------
+    scene : Scene
+        Scene to build the functions for.
+    dynamics : Dynamics, optional
+        Dynamics that replace the dynamics of the scene.
+
+    Returns
+    -------
+    SceneFunctions
+        Functions of the scene.
+    """
     law, stress, source = scene.parts.law, scene.parts.normal_stress, scene.pressure_source
     of_shear_stress = friction.shear_stress_effect_on_state if law.stress_dependence else None
     effects = stress.state_effect, law.state_effect, of_shear_stress

@@ -11,61 +11,83 @@ from typing import Any, Protocol
 
 
 class SceneView(Protocol):
-    """Scene, as the parts and the equations see it. The attributes are those of ``Scene``."""
+    """Attributes of a scene that the parts and the equations use.
+
+    The attributes have the same meaning as the attributes of ``Scene``.
+    """
 
     @property
-    def parts(self) -> Any: ...
+    def parts(self) -> Any:
+        """Parts of the scene, by slot."""
 
     @property
-    def mu_star(self) -> float: ...
+    def mu_star(self) -> float:
+        """Friction coefficient at the reference velocity."""
 
     @property
-    def under_steady_loading(self) -> SceneView: ...
+    def under_steady_loading(self) -> SceneView:
+        """Copy of the scene with a load point that moves steadily."""
 
     @property
-    def cache(self) -> dict[tuple[Any, ...], Any]: ...
+    def cache(self) -> dict[tuple[Any, ...], Any]:
+        """Cache of functions decorated with ``cached_per_scene``."""
 
     @property
-    def parameter_values(self) -> tuple[float, ...]: ...
+    def parameter_values(self) -> tuple[float, ...]:
+        """Parameter tuple ``p`` of the equations."""
 
     @property
-    def friction_parameter_values(self) -> tuple[float, ...]: ...
+    def friction_parameter_values(self) -> tuple[float, ...]:
+        """Parameter tuple ``p`` with NaN for the spring and the load point."""
 
     @property
-    def equation_functions(self) -> Any: ...
+    def equation_functions(self) -> Any:
+        """Functions of the equations of motion."""
 
     @property
-    def dynamics(self) -> Any: ...
+    def dynamics(self) -> Any:
+        """Dynamics of the slider."""
 
     @property
-    def pressure_source(self) -> Any: ...
+    def pressure_source(self) -> Any:
+        """Fluid, loading, or combination of both with auxiliary unknowns."""
 
     @property
-    def has_mass(self) -> bool: ...
+    def has_mass(self) -> bool:
+        """True if the slider has inertia."""
 
     @property
-    def state_count(self) -> int: ...
+    def state_count(self) -> int:
+        """Number of states, including the auxiliary unknowns."""
 
     @property
-    def a(self) -> float: ...
+    def a(self) -> float:
+        """Parameter of the direct effect."""
 
     @property
-    def b(self) -> float: ...
+    def b(self) -> float:
+        """Parameter of the evolution effect."""
 
     @property
-    def stiffness(self) -> float: ...
+    def stiffness(self) -> float:
+        """Stiffness in units of sigma_*/D_c."""
 
     @property
-    def load_velocity(self) -> float: ...
+    def load_velocity(self) -> float:
+        """Load point velocity in units of V_*."""
 
     @property
-    def log_load_velocity(self) -> float: ...
+    def log_load_velocity(self) -> float:
+        """Natural logarithm of the load point velocity in units of V_*."""
 
     @property
-    def imposed_normal_stress(self) -> float: ...
+    def imposed_normal_stress(self) -> float:
+        """Imposed change of normal stress in units of sigma_*."""
 
     @property
-    def inertial_time(self) -> float: ...
+    def inertial_time(self) -> float:
+        """Inertial time T/(2 pi) in units of D_c/V_*."""
 
     @property
-    def critical_stiffness(self) -> float: ...
+    def critical_stiffness(self) -> float:
+        """Critical stiffness in units of sigma_*/D_c."""

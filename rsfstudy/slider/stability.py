@@ -1,25 +1,38 @@
-"""Linear stability of steady sliding, from the friction relation of a scene alone.
+r"""Linear stability of steady sliding, computed from the friction relation.
 
-A small change of slip that goes as exp(p s), s being slip over D_c, changes frictional stress by
-G(p) times itself. With D = strength', S = shift', and the slopes M, E_x and E_s of the evolution of
-the states with respect to one another, to x and to the shift,
+`critical_stiffness` and `largest_linear_growth_rate` are the main functions. They work for any
+combination of parts.
 
-    [D - S 1.(p - M)^-1 E_s] dg = p [a + 1.(p - M)^-1 E_x] du.
+Consider a small perturbation of slip, :math:`du`, that grows as :math:`\exp(p s)` with slip
+:math:`s` in units of :math:`D_c`. The perturbation of the frictional stress is
+:math:`dg = G(p) \, du` with
 
-Pore pressure P, the last state where there is a fluid, takes -dstrength/dP from a x in the place of
-the 1 of a state of the law, and porosity nothing; P moves the shift too, so that E_s dshift/dP is
-part of its column of M.
+.. math::
 
-Normal stress that something outside changes by -dP acts on friction and on the shift alone: with
-the slopes F and S_P of strength and shift with respect to P, friction changes by
+    G(p) = \frac{p [a + 1^T (p - M)^{-1} E_x]}{D - S \, 1^T (p - M)^{-1} E_s}.
 
-    -[F - S_P 1.(p - M)^-1 E_s] dP / [D - S 1.(p - M)^-1 E_s]
+Here :math:`D` and :math:`S` are the derivatives of strength and of the shift with respect to
+frictional stress. The matrix :math:`M` and the vectors :math:`E_x` and :math:`E_s` contain the
+derivatives of the state evolution with respect to the states, to :math:`x = \ln V` and to the
+shift. The sum of the states of the law acts on friction, so the vector of weights is :math:`1^T`.
+If the scene has a fluid, the weight of the pore pressure :math:`P`, the last state, is minus the
+derivative of strength with respect to :math:`P`, and the weight of porosity is 0. Because the
+pressure also changes the shift, the last column of :math:`M` includes the product of :math:`E_s`
+and the derivative of the shift with respect to :math:`P`.
 
-beside G(p) du.
+If an external load changes the normal stress by :math:`-dP`, the frictional stress changes by an
+additional term,
 
-Spring, waves and mass balance it where K (1 + w**2 p**2) + eta V p + G(p) = 0, w being
-V T/(2 pi D_c). The critical stiffness is the K at which p is imaginary. Nothing here depends on
-which parts the scene has.
+.. math::
+
+    -\frac{F - S_P \, 1^T (p - M)^{-1} E_s}{D - S \, 1^T (p - M)^{-1} E_s} \, dP,
+
+in which :math:`F` and :math:`S_P` are the derivatives of strength and of the shift with respect to
+:math:`P`.
+
+The perturbation satisfies the force balance if :math:`K (1 + w^2 p^2) + \eta V p + G(p) = 0` with
+:math:`w = V T/(2 \pi D_c)`. The critical stiffness is the stiffness :math:`K` for which :math:`p`
+is imaginary.
 """
 
 from __future__ import annotations
@@ -42,13 +55,14 @@ from rsfstudy.slider.scene_caching import cached_per_scene
 from rsfstudy.slider.scene_view import SceneView
 from rsfstudy.slider.steady_state import SteadySliding, steady_sliding
 
-#: Critical stiffness over a, and growth per slip in D_c, that rounding leaves where there is none.
+#: Rounding errors of a critical stiffness of zero, divided by a, and of a growth rate of zero per
+#: unit slip in D_c.
 _MIN_CRITICAL_STIFFNESS_OVER_A, _GROWTH_RATE_FLOOR = 1e-12, 1e-9
-#: Rounding error of growth rates, relative to the largest.
+#: Rounding error of the growth rates, relative to the largest growth rate.
 _RELATIVE_ROOT_ROUNDING_ERROR = 64.0 * 2.0**-52
 
-#: Part of the next coefficient below which the one of mass is small, and steps of Newton from the
-#: growth rates without it.
+#: Ratio of the leading coefficient to the next coefficient below which the mass is treated as
+#: small, and the number of Newton iterations that follow.
 _SMALL_MASS_RATIO, _NEWTON_STEPS = 1e-6, 2
 
 PolynomialCoefficients = list[float]
@@ -57,27 +71,35 @@ PolynomialCoefficients = list[float]
 def critical_stiffness(
     scene: SceneView, log_slip_rate: float, *, quasi_static: bool = False
 ) -> float:
-    """Critical stiffness ``k_cr D_c/sigma_*`` of steady sliding at ln(V/V_*).
+    r"""Compute the critical stiffness of steady sliding at a slip rate.
 
     Parameters
     ----------
     scene : Scene
-        Its own stiffness does not matter.
+        Scene with friction parameters. The stiffness of the scene is not used.
     log_slip_rate : float
-        ln(V/V_*).
-    quasi_static : bool
-        Leave mass and radiation out.
+        Natural logarithm of the slip rate, :math:`\ln(V/V_*)`.
+    quasi_static : bool, default: False
+        Whether to ignore inertia and radiation damping.
 
     Returns
     -------
     float
-        Zero where sliding is stable at every stiffness, ``math.inf`` where it is unstable at every
-        stiffness, and NaN where there is no steady sliding.
+        Critical stiffness :math:`k_{cr} D_c/\sigma_*`. The result is 0 if sliding is stable at
+        every stiffness, ``math.inf`` if sliding is unstable at every stiffness, and NaN if steady
+        sliding does not exist at this slip rate.
+
+    Notes
+    -----
+    For one state variable without inertia,
+
+    .. math::
+
+        k_{cr} = \frac{(b - a) \sigma_{ss}}{D_c [1 - \cot\phi \, (\mu_{ss} - \alpha)]}.
 
     References
     ----------
-    Dieterich and Linker (1992), Geophys. Res. Lett. 19, 1691-1694, for one state variable without
-    mass: ``(b - a) sigma_ss / (D_c [1 - cot(phi) (mu_ss - alpha)])``.
+    Dieterich and Linker (1992), Geophys. Res. Lett. 19, 1691-1694.
     """
     scene = scene.under_steady_loading
     steady = steady_sliding(scene, log_slip_rate)
@@ -86,17 +108,35 @@ def critical_stiffness(
     around = _linearise_force_balance(scene, steady, quasi_static=quasi_static)
     crossings = _find_critical_stiffnesses(around, _MIN_CRITICAL_STIFFNESS_OVER_A * scene.a)
     critical = crossings[-1] if crossings else 0.0
-    # of one state drained, no perturbation grows beyond the only crossing
+    # With one state and constant pore pressure, no perturbation grows above the only crossing.
     if scene.state_count == 1 or critical == math.inf:
         return critical
     return math.inf if _is_unstable_at_stiffness(around, 2.0 * critical or scene.a) else critical
 
 
 def all_critical_stiffnesses(scene: SceneView, log_slip_rate: float) -> list[float]:
-    """Every stiffness over sigma_*/D_c at which small changes of steady sliding come to grow or to
-    decay, or more of them grow, from the smallest up: several states may have more than one.
+    r"""Compute all stiffnesses at which the stability of sliding changes.
 
-    Those K at which a root of ``K (1 + w**2 p**2) + eta V p + G(p) = 0`` is imaginary.
+    A scene with several states may have more than one critical stiffness. At each critical
+    stiffness, the number of growing perturbations changes.
+
+    Parameters
+    ----------
+    scene : Scene
+        Scene with friction parameters. The stiffness of the scene is not used.
+    log_slip_rate : float
+        Natural logarithm of the slip rate, :math:`\ln(V/V_*)`.
+
+    Returns
+    -------
+    list of float
+        Critical stiffnesses in units of :math:`\sigma_*/D_c`, in ascending order. The list is empty
+        if steady sliding does not exist at this slip rate.
+
+    Notes
+    -----
+    The critical stiffnesses are the values of :math:`K` at which the equation
+    :math:`K (1 + w^2 p^2) + \eta V p + G(p) = 0` has an imaginary root.
     """
     scene = scene.under_steady_loading
     steady = steady_sliding(scene, log_slip_rate)
@@ -110,7 +150,7 @@ def all_critical_stiffnesses(scene: SceneView, log_slip_rate: float) -> list[flo
 
 
 class _LinearisedForceBalance(NamedTuple):
-    """Terms that balance a spring around steady sliding: friction above/below, waves and mass."""
+    """Coefficients of the linearised force balance around steady sliding."""
 
     friction_response_numerator: PolynomialCoefficients
     friction_response_denominator: PolynomialCoefficients
@@ -137,10 +177,12 @@ def _linearise_force_balance(
 def _find_critical_stiffnesses(
     linearised_balance: _LinearisedForceBalance, min_stiffness: float
 ) -> list[float]:
-    """Stiffnesses above the least at which a growth rate is imaginary, from the smallest up;
-    ``math.inf`` for one that mass leaves none for.
+    """Find all stiffnesses above a minimum with an imaginary growth rate.
+
+    The result is in ascending order. If inertia leaves no finite stiffness for a frequency, the
+    result contains ``math.inf``.
     """
-    # at p = i omega, as polynomials in omega**2
+    # For p = i omega, these polynomials depend on omega**2 only.
     (a_even, a_odd), (b_even, b_odd) = (
         _split_even_and_odd_powers(linearised_balance.friction_response_numerator),
         _split_even_and_odd_powers(linearised_balance.friction_response_denominator),
@@ -169,7 +211,7 @@ def _find_critical_stiffnesses(
 def _compute_growth_rates(
     linearised_balance: _LinearisedForceBalance, stiffness: float
 ) -> np.ndarray:
-    """Growth rates p at a stiffness, the fastest first."""
+    """Compute the growth rates p at a stiffness, largest real part first."""
     spring_stress = [
         stiffness,
         linearised_balance.radiation_damping,
@@ -188,8 +230,11 @@ def _compute_growth_rates(
 
 
 def _find_roots_if_one_is_distant(polynomial: PolynomialCoefficients) -> np.ndarray:
-    """Roots of which a small mass makes one, 1e20 of the others: next to it they would lose digits,
-    and are found without it.
+    """Find the roots of a polynomial with one root of large magnitude.
+
+    A small mass makes one root about 1e20 times larger. If all roots were computed together, the
+    other roots would lose digits. The function computes the other roots without the leading
+    coefficient and improves all roots by Newton iterations.
     """
     falling = polynomial[::-1]
     roots = np.append(np.roots(falling[1:]), -falling[1] / falling[0]).astype(complex)
@@ -210,23 +255,27 @@ def linear_friction_response(
     steady_state: SteadySliding,
     evolution_derivatives: StateEvolutionDerivatives | None = None,
 ) -> tuple[PolynomialCoefficients, PolynomialCoefficients]:
-    """Compute the response of friction to small changes of slip in steady sliding.
-
-    The response is the rational function ``G(p) = p above(p)/below(p)``. See the module docstring
-    for its definition, ``G(p) = p [a + 1.(p - M)^-1 E_x]/[D - S 1.(p - M)^-1 E_s]``. For a law with
-    one state at constant normal stress, ``G(p) = p [a - b/(p + 1)]``, in units of sigma_*/D_c.
+    r"""Compute the response of friction to small perturbations of slip.
 
     Parameters
     ----------
     scene : Scene
+        Scene with friction parameters.
     steady_state : SteadySliding
-    evolution_derivatives : LawSlopes, optional
-        Derivatives of the state evolution. By default the derivatives are computed.
+        Steady sliding of the scene.
+    evolution_derivatives : StateEvolutionDerivatives, optional
+        Derivatives of the state evolution. By default the function computes the derivatives.
 
     Returns
     -------
     above, below : list of float
         Coefficients of the numerator and denominator polynomials, in ascending order.
+
+    Notes
+    -----
+    The response is the rational function :math:`G(p) = p \, \mathrm{above}(p)/\mathrm{below}(p)`,
+    which the module docstring defines. For a law with one state at constant normal stress,
+    :math:`G(p) = p [a - b/(p + 1)]` in units of :math:`\sigma_*/D_c`.
 
     References
     ----------
@@ -255,7 +304,10 @@ def linear_friction_response(
 def _state_weights_in_log_slip_rate(
     scene: SceneView, steady_state: SteadySliding
 ) -> tuple[list[float], float]:
-    """Change of a ln V by each state, and by how much the last moves the shift."""
+    """Return the weight of each state in the friction relation.
+
+    The second returned value is the derivative of the shift with respect to the last state.
+    """
     law, fluid = scene.parts.law.state_count, len(scene.parts.fluid.unknowns)
     if not fluid:
         return [1.0] * law, 0.0
@@ -271,8 +323,22 @@ def _dot_product(first: Sequence[float], second: Sequence[float]) -> float:
 
 
 def compute_matrix_resolvent(matrix: Matrix) -> tuple[PolynomialCoefficients, list[Matrix]]:
-    """Characteristic polynomial of a matrix M, and the adjugate of p - M, whose quotient is the
-    inverse of p - M: coefficients from the constant one up (Faddeev and LeVerrier).
+    """Compute the resolvent of a matrix by the Faddeev-LeVerrier algorithm.
+
+    The resolvent :math:`(p - M)^{-1}` is the adjugate matrix of :math:`p - M`, divided by the
+    characteristic polynomial of :math:`M`.
+
+    Parameters
+    ----------
+    matrix : list of list of float
+        Square matrix :math:`M`.
+
+    Returns
+    -------
+    coefficients : list of float
+        Coefficients of the characteristic polynomial, in ascending order.
+    adjugate : list of list of list of float
+        Matrix coefficients of the adjugate matrix, in ascending order.
     """
     places = range(len(matrix))
     coefficients, terms = [1.0], [[[float(i == j) for j in places] for i in places]]
@@ -287,26 +353,29 @@ def compute_matrix_resolvent(matrix: Matrix) -> tuple[PolynomialCoefficients, li
 
 
 def linear_growth_rates(scene: SceneView, log_slip_rate: float) -> np.ndarray:
-    """Growth rates p of small changes of steady sliding at the stiffness of the scene.
-
-    The roots of ``K (1 + w**2 p**2) + eta V p + G(p) = 0`` with w = V T/(2 pi D_c). Small changes
-    go as exp(p V t/D_c).
+    r"""Compute the growth rates of small perturbations of steady sliding.
 
     Parameters
     ----------
     scene : Scene
+        Scene with a stiffness.
     log_slip_rate : float
-        ln(V/V_*).
+        Natural logarithm of the slip rate, :math:`\ln(V/V_*)`.
 
     Returns
     -------
     ndarray of complex
-        Per slip in D_c, the fastest first.
+        Growth rates per unit slip in :math:`D_c`, sorted by descending real part.
 
     Raises
     ------
     ValueError
-        Where there is no steady sliding.
+        If steady sliding does not exist at this slip rate.
+
+    Notes
+    -----
+    The growth rates are the roots of :math:`K (1 + w^2 p^2) + \eta V p + G(p) = 0` with
+    :math:`w = V T/(2 \pi D_c)`. A small perturbation varies as :math:`\exp(p V t/D_c)`.
     """
     scene = scene.under_steady_loading
     return _compute_growth_rates(
@@ -316,12 +385,12 @@ def linear_growth_rates(scene: SceneView, log_slip_rate: float) -> np.ndarray:
 
 
 class GrowthRate(NamedTuple):
-    """Largest growth rate of small perturbations of steady sliding, per slip in D_c.
+    """Largest growth rate of small perturbations of steady sliding.
 
-    Attributes
+    Parameters
     ----------
     value : float
-        Real part of the growth rate.
+        Real part of the growth rate, per unit slip in :math:`D_c`.
     error : float
         Error estimate of the real part.
     """
@@ -342,21 +411,21 @@ class GrowthRate(NamedTuple):
 
 @cached_per_scene
 def largest_linear_growth_rate(scene: SceneView, log_slip_rate: float) -> GrowthRate | None:
-    """Compute the largest growth rate of small perturbations of steady sliding.
-
-    The growth rate is computed at the stiffness of the scene. Its error estimate includes the
-    errors of the derivatives of the law and the rounding errors of the roots.
+    r"""Compute the largest growth rate of perturbations of steady sliding.
 
     Parameters
     ----------
     scene : Scene
+        Scene with a stiffness.
     log_slip_rate : float
-        ln(V/V_*).
+        Natural logarithm of the slip rate, :math:`\ln(V/V_*)`.
 
     Returns
     -------
     GrowthRate or None
-        None if steady sliding does not exist at this slip rate.
+        Growth rate with its error estimate, which includes the errors of the derivatives of the law
+        and the rounding errors of the roots. None if steady sliding does not exist at this slip
+        rate.
     """
     scene = scene.under_steady_loading
     steady = steady_sliding(scene, log_slip_rate)
@@ -375,7 +444,8 @@ def largest_linear_growth_rate(scene: SceneView, log_slip_rate: float) -> Growth
     changes = [
         abs(perturbed_growth_rates(part)[0].real - found[0].real) for part in (error, -error)
     ]
-    # the root that a small mass sends far off is found apart from the others
+    # A small mass makes one root very large. The rounding error excludes this root, because it is
+    # computed separately.
     sizes = np.sort(np.abs(found))[: -1 if scene.has_mass else None]
     rounding = _RELATIVE_ROOT_ROUNDING_ERROR * float(sizes.max(initial=0.0))
     return GrowthRate(float(found[0].real), float(max(changes)) + rounding + _GROWTH_RATE_FLOOR)
@@ -384,25 +454,42 @@ def largest_linear_growth_rate(scene: SceneView, log_slip_rate: float) -> Growth
 def spring_response_to_normal_stress(
     scene: SceneView, log_slip_rate: float, angular_frequency: float
 ) -> complex:
-    """Spring stress over imposed normal stress in small oscillations around steady sliding, of a
-    scene whose loading goes on changing that.
+    r"""Compute the response of the spring stress to imposed normal stress.
 
-    At constant shear stress and with the laws that rest at Theta = -b ln(V/V_*) it is ``K [mu + (mu
-    - alpha) p]/[a p**2 + (K - b + a) p + K]``, with p = i omega D_c/V and stress over sigma, which
-    has its resonance at omega D_c/V = sqrt((b - a)/a) as K falls to its critical value.
+    The function considers small oscillations of the normal stress around steady sliding. The
+    loading of the scene must impose normal stress or pore pressure.
 
     Parameters
     ----------
     scene : Scene
+        Scene whose loading changes the normal stress.
     log_slip_rate : float
-        ln(V/V_*).
+        Natural logarithm of the slip rate, :math:`\ln(V/V_*)`.
     angular_frequency : float
-        omega D_c/V_*.
+        Angular frequency :math:`\omega D_c/V_*`.
+
+    Returns
+    -------
+    complex
+        Ratio of the amplitudes of spring stress and normal stress.
 
     Raises
     ------
     ValueError
-        Where there is no steady sliding.
+        If steady sliding does not exist at this slip rate.
+
+    Notes
+    -----
+    For laws with :math:`\Theta = -b \ln(V/V_*)` in steady sliding and normal stress that does not
+    depend on shear stress, the response is
+
+    .. math::
+
+        \frac{K [\mu + (\mu - \alpha) p]}{a p^2 + (K - b + a) p + K}, \qquad
+        p = \frac{i \omega D_c}{V},
+
+    with stress in units of :math:`\sigma`. As :math:`K` decreases to its critical value, the
+    response has a resonance at :math:`\omega D_c/V = \sqrt{(b - a)/a}`.
     """
     still = scene.under_steady_loading
     steady = _require_steady_sliding(still, log_slip_rate)
@@ -433,7 +520,7 @@ def spring_response_to_normal_stress(
 
 
 def _require_steady_sliding(scene: SceneView, log_slip_rate: float) -> SteadySliding:
-    """Steady sliding, which there must be."""
+    """Return steady sliding, or raise ``ValueError`` if it does not exist."""
     steady = steady_sliding(scene, log_slip_rate)
     if steady is None:
         raise ValueError(f"there is no steady sliding at ln(V/V_*) = {log_slip_rate:g}")
@@ -443,7 +530,10 @@ def _require_steady_sliding(scene: SceneView, log_slip_rate: float) -> SteadySli
 def _split_even_and_odd_powers(
     polynomial: PolynomialCoefficients,
 ) -> tuple[PolynomialCoefficients, PolynomialCoefficients]:
-    """Real part, and imaginary part over omega, of a polynomial at i omega, in omega**2."""
+    """Return the real part and the imaginary part of a polynomial at i omega.
+
+    Both parts are polynomials in omega**2. The imaginary part is divided by omega.
+    """
     even = [x * (-1.0) ** n for n, x in enumerate(polynomial[0::2])]
     odd = [x * (-1.0) ** n for n, x in enumerate(polynomial[1::2])]
     return even, odd

@@ -1,11 +1,12 @@
-"""Steady sliding, from the friction relation of a scene alone.
+r"""Steady sliding, computed from the friction relation of a scene.
 
-At a steady ln(V/V_*) = x the states Psi_i rest where their law says, -b x + shift(g) for most, so
-that frictional stress g solves
+In steady sliding at :math:`x = \ln(V/V_*)`, the evolution law determines the states :math:`\Psi_i`.
+For most laws with one state, :math:`\Psi = -b x + \mathrm{shift}(g)`. The frictional stress
+:math:`g` is the solution of
 
-    strength(g) = a x + sum of Psi_i.
+.. math:: \mathrm{strength}(g) = a x + \sum_i \Psi_i.
 
-Nothing here depends on which parts the scene has.
+The functions of this module work for any combination of parts.
 """
 
 from __future__ import annotations
@@ -21,23 +22,26 @@ from rsfstudy.slider.parts import Numbers
 from rsfstudy.slider.scene_caching import cached_per_scene
 from rsfstudy.slider.scene_view import SceneView
 
-#: Deviation of frictional stress, over sigma_*, beyond which none counts as steady.
+#: Largest deviation of frictional stress, in units of sigma_*, that the root search considers.
 _MAX_STEADY_FRICTIONAL_STRESS = 1e9
-#: ln(V/V_*) below which steady sliding is not followed.
+#: Smallest ln(V/V_*) that the search for a minimum steady slip rate considers.
 _MIN_LOG_SLIP_RATE = -1e6
 
 
 @dataclass(frozen=True)
 class SteadySliding:
-    """Steady sliding at ln(V/V_*) = `log_slip_rate`.
+    r"""Stresses and states of steady sliding at one slip rate.
 
-    Attributes
+    Parameters
     ----------
     log_slip_rate : float
-    frictional_stress, spring_stress : float
-        Deviations of frictional stress and of spring stress from tau_*, over sigma_*.
+        Natural logarithm of the slip rate, :math:`\ln(V/V_*)`.
+    frictional_stress : float
+        Deviation of frictional stress from :math:`\tau_*`, in units of :math:`\sigma_*`.
+    spring_stress : float
+        Deviation of spring stress from :math:`\tau_*`, in units of :math:`\sigma_*`.
     states : tuple of float
-        States freed of stress.
+        States :math:`\Psi_i`, from which the effect of stress is removed.
     """
 
     log_slip_rate: float
@@ -48,17 +52,26 @@ class SteadySliding:
 
 @cached_per_scene
 def steady_sliding(scene: SceneView, log_slip_rate: float) -> SteadySliding | None:
-    """Steady sliding of a scene at ln(V/V_*), found once; None where no stress is as weak or as
-    strong.
-
-    Frictional stress g solves ``strength(g) = a ln(V/V_*) + sum of Psi_i``, and spring stress is
-    that and what waves radiate.
+    r"""Compute steady sliding of a scene at a slip rate.
 
     Parameters
     ----------
     scene : Scene
+        Scene with friction parameters.
     log_slip_rate : float
-        ln(V/V_*).
+        Natural logarithm of the slip rate, :math:`\ln(V/V_*)`.
+
+    Returns
+    -------
+    SteadySliding or None
+        Stresses and states. None if steady friction does not reach the required value at any
+        stress.
+
+    Notes
+    -----
+    The frictional stress :math:`g` solves
+    :math:`\mathrm{strength}(g) = a \ln(V/V_*) + \sum_i \Psi_i`. The spring stress is the sum of the
+    frictional stress and the stress that radiation damping adds.
     """
     friction = frictional_stress_for_friction(
         scene, steady_friction_minus_reference(scene, log_slip_rate)
@@ -73,15 +86,23 @@ def steady_sliding(scene: SceneView, log_slip_rate: float) -> SteadySliding | No
 
 
 def steady_friction_minus_reference(scene: SceneView, log_slip_rate: float) -> float:
-    """Steady friction coefficient at a slip rate, less mu_*.
-
-    ``mu_ss - mu_* = (a - b) ln(V/V_*)`` by most laws.
+    r"""Compute the steady friction coefficient minus its reference value.
 
     Parameters
     ----------
     scene : Scene
+        Scene with friction parameters.
     log_slip_rate : float
-        ln(V/V_*).
+        Natural logarithm of the slip rate, :math:`\ln(V/V_*)`.
+
+    Returns
+    -------
+    float
+        Difference :math:`\mu_{ss} - \mu_*`.
+
+    Notes
+    -----
+    For most laws, :math:`\mu_{ss} - \mu_* = (a - b) \ln(V/V_*)`.
 
     References
     ----------
@@ -96,18 +117,26 @@ def steady_friction_minus_reference(scene: SceneView, log_slip_rate: float) -> f
 def frictional_stress_for_friction(
     scene: SceneView, friction_minus_reference: float
 ) -> float | None:
-    """Deviation of frictional stress from tau_*, over sigma_*, at which the friction coefficient is
-    mu_* + `excess`; None where it never is.
-
-    ``(mu_* + g)/s(g) = mu_* + excess``, s being the normal stress ratio; where normal stress
-    follows shear stress there is none below phi = atan(mu_ss), eq. 9 of
-    doi:10.1007/s11589-014-0098-4.
+    r"""Compute the frictional stress for a given friction coefficient.
 
     Parameters
     ----------
     scene : Scene
+        Scene with friction parameters.
     friction_minus_reference : float
-        Friction coefficient less mu_*.
+        Friction coefficient minus :math:`\mu_*`.
+
+    Returns
+    -------
+    float or None
+        Deviation of frictional stress from :math:`\tau_*`, in units of :math:`\sigma_*`. None if
+        the friction coefficient does not reach the given value at any stress.
+
+    Notes
+    -----
+    The stress :math:`g` solves :math:`(\mu_* + g)/s(g) = \mu`, with the normal stress ratio
+    :math:`s`. If normal stress follows shear stress, the equation has no solution for loading
+    angles :math:`\phi < \arctan \mu_{ss}` (eq. 9 of doi:10.1007/s11589-014-0098-4).
     """
     relation = build_friction_relation(scene)
 
@@ -123,19 +152,29 @@ def frictional_stress_for_friction(
 def frictional_stress_after_jump(
     scene: SceneView, strength: float, states: Numbers = ()
 ) -> float | None:
-    """Deviation of frictional stress from tau_*, over sigma_*, just after a sudden change; None
-    where there is none.
-
-    The states freed of stress stay as they are, so that ``strength(g) = excess`` with ``excess = a
-    ln(V/V_*) + sum of Psi_i`` (eqs. 12 and 13 of doi:10.1007/s11589-014-0098-4).
+    r"""Compute the frictional stress immediately after a sudden change.
 
     Parameters
     ----------
     scene : Scene
+        Scene with friction parameters.
     strength : float
-        What strength becomes, over sigma_*.
+        Strength after the change, in units of :math:`\sigma_*`.
     states : tuple of float, optional
-        States freed of stress, by which pore pressure is told; else that of steady sliding.
+        States :math:`\Psi_i`, which determine the pore pressure. By default the pore pressure is
+        the pore pressure of steady sliding.
+
+    Returns
+    -------
+    float or None
+        Deviation of frictional stress from :math:`\tau_*`, in units of :math:`\sigma_*`. None if no
+        frictional stress has the given strength.
+
+    Notes
+    -----
+    The states :math:`\Psi_i` do not change during a sudden change, so that
+    :math:`\mathrm{strength}(g) = a \ln(V/V_*) + \sum_i \Psi_i` (eqs. 12 and 13 of
+    doi:10.1007/s11589-014-0098-4).
     """
     relation = build_friction_relation(scene, states)
     return _find_root_of_increasing_function(
@@ -144,16 +183,22 @@ def frictional_stress_after_jump(
 
 
 def _min_frictional_stress(scene: SceneView) -> float:
-    """Deviation of frictional stress above which slip is forward and normal stress positive."""
+    """Return the frictional stress above which slip is forward.
+
+    Normal stress is positive above this limit.
+    """
     weakest = scene.parts.normal_stress.min_frictional_stress(scene)
-    # where slip may reverse, strength grows with stress of either sign
+    # Strength increases with stress of either sign if slip may reverse.
     return max(weakest, -scene.mu_star) if scene.parts.law.regularised else weakest
 
 
 def _find_root_of_increasing_function(
     increasing_function: Callable[[float], float], initial_guess: float, lower_bound: float
 ) -> float | None:
-    """Zero of a growing function, above `lowest`; None where there is none."""
+    """Find the root of an increasing function above a lower bound.
+
+    The function returns None if there is no root.
+    """
     low = initial_guess if initial_guess > lower_bound else 0.5 * lower_bound
     high, stride = low, 1e-3 + abs(low)
     at = increasing_function(low)
@@ -180,11 +225,24 @@ def _find_root_of_increasing_function(
 
 
 def min_steady_log_slip_rate(scene: SceneView) -> float:
-    """Smallest ln(V/V_*) with steady sliding: where stress would grow without bound; ``-inf`` where
-    there is none.
+    r"""Compute the smallest slip rate with steady sliding.
 
-    Of a driving stress at the angle phi, without an effect of normal stress on the law, it is where
-    ``mu_ss = tan(phi)``, eq. 9 of doi:10.1007/s11589-014-0098-4.
+    Parameters
+    ----------
+    scene : Scene
+        Scene with friction parameters.
+
+    Returns
+    -------
+    float
+        Smallest :math:`\ln(V/V_*)`, at which the steady stress becomes infinite. The result is
+        ``-inf`` if steady sliding exists at all slip rates.
+
+    Notes
+    -----
+    If normal stress follows shear stress at the angle :math:`\phi` and does not affect the state,
+    the smallest slip rate is the solution of :math:`\mu_{ss} = \tan\phi` (eq. 9 of
+    doi:10.1007/s11589-014-0098-4).
     """
     value, _slope, shift, _shift_slope = build_friction_relation(scene)(
         _MAX_STEADY_FRICTIONAL_STRESS
