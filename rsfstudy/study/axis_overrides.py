@@ -1,4 +1,4 @@
-"""Overrides of zipped and numbered axes: point selection and new field values."""
+"""Point selection and new field values for zipped and numbered axes."""
 
 from __future__ import annotations
 
@@ -132,7 +132,7 @@ def _label_after_override(
 
 
 def _format_with_all_digits(value: Any) -> str:
-    """Format a value, with all digits if six digits do not represent a float exactly."""
+    """Format a value with six digits, or with all digits if necessary."""
     short_text = format_value(value)
     is_rounded = isinstance(value, float) and float(short_text) != value
     return repr(value) if is_rounded else short_text

@@ -257,10 +257,10 @@ def build_verdict_table(
 ) -> VerdictTable:
     """Build a table of verdicts with one row per claim.
 
-    Claims refer to the study as it is declared. If an override has changed a fixed field of the
-    scene or of the measure, or if the results have been converted to other units, all claims are
-    not applicable. If an override has changed the values of a dimension, claims about results that
-    were reduced along this dimension are not applicable.
+    Claims refer to the study without overrides. If an override has changed a fixed field of the
+    scene or of the measure, or if the results have been converted to other units, no claim is
+    applicable. If an override has changed the values of a dimension, claims about results that were
+    reduced along this dimension are not applicable.
 
     Parameters
     ----------

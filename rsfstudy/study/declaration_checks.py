@@ -68,7 +68,7 @@ def check_types(study_fields: Mapping[str, Any]) -> None:
 def check_name_clashes(
     measure: Measure, reductions: Sequence[Reduction], axes: Sequence[Axis]
 ) -> None:
-    """Raise InvalidValue if a study uses the same name for different things.
+    """Raise InvalidValue if a name is unknown, reserved or used twice.
 
     Parameters
     ----------
@@ -195,7 +195,7 @@ def check_axis_fields(
 def check_outputs_do_not_vary(
     measure: Measure, measure_field_changes: Iterable[Mapping[str, Any]]
 ) -> None:
-    """Raise InvalidValue if an axis changes which results the measure has.
+    """Raise InvalidValue if an axis changes the set of results.
 
     All cells of a lattice must have the same results.
 
@@ -228,10 +228,10 @@ def check_override_of_partly_set_field(
     field_name: str,
     new_value: Any,
 ) -> None:
-    """Reject the override of a field that only some points of an axis set.
+    """Reject an override of a field that is set at only some axis points.
 
-    The other points use the value of the base scene, which the override would not change. The
-    override is accepted if the field has no value or no meaning at the other points.
+    At the other points, the field has the value of the base scene, which the override would not
+    change. The override is accepted if the field has no value or no meaning at the other points.
 
     Parameters
     ----------

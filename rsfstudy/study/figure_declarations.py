@@ -45,7 +45,7 @@ GENERIC_FIGURE_NAMES = frozenset(
 @guard_methods
 @dataclass(frozen=True, kw_only=True)
 class Panel:
-    """Panel of a figure, or a set of panels for the points of some axes.
+    """Panel of a figure, or several panels for the points of some axes.
 
     Functions that receive a dataset are called with the part of the dataset that the panel shows.
     Functions that receive a row are called with the part of the dataset that one curve shows.

@@ -11,7 +11,7 @@ from rsfstudy.slider import Scene
 
 
 class Cell(NamedTuple):
-    """Scene of a cell, and the values of the measure fields that axes change.
+    """Scene of a cell, and the measure fields that vary along axes.
 
     Parameters
     ----------

@@ -96,7 +96,7 @@ class Study:
     plot : Figure, callable, module or str, default: "lines"
         Figure of the study. The figure can be a `Figure` of panels, a function ``draw(dataset,
         axes)``, a module with a function ``draw``, or the name of a figure. The name of a named
-        study stands for the figure of this study. The default draws lines, or maps if two axes are
+        study selects the figure of this study. The default draws lines, or maps if two axes are
         numeric.
     references : sequence of str, optional
         Literature references.
@@ -219,8 +219,8 @@ class Study:
     def user_parts(self) -> Mapping[str, UserPart]:
         """User-defined parts of the slider, by name.
 
-        The parts are stored when the property is first used, so a part that is redefined later does
-        not change the study.
+        The constructor stores the parts, so a part that is redefined later does not change the
+        study.
         """
         parts: dict[str, UserPart] = {}
         for axis in self.axes:
@@ -447,7 +447,7 @@ class Study:
         )
 
     def _compute_cell_changes(self, axis_rows: Sequence[AxisRow]) -> CellChanges:
-        """Compute the changes that the rows of the axes make in a cell."""
+        """Compute the changes of a cell at one row of each axis."""
         given, of_measure = self.split_rows(axis_rows)
         of_scene = self.scene_fields_of_row(given)
         if _FIELDS_THAT_SELECT_PARTS.isdisjoint(of_scene) and _FIELDS_THAT_SELECT_PARTS.isdisjoint(
@@ -471,7 +471,7 @@ class Study:
         return CellChanges({n: values[n] for n in of_scene if n not in meaningless}, of_measure)
 
     def _build_cell(self, axis_rows: Sequence[AxisRow]) -> Cell:
-        """Build the cell of the rows of the axes."""
+        """Build the cell at one row of each axis."""
         try:
             return self._compute_cell_changes(axis_rows).build_cell(self.base)
         except InvalidValue as error:
@@ -490,9 +490,10 @@ class Study:
         **overrides : object
             New values by field or dimension. A list of values for a fixed field creates a new axis.
             A list of values for an existing axis replaces the values of the axis. For the dimension
-            of a zipped axis, the values are labels, which select points of the axis. For a field of
-            a zipped axis, a new point is created for each value, and points that do not set the
-            field remain unchanged. Points are selected before fields are changed.
+            of a zipped or numbered axis, the values are labels or numbers, which select points of
+            the axis. For a field of a zipped axis, a new point is created for each value, and
+            points that do not set the field remain unchanged. Points are selected before fields are
+            changed.
 
         Returns
         -------
@@ -598,7 +599,7 @@ class Study:
     def _make_axis(self, field_name: str, values: Sequence[Any], units: str = "") -> Axis:
         """Create an axis of a field.
 
-        In a study with a rig, plain numbers have the given units.
+        In a study with a rig, numbers without units are interpreted in the given units.
         """
         if self.rig is None:
             return Axis(field_name, values)

@@ -56,7 +56,7 @@ def study_html(
 
 
 def _html_details(caption: str, content: HtmlMarkup) -> HtmlMarkup:
-    """Return an element whose content is shown if the caption is clicked."""
+    """Return HTML code that shows the content after a click on the caption."""
     return HtmlMarkup(f"<details><summary>{escape_html(caption)}</summary>{content}</details>")
 
 

@@ -42,7 +42,7 @@ def study_titles() -> dict[str, str]:
 
 
 def _read_title_from_source(source_code: bytes) -> str:
-    """Return the argument ``title`` in the declaration of ``study``."""
+    """Return the title in the source code of a study."""
     # The source code before the declaration is not parsed, because parsing it would double the run
     # time.
     declared = ast.parse(source_code[source_code.index(b"\nstudy = ") :]).body[0]

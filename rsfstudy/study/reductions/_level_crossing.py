@@ -28,7 +28,7 @@ _MIN_SLOPE_CHANGE_OF_OSCILLATION = 0.1
 class CrossingStatus(IntEnum):
     """Outcome of the search for a crossing.
 
-    Files contain the integer value, so the values must not change.
+    Result files contain the integer values, so the values must not be changed.
     """
 
     OK, OUT_OF_REACH, NOT_UNIQUE, UNRESOLVED, TOO_FEW_POINTS = range(5)
@@ -192,7 +192,7 @@ def _estimate_slope_changes(
 
 
 def _count_sign_reversals(slope_changes: np.ndarray, min_slope_change: float) -> int:
-    """Count the sign reversals among changes of slope larger than a minimum."""
+    """Count the sign reversals among large changes of slope."""
     counted = slope_changes[np.abs(slope_changes) > min_slope_change]
     return int((counted[1:] * counted[:-1] < 0.0).sum())
 
@@ -200,7 +200,7 @@ def _count_sign_reversals(slope_changes: np.ndarray, min_slope_change: float) ->
 def _crossing_bounds(
     slope: float, slope_change: float, interval_width: float, level_above_first_sample: float
 ) -> tuple[float, float] | None:
-    """Return the first and last possible position of a crossing in an interval.
+    """Return the bounds of a crossing in an interval.
 
     Positions are relative to the first sample, and ``level_above_first_sample`` is the level minus
     the value of the first sample. The result is None if the level cannot be reached.
@@ -248,11 +248,11 @@ def _crossing_bounds_at_end(
     level_above_inner_sample: float,
     is_first_interval: bool,
 ) -> tuple[float, float]:
-    """Return the first and last possible position of a crossing at an end.
+    """Return the bounds of a crossing in the first or last interval.
 
-    The crossing is in the first or the last interval. The curve may have one kink in this interval.
-    The distance of the curve from the chord is at most the difference between the slopes of this
-    chord and the neighbouring chord, multiplied by the distance from the inner sample.
+    The curve may have one kink in this interval. The distance of the curve from the chord is at
+    most the difference between the slopes of this chord and the neighbouring chord, multiplied by
+    the distance from the inner sample.
     """
     slope, following = (slopes[0], slopes[1]) if is_first_interval else (slopes[-1], slopes[-2])
     width = float(interval_widths[0] if is_first_interval else interval_widths[-1])

@@ -1,9 +1,9 @@
 """Application of reductions to the results of a study.
 
 ``apply_reductions`` is the main function. A reduction never uses failed or missing cells. If a
-result depends on such cells, the result is NaN, and the attribute ``refused`` contains the reason.
-The option ``despite_failures`` omits failed cells instead. Cells that have an answer but no value,
-such as cells with the status ``stable_for_all_steps``, are omitted.
+result depends on failed or missing cells, the result is NaN, and the attribute ``refused`` contains
+the reason. The option ``despite_failures`` omits failed cells instead. Cells that have an answer
+but no value, such as cells with the status ``stable_for_all_steps``, are omitted.
 """
 
 from __future__ import annotations

@@ -1,8 +1,8 @@
 """Base class of reductions, and functions that all reductions share.
 
-``Reduction`` is the base class. The functions below it handle failed cells, coordinate ranges, and
-the propagation of numerical errors from cells to results. A reduction never uses failed cells,
-unless its class sets ``uses_failed_cells``.
+``Reduction`` is the base class. The functions handle failed cells, coordinate ranges, and the
+propagation of numerical errors from cells to results. A reduction never uses failed cells, unless
+its class sets ``uses_failed_cells``.
 """
 
 from __future__ import annotations
@@ -155,8 +155,8 @@ class Reduction(CheckedKeywords):
         """Return the status of the cells on which the results depend.
 
         The base class returns the status of all cells. A subclass that uses only some of the cells
-        overrides this method. The largest status code along the dimensions that a result does not
-        have is then regarded as the status of the result.
+        overrides this method. The status of a result is the largest of these status codes along the
+        dimensions that the result does not have.
 
         Parameters
         ----------
@@ -173,8 +173,8 @@ class Reduction(CheckedKeywords):
     def derivatives(self, dataset: xr.Dataset) -> DerivativesByVariable:
         """Compute the derivatives of the result with respect to the cells.
 
-        A subclass overrides this method if numerical errors of the cells shall be propagated to the
-        result ``name``. The base class returns no derivatives, so errors are not propagated.
+        A subclass must override this method to propagate the numerical errors of the cells to the
+        result. The base class returns no derivatives, so errors are not propagated.
 
         Parameters
         ----------
@@ -229,9 +229,9 @@ def failed_cell_mask(status: xr.DataArray) -> xr.DataArray:
 def worst_status_along_other_dims(
     status: xr.DataArray, kept_dimensions: Collection[Hashable]
 ) -> xr.DataArray:
-    """Return the worst status along all dimensions except some.
+    """Return the worst status along all dimensions that are not kept.
 
-    Failures have the largest status codes, so the worst status is the maximum.
+    The worst status is the maximum, because failures have the largest status codes.
 
     Parameters
     ----------
@@ -251,7 +251,7 @@ def worst_status_along_other_dims(
 def mask_unusable_values(
     dataset: xr.Dataset, variable_name: str, status: xr.DataArray
 ) -> xr.Dataset:
-    """Replace values that must not be used by NaN.
+    """Mask values that must not be used.
 
     The values of failed cells are replaced by NaN. If ``variable_name`` is the name of a standard
     error or of a bound of a confidence interval, values that are not valid are replaced by NaN as

@@ -38,8 +38,9 @@ _LOG_STEP_OF_DERIVATIVES = 1e-6
 class Boundary(Reduction):
     """Boundary between cells with values below and above a threshold.
 
-    The boundary is not interpolated. It is known only to be located between two neighbouring cells.
-    A cell is ignored if its value differs from the threshold by no more than the numerical error.
+    The boundary is not interpolated. The result only shows that the boundary is between two
+    neighbouring cells. A cell is ignored if its value differs from the threshold by no more than
+    the numerical error.
 
     Parameters
     ----------
@@ -76,10 +77,10 @@ class Boundary(Reduction):
     unit_fields: ClassVar[UnitFieldsBySuffix] = {"": ("on",)}
 
     def __call__(self, dataset: xr.Dataset) -> xr.Dataset:
-        """Find the boundary along the coordinate ``on``.
+        """Find the boundary for each point of the other dimensions.
 
-        The boundary is determined separately for each point of the other dimensions. If a cell
-        failed, the boundary along its row is NaN. Cells without a value are ignored.
+        If a cell failed, the boundary of the row with the failed cell is NaN. Cells without a value
+        are ignored.
 
         Parameters
         ----------
@@ -113,7 +114,7 @@ class Boundary(Reduction):
         return self.results(note, found)
 
     def bracket(self, values: xr.DataArray) -> tuple[xr.DataArray, ...]:
-        """Bracket the first crossing of the threshold along ``on``.
+        """Bracket the first crossing of the threshold.
 
         Parameters
         ----------
@@ -217,7 +218,7 @@ class Inverse(Reduction):
         return [Quantity(f"{self.name}_status", "", "1", text, flags=flags)]
 
     def __call__(self, dataset: xr.Dataset) -> xr.Dataset:
-        """Interpolate along the dimension of the coordinate ``on``.
+        """Find the coordinate value for each point of the other dimensions.
 
         Parameters
         ----------
@@ -259,10 +260,10 @@ class Inverse(Reduction):
         )
 
     def derivatives(self, dataset: xr.Dataset) -> DerivativesByVariable:
-        """Compute the derivatives of the crossing position by all cells.
+        """Compute the derivatives of the crossing position.
 
-        The derivative by a cell is the derivative of the interpolant by the value of this cell,
-        divided by the slope of the interpolant at the crossing.
+        The interpolant is differentiated with respect to the value of each cell, and the derivative
+        is divided by the slope of the interpolant at the crossing.
 
         Parameters
         ----------
@@ -289,7 +290,7 @@ class Inverse(Reduction):
     def _select_value_for_each_label(
         self, dataset: xr.Dataset, values: float | Mapping[str, float]
     ) -> xr.DataArray:
-        """Return a value for each label of the dimension ``along``."""
+        """Return the level or uncertainty that applies to each label."""
         if not isinstance(values, Mapping):
             return xr.DataArray(float(values))
         labels = dataset[self.along]
@@ -317,7 +318,7 @@ def _invert_along_coordinate(
 def _crossing_position_derivatives(
     values: np.ndarray, coordinate: np.ndarray, level: float
 ) -> np.ndarray:
-    """Return the derivatives of the crossing position by all values.
+    """Return the derivatives of the crossing position.
 
     The derivatives are 0 if there is no crossing.
     """

@@ -37,7 +37,7 @@ class Difference(Reduction):
     Parameters
     ----------
     name : str
-        Name of the result.
+        Name of the result, which is ``of - of_reference``.
     of : str
         Name of the variable to compare.
     along : str
@@ -84,7 +84,7 @@ class Difference(Reduction):
     def partial_derivatives(
         self, values: xr.DataArray, reference: xr.DataArray
     ) -> ValueAndReferenceDerivatives:
-        """Compute the derivatives of the comparison by value and reference.
+        """Compute the derivatives of the comparison.
 
         Parameters
         ----------
@@ -96,9 +96,9 @@ class Difference(Reduction):
         Returns
         -------
         by_value : xarray.DataArray
-            Derivative by the value, which is 1.
+            Derivative with respect to the value, which is 1.
         by_reference : xarray.DataArray
-            Derivative by the reference, which is -1.
+            Derivative with respect to the reference, which is -1.
         """
         return xr.ones_like(values), -xr.ones_like(values)
 
@@ -140,7 +140,7 @@ class Difference(Reduction):
         return xr.Dataset({self.name: compared.assign_attrs(comment=note)})
 
     def derivatives(self, dataset: xr.Dataset) -> DerivativesByVariable:
-        """Compute the derivatives by the cells and by the reference cells.
+        """Compute the derivatives of the result.
 
         At the reference point, the derivatives are 0 because the result does not depend on the
         value.
@@ -172,7 +172,7 @@ class RelativeDifference(Difference):
     Parameters
     ----------
     name : str
-        Name of the result.
+        Name of the result, which is ``1 - of/of_reference``.
     of : str
         Name of the variable to compare.
     along : str
@@ -217,7 +217,7 @@ class RelativeDifference(Difference):
     def partial_derivatives(
         self, values: xr.DataArray, reference: xr.DataArray
     ) -> ValueAndReferenceDerivatives:
-        """Compute the derivatives of the comparison by value and reference.
+        """Compute the derivatives of the comparison.
 
         Parameters
         ----------
@@ -229,9 +229,9 @@ class RelativeDifference(Difference):
         Returns
         -------
         by_value : xarray.DataArray
-            Derivative by the value, which is ``-1 / reference``.
+            Derivative with respect to the value, which is ``-1 / reference``.
         by_reference : xarray.DataArray
-            Derivative by the reference, which is ``values / reference**2``.
+            Derivative with respect to the reference, which is ``values / reference**2``.
         """
         return -xr.ones_like(values) / reference, values / reference**2
 
@@ -318,11 +318,11 @@ class Range(Reduction):
         return xr.Dataset({self.name: found.assign_attrs(comment=note)})
 
     def derivatives(self, dataset: xr.Dataset) -> DerivativesByVariable:
-        """Compute the derivatives by the cells with the extreme values.
+        """Compute the derivatives of the range.
 
-        The absolute value of the derivative is 1 for the cell with the largest sum of value and
-        error and for the cell with the smallest difference of value and error. Only absolute values
-        are used for the propagation of errors.
+        The derivative is 1 for two cells: the cell with the largest sum of value and error, and the
+        cell with the smallest difference of value and error. The sign of a derivative has no
+        influence on the propagated error.
 
         Parameters
         ----------

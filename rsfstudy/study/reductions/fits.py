@@ -28,15 +28,16 @@ from rsfstudy.study.reductions.base import (
 class LinearFit(Reduction):
     """Linear fit of a variable along one coordinate.
 
-    The fit is an unweighted least-squares fit of ``of = constant + name * on``.
+    The equation ``of = constant + name * on`` is fitted by unweighted least squares.
 
     Parameters
     ----------
     name : str
-        Name of the slope. Four more variables are returned: the standard error of the slope
-        ``<name>_stderr``, the propagated numerical error of the cells ``<name>_error`` (if the
-        cells have error estimates), the largest absolute residual ``<name>_misfit``, and the number
-        of points ``<name>_points``. The standard error is computed from the residuals.
+        Name of the slope in ``of = constant + name * on``. Four more variables are returned: the
+        standard error of the slope ``<name>_stderr``, the propagated numerical error of the cells
+        ``<name>_error`` (if the cells have error estimates), the largest absolute residual
+        ``<name>_misfit``, and the number of points ``<name>_points``. The standard error is
+        computed from the residuals.
     of : str
         Name of the variable to fit.
     on : str
@@ -144,7 +145,7 @@ class LinearFit(Reduction):
         return result.drop_vars([c for c in result.coords if dimension in result[c].dims])
 
     def derivatives(self, dataset: xr.Dataset) -> DerivativesByVariable:
-        """Compute the derivatives of the slope by the cells.
+        """Compute the derivatives of the slope with respect to the cells.
 
         The derivatives are the weights of the least-squares fit.
 
@@ -214,14 +215,14 @@ class LinearFit(Reduction):
 class ProportionalFit(LinearFit):
     """Linear fit with a fixed intercept.
 
-    The fit is an unweighted least-squares fit of ``of - minus = name * on``. If the intercept
+    The equation ``of - minus = name * on`` is fitted by unweighted least squares. If the intercept
     ``minus`` is not 0, as in ``V_0/V_* - 1``, the variable and the slope are regarded as
     dimensionless.
 
     Parameters
     ----------
     name : str
-        Name of the slope.
+        Name of the slope in ``of - minus = name * on``.
     of : str
         Name of the variable to fit.
     on : str
@@ -288,15 +289,15 @@ class ProportionalFit(LinearFit):
 class SemilogFit(LinearFit):
     """Linear fit of a variable against the decimal logarithm of a coordinate.
 
-    The fit is an unweighted least-squares fit of ``of = constant + name * log10(on)``, so the slope
-    is the change of the variable per decade. Points are omitted if the coordinate is not positive.
-    To fit a power law, use `PowerLaw`. If you apply this fit to a `Logarithm`, which is a natural
-    logarithm, the slope is 2.303 times the exponent of the power law.
+    The equation ``of = constant + name * log10(on)`` is fitted by unweighted least squares. The
+    slope is the change of the variable per decade. Points are omitted if the coordinate is not
+    positive. To fit a power law, use `PowerLaw`. If you apply this fit to a `Logarithm`, which is a
+    natural logarithm, the slope is 2.303 times the exponent of the power law.
 
     Parameters
     ----------
     name : str
-        Name of the slope.
+        Name of the slope in ``of = constant + name * log10(on)``.
     of : str
         Name of the variable to fit.
     on : str
@@ -344,14 +345,14 @@ class SemilogFit(LinearFit):
 class PowerLaw(SemilogFit):
     """Fit of a power law.
 
-    The fit is an unweighted least-squares fit of ``log10(of) = constant + name * log10(on)``. The
-    slope is the exponent of the power law, and the largest residual is in decades. Points are
+    The equation ``log10(of) = constant + name * log10(on)`` is fitted by unweighted least squares.
+    The slope is the exponent of the power law, and the largest residual is in decades. Points are
     omitted if the coordinate or the variable is not positive.
 
     Parameters
     ----------
     name : str
-        Name of the exponent.
+        Name of the exponent in ``log10(of) = constant + name * log10(on)``.
     of : str
         Name of the variable to fit.
     on : str
@@ -393,7 +394,7 @@ class PowerLaw(SemilogFit):
         return self.transform_abscissa(values)
 
     def derivatives(self, dataset: xr.Dataset) -> DerivativesByVariable:
-        """Compute the derivatives of the exponent by the cells.
+        """Compute the derivatives of the exponent with respect to the cells.
 
         The derivatives are the least-squares weights divided by ``ln(10) * of``.
 

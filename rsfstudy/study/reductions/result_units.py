@@ -28,7 +28,7 @@ def describe_reduction_results(
     that ``Reduction.unit_fields`` names. All other results are dimensionless. If the scale varies
     between the cells that were combined, the result has no scale, and a note is appended to the
     attribute ``comment`` of the result. The description in the vocabulary is used only if its units
-    and scale agree.
+    and scale agree with the units and scale of the result.
 
     Parameters
     ----------

@@ -28,14 +28,13 @@ _SOBOL_INDEX_NAMES = ("first_order", "total")
 @guard_methods
 @dataclass(frozen=True)
 class SobolIndices(Reduction):
-    """Sobol indices of first order and total Sobol indices.
+    """First-order and total Sobol indices.
 
     The first-order index of a quantity is the share of the variance that is caused by this quantity
     without interactions. The total index is the share of the variance that remains if all other
     quantities are fixed. Confidence intervals of 95 % are computed by a bootstrap over the sample
-    points. If a cell failed or has no value, all indices are NaN, because the indices of the
-    remaining cells would describe another distribution. The indices are computed by
-    `scipy.stats.sobol_indices`.
+    points. If a cell failed or has no value, all indices are NaN, because the remaining samples
+    would have a different distribution. The indices are computed by `scipy.stats.sobol_indices`.
 
     Parameters
     ----------
@@ -79,7 +78,7 @@ class SobolIndices(Reduction):
 
     @property
     def quantities(self) -> Sequence[Quantity]:
-        """Quantities of the indices, bounds and dimension ``input``."""
+        """Quantities of the indices, their bounds and the new dimension."""
         about = Quantity("input", "", "", "sampled quantity")
         return (about, *(Quantity(n, "", "1", text) for n, text in self._result_descriptions()))
 

@@ -2,7 +2,7 @@
 
 The statistics are mean, standard deviation and quantiles, and the shares of all statuses. Each
 statistic has two errors. The sampling error ``<name>_stderr`` is the standard error for independent
-samples, which is rarely exceeded by Sobol points and Latin hypercubes. The numerical error
+samples. Sobol points and Latin hypercubes usually have smaller errors. The numerical error
 ``<name>_error`` is propagated from the numerical errors of the cells.
 """
 
@@ -283,7 +283,7 @@ class StandardDeviation(_SampleStatistic):
         return standard_deviation(of, self.over), scatter
 
     def derivatives(self, dataset: xr.Dataset) -> DerivativesByVariable:
-        r"""Compute the derivatives of the standard deviation by the samples.
+        r"""Compute the derivatives of the standard deviation.
 
         Parameters
         ----------
@@ -297,7 +297,7 @@ class StandardDeviation(_SampleStatistic):
 
         Notes
         -----
-        The derivative of the standard deviation :math:`s` by a sample :math:`y_i` is
+        The derivative of the standard deviation :math:`s` with respect to a sample :math:`y_i` is
 
         .. math:: \frac{\partial s}{\partial y_i} = \frac{y_i - \bar{y}}{(n - 1) s}.
         """
@@ -313,8 +313,8 @@ class Quantile(_SampleStatistic):
     """Quantile over samples.
 
     The quantile is interpolated linearly between two neighbouring samples. The standard error is
-    half the distance between the quantiles at ``level`` plus and minus one binomial standard
-    deviation.
+    half the difference between two quantiles, whose levels are one binomial standard deviation
+    above and below ``level``.
 
     Parameters
     ----------
@@ -399,9 +399,9 @@ class Quantile(_SampleStatistic):
     def __call__(self, dataset: xr.Dataset) -> xr.Dataset:
         """Reduce the variable along the dimension of the samples.
 
-        If the variable has error estimates, the error of the quantile is computed from the
-        quantiles of the values plus and minus their errors. These two quantiles are bounds of the
-        quantile, even if the errors change the order of the samples.
+        If the variable has error estimates, the error of the quantile is computed from two bounds,
+        which are the quantiles of the values plus and minus their errors. The quantile of the exact
+        values is between the two bounds, even if the errors change the order of the samples.
 
         Parameters
         ----------
@@ -487,7 +487,7 @@ class StatusShares(Reduction):
 
     @property
     def quantities(self) -> Sequence[Quantity]:
-        """Quantities of the shares, standard error and dimension ``ended``."""
+        """Quantities of the shares, their errors and the new dimension."""
         return [*super().quantities, Quantity("ended", "", "", "status with which a sample ended")]
 
     def support_status(self, status: xr.DataArray) -> xr.DataArray:

@@ -20,7 +20,7 @@ from rsfstudy.study.reductions.base import DerivativesByVariable, Reduction
 class InUnits(Reduction):
     """Variable in units of a rig, converted in each cell with its own scales.
 
-    Convert a variable before you average it over samples with different scales. A mean of the
+    Convert a variable before you compute its mean over samples with different scales. A mean of the
     dimensionless values would combine values in different units.
 
     Parameters
