@@ -611,7 +611,7 @@ class Study:
         Returns
         -------
         dict of str to object
-            All parts of the declaration, in a form that can be stored as JSON.
+            All parts of the declaration, in a form that can be written to a JSON file.
         """
         return {
             "name": self.name,

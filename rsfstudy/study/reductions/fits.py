@@ -36,8 +36,8 @@ class LinearFit(Reduction):
         Name of the slope in ``of = constant + name * on``. Four more variables are returned: the
         standard error of the slope ``<name>_stderr``, the propagated numerical error of the cells
         ``<name>_error`` (if the cells have error estimates), the largest absolute residual
-        ``<name>_misfit``, and the number of points ``<name>_points``. The standard error is
-        computed from the residuals.
+        ``<name>_misfit`` in the units of the variable, and the number of points ``<name>_points``.
+        The standard error is computed from the residuals.
     of : str
         Name of the variable to fit.
     on : str
