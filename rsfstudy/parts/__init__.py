@@ -1,10 +1,10 @@
 """Base classes of user-defined parts of a slider, and their parameter layout.
 
-Derive a state evolution law from ``Law`` or ``LawOfStates``, a normal stress condition from
-``NormalStress``, a pore fluid from ``Fluid``, the dynamics from ``Dynamics`` and a loading from
-``Loading``, and declare its fields with ``number`` and ``flag``. The constants such as ``LAW`` are
-the indices of the parameters in the tuple ``p`` that the functions of parts receive. This package
-only exports names of ``rsfstudy.slider``.
+Derive a state evolution law from ``Law`` or ``LawBase``, a normal stress condition from
+``NormalStress``, a pore fluid from ``Fluid``, the dynamics from ``Dynamics``, and a loading from
+``Loading``. Declare the fields of the part with ``number`` and ``flag``. The functions of parts
+receive a tuple of parameters ``p``. Constants such as ``LAW`` are the indices of the parameters in
+this tuple. This package only exports names of ``rsfstudy.slider``.
 """
 
 from __future__ import annotations

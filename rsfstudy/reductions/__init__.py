@@ -1,4 +1,4 @@
-"""Reductions: from a lattice of results to boundaries, slopes and statistics.
+"""Reductions, which compute boundaries, slopes and statistics from a lattice.
 
 A reduction computes new variables from the variables of a results dataset. This package only
 exports names, for studies and for user-defined reductions. The reductions are defined in

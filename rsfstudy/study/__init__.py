@@ -1,8 +1,8 @@
 """Declarations of studies: axes, a measure, reductions, claims and a figure.
 
-A ``Study`` describes a lattice of cells and what to compute in them. The package checks
-declarations, knows the named studies, computes reductions of finished datasets, and compares these
-with claims. It never runs a study, never reads or writes a results file, and never draws a figure.
+A ``Study`` describes a lattice of cells and the results to compute in the cells. This package
+checks declarations, loads named studies, applies reductions to results, and compares results with
+claims. The package never runs a study, reads or writes a results file, or draws a figure.
 """
 
 from __future__ import annotations

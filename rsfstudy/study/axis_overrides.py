@@ -1,4 +1,4 @@
-"""Overrides of zipped and numbered axes: point selection and new field values."""
+"""Point selection and new field values for zipped and numbered axes."""
 
 from __future__ import annotations
 
@@ -13,10 +13,25 @@ from rsfstudy.formatting import format_value, is_sequence_of_axis_values
 
 
 def select_axis_points(axis: Axis, labels_or_numbers: Sequence[Any]) -> Axis:
-    """Select points of a zipped axis by label, or of a numbered axis by number.
+    """Select points of a zipped axis by label or of a numbered axis by number.
 
-    If the selection contains the first ``n`` samples in order, the axis keeps the record of the
-    sampling method.
+    Parameters
+    ----------
+    axis : Axis
+        Zipped or numbered axis.
+    labels_or_numbers : sequence of str or int
+        Points to select.
+
+    Returns
+    -------
+    Axis
+        Axis with the selected points. If the selection contains the first ``n`` samples in order,
+        the axis keeps the information about the sampling method.
+
+    Raises
+    ------
+    InvalidValue
+        If the axis does not have a selected point.
     """
     rows: dict[Any, AxisRow] = dict(zip(axis.labels or range(len(axis)), axis.rows, strict=True))
     for point in labels_or_numbers:
@@ -41,8 +56,8 @@ def replace_field_values(axis: Axis, field_name: str, values: Sequence[Any]) -> 
     ----------
     axis : Axis
         Axis that sets several fields at each point.
-    name : str
-        Field to override. Points that do not set this field remain unchanged.
+    field_name : str
+        Name of the field to override. Points that do not set this field remain unchanged.
     values : sequence
         New values. A numbered axis accepts exactly one value.
 
@@ -51,7 +66,13 @@ def replace_field_values(axis: Axis, field_name: str, values: Sequence[Any]) -> 
     Axis
         A zipped axis has one point for each combination of a new value with the other fields. If a
         point exists already, the point keeps its label. Each new label depends only on its own
-        point, not on the other values. A numbered axis loses the record of the sampling method.
+        point, not on the other values. A numbered axis loses the information about the sampling
+        method.
+
+    Raises
+    ------
+    InvalidValue
+        If a numbered axis receives several values, or if a value is not hashable.
     """
     if axis.has_numbered_points:
         if len(values) != 1:
@@ -98,8 +119,8 @@ def _label_after_override(
     """Return the label of a point after the value of one field has changed.
 
     If the label contains the old value, as in ``"imposed, alpha = 0.25"``, the old value is
-    replaced. Otherwise, if the new value identifies the point (``is_unique``), the label becomes
-    ``"alpha = 0.3"``. In all other cases ``"alpha = 0.3"`` is appended to the label.
+    replaced. Otherwise, if the new value identifies the point (``value_is_unique``), the label
+    becomes ``"alpha = 0.3"``. In all other cases ``"alpha = 0.3"`` is appended to the label.
     """
     text = f"{field_name} = {_format_with_all_digits(new_value)}"
     old_text = re.escape(_format_with_all_digits(old_value))
@@ -111,14 +132,27 @@ def _label_after_override(
 
 
 def _format_with_all_digits(value: Any) -> str:
-    """Format a value, with all digits if six digits do not represent a float exactly."""
+    """Format a value with six digits, or with all digits if necessary."""
     short_text = format_value(value)
     is_rounded = isinstance(value, float) and float(short_text) != value
     return repr(value) if is_rounded else short_text
 
 
 def to_plain_values(field_name: str, value: Any) -> Any:
-    """A value of a field, or a list of them, as `to_plain_value` gives it."""
+    """Convert a field value, or a list of field values, to plain data.
+
+    Parameters
+    ----------
+    field_name : str
+        Name of the field.
+    value : object
+        Value or list of values.
+
+    Returns
+    -------
+    object
+        Plain value or list of plain values.
+    """
     return (
         [to_plain_value(field_name, each) for each in value]
         if is_sequence_of_axis_values(value)

@@ -1,7 +1,7 @@
-"""Claims: published values, held against what a dataset says.
+"""Claims, which compare results with published values.
 
-A claim is plain data, so that it travels in the NetCDF file, and checking a file needs nothing
-else.
+A claim contains only plain data. Therefore, a claim can be stored in a NetCDF file, and the file
+can be checked without the study that created the file.
 """
 
 from __future__ import annotations
@@ -30,12 +30,12 @@ NOT_APPLICABLE_VERDICT = "not applicable"
 VERDICTS = (REPRODUCED_VERDICT, DIFFERS_VERDICT, UNDECIDED_VERDICT, NOT_APPLICABLE_VERDICT)
 
 CLAIM_RELATIONS = ("equals", "below", "above")
-#: Of a table of claims.
+#: Columns of a table of verdicts.
 _VERDICT_TABLE_COLUMNS = (
     *("id", "claim", "source", "relation", "published", "ours"),
     *("tolerance", "reason", "verdict", "expected", "because", "moved"),
 )
-#: Reason of a tolerance of zero where more cannot be asked for.
+#: Default reason of the tolerance. The default is accepted only for inequalities.
 TOLERANCE_REASON_OF_INEQUALITY = "an inequality"
 _EXPECTED_VERDICTS = (REPRODUCED_VERDICT, DIFFERS_VERDICT)
 _TEXT_FIELDS = (
@@ -48,36 +48,61 @@ _TEXT_FIELDS = (
 @guard_methods
 @dataclass(frozen=True, kw_only=True)
 class Claim:
-    """One published value and the verdict expected on it.
+    """Published value, and the expected verdict of a comparison.
 
     Parameters
     ----------
     id : str
-        Short name, as in "C7".
+        Short name of the claim, such as ``"C7"``.
     statement : str
-        What is claimed, in words.
+        Statement of the claim in words.
     source : str
-        Where it is published.
+        Literature reference of the published value.
     variable : str
-        Variable of the dataset it speaks of.
-    where : mapping
-        Coordinate values that single out one number.
-    minus : mapping, optional
-        A second place; the claim is then on the difference.
-    minus_variable : str, optional
-        The variable at the second place, where it is another.
-    relation : {"equals", "below", "above"}
-        How ours should relate to the published value.
+        Name of the variable to compare with the published value.
+    where : mapping of str to object
+        Coordinate values that select a single value of the variable.
     published : float
-        The published value.
-    tolerance : float
-        How far ours may be from it, or on the wrong side of it, and
-    reason : str
-        why that far; of an inequality both may be left out.
-    expected : str
-        The verdict expected today.
-    because : str
-        Why, where that is not "reproduced".
+        Published value.
+    tolerance : float, default: 0.0
+        Largest permitted distance from the published value. In an inequality, the result may be on
+        the wrong side of the published value by up to this distance.
+    reason : str, default: "an inequality"
+        Reason for the tolerance. Required if ``relation`` is ``"equals"``.
+    relation : {"equals", "below", "above"}, default: "equals"
+        Expected relation of the result to the published value.
+    minus : mapping of str to object, optional
+        Coordinate values that select a second value. If given, the difference of the two values is
+        compared with the published value.
+    minus_variable : str, optional
+        Name of the variable of the second value. The default is ``variable``.
+    expected : {"reproduced", "differs"}, default: "reproduced"
+        Expected verdict.
+    because : str, optional
+        Reason for the expected verdict ``"differs"``.
+
+    Raises
+    ------
+    InvalidValue
+        If an argument has a wrong type, or if an equality has no reason for its tolerance.
+
+    Examples
+    --------
+    >>> import xarray as xr
+    >>> from rsfstudy import Claim
+    >>> claim = Claim(
+    ...     id="C7",
+    ...     statement="zeta is 0.66 for alpha = 0.56",
+    ...     source="Fig. 5",
+    ...     variable="zeta",
+    ...     where={"alpha": 0.56},
+    ...     published=0.66,
+    ...     tolerance=0.02,
+    ...     reason="read from the figure",
+    ... )
+    >>> dataset = xr.Dataset({"zeta": ("alpha", [0.67])}, coords={"alpha": [0.56]})
+    >>> claim.verdict(dataset)
+    (0.67, 'reproduced')
     """
 
     id: str
@@ -95,6 +120,7 @@ class Claim:
     because: str = ""
 
     def __post_init__(self) -> None:
+        """Check the arguments."""
         for name in _TEXT_FIELDS:
             if not isinstance(getattr(self, name), str):
                 rule = f"must be a text, in claim {self.id}"
@@ -123,21 +149,59 @@ class Claim:
 
     @classmethod
     def below(cls, **claim_fields: Any) -> Claim:
-        """A claim that ours is below the published value; takes what `Claim` does."""
+        """Create a claim that the result is smaller than the published value.
+
+        Parameters
+        ----------
+        **claim_fields : object
+            Parameters of `Claim` except ``relation``.
+
+        Returns
+        -------
+        Claim
+            Claim with the relation ``"below"``.
+        """
         return cls(relation="below", **claim_fields)
 
     @classmethod
     def above(cls, **claim_fields: Any) -> Claim:
-        """A claim that ours is above the published value; takes what `Claim` does."""
+        """Create a claim that the result is larger than the published value.
+
+        Parameters
+        ----------
+        **claim_fields : object
+            Parameters of `Claim` except ``relation``.
+
+        Returns
+        -------
+        Claim
+            Claim with the relation ``"above"``.
+        """
         return cls(relation="above", **claim_fields)
 
     def describe(self) -> dict[str, Any]:
-        """The claim as plain data."""
+        """Convert the claim to a dictionary of plain values.
+
+        Returns
+        -------
+        dict of str to object
+            Parameters of the claim.
+        """
         return {**asdict(self), "where": dict(self.where), "minus": dict(self.minus)}
 
     def check_selection(self, dataset: xr.Dataset) -> None:
-        """Raise InvalidValue where a dataset has no such variable or place: the claim would never
-        be applicable.
+        """Check that the claim applies to a dataset.
+
+        Parameters
+        ----------
+        dataset : xarray.Dataset
+            Results of a study.
+
+        Raises
+        ------
+        InvalidValue
+            If the dataset does not have the variable, a coordinate or the selected point. The
+            verdict would always be ``"not applicable"``.
         """
         variables, coordinates = map(str, dataset.data_vars), [str(n) for n in dataset.coords]
         for variable in filter(None, (self.variable, self.minus_variable)):
@@ -153,10 +217,21 @@ class Claim:
             raise InvalidValue("where", {**self.where, **self.minus}, rule)
 
     def verdict(self, dataset: xr.Dataset) -> tuple[float, str]:
-        """Our value, and whether it reproduces the published one.
+        """Compare the result with the published value.
 
-        A place the lattice does not have makes the claim not applicable; a place without a number
-        leaves it undecided.
+        Parameters
+        ----------
+        dataset : xarray.Dataset
+            Results of a study.
+
+        Returns
+        -------
+        value : float
+            Result that is compared with the published value.
+        verdict : str
+            Verdict, which is ``"reproduced"``, ``"differs"``, ``"undecided"`` or ``"not
+            applicable"``. The claim is not applicable if the dataset does not contain the selected
+            point. The claim is undecided if the value at this point is NaN.
         """
         try:
             ours = _select_single_value(dataset, self.variable, self.where)
@@ -180,11 +255,27 @@ class Claim:
 def build_verdict_table(
     dataset: xr.Dataset, claims: list[Claim], study_overrides: Mapping[str, Any]
 ) -> VerdictTable:
-    """A table of claims, one row each.
+    """Build a table of verdicts with one row per claim.
 
-    Claims hold for a study as declared. Where a fixed value of the scene or of the measure was
-    changed (`overrides` that are no dimension or coordinate along one), they are not applicable;
-    nor are claims on what was reduced along an axis that was changed, and any on other units.
+    Claims refer to the study without overrides. If an override has changed a fixed field of the
+    scene or of the measure, or if the results have been converted to other units, no claim is
+    applicable. If an override has changed the values of a dimension, claims about results that were
+    reduced along this dimension are not applicable.
+
+    Parameters
+    ----------
+    dataset : xarray.Dataset
+        Results of the study.
+    claims : list of Claim
+        Claims to check.
+    study_overrides : mapping of str to object
+        Overrides of the study.
+
+    Returns
+    -------
+    VerdictTable
+        Table of the claims and verdicts. The column ``moved`` is True if an applicable claim does
+        not have the expected verdict.
     """
     along = {str(name) for name in dataset.coords if dataset[name].ndim > 0}
     moved_base = [
@@ -205,14 +296,14 @@ def build_verdict_table(
 
 
 def _is_number(value: object) -> bool:
-    """True if a value is a number that a float can hold."""
+    """Return True if a value is a finite number in the range of a float."""
     return isinstance(value, int | float) and not sys.float_info.max < abs(value) < math.inf
 
 
 def _has_all_overridden_dimensions(
     dataset: xr.Dataset, variable_name: str, study_overrides: Mapping[str, Any]
 ) -> bool:
-    """True if a variable still has every dimension that was changed."""
+    """Return True if a variable has every dimension that was overridden."""
     changed = {str(d) for n in study_overrides if n in dataset.coords for d in dataset[n].dims}
     return variable_name not in dataset or changed <= set(dataset[variable_name].dims)
 
@@ -220,7 +311,13 @@ def _has_all_overridden_dimensions(
 def _select_single_value(
     dataset: xr.Dataset, variable_name: str, coordinate_values: Mapping[str, Any]
 ) -> float:
-    """The one number at these coordinate values; KeyError where there is no such place."""
+    """Select a single value of a variable.
+
+    Raises
+    ------
+    KeyError
+        If the coordinate values do not select a single number.
+    """
     values = dataset[variable_name]
     for name, wanted in coordinate_values.items():
         at, text = dataset[name], isinstance(wanted, str)
@@ -233,7 +330,7 @@ def _select_single_value(
             raise KeyError(name)
         values = values.isel(dict.fromkeys(at.dims, int(matches[0])))
     if values.ndim or values.dtype.kind not in "iufb":
-        raise KeyError(variable_name)  # more dimensions than the claim speaks of, or no number
+        raise KeyError(variable_name)  # The selection is not a single number.
     if variable_name == "status" and int(values) == int(Status.PENDING):
         return math.nan
     return float(values)

@@ -1,4 +1,8 @@
-"""Checks of what a study is declared of: its parts, their names, and what its axes vary."""
+"""Checks of the declaration of a study.
+
+The functions check types, names, and the fields that axes vary. The constructor of ``Study`` calls
+most of these functions.
+"""
 
 from __future__ import annotations
 
@@ -27,7 +31,7 @@ from rsfstudy.study.claims import Claim
 from rsfstudy.study.reductions.application import Reduction
 from rsfstudy.vocabulary import QUANTITY_BY_NAME
 
-#: Types of the parts of a study, and types of the items of its lists. The rig is optional.
+#: Types of the attributes of a study, and types of the items of its lists. The rig is optional.
 _TYPES_OF_STUDY_FIELDS = {"base": Scene, "measure": Measure, "accuracy": Accuracy, "rig": Rig}
 _ITEM_TYPES_OF_STUDY_LISTS = {
     "axes": Axis,
@@ -38,7 +42,18 @@ _ITEM_TYPES_OF_STUDY_LISTS = {
 
 
 def check_types(study_fields: Mapping[str, Any]) -> None:
-    """Raise InvalidValue if the attributes of a study have wrong types."""
+    """Raise InvalidValue if the attributes of a study have wrong types.
+
+    Parameters
+    ----------
+    study_fields : mapping of str to object
+        Attributes of the study by name.
+
+    Raises
+    ------
+    InvalidValue
+        If an attribute has a wrong type, or if there are no axes.
+    """
     for name, kind in (_TYPES_OF_STUDY_FIELDS | _ITEM_TYPES_OF_STUDY_LISTS).items():
         given = study_fields[name]
         if name in _ITEM_TYPES_OF_STUDY_LISTS and not isinstance(given, list | tuple):
@@ -53,7 +68,23 @@ def check_types(study_fields: Mapping[str, Any]) -> None:
 def check_name_clashes(
     measure: Measure, reductions: Sequence[Reduction], axes: Sequence[Axis]
 ) -> None:
-    """Raise InvalidValue for names that are taken, and for reductions of unknown results."""
+    """Raise InvalidValue if a name is unknown, reserved or used twice.
+
+    Parameters
+    ----------
+    measure : Measure
+        Measure of the study.
+    reductions : sequence of Reduction
+        Reductions of the study.
+    axes : sequence of Axis
+        Axes of the study.
+
+    Raises
+    ------
+    InvalidValue
+        If a reduction or an axis has a name that is already used or reserved, if a reduction
+        reduces an unknown variable, or if the measure solves for a field of an axis.
+    """
     measure.check()
     known = list(measure.variables)
     for reduction in reductions:
@@ -71,7 +102,20 @@ def check_name_clashes(
 
 
 def check_fields_not_solved_for(measure: Measure, field_names: Sequence[str]) -> None:
-    """Raise InvalidValue if the measure solves for one of the fields."""
+    """Raise InvalidValue if the measure solves for one of the fields.
+
+    Parameters
+    ----------
+    measure : Measure
+        Measure of the study.
+    field_names : sequence of str
+        Names of the fields to check.
+
+    Raises
+    ------
+    InvalidValue
+        If the measure solves for a field or for the ratio that is equivalent to the field.
+    """
     for name in field_names:
         if {name, RATIO_FIELD_BY_DIMENSIONAL_NAME.get(name)} & set(measure.solved_fields):
             rule = f"{measure.name} solves for {name}; it cannot be an axis or be set"
@@ -81,7 +125,22 @@ def check_fields_not_solved_for(measure: Measure, field_names: Sequence[str]) ->
 def check_user_fields(
     measure: Measure, reductions: Sequence[Reduction], user_field_names: Sequence[str]
 ) -> None:
-    """Raise InvalidValue if a field of a user-defined part has the name of another variable."""
+    """Raise InvalidValue if a user-defined part has a reserved field name.
+
+    Parameters
+    ----------
+    measure : Measure
+        Measure of the study.
+    reductions : sequence of Reduction
+        Reductions of the study.
+    user_field_names : sequence of str
+        Names of all scene fields. The fields of user-defined parts follow the built-in fields.
+
+    Raises
+    ------
+    InvalidValue
+        If a field has the name of a result, of a reduction, or of a quantity in the vocabulary.
+    """
     taken = {*measure.variables, *measure.inner_coordinates}
     taken |= {*RESERVED_NAMES, *QUANTITY_BY_NAME, *(reduction.name for reduction in reductions)}
     for name in user_field_names[len(FIELD_NAMES) :]:
@@ -96,7 +155,25 @@ def check_axis_fields(
     scene_field_names: Sequence[str],
     rig_scenes: LatticeScenesOnRig | None,
 ) -> None:
-    """Raise InvalidValue for axes over unknown fields, and for units without a rig."""
+    """Raise InvalidValue if an axis has unknown fields or unexpected units.
+
+    Parameters
+    ----------
+    measure : Measure
+        Measure of the study.
+    axes : sequence of Axis
+        Axes of the study.
+    scene_field_names : sequence of str
+        Names of all scene fields.
+    rig_scenes : LatticeScenesOnRig or None
+        Converter of axis values with units. None in a study without a rig.
+
+    Raises
+    ------
+    InvalidValue
+        If an axis varies an unknown field, if a zipped axis has the name of a field, or if an axis
+        has units and the study has no rig.
+    """
     in_units = rig_scenes.units if rig_scenes else {}
     known = dict.fromkeys((*scene_field_names, *measure.plain_fields, *in_units))
     for axis in axes:
@@ -118,9 +195,21 @@ def check_axis_fields(
 def check_outputs_do_not_vary(
     measure: Measure, measure_field_changes: Iterable[Mapping[str, Any]]
 ) -> None:
-    """Raise InvalidValue if a change of the measure's fields changes which results it has.
+    """Raise InvalidValue if an axis changes the set of results.
 
     All cells of a lattice must have the same results.
+
+    Parameters
+    ----------
+    measure : Measure
+        Measure of the study.
+    measure_field_changes : iterable of mapping of str to object
+        Changes of the measure fields in all cells.
+
+    Raises
+    ------
+    InvalidValue
+        If a change of the measure fields changes the set of results.
     """
     given = _describe_measure_outputs(measure)
     for changed in (measure.with_(**values) for values in measure_field_changes):
@@ -139,8 +228,28 @@ def check_override_of_partly_set_field(
     field_name: str,
     new_value: Any,
 ) -> None:
-    """Refuse another value of a field that some points of an axis state, and that others take from
-    the base.
+    """Reject an override of a field that is set at only some axis points.
+
+    At the other points, the field has the value of the base scene, which the override would not
+    change. The override is accepted if the field has no value or no meaning at the other points.
+
+    Parameters
+    ----------
+    base_scene : Scene
+        Base scene of the study.
+    user_parts : mapping of str to type or UserLoading
+        User-defined parts by name.
+    axis : Axis
+        Axis of the study.
+    field_name : str
+        Name of the field to override.
+    new_value : object
+        New value, which is shown in the error message.
+
+    Raises
+    ------
+    InvalidValue
+        If the override would change the field in only some of the points.
     """
     stating = [
         point for point, row in zip(axis.point_names, axis.rows, strict=True) if field_name in row
@@ -163,7 +272,19 @@ def check_override_of_partly_set_field(
 
 
 def check_axes_are_distinct(axes: Sequence[Axis]) -> None:
-    """Refuse axes that repeat a dimension or vary the same field."""
+    """Raise InvalidValue if two axes have the same dimension or field.
+
+    Parameters
+    ----------
+    axes : sequence of Axis
+        Axes of the study.
+
+    Raises
+    ------
+    InvalidValue
+        If an axis varies the dimension or field of a preceding axis. A velocity and its ratio to
+        the reference velocity are regarded as the same field.
+    """
     taken: dict[str, str] = {}
     for axis in axes:
         for name in {
@@ -178,6 +299,24 @@ def check_axes_are_distinct(axes: Sequence[Axis]) -> None:
 def unknown_name_error(
     argument_name: str, unknown_name: str, rule: str, known_names: Collection[str]
 ) -> InvalidValue:
+    """Create the error for an unknown name.
+
+    Parameters
+    ----------
+    argument_name : str
+        Name of the argument that contains the unknown name.
+    unknown_name : str
+        Unknown name.
+    rule : str
+        Rule that the name violates.
+    known_names : collection of str
+        Known names. The message lists similar names, unless there is a hint for the unknown name.
+
+    Returns
+    -------
+    InvalidValue
+        Error to raise.
+    """
     remedy = hint_for_unknown_field(unknown_name)
     return InvalidValue(
         argument_name, unknown_name, rule, remedy=remedy, choices=() if remedy else known_names
@@ -185,6 +324,9 @@ def unknown_name_error(
 
 
 def _describe_measure_outputs(measure: Measure) -> str:
-    """The numbers a measure gives, and the fields it looks for; as text, where NaN equals NaN."""
+    """Describe the results and the solved fields of a measure.
+
+    The description is a string, so that NaN values compare equal.
+    """
     inner = {name: np.asarray(at).tolist() for name, at in measure.inner_coordinates.items()}
     return repr((measure.primary_output, dict(measure.variables), inner, measure.solved_fields))

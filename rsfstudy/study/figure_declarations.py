@@ -1,5 +1,7 @@
-"""The figure of a study: panels, or a function or module of a user's own. Nothing here loads what
-draws.
+"""Declarations of the figure of a study.
+
+A figure consists of panels, or is a user-defined function or module. This module does not import
+matplotlib, so that workers do not load it.
 """
 
 from __future__ import annotations
@@ -24,15 +26,16 @@ if TYPE_CHECKING:
 
 __getattr__ = renamed_names(__name__)
 
-#: A variable by its name, or a function that computes it; and a text in the same way.
+#: Name of a variable, or a function of a dataset that computes the values.
 VariableNameOrFunction = str | Callable[["xr.Dataset"], "xr.DataArray"]
 TextOrFunction = str | Callable[["xr.Dataset"], str]
-#: `matplotlib.axes.Axes`, for annotations: what workers load must not load matplotlib.
+#: Type of `matplotlib.axes.Axes` in annotations. Workers load this module, so it must not import
+#: matplotlib.
 Axes = Any
-#: A function of a dataset and of axes, which draws the one on the other.
+#: Function ``draw(dataset, axes)`` that draws a dataset on matplotlib axes.
 DrawFunction = Callable[[Any, Any], Any]
 
-#: Names of the figures that draw any study.
+#: Names of the figures that can draw the results of any study.
 GENERIC_FIGURE_NAMES = frozenset(
     module.name for module in pkgutil.iter_modules([str(Path(__file__).parent.parent / "plots")])
 )
@@ -42,56 +45,79 @@ GENERIC_FIGURE_NAMES = frozenset(
 @guard_methods
 @dataclass(frozen=True, kw_only=True)
 class Panel:
-    """One panel of a figure, or one for each point of some axes.
+    """Panel of a figure, or several panels for the points of some axes.
 
-    Functions of a dataset are given the part of it that the panel shows, those of a row the part
-    that one curve shows. Labels come from names, symbols and units of what is drawn.
+    Functions that receive a dataset are called with the part of the dataset that the panel shows.
+    Functions that receive a row are called with the part of the dataset that one curve shows.
 
     Parameters
     ----------
-    x, y : str or function of dataset
-        What curves are drawn of: variables by their names, or what a function makes of them.
-        Points of an axis of names lie beside each other, or below each other.
-    hue : sequence of str
-        Axes whose points are curves: the first is told by colours and markers, and the second by
-        dashes and open markers.
-    facet : sequence of str
-        Axes whose points have a panel each.
-    isel : mapping of str to int, list of int, slice or function
-        Places on other axes: numbers of points, or what gives one of their values, or several, as
-        `min` and `max` do; of what is the same everywhere, 0, for the title to say it.
-    markers_only : bool
-        Have markers without a line.
-    style : mapping, or function of row
-        What `matplotlib.axes.Axes.plot` takes, laid over that of the curve.
-    error_bars : str
-        Variable of the bars of error.
-    fit_line : function of row
-        x and y of a line through the points of a curve, in its colour: a fit or a theory.
-    curve_label : function of row
-        Name of a curve in the legend. By default, the name is its point on the axes of ``hue``.
-    annotation : str
-        Name of a slope that the legend shows for each curve, with its standard error. Curves
-        without a slope have no such entry.
-    overlays : sequence of function of (dataset, axes)
-        What is drawn beside the curves.
-    title : str, or function of dataset
-        By default the place on the axes of `facet` and `isel`.
-    x_label, y_label : str, optional
-        For what has no name, symbol and units.
-    log : str
-        Which of x and y have log scales; None for those along which points or values span decades.
-    x_limits, y_limits : tuple of float or None
-        Ends of the scales; None leaves an end to what is drawn.
-    y_scale_group : str
-        Panels that say the same have the same scale along y.
-    condition : function of dataset
-        Whether there is such a panel; always by default.
-    legend_columns : int
-        Most entries of the legend beside each other.
-    legend_title : str
-    is_custom : bool
-        Leave scales, legend and title as marks leave them: a figure of the user's own.
+    x : str or callable
+        Name of the variable along x, or a function of the row that returns the values. If the
+        values are strings, the points are equally spaced.
+    y : str or callable
+        Name of the variable along y, or a function of the row that returns the values. If the
+        values are strings, the points are equally spaced.
+    hue : sequence of str, optional
+        Axes whose points are shown as curves. The first axis is distinguished by colours and
+        markers, and the second axis by line styles and open markers.
+    facet : sequence of str, optional
+        Axes whose points are shown in separate panels.
+    isel : mapping of str to int, list of int, slice or callable, optional
+        Indices of the selected points on other axes. A function such as ``min`` receives the list
+        of coordinate values and returns one value or a list of values. A scalar coordinate with the
+        index 0 is shown in the title.
+    markers_only : bool, default: False
+        If True, draw markers without lines.
+    style : mapping or callable, optional
+        Properties for `matplotlib.axes.Axes.plot`, or a function of the row that returns
+        properties. The properties override the default style of the curve.
+    error_bars : str, optional
+        Name of the variable with the half lengths of the error bars.
+    fit_line : callable, optional
+        Function of the row that returns x and y of a fitted or theoretical line. The line has the
+        colour of the curve.
+    curve_label : callable, optional
+        Function of the row that returns the legend entry of the curve. The default is the point of
+        the curve on the axes of ``hue``.
+    annotation : str, optional
+        Name of a slope that is shown in the legend entry of each curve, with its standard error.
+        The slope is omitted if the standard error is not finite.
+    overlays : sequence of callable, optional
+        Functions ``draw(dataset, axes)`` that add elements to the panel.
+    title : str or callable, optional
+        Title, or a function of the dataset. The default is the point of the panel on the axes of
+        ``facet`` and ``isel``.
+    x_label, y_label : str or callable, optional
+        Labels of the axes, or functions of the dataset. By default, a label contains the long name,
+        symbol and units of the variable.
+    log : {"", "x", "y", "xy"} or None, default: ""
+        Directions with a logarithmic scale. None selects a logarithmic scale if the coordinates are
+        logarithmically spaced, or if the values span decades.
+    x_limits, y_limits : tuple of (float or None, float or None), default: (None, None)
+        Limits of the scales. None adapts the limit to the data.
+    y_scale_group : str, optional
+        Name of a group of panels with the same limits along y.
+    condition : callable, optional
+        Function of the dataset. If the function returns False, the panel is omitted.
+    legend_columns : int, default: 2
+        Largest number of columns of the legend.
+    legend_title : str, optional
+        Title of the legend.
+    is_custom : bool, default: False
+        If True, the overlays define the scales, the legend and the title.
+
+    Raises
+    ------
+    InvalidValue
+        If ``log`` contains characters other than x and y.
+
+    Examples
+    --------
+    >>> from rsfstudy import Panel
+    >>> panel = Panel(x="stiffness_ratio", y="critical_displacement", hue=["phi"], log="y")
+    >>> panel.hue
+    ['phi']
     """
 
     x: VariableNameOrFunction = ""
@@ -121,6 +147,7 @@ class Panel:
     is_custom: bool = False
 
     def __post_init__(self) -> None:
+        """Check the argument ``log``."""
         if isinstance(self.log, str) and not set(self.log) <= {"x", "y"}:
             raise InvalidValue("log", self.log, "must name axes", choices=("x", "y", "xy"))
 
@@ -129,17 +156,28 @@ class Panel:
 @guard_methods
 @dataclass(frozen=True)
 class Figure:
-    """Panels, from left to right and from top to bottom.
+    """Figure that consists of panels.
 
     Parameters
     ----------
-    panels : sequence of Panel, or function of (dataset, axes)
-    columns : int
-        Most panels beside each other.
-    height : float or function of dataset, optional
-        Of a panel without its legend, in mm; that of the style by default.
-    allow_extra_dims : bool
-        Whether it shows further axes of the lattice too.
+    panels : sequence of Panel or callable
+        Panels from left to right and from top to bottom. A function ``draw(dataset, axes)``
+        is converted to a panel that only has this overlay.
+    columns : int, default: 2
+        Largest number of panels in a row.
+    height : float or callable, optional
+        Height of a panel without its legend in mm, or a function of the dataset. The default is the
+        height of the current style.
+    allow_extra_dims : bool, default: False
+        If True, the panels also show additional dimensions of the lattice. If False, the panels are
+        repeated for the points of additional dimensions.
+
+    Examples
+    --------
+    >>> from rsfstudy import Figure, Panel
+    >>> figure = Figure([Panel(x="b_over_a", y="critical_displacement", hue=["phi"])])
+    >>> sorted(figure.dimensions)
+    ['b_over_a', 'phi']
     """
 
     panels: Sequence[Any]
@@ -148,6 +186,7 @@ class Figure:
     allow_extra_dims: bool = False
 
     def __post_init__(self) -> None:
+        """Convert functions to panels."""
         panels = [
             panel if isinstance(panel, Panel) else Panel(overlays=[panel], is_custom=True)
             for panel in self.panels
@@ -156,13 +195,26 @@ class Figure:
 
     @property
     def dimensions(self) -> set[str]:
-        """Axes that its panels name."""
+        """Names of all axes that the panels use."""
         named = (name for p in self.panels for name in (p.x, *p.hue, *p.facet, *p.isel))
         return {name for name in named if isinstance(name, str)}
 
 
 def horizontal_line(height: float, **style: Any) -> DrawFunction:
-    """A mark: a thin line across the panel."""
+    """Create an overlay that draws a horizontal line.
+
+    Parameters
+    ----------
+    height : float
+        Position of the line along y.
+    **style : object
+        Properties for `matplotlib.axes.Axes.axhline`.
+
+    Returns
+    -------
+    callable
+        Function ``draw(dataset, axes)``.
+    """
     thin = {"color": "0.6", "linewidth": 0.8, "linestyle": "-", "zorder": 0}
     return lambda _dataset, axes: axes.axhline(height, **thin | style)
 
@@ -170,22 +222,29 @@ def horizontal_line(height: float, **style: Any) -> DrawFunction:
 def reference_line(
     x: str, function: Callable[[Any], Any], name: str, start: float | None = None, **style: Any
 ) -> DrawFunction:
-    """A mark: a wide grey line behind the points.
+    """Create an overlay that draws a wide grey line behind the points.
 
     Parameters
     ----------
     x : str
-        Variable along x.
-    function : function of array
+        Name of the variable along x.
+    function : callable
+        Function of the x values that returns the y values.
     name : str
-        What the legend calls it.
+        Legend entry.
     start : float, optional
-        Where it begins, by default at the first point.
-    **style
-        As `matplotlib.axes.Axes.plot` takes.
+        First x value of the line. The default is the smallest value of the variable.
+    **style : object
+        Properties for `matplotlib.axes.Axes.plot`.
+
+    Returns
+    -------
+    callable
+        Function ``draw(dataset, axes)``.
     """
 
     def draw_line(dataset: xr.Dataset, axes: Axes) -> None:
+        """Draw the line."""
         low, high = float(dataset[x].min()), float(dataset[x].max())
         low = low if start is None else start
         at = np.linspace(low, high + 0.03 * (high - low), 200)
@@ -196,8 +255,20 @@ def reference_line(
 
 
 def name_of_figure(plot: Any, study_name: str) -> str:
-    """Name of a figure in a declaration: one that draws any study by its name, panels by that of
-    their study, others by that of their function or module.
+    """Return the name under which a figure is stored in a declaration.
+
+    Parameters
+    ----------
+    plot : Figure, callable, module or str
+        Figure of a study.
+    study_name : str
+        Name of the study.
+
+    Returns
+    -------
+    str
+        Name of the study for a `Figure` of panels, the string itself for a string, and the name of
+        the function or module otherwise.
     """
     if isinstance(plot, Figure):
         return study_name
@@ -205,7 +276,19 @@ def name_of_figure(plot: Any, study_name: str) -> str:
 
 
 def check_figure(plot: Any) -> None:
-    """Raise InvalidValue for something that cannot draw, or a name that another figure has."""
+    """Raise InvalidValue if an object is not a figure.
+
+    Parameters
+    ----------
+    plot : object
+        Figure of a study.
+
+    Raises
+    ------
+    InvalidValue
+        If the object cannot draw, or if a user-defined function or module has the name of a figure
+        of the package.
+    """
     if isinstance(plot, str):
         check_storable_text("plot", plot)
         return

@@ -1,4 +1,7 @@
-"""Cells of a lattice, apart from studies: workers need no more of a study than its cells."""
+"""Cells of a lattice.
+
+The module does not depend on ``Study``, because workers need only the cells of a study.
+"""
 
 from __future__ import annotations
 
@@ -8,18 +11,45 @@ from rsfstudy.slider import Scene
 
 
 class Cell(NamedTuple):
-    """A scene, and what the axes change of the fields of the study's measure there."""
+    """Scene of a cell, and the measure fields that vary along axes.
+
+    Parameters
+    ----------
+    scene : Scene
+        Scene of the cell.
+    measure_changes : dict of str to object
+        Values of the measure fields that the axes change.
+    """
 
     scene: Scene
     measure_changes: dict[str, Any]
 
 
 class CellChanges(NamedTuple):
-    """What the axes change in a cell: fields of the base scene, and fields of the measure."""
+    """Changes that the axes make in a cell.
+
+    Parameters
+    ----------
+    scene_fields : dict of str to object
+        Changed fields of the base scene.
+    measure_fields : dict of str to object
+        Changed fields of the measure.
+    """
 
     scene_fields: dict[str, Any]
     measure_fields: dict[str, Any]
 
     def build_cell(self, base_scene: Scene) -> Cell:
-        """The cell."""
+        """Build the cell from a base scene.
+
+        Parameters
+        ----------
+        base_scene : Scene
+            Scene to change.
+
+        Returns
+        -------
+        Cell
+            Cell with the changed scene.
+        """
         return Cell(base_scene.with_(**self.scene_fields), self.measure_fields)

@@ -1,4 +1,4 @@
-"""Named studies on a rig of the user."""
+"""Conversion of dimensionless studies to the units of a rig."""
 
 from __future__ import annotations
 
@@ -10,8 +10,22 @@ from rsfstudy.study.study import Study
 
 
 def convert_study_to_rig_units(study: Study, rig: Rig) -> Study:
-    """A study of no rig on a rig: what its axes and the ranges of its fits hold without dimension
-    is turned into units of the rig, as it is shown, and what it states takes the place of theirs.
+    """Convert a dimensionless study to a study with a rig.
+
+    The axes and the ranges of the fits are converted to units of the rig. Fields that the rig
+    defines replace the fields of the base scene.
+
+    Parameters
+    ----------
+    study : Study
+        Study without a rig.
+    rig : Rig
+        Rig that defines the units.
+
+    Returns
+    -------
+    Study
+        Study with the rig.
     """
     base, axes, every = put_on_rig(rig, study.base, study.axes)
     reductions = [
@@ -22,7 +36,10 @@ def convert_study_to_rig_units(study: Study, rig: Rig) -> Study:
 
 
 def _convert_reduction_range(reduction: Any, scale: float | None) -> Any:
-    """A reduction whose range, if it has any, is in units."""
+    """Convert the range of a reduction to units.
+
+    A reduction without a range is returned unchanged.
+    """
     span = getattr(reduction, "within", None)
     if scale is None or span is None:
         return reduction

@@ -1,5 +1,8 @@
-"""The declaration of a study: labelled axes laid over a scene, a measure, and what is made of
-it.
+"""Declaration of a parameter study.
+
+A ``Study`` combines a base scene, the axes of a lattice, a measure, reductions, claims and a
+figure. The constructor checks the declaration. The methods build the scene of each cell and apply
+overrides.
 """
 
 from __future__ import annotations
@@ -51,11 +54,13 @@ from rsfstudy.study.reductions.application import Reduction
 from rsfstudy.study.study_html import study_html
 from rsfstudy.study.user_parts import find_named_user_parts, user_field_quantities
 
-#: Most bytes of the name of a study: a file name has at most 255, and endings follow.
+#: Maximum length of the name of a study in bytes. Most file systems allow file names of at most 255
+#: bytes, and the names of files have suffixes.
 _MAX_NAME_BYTES = 200
-#: Fields that decide what fills a slot.
+#: Fields that select a part of the slider.
 _FIELDS_THAT_SELECT_PARTS = frozenset({*SLOT_NAMES, *PART_SELECTING_FIELDS})
-#: What states the same as another field does: of slip rates and of the spring.
+#: Pairs of equivalent fields. A slip rate can be given as a velocity or as a ratio, and the spring
+#: as a stiffness or as a ratio to the critical stiffness.
 _EQUIVALENT_FIELD = {
     **RATIO_FIELD_BY_DIMENSIONAL_NAME,
     **{ratio: name for name, ratio in RATIO_FIELD_BY_DIMENSIONAL_NAME.items()},
@@ -68,43 +73,67 @@ _EQUIVALENT_FIELD = {
 @guard_methods
 @dataclass(frozen=True, kw_only=True)
 class Study:
-    """A parameter study, declared.
+    """Declaration of a parameter study.
 
     Parameters
     ----------
     name : str
-        Name of the study and of its files.
-    title, summary : str
-        One line, and a caption.
+        Name of the study and of its files. The name must be a Python identifier.
+    title : str
+        Title on one line.
     base : Scene
-        What all cells share.
+        Scene with the fields that all cells share.
     axes : sequence of Axis
-        The dimensions of the lattice, outermost first.
+        Axes of the lattice. The first axis is the outermost dimension.
     measure : Measure
-        What is measured in each cell.
-    reductions : sequence of Reduction
-        What the lattice is reduced to.
-    claims : sequence of Claim
-        Published values the results are held against.
-    plot : Figure, function, module or str
-        What draws the study: panels, a function ``draw(dataset, axes)`` or a module of such
-        functions, or the name of a named study, whose figure is used. The default, "lines", draws
-        maps where two axes are of numbers.
-    references : sequence of str
-        Sources of the study.
-    accuracy : Accuracy
+        Measure that is evaluated in each cell.
+    summary : str, optional
+        Caption of the study.
+    reductions : sequence of Reduction, optional
+        Reductions that are applied to the results, in order.
+    claims : sequence of Claim, optional
+        Published values that are compared with the results.
+    plot : Figure, callable, module or str, default: "lines"
+        Figure of the study. The figure can be a `Figure` of panels, a function ``draw(dataset,
+        axes)``, a module with a function ``draw``, or the name of a figure. The name of a named
+        study selects the figure of this study. The default draws lines, or maps if two axes are
+        numeric.
+    references : sequence of str, optional
+        Literature references.
+    accuracy : Accuracy, optional
         Accuracy of each cell.
     rig : Rig, optional
-        The rig that the base is a scene of. Axes may be of its quantities, and are in units; plain
-        numbers are in SI units then.
-    version : int
-        Raised when the meaning of the results changes.
+        Rig of the base scene. In a study with a rig, axes may have units and may vary quantities of
+        the rig. Numbers without units are then in SI units.
+    version : int, default: 1
+        Version of the study. Increase the version if the meaning of the results changes.
+    overrides : mapping of str to object, optional
+        Overrides that `with_` has applied to the declaration.
+    source_file : str, optional
+        File of the study. Empty for a named study.
 
     Raises
     ------
     InvalidValue
-        For axes that repeat a dimension, vary the same field, one that nothing has, or one that
-        decides which numbers are measured; and for any cell that makes no meaningful scene.
+        If an argument has a wrong type. The error is also raised if two axes have the same
+        dimension or vary the same field, if an axis varies an unknown field, or if an axis changes
+        the set of results.
+
+    Examples
+    --------
+    >>> from rsfstudy import Axis, Scene, Study
+    >>> from rsfstudy.measures import CriticalStep
+    >>> study = Study(
+    ...     name="angle",
+    ...     title="Critical displacement step against the driving angle",
+    ...     base=Scene(law="slip"),
+    ...     axes=[Axis("phi", [45, 60]), Axis("b_over_a", [2, 3, 5])],
+    ...     measure=CriticalStep(of="displacement_step"),
+    ... )
+    >>> study.dimensions, study.shape, study.size
+    (('phi', 'b_over_a'), (2, 3), 6)
+    >>> study.describe_cell(4)
+    'phi = 60, b_over_a = 3'
     """
 
     name: str
@@ -121,10 +150,10 @@ class Study:
     rig: Rig | None = None
     version: int = 1
     overrides: Mapping[str, Any] = field(default_factory=dict)
-    #: The file of a study that is no named one.
     source_file: str = ""
 
     def __post_init__(self) -> None:
+        """Check the declaration."""
         if not isinstance(self.name, str) or not self.name.isidentifier():
             raise InvalidValue("name", self.name, "must be a Python identifier: it names files")
         if len(self.name.encode()) > _MAX_NAME_BYTES:
@@ -161,16 +190,37 @@ class Study:
     @staticmethod
     @error_boundary
     def caption(docstring: str | None) -> str:
-        """The second paragraph of a module's docstring: a summary at the top of the file."""
+        r"""Extract the summary of a study from the docstring of its module.
+
+        The summary is the second paragraph of the docstring.
+
+        Parameters
+        ----------
+        docstring : str or None
+            Docstring of the module that declares the study.
+
+        Returns
+        -------
+        str
+            Second paragraph on one line. Empty if there is only one paragraph.
+
+        Examples
+        --------
+        >>> from rsfstudy import Study
+        >>> Study.caption("Title.\n\nFirst line\nof the summary.\n\nDetails.")
+        'First line of the summary.'
+        """
         paragraphs = (docstring or "").split("\n\n", 2)
         return " ".join(" ".join(paragraphs[1:2]).split())
 
-    # ---- parts of the user's own ------------------------------------------------------------
+    # ---- user-defined parts ---------------------------------------------------------------------
 
     @cached_property
     def user_parts(self) -> Mapping[str, UserPart]:
-        """Parts of the slider that are the user's own, by name, as they were when the study was
-        declared.
+        """User-defined parts of the slider, by name.
+
+        The constructor stores the parts, so a part that is redefined later does not change the
+        study.
         """
         parts: dict[str, UserPart] = {}
         for axis in self.axes:
@@ -180,7 +230,10 @@ class Study:
 
     @cached_property
     def user_classes(self) -> tuple[type | UserPart, ...]:
-        """The measure, and parts and stepper that are the user's own: what own code starts at."""
+        """User-defined parts, user-defined stepper and classes of the measure.
+
+        The provenance of the results contains a digest of the code of all classes in this tuple.
+        """
         return (
             *self.measure.code_classes,
             *self.user_parts.values(),
@@ -189,32 +242,50 @@ class Study:
 
     @cached_property
     def scene_fields(self) -> tuple[str, ...]:
-        """Fields that its scenes may have: those of every scene, and those of its own parts."""
+        """Names of all scene fields, including those of user-defined parts."""
         return tuple(scene_field_quantities(self.user_parts.values()))
 
     @cached_property
     def scene_field_names(self) -> frozenset[str]:
-        """Fields of its axes, and others, that decide the scene of a cell."""
+        """Names of all fields that determine the scene of a cell.
+
+        In a study with a rig, the set also contains the axis fields with units.
+        """
         return frozenset({*self.scene_fields, *self.units})
 
     @cached_property
     def scene_builder(self) -> LatticeScenesOnRig | None:
-        """What makes scenes of axes in units, in a study of a rig."""
+        """Converter from axis values with units to scene fields.
+
+        None in a study without a rig.
+        """
         return LatticeScenesOnRig(self.rig, self.base, self.axes) if self.rig else None
 
     @cached_property
     def units(self) -> dict[str, str]:
-        """Units of the fields of its axes that are in units."""
+        """Units of the axis fields that have units."""
         return {name: units for axis in self.axes for name, units in axis.units.items()}
 
     def scene_fields_of_row(self, row: AxisRow) -> AxisRow:
-        """The fields of a scene that differ from the base where axes have these values."""
+        """Convert the axis values of a cell to scene fields.
+
+        Parameters
+        ----------
+        row : mapping of str to object
+            Axis values by field, without fields of the measure.
+
+        Returns
+        -------
+        mapping of str to object
+            Scene fields that differ from the base scene.
+        """
         return self.scene_builder.compute_scene_fields(row) if self.scene_builder else row
 
     @property
     def quantities(self) -> dict[str, Quantity]:
-        """Quantities that its own parts and its measure describe, by name; the vocabulary has
-        none of them.
+        """Quantities of the measure and of user-defined parts, by name.
+
+        The common vocabulary does not contain these quantities.
         """
         stated = *user_field_quantities(self.user_parts.values()), *self.measure.quantities
         return {about.name: about for about in stated}
@@ -223,7 +294,7 @@ class Study:
 
     @property
     def dimensions(self) -> tuple[str, ...]:
-        """Dimensions, outermost first."""
+        """Names of the dimensions, outermost first."""
         return tuple(axis.dimension for axis in self.axes)
 
     @property
@@ -237,12 +308,18 @@ class Study:
         return math.prod(self.shape)
 
     def cells(self) -> Iterator[Cell]:
-        """Each cell, in row-major order.
+        """Iterate over all cells in row-major order.
+
+        Yields
+        ------
+        Cell
+            Scene and changes of the measure.
 
         Raises
         ------
         InvalidValue
-            For a cell that makes no meaningful scene, naming its place on the axes.
+            If the fields of a cell do not form a valid scene, or if a field of an axis has no
+            effect in any cell. The message contains the position of the cell on the axes.
         """
         unused = {n for axis in self.axes for n in axis.fields if n in self.scene_fields}
         for rows in itertools.product(*(axis.rows for axis in self.axes)):
@@ -255,33 +332,98 @@ class Study:
                     raise InvalidValue(axis.dimension, name, "has no effect in any cell")
 
     def cell(self, number: int) -> Cell:
-        """One cell, by its number in row-major order."""
+        """Build one cell.
+
+        Parameters
+        ----------
+        number : int
+            Index of the cell in row-major order.
+
+        Returns
+        -------
+        Cell
+            Scene and changes of the measure.
+        """
         return self._build_cell(self._axis_rows_of_cell(number))
 
     def cell_changes(self, number: int) -> CellChanges:
-        """What the axes change in one cell, of which no scene is made here."""
+        """Compute the changes that the axes make in one cell.
+
+        This method does not build a scene, so it is faster than `cell`.
+
+        Parameters
+        ----------
+        number : int
+            Index of the cell in row-major order.
+
+        Returns
+        -------
+        CellChanges
+            Changed fields of the base scene and of the measure.
+        """
         return self._compute_cell_changes(self._axis_rows_of_cell(number))
 
     def _axis_rows_of_cell(self, cell_number: int) -> list[AxisRow]:
-        """The row of each axis that makes a cell."""
+        """Return the row of each axis at a cell."""
         places = np.unravel_index(cell_number, self.shape)
         return [axis.rows[i] for axis, i in zip(self.axes, places, strict=True)]
 
     def scenes(self) -> Iterator[Scene]:
-        """The scene of each cell, in row-major order; raises as `cells` does."""
+        """Iterate over the scenes of all cells in row-major order.
+
+        Returns
+        -------
+        iterator of Scene
+            Scenes. The iterator raises the same errors as `cells`.
+        """
         return (cell.scene for cell in self.cells())
 
     def scene(self, number: int) -> Scene:
-        """The scene of one cell, by its number in row-major order."""
+        """Build the scene of one cell.
+
+        Parameters
+        ----------
+        number : int
+            Index of the cell in row-major order.
+
+        Returns
+        -------
+        Scene
+            Scene of the cell.
+        """
         return self.cell(number).scene
 
     def describe_cell(self, cell: int) -> str:
-        """Where a cell is on the axes, in words."""
+        """Describe the position of a cell on the axes.
+
+        Parameters
+        ----------
+        cell : int
+            Index of the cell in row-major order.
+
+        Returns
+        -------
+        str
+            Description, such as ``"phi = 60, b_over_a = 3"``.
+        """
         at = zip(self.axes, np.unravel_index(cell, self.shape), strict=True)
         return ", ".join(f"{axis.dimension} = {axis.point_names[i]}" for axis, i in at)
 
     def split_rows(self, rows: Sequence[AxisRow]) -> tuple[dict[str, Any], dict[str, Any]]:
-        """The fields of the scene, and those of the measure, that rows set."""
+        """Separate the fields of the scene from the fields of the measure.
+
+        Parameters
+        ----------
+        rows : sequence of mapping of str to object
+            Rows of several axes.
+
+        Returns
+        -------
+        scene_fields : dict of str to object
+            Values of the scene fields.
+        measure_fields : dict of str to object
+            Values of the measure fields.
+        """
         split: tuple[dict[str, Any], dict[str, Any]] = {}, {}
         for row in rows:
             for name, value in row.items():
@@ -290,17 +432,22 @@ class Study:
 
     @cached_property
     def _base_fields(self) -> dict[str, Any]:
+        """Fields of the base scene."""
         return self.base.as_dict()
 
     @cached_property
     def _fields_without_meaning(self) -> frozenset[str]:
-        """Fields without meaning where no axis decides what fills a slot."""
+        """Fields that have no meaning for the parts of the base scene.
+
+        The set applies to cells in which no axis selects a part.
+        """
         parts = self.user_parts
         return find_inapplicable_fields(
             replace_names_by_user_parts(self._base_fields, parts), parts.values()
         )
 
     def _compute_cell_changes(self, axis_rows: Sequence[AxisRow]) -> CellChanges:
+        """Compute the changes of a cell at one row of each axis."""
         given, of_measure = self.split_rows(axis_rows)
         of_scene = self.scene_fields_of_row(given)
         if _FIELDS_THAT_SELECT_PARTS.isdisjoint(of_scene) and _FIELDS_THAT_SELECT_PARTS.isdisjoint(
@@ -310,7 +457,8 @@ class Study:
                 n: value for n, value in of_scene.items() if n not in self._fields_without_meaning
             }
             return CellChanges(kept, of_measure)
-        # a row that states a choice together with a field it makes meaningless must be refused
+        # If a row selects a part and also sets a field without a meaning for this part, the field
+        # is kept, so that the scene rejects the field.
         stated = {
             name
             for row in axis_rows
@@ -323,6 +471,7 @@ class Study:
         return CellChanges({n: values[n] for n in of_scene if n not in meaningless}, of_measure)
 
     def _build_cell(self, axis_rows: Sequence[AxisRow]) -> Cell:
+        """Build the cell at one row of each axis."""
         try:
             return self._compute_cell_changes(axis_rows).build_cell(self.base)
         except InvalidValue as error:
@@ -331,24 +480,50 @@ class Study:
             )
             raise error.with_location(f"cell {place}") from error
 
-    # ---- other axes ---------------------------------------------------------------------------
+    # ---- overrides -----------------------------------------------------------------------------
 
     def with_(self, /, **overrides: Any) -> Study:
-        """The study with other axis values or other fixed values.
+        """Create a copy of the study with other axis values or fixed values.
 
-        A list for a field that is fixed makes it an axis; a field along a zipped axis changes only
-        in the points that use it, where each new value makes a point of its own; labels select
-        points of a zipped axis, before fields change.
+        Parameters
+        ----------
+        **overrides : object
+            New values by field or dimension. A list of values for a fixed field creates a new axis.
+            A list of values for an existing axis replaces the values of the axis. For the dimension
+            of a zipped or numbered axis, the values are labels or numbers, which select points of
+            the axis. For a field of a zipped axis, a new point is created for each value, and
+            points that do not set the field remain unchanged. Points are selected before fields are
+            changed.
+
+        Returns
+        -------
+        Study
+            Copy with the overrides.
 
         Raises
         ------
         InvalidValue
-            For a name that is neither an axis nor a field of the scene or of the measure, for
-            values that make no axis, and for a field that some points of a zipped axis state and
-            the others take from the base.
+            If a name is neither an axis nor a field of the scene or of the measure, or if the
+            values do not form an axis. The error is also raised if only some points of a zipped
+            axis set a field, and the override would not change this field in the other points.
+
+        Examples
+        --------
+        >>> from rsfstudy import Axis, Scene, Study
+        >>> from rsfstudy.measures import CriticalStep
+        >>> study = Study(
+        ...     name="angle",
+        ...     title="Critical displacement step against the driving angle",
+        ...     base=Scene(law="slip"),
+        ...     axes=[Axis("phi", [45, 60])],
+        ...     measure=CriticalStep(of="displacement_step"),
+        ... )
+        >>> study.with_(phi=[30, 45, 60], alpha=[0.0, 0.5]).shape
+        (2, 3)
         """
         study, given = self, {name: to_plain_values(name, v) for name, v in overrides.items()}
-        # parts of the user's own come first: they bring the fields that others may be
+        # User-defined parts are replaced first, because they may define the fields of other
+        # overrides.
         own = [
             name
             for name in given
@@ -360,6 +535,7 @@ class Study:
         return replace(study, overrides={**self.overrides, **given})
 
     def _override_field(self, field_name: str, value: Any) -> Study:
+        """Apply the override of one field or dimension."""
         values = list(value) if is_sequence_of_axis_values(value) else [value]
         of_rig = self.rig is not None and bool(values)
         field_name, units = (
@@ -391,7 +567,10 @@ class Study:
         return replace(self, measure=self.measure.with_(**{field_name: value}))
 
     def _override_axis(self, axis: Axis, field_name: str, values: Sequence[Any]) -> Axis | None:
-        """An axis with other values, if it is of this field, or of one that states the same."""
+        """Apply an override to one axis.
+
+        The result is None if the axis varies neither this field nor an equivalent field.
+        """
         units = axis.units.get(field_name, "")
         if field_name == axis.dimension:
             return (
@@ -418,13 +597,22 @@ class Study:
         return self._make_axis(field_name, values)
 
     def _make_axis(self, field_name: str, values: Sequence[Any], units: str = "") -> Axis:
-        """An axis of a field, whose plain numbers are in these units in a study of a rig."""
+        """Create an axis of a field.
+
+        In a study with a rig, numbers without units are interpreted in the given units.
+        """
         if self.rig is None:
             return Axis(field_name, values)
         return axis_in_units(field_name, values, "" if isinstance(values[0], str) else units)
 
     def describe(self) -> dict[str, Any]:
-        """The whole declaration as plain data."""
+        """Convert the declaration to a dictionary of plain values.
+
+        Returns
+        -------
+        dict of str to object
+            All parts of the declaration, in a form that can be written to a JSON file.
+        """
         return {
             "name": self.name,
             "title": self.title,
@@ -448,5 +636,5 @@ class Study:
 
 
 def _rows_of_overridden_field(field_name: str, value: Any) -> list[AxisRow]:
-    """The rows of a field that is given one value or a list of them."""
+    """Return one row for each value of a field."""
     return [{field_name: v} for v in (value if is_sequence_of_axis_values(value) else [value])]

@@ -1,4 +1,4 @@
-"""A study as a notebook shows it."""
+"""HTML representation of a study in notebooks."""
 
 from __future__ import annotations
 
@@ -20,22 +20,25 @@ def study_html(
     measure: Measure,
     known_quantities: Mapping[str, Quantity],
 ) -> str:
-    """Format a study as HTML tables of its axes, its fixed fields and its results.
+    """Format a study as HTML tables of axes, fixed fields and results.
 
     Parameters
     ----------
     heading : str
         Heading of the first table.
     axes : sequence of Axis
+        Axes of the study.
     base_scene : Scene
         Scene with the fixed fields, which are shown in a collapsed table.
     measure : Measure
+        Measure of the study. The results are shown in a collapsed table.
     known_quantities : mapping of str to Quantity
         Quantities that are not in the common vocabulary.
 
     Returns
     -------
     str
+        HTML code.
     """
     varied = {name for axis in axes for name in axis.fields}
     fixed = {name: v for name, v in base_scene.as_dict().items() if name not in varied}
@@ -53,16 +56,19 @@ def study_html(
 
 
 def _html_details(caption: str, content: HtmlMarkup) -> HtmlMarkup:
-    """Content that is shown once its caption is clicked."""
+    """Return HTML code that shows the content after a click on the caption."""
     return HtmlMarkup(f"<details><summary>{escape_html(caption)}</summary>{content}</details>")
 
 
 def _describe_axis_quantity(axis: Axis, known_quantities: Mapping[str, Quantity]) -> Quantity:
-    """The quantity along an axis, without symbol and scale where the axis is in units."""
+    """Return the quantity of an axis.
+
+    If the axis has units, the quantity has no symbol and no scale.
+    """
     about, units = find_quantity(axis.dimension, known_quantities), axis.units.get(axis.dimension)
     return about if units is None else replace(about, symbol="", units=units, scale="")
 
 
 def _format_axis_points(axis: Axis) -> str:
-    """The points of an axis, a long list cut short."""
+    """Format the points of an axis, and shorten long lists."""
     return f"{format_list(axis.point_names, ', ')} ({len(axis)})"

@@ -1,4 +1,7 @@
-"""Names and titles of the named studies, none of which is run."""
+"""Names and titles of the named studies.
+
+The functions do not import the studies, because an import would load all measures and parts.
+"""
 
 from __future__ import annotations
 
@@ -7,20 +10,31 @@ import importlib
 import pkgutil
 from pathlib import Path
 
-#: Where the files of `studies/` are installed.
+#: Import path of the package with the named studies.
 STUDIES_PACKAGE = "rsfstudy.named_studies"
 
 
 def study_names() -> tuple[str, ...]:
-    """Names of the studies, in alphabetical order; files that start with _ are shared by them."""
+    """Return the names of the named studies.
+
+    Returns
+    -------
+    tuple of str
+        Names in alphabetical order. Modules whose names start with an underscore are omitted,
+        because they contain code that studies share.
+    """
     package = importlib.import_module(STUDIES_PACKAGE)
     modules = (module.name for module in pkgutil.iter_modules(package.__path__))
     return tuple(sorted(name for name in modules if not name.startswith("_")))
 
 
 def study_titles() -> dict[str, str]:
-    """Titles of the studies, by name, as they stand in their files: none is run, because that would
-    load all that studies are made of.
+    """Read the titles of the named studies from their source files.
+
+    Returns
+    -------
+    dict of str to str
+        Titles by name.
     """
     (place,) = importlib.import_module(STUDIES_PACKAGE).__path__
     files = {name: Path(place, f"{name}.py") for name in study_names()}
@@ -28,8 +42,9 @@ def study_titles() -> dict[str, str]:
 
 
 def _read_title_from_source(source_code: bytes) -> str:
-    """The text given as ``title`` to the call whose value is named `study`."""
-    # what stands before it need not be parsed, which would take as long again
+    """Return the title in the source code of a study."""
+    # The source code before the declaration is not parsed, because parsing it would double the run
+    # time.
     declared = ast.parse(source_code[source_code.index(b"\nstudy = ") :]).body[0]
     assert isinstance(declared, ast.Assign)
     assert isinstance(declared.value, ast.Call)

@@ -1,4 +1,7 @@
-"""Sources of studies: the named ones, found by file name, and files of a user's own."""
+"""Loading of named studies and of study files.
+
+``load_study`` is the main function.
+"""
 
 from __future__ import annotations
 
@@ -22,13 +25,23 @@ if TYPE_CHECKING:
 
 
 def load_study(name_or_file: str) -> Study:
-    """The declaration of a named study, or that of a Python file with a `study` in it.
+    """Load a named study, or the study in a Python file.
+
+    Parameters
+    ----------
+    name_or_file : str
+        Name of a study, or path of a Python file that assigns a `Study` to the variable ``study``.
+
+    Returns
+    -------
+    Study
+        Declaration of the study.
 
     Raises
     ------
     InvalidValue
-        For a name there is no study of, with close matches, and for a file that is not there,
-        raises, or declares no study.
+        If there is no study of this name, if the file cannot be read or raises an exception, or if
+        the file does not declare a study. For an unknown name, the message lists similar names.
     """
     check_path("study", name_or_file)
     if name_or_file.endswith(".py"):
@@ -47,18 +60,18 @@ def load_study(name_or_file: str) -> Study:
 
 
 def _import_study_file(study_file: Path) -> ModuleType:
-    """The module that a file defines.
+    """Import a study file as a module.
 
-    It is removed from `sys.modules` again, and so are the modules in its directory that it imports.
-    Worker processes, which cannot import them, then receive their contents by value, and another
-    file may import other modules of the same names.
+    The module and the modules in the same directory are removed from ``sys.modules`` after the
+    import. Worker processes cannot import these modules, and therefore receive their contents by
+    value. Another study file may import other modules with the same names.
     """
     try:
         path = study_file.resolve(strict=True)
-        if not path.is_file():  # reading a pipe or a device may never end
+        if not path.is_file():  # Reading a pipe or a device may block.
             raise InvalidValue("study", str(study_file), "is no file, but a directory or the like")
         path.read_bytes()
-    except (OSError, RuntimeError) as error:  # links in a circle are a RuntimeError
+    except (OSError, RuntimeError) as error:  # Circular links raise a RuntimeError.
         reason = getattr(error, "strerror", None) or error
         raise InvalidValue("study", str(study_file), f"is no file ({reason})") from error
     spec = importlib.util.spec_from_file_location(f"study_file_{path.stem}", path)
@@ -67,7 +80,7 @@ def _import_study_file(study_file: Path) -> ModuleType:
     module = importlib.util.module_from_spec(spec)
     known = set(sys.modules)
     sys.modules[spec.name] = module
-    sys.path.insert(0, str(path.parent))  # a file may have helpers beside it
+    sys.path.insert(0, str(path.parent))  # The file may import modules in its directory.
     try:
         spec.loader.exec_module(module)
     except InvalidValue as error:
@@ -88,14 +101,17 @@ def _import_study_file(study_file: Path) -> ModuleType:
 
 
 def _is_module_in_directory_of(module_name: str, study_file: Path) -> bool:
-    """True if a module is a file, or in a package, in the same directory."""
+    """Return True if a module or its package is in the directory of a file."""
     top = sys.modules.get(module_name.partition(".")[0])
     places = [getattr(top, "__file__", None), *getattr(top, "__path__", ())]
     return any(Path(place).parent == study_file.parent for place in places if place)
 
 
 def _describe_error_line(error: BaseException, study_file: Path) -> str:
-    """Line of the file where an error arose, in words."""
+    """Return the line of the study file in which an error was raised.
+
+    The result is empty if the error was raised elsewhere.
+    """
     lines = [
         frame.lineno
         for frame in traceback.extract_tb(error.__traceback__)
@@ -105,7 +121,8 @@ def _describe_error_line(error: BaseException, study_file: Path) -> str:
 
 
 def _study_in_module(module: ModuleType, study_name: str) -> Study:
-    from rsfstudy.study.study import Study  # here, because names and titles need none of it
+    """Return the study that a module declares."""
+    from rsfstudy.study.study import Study  # slow import, not needed for names
 
     study = getattr(module, "study", None)
     if not isinstance(study, Study):

@@ -1,4 +1,4 @@
-"""Parts of the user that a study names, and the quantities of their fields."""
+"""User-defined parts of the slider in the declaration of a study."""
 
 from __future__ import annotations
 

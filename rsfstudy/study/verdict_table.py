@@ -1,4 +1,4 @@
-"""Verdicts on claims, as a terminal and a notebook show them."""
+"""Tables of the verdicts on claims, for terminals and notebooks."""
 
 from __future__ import annotations
 
@@ -11,9 +11,9 @@ from rsfstudy.errors import escape_control_characters
 from rsfstudy.quantities import html_table
 
 _SIGNS_OF_CLAIM_RELATIONS = {"equals": "", "below": "< ", "above": "> "}
-#: Of a line of a terminal, and of an identifier on it, in characters.
+#: Widths of a line and of the column with the identifiers on a terminal, in characters.
 _TERMINAL_LINE_WIDTH, _CLAIM_ID_WIDTH = 100, 12
-#: What a printed line tells of a claim.
+#: Columns that must be present in a table that is printed on a terminal.
 _COLUMNS_PRINTED_ON_TERMINAL = (
     "id",
     "claim",
@@ -27,12 +27,23 @@ _COLUMNS_PRINTED_ON_TERMINAL = (
 
 
 def format_published_value(verdict_row: dict[Any, Any]) -> str:
-    """The published value of a claim, with the sign of a bound."""
+    """Format the published value of a claim.
+
+    Parameters
+    ----------
+    verdict_row : dict
+        Row of a table of verdicts.
+
+    Returns
+    -------
+    str
+        Published value. The value of an inequality is preceded by ``<`` or ``>``.
+    """
     return f"{_SIGNS_OF_CLAIM_RELATIONS[verdict_row['relation']]}{verdict_row['published']:.6g}"
 
 
 def _format_row_for_terminal(verdict_row: dict[Any, Any]) -> dict[str, str]:
-    """A claim as a terminal has room for it, by the headings."""
+    """Format the cells of a row for a terminal."""
     return {
         "id": textwrap.shorten(str(verdict_row["id"]), _CLAIM_ID_WIDTH, placeholder="..."),
         "claim": " ".join(str(verdict_row["claim"]).split()),
@@ -44,7 +55,10 @@ def _format_row_for_terminal(verdict_row: dict[Any, Any]) -> dict[str, str]:
 
 
 def _align_columns(rows: list[dict[str, str]]) -> str:
-    """Columns side by side under their headings; claims take the room that the others leave."""
+    """Align the columns of a table under their headings.
+
+    The column with the statements is shortened to fit the width of the terminal.
+    """
     table = [{name: name for name in rows[0]}, *rows]
     wide = {name: max(len(row[name]) for row in table) for name in rows[0]}
     others = sum(width + 2 for name, width in wide.items() if name != "claim")
@@ -56,13 +70,18 @@ def _align_columns(rows: list[dict[str, str]]) -> str:
 
 
 class VerdictTable(pd.DataFrame):
-    """A table of claims, one row each; what is taken from it is a plain table."""
+    """Table of the verdicts on claims, with one row per claim.
+
+    Selections from the table are ordinary data frames.
+    """
 
     @property
     def _constructor(self) -> type[pd.DataFrame]:
+        """Class of the objects that are selected from the table."""
         return pd.DataFrame
 
     def __repr__(self) -> str:
+        """Format the table for a terminal."""
         if self.empty or not set(_COLUMNS_PRINTED_ON_TERMINAL) <= set(self):
             return super().__repr__()
         return escape_control_characters(
@@ -79,7 +98,19 @@ class VerdictTable(pd.DataFrame):
 
 
 def format_verdict_row(verdict_row: dict[Any, Any]) -> dict[str, str]:
-    """A claim in words, by headings; where there are several studies, with the name of its own."""
+    """Format the cells of a row for a notebook or a report.
+
+    Parameters
+    ----------
+    verdict_row : dict
+        Row of a table of verdicts.
+
+    Returns
+    -------
+    dict of str to str
+        Cells of the row by heading. If the row has a column ``study``, the claim begins with the
+        name of the study.
+    """
     reason = f"{verdict_row['tolerance']:.3g}: {verdict_row['reason']}"
     if verdict_row["because"]:
         reason += f". It differs because {verdict_row['because']}"

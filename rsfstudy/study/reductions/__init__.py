@@ -1,1 +1,1 @@
-"""Not written yet."""
+"""Reductions of the results of a study."""

@@ -1,4 +1,8 @@
-"""Level crossing of a sampled curve, with bounds on its position between samples."""
+"""Level crossing of a sampled curve.
+
+``find_crossing`` returns the position of a crossing with lower and upper bounds. The bounds account
+for the unknown shape of the curve between two samples.
+"""
 
 from __future__ import annotations
 
@@ -10,28 +14,38 @@ import numpy as np
 from scipy.interpolate import PchipInterpolator
 from scipy.optimize import brentq
 
-#: Number of samples at least.
+#: Minimum number of samples.
 MIN_SAMPLES_OF_CURVE = 4
-#: Intervals on either side of the bracket in which the curve is examined.
+#: Number of intervals on either side of the bracket in which the curve is examined.
 _EXAMINED_INTERVALS_PER_SIDE = 3
-#: Changes of slope, relative to the largest slope, that count as rounding errors.
+#: Changes of slope below this fraction of the largest slope are regarded as rounding errors.
 _MAX_ROUNDING_OF_SLOPE_CHANGES = 1e-9
-#: The same, relative to the largest change and to the smallest slope nearby, that count for an
-#: oscillation.
+#: Minimum changes of slope that indicate an oscillation, relative to the largest change of slope
+#: and to the smallest slope nearby.
 _MIN_SLOPE_CHANGE_OF_OSCILLATION = 0.1
 
 
 class CrossingStatus(IntEnum):
     """Outcome of the search for a crossing.
 
-    Files contain the integer value, so the values must not change.
+    Result files contain the integer values, so the values must not be changed.
     """
 
     OK, OUT_OF_REACH, NOT_UNIQUE, UNRESOLVED, TOO_FEW_POINTS = range(5)
 
 
 class Crossing(NamedTuple):
-    """Position of a level crossing, with lower and upper bounds and the verdict."""
+    """Position of a level crossing, its bounds, and the status of the search.
+
+    Parameters
+    ----------
+    position : float
+        Position of the crossing.
+    lower_bound, upper_bound : float
+        Bounds of the position.
+    status : CrossingStatus
+        Outcome of the search.
+    """
 
     position: float
     lower_bound: float
@@ -40,31 +54,38 @@ class Crossing(NamedTuple):
 
 
 def find_crossing(x: np.ndarray, y: np.ndarray, level: float) -> Crossing:
-    """Find the position at which a sampled curve reaches a level.
-
-    The bounds allow for curves that differ from the straight chord between two samples. If the
-    slope changes by T in total within an interval of width h, the curve departs from the chord at
-    distance u from the first sample by at most ``T u (h - u)/h``. T is estimated by the change of
-    slope from the previous chord to the next chord. This estimate is exact for a single kink, and
-    for a parabola the estimate is twice the true value. In the first and the last interval, the
-    kink may also be located next to the end, and the curve then follows the neighbouring chord.
-
-    If the slope does not vary monotonically over the neighbouring intervals, changes of opposite
-    sign partly cancel. The largest T among these intervals is then doubled and used for all of
-    them. If the changes of slope alternate in sign, the samples may hide an oscillation. The bounds
-    then enclose at least the whole interval.
+    r"""Find the position at which a sampled curve reaches a level.
 
     Parameters
     ----------
-    x, y : ndarray
+    x, y : ndarray, shape (n,)
         Samples, with x in ascending order.
     level : float
+        Level to reach.
 
     Returns
     -------
     Crossing
         The position and the bounds are NaN unless the samples cross the level exactly once. The
-        verdict is ``UNRESOLVED`` if a hidden oscillation could reach the level in other intervals.
+        status is ``UNRESOLVED`` if a hidden oscillation could reach the level in other intervals.
+
+    Notes
+    -----
+    The bounds allow for curves that differ from the straight chord between two samples. If the
+    slope changes by :math:`T` in total within an interval of width :math:`h`, the distance between
+    the curve and the chord at a distance :math:`u` from the first sample is at most
+
+    .. math:: \frac{T u (h - u)}{h}.
+
+    :math:`T` is estimated by the change of slope from the previous chord to the next chord. The
+    estimate is exact for a single kink. For a parabola, the estimate is twice the true value. In
+    the first and the last interval, the kink may also be located next to the end, and the curve
+    then follows the neighbouring chord.
+
+    If the slope does not vary monotonically over the neighbouring intervals, changes of opposite
+    sign partly cancel. The largest :math:`T` of the neighbouring intervals is then doubled and used
+    for all intervals. If the changes of slope alternate in sign, the samples may hide an
+    oscillation. The bounds then enclose at least the whole interval.
     """
     if x.size < MIN_SAMPLES_OF_CURVE:
         return _build_missing_crossing(CrossingStatus.TOO_FEW_POINTS)
@@ -99,10 +120,24 @@ def find_crossing(x: np.ndarray, y: np.ndarray, level: float) -> Crossing:
 
 
 def find_all_crossings(x: np.ndarray, y: np.ndarray, level: float) -> list[float]:
-    """Return all positions at which the interpolant of the samples reaches a level."""
+    """Return all positions at which the interpolant reaches a level.
+
+    Parameters
+    ----------
+    x, y : ndarray, shape (n,)
+        Samples, with x in ascending order.
+    level : float
+        Level to reach.
+
+    Returns
+    -------
+    list of float
+        Positions of the crossings.
+    """
     off, curve = y - level, PchipInterpolator(x, y)
     places: list[float] = x[off == 0.0].tolist()
-    # between two samples it is monotone, and at them it has their values but for rounding
+    # Between two samples the interpolant is monotone. At the samples, the values are used instead
+    # of the interpolant to avoid rounding errors.
     known = dict(zip(x.tolist(), off.tolist(), strict=True))
     for first in np.flatnonzero(off[:-1] * off[1:] < 0.0):
         ends = x[first : first + 2].tolist()
@@ -111,18 +146,26 @@ def find_all_crossings(x: np.ndarray, y: np.ndarray, level: float) -> list[float
 
 
 def _build_missing_crossing(crossing_status: CrossingStatus) -> Crossing:
+    """Return a crossing without a position."""
     return Crossing(math.nan, math.nan, math.nan, crossing_status)
 
 
 def _estimate_slope_changes(
     slopes: np.ndarray, interval_numbers: range
 ) -> tuple[dict[int, float], bool]:
-    """Estimate the total change of slope within each of the given intervals.
+    """Estimate the total change of slope within each of several intervals.
+
+    Parameters
+    ----------
+    slopes : ndarray, shape (n - 1,)
+        Slopes of the chords.
+    interval_numbers : range
+        Indices of the intervals.
 
     Returns
     -------
     turns : dict of int to float
-        Total change of slope, by the number of the interval.
+        Total change of slope by the index of the interval.
     alternates : bool
         True if the changes of slope alternate in sign.
     """
@@ -131,14 +174,14 @@ def _estimate_slope_changes(
     turns = {}
     for n in interval_numbers:
         beside = sizes[max(n - 1, 0) : n + 1]
-        turns[n] = 2.0 * float(beside.mean())  # at an end, the other change is not known
+        turns[n] = 2.0 * float(beside.mean())  # At an end, only one change is known.
     within = bends[interval_numbers.start : interval_numbers.stop - 1]
     if not _count_sign_reversals(
         within, _MAX_ROUNDING_OF_SLOPE_CHANGES * float(np.abs(slopes).max())
     ):
         return turns, False
     largest = 2.0 * max(turns.values())
-    # the small changes on either side of a kink, or noise, do not make an oscillation
+    # Small changes on either side of a kink, and noise, do not indicate an oscillation.
     noticeable = _MIN_SLOPE_CHANGE_OF_OSCILLATION * float(np.abs(within).max())
     steady = largest < 2.0 * _MIN_SLOPE_CHANGE_OF_OSCILLATION * float(
         np.abs(slopes[interval_numbers.start : interval_numbers.stop]).min()
@@ -149,7 +192,7 @@ def _estimate_slope_changes(
 
 
 def _count_sign_reversals(slope_changes: np.ndarray, min_slope_change: float) -> int:
-    """Count the sign reversals among changes of slope larger than a minimum."""
+    """Count the sign reversals among large changes of slope."""
     counted = slope_changes[np.abs(slope_changes) > min_slope_change]
     return int((counted[1:] * counted[:-1] < 0.0).sum())
 
@@ -157,7 +200,7 @@ def _count_sign_reversals(slope_changes: np.ndarray, min_slope_change: float) ->
 def _crossing_bounds(
     slope: float, slope_change: float, interval_width: float, level_above_first_sample: float
 ) -> tuple[float, float] | None:
-    """Return the first and last possible position of a crossing in an interval.
+    """Return the bounds of a crossing in an interval.
 
     Positions are relative to the first sample, and ``level_above_first_sample`` is the level minus
     the value of the first sample. The result is None if the level cannot be reached.
@@ -166,7 +209,7 @@ def _crossing_bounds(
         slope, level_above_first_sample = -slope, -level_above_first_sample
     if (
         level_above_first_sample > slope * interval_width
-    ):  # seen from the other end, it is below the sample
+    ):  # The curve is mirrored, so that the level is below the first sample.
         mirrored = _crossing_bounds(
             slope, slope_change, interval_width, slope * interval_width - level_above_first_sample
         )
@@ -205,11 +248,11 @@ def _crossing_bounds_at_end(
     level_above_inner_sample: float,
     is_first_interval: bool,
 ) -> tuple[float, float]:
-    """Return the first and last possible position of a crossing in an end interval.
+    """Return the bounds of a crossing in the first or last interval.
 
-    The curve may have one kink in this interval. Its distance from the chord is at most the
-    difference between the slopes of this chord and the neighbouring chord, multiplied by the
-    distance from the inner sample.
+    The curve may have one kink in this interval. The distance of the curve from the chord is at
+    most the difference between the slopes of this chord and the neighbouring chord, multiplied by
+    the distance from the inner sample.
     """
     slope, following = (slopes[0], slopes[1]) if is_first_interval else (slopes[-1], slopes[-2])
     width = float(interval_widths[0] if is_first_interval else interval_widths[-1])

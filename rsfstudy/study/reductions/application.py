@@ -1,9 +1,9 @@
-"""Reductions: from a lattice to boundaries and scaling slopes, kept in the same dataset.
+"""Application of reductions to the results of a study.
 
-A reduction never draws on failed or missing cells: where there are any within its support, the
-result is NaN and says why, unless it is told to leave the failed ones out. Cells that answered
-without a number (such as `stable_for_all_steps`) are left out, and counted. Numerical errors of
-cells are carried to what is made of them (`rsfstudy.study.reductions.base.with_propagated_errors`).
+``apply_reductions`` is the main function. A reduction never uses failed or missing cells. If a
+result depends on failed or missing cells, the result is NaN, and the attribute ``refused`` contains
+the reason. The option ``despite_failures`` omits failed cells instead. Cells that have an answer
+but no value, such as cells with the status ``stable_for_all_steps``, are omitted.
 """
 
 from __future__ import annotations
@@ -61,11 +61,12 @@ __all__ = [
     "apply_reductions",
 ]
 
-#: What tells of the quality of a result, by the ends of their names.
+#: Suffixes of the variables that describe the quality of a result.
 _SUFFIXES_OF_QUALITY_VARIABLES = ("error", "stderr", "misfit", "points", "status")
 
 
 def _reduced_variable_names(dataset: xr.Dataset) -> list[str]:
+    """Return the names of all data variables."""
     return list(map(str, dataset.data_vars))
 
 
@@ -73,14 +74,44 @@ def _reduced_variable_names(dataset: xr.Dataset) -> list[str]:
 def apply_reductions(
     dataset: xr.Dataset, reductions: tuple[Reduction, ...], *, despite_failures: bool = False
 ) -> xr.Dataset:
-    """The dataset with the results of its reductions, each described by the vocabulary.
+    """Add the results of reductions to a dataset.
+
+    The attributes of the results, such as units and long names, are taken from the vocabulary or
+    from the reductions.
 
     Parameters
     ----------
     dataset : xarray.Dataset
+        Results of the cells, including the variable ``status``.
     reductions : tuple of Reduction
-    despite_failures : bool
-        Leave failed cells out instead of refusing to draw on them; the results say so.
+        Reductions, applied in order. A reduction may use the results of the preceding reductions.
+    despite_failures : bool, default: False
+        If True, omit failed cells. If False, all results that depend on failed cells are NaN.
+
+    Returns
+    -------
+    xarray.Dataset
+        Dataset with the results. If failed cells were omitted, the attribute ``despite`` of each
+        result contains their number.
+
+    Raises
+    ------
+    InvalidValue
+        If the dataset does not contain the variable to reduce, if a result would replace a variable
+        of the dataset, or if a user-defined reduction does not return a dataset.
+
+    Examples
+    --------
+    >>> import xarray as xr
+    >>> from rsfstudy.reductions import Range, apply_reductions
+    >>> dataset = xr.Dataset(
+    ...     {"stress_drop": ("phi", [2.0, 5.0]), "status": ("phi", [0, 0])},
+    ...     coords={"phi": [45.0, 60.0]},
+    ... )
+    >>> spread = Range(name="spread", of="stress_drop", over="phi")
+    >>> reduced = apply_reductions(dataset, (spread,))
+    >>> float(reduced["spread"])
+    3.0
     """
     lost = int(
         (failed_cell_mask(dataset["status"]) & (dataset["status"] != int(Status.PENDING))).sum()
@@ -98,7 +129,7 @@ def apply_reductions(
         if not reduction.uses_failed_cells:
             own = drawn.get(reduction.of, own)
         support = mask_unusable_values(support, reduction.of, own)
-        found: object = reduction(support)  # user-defined reductions may return anything
+        found: object = reduction(support)  # A user-defined reduction may return any object.
         if not isinstance(found, xr.Dataset):
             rule = "must return an xarray.Dataset of the new variables"
             remedy = "Write return self.results('how it was found', {'': values})."
@@ -129,7 +160,8 @@ def apply_reductions(
             before = {key: along.attrs for key, along in dataset.coords.items()}
             dataset = dataset.assign({name: values})
             for coordinate, attributes in before.items():
-                # results may lack the attributes of coordinates: older versions of xarray drop them
+                # Older versions of xarray drop the attributes of coordinates, so the attributes are
+                # restored.
                 dataset[coordinate].attrs = attributes
             for coordinate in values.dims:
                 if coordinate in dataset.coords and not dataset[coordinate].attrs:

@@ -1,4 +1,9 @@
-"""Base of reductions: a name, a variable to reduce, and that they never use failed cells."""
+"""Base class of reductions, and functions that all reductions share.
+
+``Reduction`` is the base class. The functions handle failed cells, coordinate ranges, and the
+propagation of numerical errors from cells to results. A reduction never uses failed cells, unless
+its class sets ``uses_failed_cells``.
+"""
 
 from __future__ import annotations
 
@@ -19,19 +24,23 @@ from rsfstudy.vocabulary import QUANTITY_BY_NAME
 
 DatasetOrArray = TypeVar("DatasetOrArray", xr.Dataset, xr.DataArray)
 
-#: Derivatives of a result by cells, each with the place of those on some dimensions.
+#: Pairs of a derivative with respect to cells and the position of these cells along some
+#: dimensions.
 DerivativesByVariable = Sequence[tuple[xr.DataArray, Mapping[str, Any]]]
 
-#: Fields that name what a result is measured in units of, by the end of its name.
+#: For each suffix of a result name, the fields of the reduction that name the variables from which
+#: the units of the result are derived.
 UnitFieldsBySuffix = Mapping[str, Sequence[str]]
 
-#: How a result comes by its error, for the attributes of that.
+#: Value of the attribute ``comment`` of propagated errors.
 PROPAGATED_ERROR_COMMENT = (
     "errors of the cells it draws on, each times the derivative by it, in absolute value"
 )
-#: Endings of the names of variables that hold statistical errors.
+#: Suffixes of the names of variables that contain standard errors, bounds of confidence intervals,
+#: covariances or correlations.
 _STATISTICAL_SUFFIXES = ("_stderr", "_low", "_high", "covariance", "correlation")
-#: Rounding error by which a coordinate value may miss a range and still count as in it.
+#: Relative tolerance at the ends of a coordinate range. A coordinate value may differ from the end
+#: of a range by rounding errors.
 COORDINATE_RANGE_RTOL = 1e-9
 
 
@@ -41,109 +50,227 @@ COORDINATE_RANGE_RTOL = 1e-9
 class Reduction(CheckedKeywords):
     """Base class of all reductions.
 
-    Calling a reduction, as in ``reduction(dataset)``, returns a dataset of the new variables. To
-    write your own reduction, derive a frozen dataclass from this class. Fields other than ``name``
-    and ``of`` are options of the reduction. One method is required::
+    If you call a reduction, as in ``reduction(dataset)``, it returns a dataset with the new
+    variables. To write your own reduction, derive a frozen dataclass from this class. Fields other
+    than ``name`` and ``of`` are options of the reduction. One method is required::
 
         __call__(self, dataset) -> xarray.Dataset
 
-    ``name`` is the name of the result, and ``of`` is the variable to reduce. In ``dataset``, the
-    values of failed cells are NaN, and the variable ``status`` contains the status of each cell.
-    The following class attributes and methods are optional::
+    In ``dataset``, the values of failed cells are NaN, and the variable ``status`` contains the
+    status of each cell. The following class attributes and methods are optional::
 
         kind: ClassVar[str]
         long_names: ClassVar[Mapping[str, str]]
-        measured_in: ClassVar[Mapping[str, Sequence[str]]]
+        unit_fields: ClassVar[Mapping[str, Sequence[str]]]
         derivatives(self, dataset) -> Sequence[tuple[xarray.DataArray, Mapping]]
 
     ``kind`` is the name of the reduction in files. The default is the class name. ``long_names``
     and ``unit_fields`` define the long names and the units of the results. ``derivatives`` returns
     the derivatives with which the numerical errors of cells are propagated to ``<name>_error``.
+
+    Parameters
+    ----------
+    name : str
+        Name of the result, and the beginning of the names of all further results.
+    of : str
+        Name of the variable to reduce.
+
+    Examples
+    --------
+    >>> from dataclasses import dataclass
+    >>> import xarray as xr
+    >>> from rsfstudy.reductions import Reduction
+    >>> @dataclass(frozen=True)
+    ... class SquareRoot(Reduction):
+    ...     def __call__(self, dataset):
+    ...         return self.results("square root", {"": dataset[self.of] ** 0.5})
+    >>> dataset = xr.Dataset({"area": ("cell", [4.0, 9.0])})
+    >>> SquareRoot(name="side", of="area")(dataset)["side"].values.tolist()
+    [2.0, 3.0]
     """
 
-    #: Name of the kind in declarations; by default that of the class.
+    #: Name of the reduction in declarations and files. The default is the name of the class.
     kind: ClassVar[str] = "Reduction"
-    #: Long names of its results that are pure numbers, by what follows `name` in theirs; "{name}"
-    #: in them is `name` in words.
+    #: Long names of dimensionless results, by the suffix that follows ``name`` in the name of the
+    #: result. The placeholder ``{name}`` is replaced by ``name`` with spaces instead of
+    #: underscores.
     long_names: ClassVar[Mapping[str, str]] = {}
-    #: What its results are in units of, by what follows `name` in theirs: the variable that a field
-    #: names, as `("of",)`, or over that of others, as `("of", "on")`. All others are pure numbers.
+    #: Fields that determine the units of the results, by the suffix that follows ``name`` in the
+    #: name of the result. For ``("of",)``, the result has the units of the variable that the field
+    #: ``of`` names. For ``("of", "on")``, the result has the units of the first variable divided by
+    #: the units of the second variable. All other results are dimensionless.
     unit_fields: ClassVar[UnitFieldsBySuffix] = {}
-    #: Whether it tells of cells that failed, which all others refuse to draw on.
+    #: True if the reduction also uses failed cells. All other reductions reject failed cells.
     uses_failed_cells: ClassVar[bool] = False
 
     name: str
     of: str
 
     def __init_subclass__(cls) -> None:
+        """Set the default kind of a subclass and adopt former member names."""
         super().__init_subclass__()
         adopt_former_members(cls)
         if "kind" not in vars(cls) and not cls.__name__.startswith("_"):
             cls.kind = cls.__name__
 
     def __call__(self, dataset: xr.Dataset) -> xr.Dataset:
-        """Return the new variables."""
+        """Compute the new variables.
+
+        Parameters
+        ----------
+        dataset : xarray.Dataset
+            Results of the cells, including the variable ``status``.
+
+        Returns
+        -------
+        xarray.Dataset
+            New variables.
+
+        Raises
+        ------
+        TypeError
+            If a subclass does not override this method.
+        """
         raise TypeError(f"{type(self).__name__} reduces nothing")
 
     def results(self, comment: str, values: Mapping[str, xr.DataArray]) -> xr.Dataset:
-        """The new variables, by what follows `name` in their names, with how they came about."""
+        """Assemble a dataset of results.
+
+        Parameters
+        ----------
+        comment : str
+            Description of the computation, which becomes the attribute ``comment`` of all results.
+        values : mapping of str to xarray.DataArray
+            Results by name suffix. The suffix ``""`` stands for the result ``name`` itself.
+
+        Returns
+        -------
+        xarray.Dataset
+            Results with their full names.
+        """
         described = {end: found.assign_attrs(comment=comment) for end, found in values.items()}
         return xr.Dataset({f"{self.name}{end}": found for end, found in described.items()})
 
     def support_status(self, status: xr.DataArray) -> xr.DataArray:
-        """The worst status among the cells that each result draws on, from the status of all cells;
-        `worst_status` removes the dimensions that the results do not have.
+        """Return the status of the cells on which the results depend.
+
+        The base class returns the status of all cells. A subclass that uses only some of the cells
+        overrides this method. The status of a result is the largest of these status codes along the
+        dimensions that the result does not have.
+
+        Parameters
+        ----------
+        status : xarray.DataArray
+            Status codes of all cells.
+
+        Returns
+        -------
+        xarray.DataArray
+            Status codes of the cells on which the results depend.
         """
         return status
 
     def derivatives(self, dataset: xr.Dataset) -> DerivativesByVariable:
-        """Derivatives of the result `name` by the cells that it draws on, 0 by those that have no
-        number; none where the errors of cells do not carry over.
+        """Compute the derivatives of the result with respect to the cells.
 
-        Each is by the cells at the result's own place, or at the place on some dimensions that
-        comes with it; along dimensions that the result does not have, by each of the cells.
+        A subclass must override this method to propagate the numerical errors of the cells to the
+        result. The base class returns no derivatives, so errors are not propagated.
+
+        Parameters
+        ----------
+        dataset : xarray.Dataset
+            Results of the cells, including the variable ``status``.
+
+        Returns
+        -------
+        sequence of (xarray.DataArray, mapping)
+            Each derivative is paired with the position of the cells. If the mapping is empty, the
+            cells are at the same position as the result. Otherwise, the mapping contains coordinate
+            values of the cells along some dimensions. If a derivative has dimensions that the
+            result does not have, the result depends on all cells along these dimensions. The
+            derivative is 0 for cells without a value.
         """
         return ()
 
     @property
     def quantities(self) -> Sequence[Quantity]:
-        """Names and units of its results that the vocabulary does not hold: of `long_names`."""
+        """Quantities of the results that have an entry in ``long_names``."""
         words = {"name": self.name.replace("_", " ")}
         given = self.long_names.items()
         return [Quantity(f"{self.name}{end}", "", "1", t.format(**words)) for end, t in given]
 
     def describe(self) -> dict[str, Any]:
-        """The reduction as plain data."""
+        """Convert the reduction to a dictionary of plain values.
+
+        Returns
+        -------
+        dict of str to object
+            Kind and fields of the reduction.
+        """
         return {"kind": self.kind, **asdict(self)}
 
 
 def failed_cell_mask(status: xr.DataArray) -> xr.DataArray:
-    """Cells that failed or were not computed."""
+    """Return a mask of the cells that failed or were not computed.
+
+    Parameters
+    ----------
+    status : xarray.DataArray
+        Status codes of the cells.
+
+    Returns
+    -------
+    xarray.DataArray
+        True for cells that failed and for pending cells.
+    """
     return status >= int(Status.WORK_BUDGET_SPENT)
 
 
 def worst_status_along_other_dims(
     status: xr.DataArray, kept_dimensions: Collection[Hashable]
 ) -> xr.DataArray:
-    """The worst status along all dimensions but `dims`; failures have the largest codes."""
+    """Return the worst status along all dimensions that are not kept.
+
+    The worst status is the maximum, because failures have the largest status codes.
+
+    Parameters
+    ----------
+    status : xarray.DataArray
+        Status codes of the cells.
+    kept_dimensions : collection of str
+        Dimensions of the result.
+
+    Returns
+    -------
+    xarray.DataArray
+        Largest status code along all other dimensions.
+    """
     return status.max([d for d in status.dims if d not in kept_dimensions])
 
 
 def mask_unusable_values(
     dataset: xr.Dataset, variable_name: str, status: xr.DataArray
 ) -> xr.Dataset:
-    """Return a copy of the dataset in which values that must not be used are NaN.
+    """Mask values that must not be used.
 
-    The values of failed cells are replaced by NaN. If ``variable_name`` is a standard error or the
-    bound of a confidence interval, values that are not valid are replaced by NaN as well.
+    The values of failed cells are replaced by NaN. If ``variable_name`` is the name of a standard
+    error or of a bound of a confidence interval, values that are not valid are replaced by NaN as
+    well.
 
     Parameters
     ----------
     dataset : xarray.Dataset
+        Results of the cells.
     variable_name : str
-        Variable to reduce.
+        Name of the variable to reduce.
     status : xarray.DataArray
-        Status of the cells on which ``variable_name`` depends. The status is added to the result.
+        Status of the cells on which ``variable_name`` depends. The status is added to the returned
+        dataset.
+
+    Returns
+    -------
+    xarray.Dataset
+        Copy with masked values.
     """
     bad = failed_cell_mask(status)
     if variable_name.endswith(_STATISTICAL_SUFFIXES):
@@ -156,8 +283,22 @@ def mask_unusable_values(
 def refused_result_mask(
     dataset: xr.Dataset, variable_name: str, *reduced_dimensions: str
 ) -> xr.DataArray:
-    """True if a result must be refused because a cell failed along these dimensions, or along those
-    that `of` does not have.
+    """Return a mask of the results that depend on failed cells.
+
+    Parameters
+    ----------
+    dataset : xarray.Dataset
+        Results of the cells, including the variable ``status``.
+    variable_name : str
+        Name of the variable to reduce.
+    *reduced_dimensions : str
+        Dimensions along which the variable is reduced.
+
+    Returns
+    -------
+    xarray.DataArray
+        True if a cell failed along the reduced dimensions or along dimensions that the variable
+        does not have.
     """
     bad = failed_cell_mask(dataset["status"])
     return bad.any(
@@ -166,7 +307,20 @@ def refused_result_mask(
 
 
 def mask_failures(dataset: xr.Dataset) -> xr.Dataset:
-    """The dataset with failed cells changed to cells that have an answer but no number."""
+    """Replace failed cells by cells that have an answer but no value.
+
+    Pending cells are not changed.
+
+    Parameters
+    ----------
+    dataset : xarray.Dataset
+        Results of the cells, including the variable ``status``.
+
+    Returns
+    -------
+    xarray.Dataset
+        Copy in which the values of failed cells are NaN, and their status is ``NO_STEP``.
+    """
     lost = failed_cell_mask(dataset["status"]) & (dataset["status"] != int(Status.PENDING))
     kept = {
         name: values.where(~lost)
@@ -178,12 +332,25 @@ def mask_failures(dataset: xr.Dataset) -> xr.Dataset:
 
 
 def dimension_of_coordinate(dataset: xr.Dataset | xr.DataArray, coordinate_name: str) -> str:
-    """The one dimension a coordinate lies along.
+    """Return the dimension of a one-dimensional numeric coordinate.
+
+    Parameters
+    ----------
+    dataset : xarray.Dataset or xarray.DataArray
+        Object with the coordinate.
+    coordinate_name : str
+        Name of the coordinate.
+
+    Returns
+    -------
+    str
+        Name of the dimension.
 
     Raises
     ------
     InvalidValue
-        Where `on` is no coordinate along one dimension.
+        If the object has no one-dimensional coordinate of this name, or if the coordinate is not
+        numeric.
     """
     if coordinate_name not in dataset.coords or dataset[coordinate_name].ndim != 1:
         choices = [
@@ -200,8 +367,23 @@ def dimension_of_coordinate(dataset: xr.Dataset | xr.DataArray, coordinate_name:
 def select_coordinate_range(
     dataset: DatasetOrArray, coordinate_name: str, coordinate_range: tuple[float, float] | None
 ) -> DatasetOrArray:
-    """The part of a dataset in a range of a coordinate, both ends included; all of what does not
-    lie along that coordinate.
+    """Select the points within a range of a coordinate.
+
+    Parameters
+    ----------
+    dataset : xarray.Dataset or xarray.DataArray
+        Object to select from.
+    coordinate_name : str
+        Name of the coordinate.
+    coordinate_range : tuple of (float, float) or None
+        Lowest and highest value of the range. Both ends are included, with a tolerance for rounding
+        errors. None selects all points.
+
+    Returns
+    -------
+    xarray.Dataset or xarray.DataArray
+        Selected points. If the object does not have the coordinate, the object is returned
+        unchanged.
     """
     if coordinate_range is None or coordinate_name not in dataset.coords:
         return dataset
@@ -213,8 +395,20 @@ def select_coordinate_range(
 
 
 def read_undocumented_quantities(dataset: xr.Dataset) -> dict[str, Quantity]:
-    """Quantities that a dataset states for variables that the vocabulary does not hold, or calls
-    something else, or holds in other units.
+    """Read the quantities of variables that the vocabulary does not describe.
+
+    Parameters
+    ----------
+    dataset : xarray.Dataset
+        Dataset whose variables have the attributes ``long_name``, ``units``, ``symbol`` and
+        ``scale``.
+
+    Returns
+    -------
+    dict of str to Quantity
+        Quantities by variable name. The dictionary contains the variables that have no entry in the
+        vocabulary, or whose long name or units differ from the vocabulary. Variables without a long
+        name are omitted.
     """
     return {
         str(name): Quantity(
@@ -230,6 +424,7 @@ def read_undocumented_quantities(dataset: xr.Dataset) -> dict[str, Quantity]:
 
 
 def _is_in_vocabulary(variable_name: str, variable_attributes: Mapping[Any, Any]) -> bool:
+    """Return True if the long name and units of a variable are standard."""
     about = QUANTITY_BY_NAME.get(variable_name)
     if about is None or variable_attributes["long_name"] != about.long_name:
         return False
@@ -242,22 +437,37 @@ def _is_in_vocabulary(variable_name: str, variable_attributes: Mapping[Any, Any]
 def with_propagated_errors(
     reduction: Reduction, dataset: xr.Dataset, reduction_results: xr.Dataset
 ) -> xr.Dataset:
-    """The results of a reduction with ``<name>_error``, what the errors of its cells make of them;
-    added to the error that the reduction has of its own.
+    r"""Propagate the numerical errors of cells to the result of a reduction.
 
-    The error of each cell, and its rounding, count with the derivative of the result by that cell,
-    all in absolute value: errors of a solver are systematic, so that those of neighbours add up.
-    To first order this is a bound where those of the cells are. It is NaN where a cell that the
-    result depends on has no error estimate. Nothing is carried where none has, or where the
-    reduction has no derivatives.
+    If the reduction has already computed its own error, the propagated error is added. Nothing is
+    propagated if the reduced variable has no error estimates or if the reduction has no
+    derivatives.
 
     Parameters
     ----------
     reduction : Reduction
+        Reduction that computed the results.
     dataset : xarray.Dataset
-        What was reduced.
+        Dataset that was reduced.
     reduction_results : xarray.Dataset
-        The results.
+        Results of the reduction.
+
+    Returns
+    -------
+    xarray.Dataset
+        Results with the variable ``<name>_error``. The error is NaN if the result depends on a cell
+        without an error estimate.
+
+    Notes
+    -----
+    The error of a result :math:`r` that depends on cells with values :math:`y_i` and errors
+    :math:`e_i` is
+
+    .. math:: e_r = \sum_i \left|\frac{\partial r}{\partial y_i}\right| (e_i + \epsilon |y_i|),
+
+    with the rounding error :math:`\epsilon` of double precision. Absolute values are added because
+    the errors of a solver are systematic, so the errors of neighbouring cells do not cancel. To
+    first order, the sum is an upper bound of the error if the errors of the cells are upper bounds.
     """
     of, name = f"{reduction.of}_error", f"{reduction.name}_error"
     if of not in dataset or reduction.name not in reduction_results:
@@ -267,7 +477,7 @@ def with_propagated_errors(
     parts = []
     for derivative, place in reduction.derivatives(dataset):
         felt = abs(derivative) * errors.sel(place, drop=True)
-        felt = felt.where(derivative != 0.0, 0.0)  # a cell without a number may have no error
+        felt = felt.where(derivative != 0.0, 0.0)  # A cell without a value may have no error.
         parts.append(felt.sum([d for d in felt.dims if d not in result.dims], skipna=False))
     if not parts:
         return reduction_results

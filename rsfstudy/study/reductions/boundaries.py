@@ -1,4 +1,8 @@
-"""Boundaries: where a lattice changes from no to yes, and where a smooth number reaches a level."""
+"""Reductions that find boundaries and level crossings.
+
+A ``Boundary`` separates cells on either side of a threshold. An ``Inverse`` interpolates a smooth
+variable to find the coordinate value at which the variable reaches a level.
+"""
 
 from __future__ import annotations
 
@@ -25,30 +29,46 @@ from rsfstudy.study.reductions.base import (
     refused_result_mask,
 )
 
-#: Change of ln(value) by which derivatives of an interpolant are taken.
+#: Change of ln(value) in the finite differences for the derivatives of an interpolant.
 _LOG_STEP_OF_DERIVATIVES = 1e-6
 
 
 @guard_methods
 @dataclass(frozen=True)
 class Boundary(Reduction):
-    """Boundary between the points of a coordinate whose cells say no and those that say yes.
+    """Boundary between cells with values below and above a threshold.
 
-    Nothing is interpolated: cells that answer yes or no bracket the boundary, and no more. A cell
-    nearer to the level than its numerical error does not say which.
+    The boundary is not interpolated. The result only shows that the boundary is between two
+    neighbouring cells. A cell is ignored if its value differs from the threshold by no more than
+    the numerical error.
 
     Parameters
     ----------
     name : str
-        Name of the boundary, the middle of its bracket; ``<name>_stable`` and ``<name>_unstable``
-        (the ends of the bracket), ``<name>_error`` (half its width) and ``<name>_crossings`` (how
-        often the answer changes: the boundary is a number only where it changes once) come with it.
+        Name of the boundary, which is the midpoint of its bracket. The ends of the bracket are
+        ``<name>_stable`` (value at or below the threshold) and ``<name>_unstable`` (value above the
+        threshold). Half the width of the bracket is ``<name>_error``. The number of crossings of
+        the threshold along the coordinate is ``<name>_crossings``. The boundary is NaN unless there
+        is exactly one crossing.
     of : str
-        Variable that is above `level` where the answer is yes (unstable).
+        Name of the variable that is compared with the threshold. A value above the threshold means
+        that the cell is unstable.
     on : str
-        Coordinate along one dimension.
-    level : float
-        What separates no from yes.
+        Name of a one-dimensional coordinate.
+    level : float, default: 0.5
+        Threshold.
+
+    Examples
+    --------
+    >>> import xarray as xr
+    >>> from rsfstudy.reductions import Boundary
+    >>> dataset = xr.Dataset(
+    ...     {"unstable": ("b_over_a", [0.0, 0.0, 1.0]), "status": ("b_over_a", [0, 0, 0])},
+    ...     coords={"b_over_a": [1.0, 2.0, 3.0]},
+    ... )
+    >>> edge = Boundary(name="edge", of="unstable", on="b_over_a")(dataset)
+    >>> float(edge["edge"]), float(edge["edge_error"])
+    (2.5, 0.5)
     """
 
     on: str = ""
@@ -57,15 +77,25 @@ class Boundary(Reduction):
     unit_fields: ClassVar[UnitFieldsBySuffix] = {"": ("on",)}
 
     def __call__(self, dataset: xr.Dataset) -> xr.Dataset:
-        """Bracket the boundary along the dimension of `on`, for each point of the others.
+        """Find the boundary for each point of the other dimensions.
 
-        Failed cells refuse their row; cells that answered without a number, or without saying yes
-        or no, are left out.
+        If a cell failed, the boundary of the row with the failed cell is NaN. Cells without a value
+        are ignored.
+
+        Parameters
+        ----------
+        dataset : xarray.Dataset
+            Results of the cells, including the variable ``status``.
+
+        Returns
+        -------
+        xarray.Dataset
+            Boundary, ends of the bracket, error and number of crossings.
 
         Raises
         ------
         InvalidValue
-            Where `on` is no coordinate along one dimension.
+            If ``on`` is not a one-dimensional numeric coordinate.
         """
         dimension = dimension_of_coordinate(dataset, self.on)
         values = dataset[self.of].where(~refused_result_mask(dataset, self.of, dimension))
@@ -84,8 +114,21 @@ class Boundary(Reduction):
         return self.results(note, found)
 
     def bracket(self, values: xr.DataArray) -> tuple[xr.DataArray, ...]:
-        """The cells that say no and yes next to the first change of the answer along `on`, and how
-        often it changes; NaN where no cell says so.
+        """Bracket the first crossing of the threshold.
+
+        Parameters
+        ----------
+        values : xarray.DataArray
+            Values of the variable, with the coordinate ``on``.
+
+        Returns
+        -------
+        stable, unstable : xarray.DataArray
+            Coordinates of the cells on either side of the first crossing. If there is no crossing,
+            the last cell below the threshold or the first cell above the threshold is returned, and
+            the other coordinate is NaN.
+        crossings : xarray.DataArray
+            Number of crossings. NaN if there are no values.
         """
         dimension = dimension_of_coordinate(values, self.on)
         edges: tuple[xr.DataArray, ...] = xr.apply_ufunc(
@@ -101,7 +144,7 @@ class Boundary(Reduction):
     def _bracket_along_coordinate(
         self, values: np.ndarray, coordinate: np.ndarray
     ) -> tuple[float, float, float]:
-        """Ends of the bracket next to the first change of the answer, and the number of changes."""
+        """Bracket the first crossing and count the crossings."""
         order = [i for i in np.argsort(coordinate) if not np.isnan(values[i])]
         if not order:
             return np.nan, np.nan, np.nan
@@ -121,7 +164,7 @@ class Boundary(Reduction):
 class Inverse(Reduction):
     """Coordinate value at which a monotone variable reaches a level.
 
-    The variable is interpolated in logarithms of the variable and the coordinate.
+    The logarithm of the variable is interpolated as a function of the logarithm of the coordinate.
 
     Parameters
     ----------
@@ -129,21 +172,35 @@ class Inverse(Reduction):
         Name of the result. Two more variables are returned. ``<name>_error`` is the sum of three
         contributions: the uncertainty of the level, the distance to the farthest position at which
         a curve through the cells may reach the level, and the numerical errors of the cells.
-        ``<name>_status`` is ``ok`` or gives the reason why the result is NaN. ``out_of_reach``
-        means that the variable does not reach the level, and ``not_unique`` that the variable
-        reaches the level several times. ``unresolved`` means that the variable may oscillate
-        between the cells, and ``too_few_points`` that there are too few cells for an interpolation.
+        ``<name>_status`` is ``ok`` or the reason why the result is NaN. ``out_of_reach`` means that
+        the variable does not reach the level. ``not_unique`` means that the variable reaches the
+        level several times. ``unresolved`` means that the variable may oscillate between the cells.
+        ``too_few_points`` means that there are too few cells for an interpolation.
     of : str
-        Variable that reaches the level. The variable must be positive.
+        Name of the variable that reaches the level. The variable must be positive.
     on : str
-        One-dimensional coordinate. The coordinate must be positive.
-    levels : float, or mapping of str to float
+        Name of a one-dimensional coordinate. The coordinate must be positive.
+    levels : float, or mapping of str to float, default: 1.0
         A single level, or one level for each label of the dimension ``along``. Labels that are not
         in the mapping have no level.
-    uncertainty : float, or mapping of str to float
+    uncertainty : float, or mapping of str to float, default: 0.0
         Relative uncertainty of the level, in the same form as ``levels``.
     along : str
-        Dimension of the labels.
+        Name of the dimension of the labels. Required if ``levels`` or ``uncertainty`` is a mapping.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import xarray as xr
+    >>> from rsfstudy.reductions import Inverse
+    >>> x = np.array([1.0, 2.0, 4.0, 8.0])
+    >>> dataset = xr.Dataset(
+    ...     {"drop": ("stiffness", 3.0 / x), "status": ("stiffness", [0, 0, 0, 0])},
+    ...     coords={"stiffness": x},
+    ... )
+    >>> found = Inverse(name="stiffness_found", of="drop", on="stiffness", levels=1.0)(dataset)
+    >>> round(float(found["stiffness_found"]), 6)
+    3.0
     """
 
     on: str = ""
@@ -155,17 +212,28 @@ class Inverse(Reduction):
 
     @property
     def quantities(self) -> Sequence[Quantity]:
+        """Quantity of the status of the interpolation."""
         flags = tuple(verdict.name.lower() for verdict in CrossingStatus)
         text = f"status of {self.name.replace('_', ' ')}"
         return [Quantity(f"{self.name}_status", "", "1", text, flags=flags)]
 
     def __call__(self, dataset: xr.Dataset) -> xr.Dataset:
-        """Interpolate along the dimension of the coordinate ``on``.
+        """Find the coordinate value for each point of the other dimensions.
+
+        Parameters
+        ----------
+        dataset : xarray.Dataset
+            Results of the cells, including the variable ``status``.
+
+        Returns
+        -------
+        xarray.Dataset
+            Coordinate value, error and status. Empty if the dimension has fewer than four points.
 
         Raises
         ------
         InvalidValue
-            If ``on`` is not a one-dimensional coordinate.
+            If ``on`` is not a one-dimensional numeric coordinate.
         """
         dimension = dimension_of_coordinate(dataset, self.on)
         if dataset.sizes[dimension] < MIN_SAMPLES_OF_CURVE:
@@ -192,7 +260,21 @@ class Inverse(Reduction):
         )
 
     def derivatives(self, dataset: xr.Dataset) -> DerivativesByVariable:
-        """Those of the interpolant by its points, over its slope."""
+        """Compute the derivatives of the crossing position.
+
+        The interpolant is differentiated with respect to the value of each cell, and the derivative
+        is divided by the slope of the interpolant at the crossing.
+
+        Parameters
+        ----------
+        dataset : xarray.Dataset
+            Results of the cells, including the variable ``status``.
+
+        Returns
+        -------
+        sequence of (xarray.DataArray, mapping)
+            Derivatives with the positions of the cells, as described in the base class `Reduction`.
+        """
         dimension = dimension_of_coordinate(dataset, self.on)
         by_cells = xr.apply_ufunc(
             _crossing_position_derivatives,
@@ -208,6 +290,7 @@ class Inverse(Reduction):
     def _select_value_for_each_label(
         self, dataset: xr.Dataset, values: float | Mapping[str, float]
     ) -> xr.DataArray:
+        """Return the level or uncertainty that applies to each label."""
         if not isinstance(values, Mapping):
             return xr.DataArray(float(values))
         labels = dataset[self.along]
@@ -218,6 +301,7 @@ class Inverse(Reduction):
 def _invert_along_coordinate(
     values: np.ndarray, coordinate: np.ndarray, level: float, uncertainty: float
 ) -> tuple[float, float, float]:
+    """Return the crossing position, its error and its status for one row."""
     x, y, _places = _log_coordinate_and_values(values, coordinate)
     if np.isnan(level) or level <= 0.0:
         return np.nan, np.nan, float(CrossingStatus.OUT_OF_REACH)
@@ -234,7 +318,10 @@ def _invert_along_coordinate(
 def _crossing_position_derivatives(
     values: np.ndarray, coordinate: np.ndarray, level: float
 ) -> np.ndarray:
-    """Derivatives of the place where the level is reached by all values; 0 where there is none."""
+    """Return the derivatives of the crossing position.
+
+    The derivatives are 0 if there is no crossing.
+    """
     x, y, places = _log_coordinate_and_values(values, coordinate)
     slopes = np.zeros(values.size)
     if np.isnan(level) or level <= 0.0:
@@ -242,9 +329,10 @@ def _crossing_position_derivatives(
     fine = find_crossing(x, y, np.log(level)).position
     if np.isnan(fine):
         return slopes
-    # each value moved in turn: the interpolant is smooth in them, but for kinks
+    # The values are changed one at a time. The interpolant is a smooth function of the values,
+    # except at isolated kinks.
     moved = PchipInterpolator(x, y + _LOG_STEP_OF_DERIVATIVES * np.eye(x.size), axis=1)(fine)
-    rise = float(PchipInterpolator(x, y)(fine, 1)) or np.nan  # at a flat end errors have no bound
+    rise = float(PchipInterpolator(x, y)(fine, 1)) or np.nan  # a zero slope means unbounded errors
     slopes[places] = (
         (moved - np.log(level)) / _LOG_STEP_OF_DERIVATIVES / rise * np.exp(fine) / values[places]
     )
@@ -254,7 +342,11 @@ def _crossing_position_derivatives(
 def _log_coordinate_and_values(
     values: np.ndarray, coordinate: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Logarithms of the coordinate, ascending, and of the values; and which points they are of."""
+    """Return the logarithms of the sorted coordinate and of the values.
+
+    The third array contains the indices of the points. Points are omitted if the coordinate or the
+    value is not positive.
+    """
     places = np.flatnonzero(np.isfinite(values) & (values > 0.0) & (coordinate > 0.0))
     places = places[np.argsort(coordinate[places])]
     return np.log(coordinate[places]), np.log(values[places]), places

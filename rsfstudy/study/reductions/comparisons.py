@@ -1,4 +1,8 @@
-"""Comparisons: with a reference point of the lattice, among points, and with a closed form."""
+"""Reductions that compare values.
+
+A variable is compared with its value at a reference point, with its other values along a dimension,
+or with a closed-form solution.
+"""
 
 from __future__ import annotations
 
@@ -26,18 +30,32 @@ ValueAndReferenceDerivatives = tuple[xr.DataArray, xr.DataArray]
 @guard_methods
 @dataclass(frozen=True)
 class Difference(Reduction):
-    """Difference of a variable above its value at a reference point: ``of - of_reference``.
+    """Difference between a variable and its value at a reference point.
+
+    The result is ``of - of_reference``.
 
     Parameters
     ----------
     name : str
-        Name of the result.
+        Name of the result, which is ``of - of_reference``.
     of : str
-        Variable to compare.
+        Name of the variable to compare.
     along : str
-        Dimension of the reference.
+        Dimension of the reference point.
     reference : str or float
-        Label of the reference point on that dimension.
+        Coordinate value of the reference point on this dimension.
+
+    Examples
+    --------
+    >>> import xarray as xr
+    >>> from rsfstudy.reductions import Difference
+    >>> dataset = xr.Dataset(
+    ...     {"drop": ("law", [2.0, 5.0]), "status": ("law", [0, 0])},
+    ...     coords={"law": ["slip", "slowness"]},
+    ... )
+    >>> excess = Difference(name="excess", of="drop", along="law", reference="slip")
+    >>> excess(dataset)["excess"].values.tolist()
+    [0.0, 3.0]
     """
 
     along: str = ""
@@ -47,22 +65,72 @@ class Difference(Reduction):
     formula: ClassVar[str] = "{of} less {reference}"
 
     def compare(self, values: xr.DataArray, reference: xr.DataArray) -> xr.DataArray:
-        """The comparison: of - of_reference."""
+        """Subtract the reference from the values.
+
+        Parameters
+        ----------
+        values : xarray.DataArray
+            Values of the variable.
+        reference : xarray.DataArray
+            Value at the reference point.
+
+        Returns
+        -------
+        xarray.DataArray
+            Difference.
+        """
         return values - reference
 
     def partial_derivatives(
         self, values: xr.DataArray, reference: xr.DataArray
     ) -> ValueAndReferenceDerivatives:
-        """Derivatives of the comparison by the value and by the reference: 1 and -1."""
+        """Compute the derivatives of the comparison.
+
+        Parameters
+        ----------
+        values : xarray.DataArray
+            Values of the variable.
+        reference : xarray.DataArray
+            Value at the reference point.
+
+        Returns
+        -------
+        by_value : xarray.DataArray
+            Derivative with respect to the value, which is 1.
+        by_reference : xarray.DataArray
+            Derivative with respect to the reference, which is -1.
+        """
         return xr.ones_like(values), -xr.ones_like(values)
 
     def support_status(self, status: xr.DataArray) -> xr.DataArray:
-        """The point itself and the reference: where one failed, there is nothing to compare."""
+        """Return the worse status of each point and the reference point.
+
+        Parameters
+        ----------
+        status : xarray.DataArray
+            Status codes of all cells.
+
+        Returns
+        -------
+        xarray.DataArray
+            Status codes of the cells on which the results depend.
+        """
         reference = status.sel({self.along: self.reference}, drop=True)
         return status.where(status >= reference, reference)
 
     def __call__(self, dataset: xr.Dataset) -> xr.Dataset:
-        """Compare along `along`; nothing if the lattice has no reference point."""
+        """Compare the values with the reference point.
+
+        Parameters
+        ----------
+        dataset : xarray.Dataset
+            Results of the cells, including the variable ``status``.
+
+        Returns
+        -------
+        xarray.Dataset
+            Result of the comparison. Empty if the lattice has no reference point.
+        """
         values = dataset[self.of]
         if self.along not in values.dims or self.reference not in dataset[self.along].values:
             return xr.Dataset()
@@ -72,8 +140,20 @@ class Difference(Reduction):
         return xr.Dataset({self.name: compared.assign_attrs(comment=note)})
 
     def derivatives(self, dataset: xr.Dataset) -> DerivativesByVariable:
-        """By the cell and by the reference; where they are one, the result is the same whatever it
-        is.
+        """Compute the derivatives of the result.
+
+        At the reference point, the derivatives are 0 because the result does not depend on the
+        value.
+
+        Parameters
+        ----------
+        dataset : xarray.Dataset
+            Results of the cells, including the variable ``status``.
+
+        Returns
+        -------
+        sequence of (xarray.DataArray, mapping)
+            Derivatives with the positions of the cells, as described in the base class `Reduction`.
         """
         values, place = dataset[self.of], {self.along: self.reference}
         own, others = self.partial_derivatives(values, values.sel(place, drop=True))
@@ -84,38 +164,105 @@ class Difference(Reduction):
 @guard_methods
 @dataclass(frozen=True)
 class RelativeDifference(Difference):
-    """Difference of a variable below its value at a reference point: ``1 - of/of_reference``."""
+    """Relative difference between a variable and its reference value.
+
+    The result is ``1 - of/of_reference``. The result is positive if the value is smaller than the
+    reference.
+
+    Parameters
+    ----------
+    name : str
+        Name of the result, which is ``1 - of/of_reference``.
+    of : str
+        Name of the variable to compare.
+    along : str
+        Dimension of the reference point.
+    reference : str or float
+        Coordinate value of the reference point on this dimension.
+
+    Examples
+    --------
+    >>> import xarray as xr
+    >>> from rsfstudy.reductions import RelativeDifference
+    >>> dataset = xr.Dataset(
+    ...     {"drop": ("law", [4.0, 3.0]), "status": ("law", [0, 0])},
+    ...     coords={"law": ["slip", "slowness"]},
+    ... )
+    >>> lowering = RelativeDifference("lowering", of="drop", along="law", reference="slip")
+    >>> lowering(dataset)["lowering"].values.tolist()
+    [0.0, 0.25]
+    """
 
     kind: ClassVar[str] = "relative_difference"
     unit_fields: ClassVar[UnitFieldsBySuffix] = {}
     formula: ClassVar[str] = "1 - {of} over {reference}"
 
     def compare(self, values: xr.DataArray, reference: xr.DataArray) -> xr.DataArray:
-        """1 - of/of_reference."""
+        """Compute the relative difference.
+
+        Parameters
+        ----------
+        values : xarray.DataArray
+            Values of the variable.
+        reference : xarray.DataArray
+            Value at the reference point.
+
+        Returns
+        -------
+        xarray.DataArray
+            Relative difference, ``1 - values / reference``.
+        """
         return 1.0 - values / reference
 
     def partial_derivatives(
         self, values: xr.DataArray, reference: xr.DataArray
     ) -> ValueAndReferenceDerivatives:
-        """-1/of_reference and of/of_reference^2."""
+        """Compute the derivatives of the comparison.
+
+        Parameters
+        ----------
+        values : xarray.DataArray
+            Values of the variable.
+        reference : xarray.DataArray
+            Value at the reference point.
+
+        Returns
+        -------
+        by_value : xarray.DataArray
+            Derivative with respect to the value, which is ``-1 / reference``.
+        by_reference : xarray.DataArray
+            Derivative with respect to the reference, which is ``values / reference**2``.
+        """
         return -xr.ones_like(values) / reference, values / reference**2
 
 
 @guard_methods
 @dataclass(frozen=True)
 class Range(Reduction):
-    """Largest less least value along a dimension, of two at least.
+    """Difference between the largest and the smallest value along a dimension.
 
     Parameters
     ----------
     name : str
         Name of the result.
     of : str
-        Variable to reduce.
+        Name of the variable to reduce.
     over : str
-        The dimension, or a coordinate of numbers along one.
-    within : tuple of float
-        Part of that coordinate, both ends included; all of it by default.
+        Dimension to reduce, or a numeric coordinate along this dimension.
+    within : tuple of (float, float), optional
+        Range of the coordinate ``over``, including both ends. The default is the whole coordinate.
+
+    Examples
+    --------
+    >>> import xarray as xr
+    >>> from rsfstudy.reductions import Range
+    >>> dataset = xr.Dataset(
+    ...     {"drop": ("phi", [2.0, 5.0, 9.0]), "status": ("phi", [0, 0, 0])},
+    ...     coords={"phi": [45.0, 60.0, 75.0]},
+    ... )
+    >>> spread = Range(name="spread", of="drop", over="phi", within=(45, 60))
+    >>> float(spread(dataset)["spread"])
+    3.0
     """
 
     over: str = ""
@@ -124,11 +271,40 @@ class Range(Reduction):
     unit_fields: ClassVar[UnitFieldsBySuffix] = {"": ("of",)}
 
     def support_status(self, status: xr.DataArray) -> xr.DataArray:
-        """The points in range."""
+        """Return the status of the points in the range.
+
+        Parameters
+        ----------
+        status : xarray.DataArray
+            Status codes of all cells.
+
+        Returns
+        -------
+        xarray.DataArray
+            Status codes of the cells on which the results depend.
+        """
         return select_coordinate_range(status, self.over, self.within)
 
     def __call__(self, dataset: xr.Dataset) -> xr.Dataset:
-        """Reduce along the dimension; nothing where fewer than two points are in range."""
+        """Compute the range of the values along the dimension.
+
+        Parameters
+        ----------
+        dataset : xarray.Dataset
+            Results of the cells, including the variable ``status``.
+
+        Returns
+        -------
+        xarray.Dataset
+            Range of the values. Empty if there are fewer than two points. NaN if fewer than two
+            points have a value, or if a cell failed.
+
+        Raises
+        ------
+        InvalidValue
+            If ``over`` is neither a dimension of the variable nor a one-dimensional numeric
+            coordinate.
+        """
         dimension, support = self._select_points_in_range(dataset)
         if support.sizes[dimension] < 2:
             return xr.Dataset()
@@ -142,8 +318,21 @@ class Range(Reduction):
         return xr.Dataset({self.name: found.assign_attrs(comment=note)})
 
     def derivatives(self, dataset: xr.Dataset) -> DerivativesByVariable:
-        """1 by the cell that, within its error, may be the largest, -1 by that which may be the
-        least: the sizes of both count.
+        """Compute the derivatives of the range.
+
+        The derivative is 1 for two cells: the cell with the largest sum of value and error, and the
+        cell with the smallest difference of value and error. The sign of a derivative has no
+        influence on the propagated error.
+
+        Parameters
+        ----------
+        dataset : xarray.Dataset
+            Results of the cells, including the variable ``status``.
+
+        Returns
+        -------
+        sequence of (xarray.DataArray, mapping)
+            Derivatives with the positions of the cells, as described in the base class `Reduction`.
         """
         dimension, support = self._select_points_in_range(dataset)
         values, errors = support[self.of], support[f"{self.of}_error"]
@@ -152,7 +341,7 @@ class Range(Reduction):
         return [((number == reach.argmax(dimension)).astype(float), {}) for reach in reaches]
 
     def _select_points_in_range(self, dataset: xr.Dataset) -> tuple[str, xr.Dataset]:
-        """The dimension, and the points in range."""
+        """Return the dimension, and the dataset of the points in the range."""
         along = self.over in dataset[self.of].dims
         dimension = self.over if along else dimension_of_coordinate(dataset, self.over)
         return dimension, select_coordinate_range(dataset, self.over, self.within)
@@ -161,16 +350,33 @@ class Range(Reduction):
 @guard_methods
 @dataclass(frozen=True)
 class ClosedFormRatio(Reduction):
-    """A variable over a published closed form.
+    """Ratio of a variable to a published closed-form solution.
 
     Parameters
     ----------
     name : str
-        Name of the ratio; ``<name>_closed_form``, the closed form itself, comes with it.
+        Name of the ratio. The closed-form solution is returned as ``<name>_closed_form``.
     of : str
-        Variable to compare.
+        Name of the variable to compare.
     form : str
-        Name in `rsfstudy.slider.closed_forms`.
+        Name of the solution in ``rsfstudy.slider.CLOSED_FORMS``, such as ``"displacement_step"``.
+
+    Raises
+    ------
+    InvalidValue
+        If there is no solution of this name.
+
+    Examples
+    --------
+    >>> import xarray as xr
+    >>> from rsfstudy.reductions import ClosedFormRatio
+    >>> dataset = xr.Dataset(
+    ...     {"critical_displacement": ("b_over_a", [1.1, 0.5]), "status": ("b_over_a", [0, 0])},
+    ...     coords={"b_over_a": [2.0, 3.0]},
+    ... )
+    >>> ratio = ClosedFormRatio("ratio", of="critical_displacement", form="displacement_step")
+    >>> ratio(dataset)["ratio"].values.round(6).tolist()
+    [1.1, 1.0]
     """
 
     form: str = ""
@@ -178,11 +384,24 @@ class ClosedFormRatio(Reduction):
     unit_fields: ClassVar[UnitFieldsBySuffix] = {"_closed_form": ("of",)}
 
     def __post_init__(self) -> None:
+        """Check that the solution exists."""
         if self.form not in CLOSED_FORMS:
             raise InvalidValue("form", self.form, "is no closed form", choices=CLOSED_FORMS)
 
     def __call__(self, dataset: xr.Dataset) -> xr.Dataset:
-        """Compare in every cell; nothing where the lattice lacks a field of the formula."""
+        """Compute the ratio in each cell.
+
+        Parameters
+        ----------
+        dataset : xarray.Dataset
+            Results of the cells, including the variable ``status``.
+
+        Returns
+        -------
+        xarray.Dataset
+            Ratio and closed-form solution. Empty if a parameter of the solution is not a coordinate
+            of the dataset.
+        """
         form = CLOSED_FORMS[self.form]
         if not all(name in dataset.coords for name in form.scene_field_names):
             return xr.Dataset()
@@ -193,10 +412,22 @@ class ClosedFormRatio(Reduction):
         return xr.Dataset({self.name: ratio, **beside})
 
     def derivatives(self, dataset: xr.Dataset) -> DerivativesByVariable:
-        """One over the closed form."""
+        """Return the reciprocal of the closed-form solution.
+
+        Parameters
+        ----------
+        dataset : xarray.Dataset
+            Results of the cells, including the variable ``status``.
+
+        Returns
+        -------
+        sequence of (xarray.DataArray, mapping)
+            Derivatives with the positions of the cells, as described in the base class `Reduction`.
+        """
         return [(1.0 / self._evaluate_closed_form(dataset), {})]
 
     def _evaluate_closed_form(self, dataset: xr.Dataset) -> xr.DataArray:
+        """Evaluate the closed-form solution in each cell."""
         form = CLOSED_FORMS[self.form]
         fields = [dataset[name].astype(float) for name in form.scene_field_names]
         exact: xr.DataArray = xr.apply_ufunc(form.function, *fields, vectorize=True)

@@ -1,4 +1,8 @@
-"""Fits along one coordinate: slopes with their standard errors."""
+"""Least-squares fits along one coordinate.
+
+The result of a fit is the slope with its standard error. ``LinearFit`` is the base class of the
+other fits, which transform the coordinate or the variable.
+"""
 
 from __future__ import annotations
 
@@ -22,49 +26,98 @@ from rsfstudy.study.reductions.base import (
 @guard_methods
 @dataclass(frozen=True)
 class LinearFit(Reduction):
-    """Unweighted least squares of ``of = constant + name * on`` along one coordinate.
+    """Linear fit of a variable along one coordinate.
+
+    The equation ``of = constant + name * on`` is fitted by unweighted least squares.
 
     Parameters
     ----------
     name : str
-        Name of the slope; ``<name>_stderr`` (the standard error, which measures the misfit of the
-        law), ``<name>_error`` (what the numerical errors of the cells make of it, where they have
-        any), ``<name>_misfit`` (the largest misfit, in units of `of`) and ``<name>_points`` come
-        with it.
+        Name of the slope in ``of = constant + name * on``. Four more variables are returned: the
+        standard error of the slope ``<name>_stderr``, the propagated numerical error of the cells
+        ``<name>_error`` (if the cells have error estimates), the largest absolute residual
+        ``<name>_misfit`` in the units of the variable, and the number of points ``<name>_points``.
+        The standard error is computed from the residuals.
     of : str
-        Variable to fit.
+        Name of the variable to fit.
     on : str
-        Coordinate along one dimension.
-    within : tuple of float
-        Range of `on` that is fitted, both ends included; all of it by default.
+        Name of a one-dimensional coordinate.
+    within : tuple of (float, float), optional
+        Range of the coordinate that is fitted, including both ends. The default is the whole
+        coordinate.
+
+    Examples
+    --------
+    >>> import xarray as xr
+    >>> from rsfstudy.reductions import LinearFit
+    >>> dataset = xr.Dataset(
+    ...     {"drop": ("phi", [1.0, 3.0, 5.0]), "status": ("phi", [0, 0, 0])},
+    ...     coords={"phi": [45.0, 46.0, 47.0]},
+    ... )
+    >>> fit = LinearFit(name="slope", of="drop", on="phi")(dataset)
+    >>> float(fit["slope"]), int(fit["slope_points"])
+    (2.0, 3)
     """
 
     on: str = ""
     within: tuple[float, float] | None = None
-    #: Parameters of the law, and the law with the names of the fields of the fit.
+    #: Number of fitted parameters, and the template of the fitted equation, which contains the
+    #: names of the fields of the fit.
     parameter_count: ClassVar[int] = 2
     formula: ClassVar[str] = "{of} = constant + {name} * {on}"
     kind: ClassVar[str] = "linear_fit"
     unit_fields: ClassVar[UnitFieldsBySuffix] = {"": ("of", "on"), "_misfit": ("of",)}
 
     def centre_values(self, values: xr.DataArray, dimension: str) -> xr.DataArray:
-        """Values as they enter a fit through the origin: less their mean, which takes care of the
-        constant.
+        """Subtract the mean of the values, which eliminates the constant.
+
+        Parameters
+        ----------
+        values : xarray.DataArray
+            Transformed coordinate or variable.
+        dimension : str
+            Dimension of the fit.
+
+        Returns
+        -------
+        xarray.DataArray
+            Centred values.
         """
         return values - values.mean(dimension)
 
     def support_status(self, status: xr.DataArray) -> xr.DataArray:
-        """The points in range."""
+        """Return the status of the points in the range.
+
+        Parameters
+        ----------
+        status : xarray.DataArray
+            Status codes of all cells.
+
+        Returns
+        -------
+        xarray.DataArray
+            Status codes of the cells on which the results depend.
+        """
         return select_coordinate_range(status, self.on, self.within)
 
     def __call__(self, dataset: xr.Dataset) -> xr.Dataset:
-        """Fit along the dimension of `on`, for each point of the others; nothing where no point is
-        in range.
+        """Fit the variable separately for each point of the other dimensions.
+
+        Parameters
+        ----------
+        dataset : xarray.Dataset
+            Results of the cells, including the variable ``status``.
+
+        Returns
+        -------
+        xarray.Dataset
+            Slope, standard error, largest residual and number of points. Empty if there are no
+            points in the range.
 
         Raises
         ------
         InvalidValue
-            Where `on` is no coordinate along one dimension.
+            If ``on`` is not a one-dimensional numeric coordinate.
         """
         dimension = dimension_of_coordinate(dataset, self.on)
         support = select_coordinate_range(dataset, self.on, self.within)
@@ -92,7 +145,20 @@ class LinearFit(Reduction):
         return result.drop_vars([c for c in result.coords if dimension in result[c].dims])
 
     def derivatives(self, dataset: xr.Dataset) -> DerivativesByVariable:
-        """The weights of least squares."""
+        """Compute the derivatives of the slope with respect to the cells.
+
+        The derivatives are the weights of the least-squares fit.
+
+        Parameters
+        ----------
+        dataset : xarray.Dataset
+            Results of the cells, including the variable ``status``.
+
+        Returns
+        -------
+        sequence of (xarray.DataArray, mapping)
+            Derivatives with the positions of the cells, as described in the base class `Reduction`.
+        """
         x, _y = self._centred_fit_coordinates(
             select_coordinate_range(dataset, self.on, self.within)
         )
@@ -101,30 +167,83 @@ class LinearFit(Reduction):
     def _centred_fit_coordinates(
         self, selected_points: xr.Dataset
     ) -> tuple[xr.DataArray, xr.DataArray]:
-        """Both coordinates of the points as they enter a fit through the origin; NaN for those
-        without a number.
+        """Return the transformed and centred coordinate and variable.
+
+        Points without a value are NaN.
         """
         dimension, of = dimension_of_coordinate(selected_points, self.on), selected_points[self.of]
-        # sums over arrays with another memory layout differ in the last bit
+        # The array is made contiguous, because sums over arrays with another memory layout differ
+        # in the last bit.
         of = of.copy(data=np.ascontiguousarray(of.values))
         x = self.transform_abscissa(selected_points[self.on].astype(float))
         y = self.transform_ordinate(of).where(x.notnull())
         return self.centre_values(x.where(y.notnull()), dimension), self.centre_values(y, dimension)
 
     def transform_ordinate(self, values: xr.DataArray) -> xr.DataArray:
-        """Values less what the law holds fixed."""
+        """Transform the variable before the fit.
+
+        Parameters
+        ----------
+        values : xarray.DataArray
+            Values of the variable.
+
+        Returns
+        -------
+        xarray.DataArray
+            Unchanged values.
+        """
         return values
 
     def transform_abscissa(self, on: xr.DataArray) -> xr.DataArray:
-        """Abscissa in which the law is linear."""
+        """Transform the coordinate before the fit.
+
+        Parameters
+        ----------
+        on : xarray.DataArray
+            Values of the coordinate.
+
+        Returns
+        -------
+        xarray.DataArray
+            Unchanged values.
+        """
         return on
 
 
 @guard_methods
 @dataclass(frozen=True)
 class ProportionalFit(LinearFit):
-    """Least squares of ``of - minus = name * on``, without intercept; `minus` is the value of `of`
-    at the origin. With one, as in V0/V_* - 1, the slope is that of numbers without dimension.
+    """Linear fit with a fixed intercept.
+
+    The equation ``of - minus = name * on`` is fitted by unweighted least squares. If the intercept
+    ``minus`` is not 0, as in ``V_0/V_* - 1``, the variable and the slope are regarded as
+    dimensionless.
+
+    Parameters
+    ----------
+    name : str
+        Name of the slope in ``of - minus = name * on``.
+    of : str
+        Name of the variable to fit.
+    on : str
+        Name of a one-dimensional coordinate.
+    within : tuple of (float, float), optional
+        Range of the coordinate that is fitted, including both ends. The default is the whole
+        coordinate.
+    minus : float, default: 0.0
+        Value of the variable at the origin of the coordinate.
+
+    Examples
+    --------
+    >>> import xarray as xr
+    >>> from rsfstudy.reductions import ProportionalFit
+    >>> dataset = xr.Dataset(
+    ...     {"step": ("ratio", [1.5, 2.0]), "status": ("ratio", [0, 0])},
+    ...     coords={"ratio": [1.0, 2.0]},
+    ... )
+    >>> fit = ProportionalFit(name="zeta", of="step", on="ratio", minus=1.0)
+    >>> float(fit(dataset)["zeta"])
+    0.5
     """
 
     minus: float = 0.0
@@ -133,20 +252,71 @@ class ProportionalFit(LinearFit):
     formula: ClassVar[str] = "{of} = {minus:g} + {name} * {on}"
 
     def centre_values(self, values: xr.DataArray, dimension: str) -> xr.DataArray:
-        """As they are: the line goes through the origin."""
+        """Return the values unchanged, because the intercept is fixed.
+
+        Parameters
+        ----------
+        values : xarray.DataArray
+            Transformed coordinate or variable.
+        dimension : str
+            Dimension of the fit.
+
+        Returns
+        -------
+        xarray.DataArray
+            Unchanged values.
+        """
         return values
 
     def transform_ordinate(self, values: xr.DataArray) -> xr.DataArray:
-        """Values less the value at the origin."""
+        """Subtract the intercept from the variable.
+
+        Parameters
+        ----------
+        values : xarray.DataArray
+            Values of the variable.
+
+        Returns
+        -------
+        xarray.DataArray
+            Values minus the intercept.
+        """
         return values - self.minus
 
 
 @guard_methods
 @dataclass(frozen=True)
 class SemilogFit(LinearFit):
-    """Least squares of ``of = constant + name * log10(on)``: the slope per decade. Points where
-    `on` is 0 or less are left out. Of a power law see `PowerLaw`, not this of a `Logarithm`, which
-    is natural: that slope is 2.303 times the exponent.
+    """Linear fit of a variable against the decimal logarithm of a coordinate.
+
+    The equation ``of = constant + name * log10(on)`` is fitted by unweighted least squares. The
+    slope is the change of the variable per decade. Points are omitted if the coordinate is not
+    positive. To fit a power law, use `PowerLaw`. If you apply this fit to a `Logarithm`, which is a
+    natural logarithm, the slope is 2.303 times the exponent of the power law.
+
+    Parameters
+    ----------
+    name : str
+        Name of the slope in ``of = constant + name * log10(on)``.
+    of : str
+        Name of the variable to fit.
+    on : str
+        Name of a one-dimensional coordinate.
+    within : tuple of (float, float), optional
+        Range of the coordinate that is fitted, including both ends. The default is the whole
+        coordinate.
+
+    Examples
+    --------
+    >>> import xarray as xr
+    >>> from rsfstudy.reductions import SemilogFit
+    >>> dataset = xr.Dataset(
+    ...     {"drop": ("hold_time", [1.0, 3.0, 5.0]), "status": ("hold_time", [0, 0, 0])},
+    ...     coords={"hold_time": [1.0, 10.0, 100.0]},
+    ... )
+    >>> fit = SemilogFit(name="slope", of="drop", on="hold_time")(dataset)
+    >>> round(float(fit["slope"]), 6)
+    2.0
     """
 
     kind: ClassVar[str] = "decade_fit"
@@ -154,7 +324,18 @@ class SemilogFit(LinearFit):
     formula: ClassVar[str] = "{of} = constant + {name} * log10({on})"
 
     def transform_abscissa(self, on: xr.DataArray) -> xr.DataArray:
-        """The decimal logarithm."""
+        """Compute the decimal logarithm of the coordinate.
+
+        Parameters
+        ----------
+        on : xarray.DataArray
+            Values of the coordinate.
+
+        Returns
+        -------
+        xarray.DataArray
+            Decimal logarithm. NaN if the value is not positive.
+        """
         logarithms: xr.DataArray = xr.apply_ufunc(np.log10, on.where(on > 0.0))
         return logarithms
 
@@ -162,8 +343,35 @@ class SemilogFit(LinearFit):
 @guard_methods
 @dataclass(frozen=True)
 class PowerLaw(SemilogFit):
-    """Least squares of ``log10(of) = constant + name * log10(on)``: the exponent of a power law,
-    with its largest misfit in decades. Points where either is 0 or less are left out.
+    """Fit of a power law.
+
+    The equation ``log10(of) = constant + name * log10(on)`` is fitted by unweighted least squares.
+    The slope is the exponent of the power law, and the largest residual is in decades. Points are
+    omitted if the coordinate or the variable is not positive.
+
+    Parameters
+    ----------
+    name : str
+        Name of the exponent in ``log10(of) = constant + name * log10(on)``.
+    of : str
+        Name of the variable to fit.
+    on : str
+        Name of a one-dimensional coordinate.
+    within : tuple of (float, float), optional
+        Range of the coordinate that is fitted, including both ends. The default is the whole
+        coordinate.
+
+    Examples
+    --------
+    >>> import xarray as xr
+    >>> from rsfstudy.reductions import PowerLaw
+    >>> dataset = xr.Dataset(
+    ...     {"interval": ("rate", [8.0, 4.0, 2.0]), "status": ("rate", [0, 0, 0])},
+    ...     coords={"rate": [1.0, 2.0, 4.0]},
+    ... )
+    >>> fit = PowerLaw(name="exponent", of="interval", on="rate")(dataset)
+    >>> round(float(fit["exponent"]), 6)
+    -1.0
     """
 
     kind: ClassVar[str] = "power_law"
@@ -171,11 +379,35 @@ class PowerLaw(SemilogFit):
     formula: ClassVar[str] = "log10({of}) = constant + {name} * log10({on})"
 
     def transform_ordinate(self, values: xr.DataArray) -> xr.DataArray:
-        """The decimal logarithm."""
+        """Compute the decimal logarithm of the variable.
+
+        Parameters
+        ----------
+        values : xarray.DataArray
+            Values of the variable.
+
+        Returns
+        -------
+        xarray.DataArray
+            Decimal logarithm. NaN if the value is not positive.
+        """
         return self.transform_abscissa(values)
 
     def derivatives(self, dataset: xr.Dataset) -> DerivativesByVariable:
-        """The weights of least squares, over ``ln(10) of``."""
+        """Compute the derivatives of the exponent with respect to the cells.
+
+        The derivatives are the least-squares weights divided by ``ln(10) * of``.
+
+        Parameters
+        ----------
+        dataset : xarray.Dataset
+            Results of the cells, including the variable ``status``.
+
+        Returns
+        -------
+        sequence of (xarray.DataArray, mapping)
+            Derivatives with the positions of the cells, as described in the base class `Reduction`.
+        """
         of = select_coordinate_range(dataset[self.of], self.on, self.within)
         ((weights, place),) = super().derivatives(dataset)
         return [((weights / (np.log(10.0) * of)).where(weights != 0.0, 0.0), place)]

@@ -1,4 +1,8 @@
-"""Units of what is made of a lattice: by those of what it is made of, never by its name."""
+"""Units and scales of the results of reductions.
+
+The units of a result follow from the units of the variables that the reduction used, and never from
+the name of the result.
+"""
 
 from __future__ import annotations
 
@@ -11,18 +15,35 @@ from rsfstudy.quantities import Quantity, format_unit_quotient
 from rsfstudy.study.reductions.base import Reduction, read_undocumented_quantities
 from rsfstudy.vocabulary import find_quantity
 
-#: Coordinates of the scales that quantities are measured in.
+#: Coordinates that contain the scales of quantities, by the symbol of the scale.
 _SCALE_COORDINATES = {"sigma_*": "sigma_star", "D_c": "slip_distance", "V_*": "reference_velocity"}
 
 
 def describe_reduction_results(
     reduction: Reduction, dataset: xr.Dataset, reduction_results: xr.Dataset
 ) -> dict[str, Quantity]:
-    """Quantities of the results of a reduction, and those that the dataset states.
+    """Determine the quantities of the results of a reduction.
 
-    A result is what the reduction says in `quantities`, in units and scale of what it draws on
-    (`unit_fields`); all others are pure numbers. The vocabulary has words for those of the same
-    units and scale. What was made of cells of several scales has none, and its comment says so.
+    The units and the scale of a result are the quotient of the units and scales of the variables
+    that ``Reduction.unit_fields`` names. All other results are dimensionless. If the scale varies
+    between the cells that were combined, the result has no scale, and a note is appended to the
+    attribute ``comment`` of the result. The description in the vocabulary is used only if its units
+    and scale agree with the units and scale of the result.
+
+    Parameters
+    ----------
+    reduction : Reduction
+        Reduction that computed the results.
+    dataset : xarray.Dataset
+        Dataset that was reduced.
+    reduction_results : xarray.Dataset
+        Results of the reduction.
+
+    Returns
+    -------
+    dict of str to Quantity
+        Quantities by name. The dictionary contains the quantities of the results and the quantities
+        of the dataset that are not in the vocabulary.
     """
     stated = {q.name: q for q in reduction.quantities}
     found, of = read_undocumented_quantities(dataset) | stated, dataset[reduction.of]
@@ -40,11 +61,11 @@ def describe_reduction_results(
             reduction_results[name].attrs["comment"] = (
                 reduction_results[name].attrs.get("comment", "") + why
             )
-        # a law that holds a number is one of numbers without dimension
+        # A fit with a fixed dimensionless intercept applies to dimensionless values.
         scale = "" if varied or scale == "1" or vars(reduction).get("minus") else scale
         about = find_quantity(name, found)
         if not end and name not in stated and (about.units, about.scale) != (units, scale):
-            about = Quantity(name, "", units, name.replace("_", " "))  # it is another's name
+            about = Quantity(name, "", units, name.replace("_", " "))  # same name, other quantity
         found[name] = replace(about, units=units, scale=scale)
     return found
 
@@ -52,7 +73,23 @@ def describe_reduction_results(
 def find_varying_scale(
     dataset: xr.Dataset, scale_expression: str, reduced_dimensions: Collection[Hashable]
 ) -> str:
-    """What of a scale varies across some dimensions."""
+    """Find a scale that varies along reduced dimensions.
+
+    Parameters
+    ----------
+    dataset : xarray.Dataset
+        Results of a study. On a rig, the coordinates contain the scales.
+    scale_expression : str
+        Scale of a variable, such as ``"D_c/V_*"``.
+    reduced_dimensions : collection of str
+        Dimensions along which the variable is reduced.
+
+    Returns
+    -------
+    str
+        Symbol of the first scale in the expression that varies along these dimensions. Empty if no
+        scale varies.
+    """
     held = {part: dataset[n].dims for part, n in _SCALE_COORDINATES.items() if n in dataset.coords}
     return next(
         (

@@ -1,4 +1,7 @@
-"""Sobol indices: the share of the variance of a result that each sampled quantity explains."""
+"""Sobol indices of sampled quantities.
+
+A Sobol index is a share of the variance of a result that is caused by one sampled quantity.
+"""
 
 from __future__ import annotations
 
@@ -15,9 +18,9 @@ from rsfstudy.errors import InvalidValue
 from rsfstudy.quantities import Quantity
 from rsfstudy.study.reductions.base import Reduction, refused_result_mask
 
-#: How often samples are drawn anew from themselves, how many such at a time, and from which seed.
+#: Number of bootstrap resamples, number of resamples per batch, and seed of the random generator.
 _BOOTSTRAP_RESAMPLES, _RESAMPLES_PER_BATCH, _RESAMPLING_SEED = 400, 25, 2010
-#: Ends of the confidence interval.
+#: Probabilities of the bounds of the confidence interval.
 _INTERVAL_QUANTILES = (0.025, 0.975)
 _SOBOL_INDEX_NAMES = ("first_order", "total")
 
@@ -25,27 +28,49 @@ _SOBOL_INDEX_NAMES = ("first_order", "total")
 @guard_methods
 @dataclass(frozen=True)
 class SobolIndices(Reduction):
-    """Sobol indices of first order and total, with 95 % confidence intervals, by
-    `scipy.stats.sobol_indices`.
+    """First-order and total Sobol indices.
 
-    A first-order index is the share of the variance that is explained by one quantity alone, a
-    total one the share that is left while all others are held. The intervals are those of resampled
-    points. A cell that failed, or has no number, leaves out all indices: a variance without it
-    would be that of another question.
+    The first-order index of a quantity is the share of the variance that is caused by this quantity
+    without interactions. The total index is the share of the variance that remains if all other
+    quantities are fixed. Confidence intervals of 95 % are computed by a bootstrap over the sample
+    points. If a cell failed or has no value, all indices are NaN, because the remaining samples
+    would have a different distribution. The indices are computed by `scipy.stats.sobol_indices`.
 
     Parameters
     ----------
     name : str
-        Beginning of the names: ``<name>_first_order``, ``<name>_total``, and the ends of their
-        intervals, ``..._low`` and ``..._high``, along the dimension ``input``.
+        Beginning of the names of the results ``<name>_first_order`` and ``<name>_total``. The
+        bounds of their confidence intervals have the suffixes ``_low`` and ``_high``. The results
+        have the dimension ``input``.
     of : str
-        Variable to explain.
-    over : str
-        Dimension of the samples, drawn by ``Axis.samples(..., method="saltelli")``.
+        Name of the variable whose variance is analysed.
+    over : str, default: "sample"
+        Dimension of the samples. The samples must be drawn with ``Axis.samples(...,
+        method="saltelli")``.
 
     References
     ----------
-    Saltelli et al. (2010), Computer Physics Communications 181, 259-270.
+    .. [1] Saltelli et al. (2010), Variance based sensitivity analysis of model output. Computer
+    Physics Communications 181, 259-270.
+
+    Examples
+    --------
+    >>> import json
+    >>> import xarray as xr
+    >>> from rsfstudy.reductions import SobolIndices
+    >>> sampling = {"of": ["a", "b"], "method": "saltelli"}
+    >>> dataset = xr.Dataset(
+    ...     {
+    ...         "drop": ("sample", [1.0, 4.0, 3.0, 2.0, 5.0, 3.0, 5.0, 3.0]),
+    ...         "status": ("sample", [0] * 8),
+    ...     },
+    ...     coords={"sample": ("sample", range(8), {"drawn": json.dumps(sampling)})},
+    ... )
+    >>> indices = SobolIndices(name="sobol", of="drop")(dataset)
+    >>> indices["input"].values.tolist()
+    ['a', 'b']
+    >>> "sobol_total_high" in indices
+    True
     """
 
     over: str = "sample"
@@ -53,10 +78,12 @@ class SobolIndices(Reduction):
 
     @property
     def quantities(self) -> Sequence[Quantity]:
+        """Quantities of the indices, their bounds and the new dimension."""
         about = Quantity("input", "", "", "sampled quantity")
         return (about, *(Quantity(n, "", "1", text) for n, text in self._result_descriptions()))
 
     def _result_descriptions(self) -> Iterator[tuple[str, str]]:
+        """Yield the name and the description of each result."""
         for order in _SOBOL_INDEX_NAMES:
             text = f"{order.replace('_', '-')} Sobol index of {self.of.replace('_', ' ')}"
             yield f"{self.name}_{order}", text
@@ -64,12 +91,22 @@ class SobolIndices(Reduction):
                 yield f"{self.name}_{order}_{end}", f"{end} end of the 95 % interval of the {text}"
 
     def __call__(self, dataset: xr.Dataset) -> xr.Dataset:
-        """The indices, for each point of the other dimensions.
+        """Compute the indices for each point of the other dimensions.
+
+        Parameters
+        ----------
+        dataset : xarray.Dataset
+            Results of the cells, including the variable ``status``.
+
+        Returns
+        -------
+        xarray.Dataset
+            Indices and bounds of their confidence intervals.
 
         Raises
         ------
         InvalidValue
-            Where the samples were not drawn for Sobol indices.
+            If the samples were not drawn for Sobol indices, or if some samples are missing.
         """
         inputs = self._sampled_inputs(dataset)
         of, d = dataset[self.of].transpose(..., self.over), len(inputs)
@@ -100,7 +137,7 @@ class SobolIndices(Reduction):
         )
 
     def _sampled_inputs(self, dataset: xr.Dataset) -> list[str]:
-        """The quantities that were drawn."""
+        """Return the names of the sampled quantities."""
         if self.over not in dataset[self.of].dims:
             raise InvalidValue("over", self.over, f"is no dimension of {self.of}")
         drawn: dict[str, Any] = json.loads(dataset[self.over].attrs.get("drawn", "{}"))
@@ -114,16 +151,19 @@ class SobolIndices(Reduction):
 
 
 def _indices_with_intervals(sample_values: np.ndarray) -> np.ndarray:
-    """First-order and total indices with the ends of their intervals.
+    """Compute Sobol indices with confidence intervals.
 
     Parameters
     ----------
     sample_values : ndarray, shape (2 + inputs, points)
-        Values at A, at B, and at A with one input after the other from B.
+        Values at the sample matrix A, at the sample matrix B, and at copies of A in which one
+        column at a time is replaced by the column of B.
 
     Returns
     -------
     ndarray, shape (2, 3, inputs)
+        First-order and total indices. The second dimension contains the estimate and the two
+        bounds.
     """
     random, count = np.random.default_rng(_RESAMPLING_SEED), sample_values.shape[1]
     resampled = []
@@ -136,10 +176,19 @@ def _indices_with_intervals(sample_values: np.ndarray) -> np.ndarray:
 
 
 def _saltelli_indices(sample_values: np.ndarray) -> np.ndarray:
-    """Indices of first order and total, of shape (2, sets, inputs), of several sets of values of
-    shape (2 + inputs, sets, points).
+    """Compute the first-order and total indices of several sets of values.
+
+    Parameters
+    ----------
+    sample_values : ndarray, shape (2 + inputs, sets, points)
+        Values of each set, in the order of `_indices_with_intervals`.
+
+    Returns
+    -------
+    ndarray, shape (2, sets, inputs)
+        First-order and total indices.
     """
-    from scipy.stats import sobol_indices  # takes as long to load as the package
+    from scipy.stats import sobol_indices  # Importing scipy.stats is slow.
 
     parts = {"f_A": sample_values[0], "f_B": sample_values[1], "f_AB": sample_values[2:]}
     found = sobol_indices(func=parts, n=sample_values.shape[-1])

@@ -1,9 +1,9 @@
-"""Statistics over samples: mean, standard deviation and quantiles with their errors, and the share
-of each status.
+"""Statistics over samples.
 
-Each has two errors, told apart: ``<name>_stderr`` is that of sampling, the standard error if the
-samples were independent, which those of Sobol points and Latin hypercubes rarely exceed;
-``<name>_error`` is what the numerical errors of the cells make of it.
+The statistics are mean, standard deviation and quantiles, and the shares of all statuses. Each
+statistic has two errors. The sampling error ``<name>_stderr`` is the standard error for independent
+samples. Sobol points and Latin hypercubes usually have smaller errors. The numerical error
+``<name>_error`` is propagated from the numerical errors of the cells.
 """
 
 from __future__ import annotations
@@ -33,16 +33,19 @@ from rsfstudy.study.reductions.result_units import find_varying_scale
 
 @dataclass(frozen=True)
 class _SampleStatistic(Reduction):
-    """A statistic over samples; members say which.
+    """Base class of statistics over samples.
+
+    Subclasses define ``compute``, ``description`` and ``min_samples``.
 
     Parameters
     ----------
     name : str
-        Name of the result; ``<name>_stderr``, ``<name>_error`` and ``<name>_points`` (the number of
-        samples that have a number) come with it.
+        Name of the result. Three more variables are returned: the sampling error ``<name>_stderr``,
+        the propagated numerical error ``<name>_error``, and the number of samples with a value
+        ``<name>_points``.
     of : str
-        Variable to reduce.
-    over : str
+        Name of the variable to reduce.
+    over : str, default: "sample"
         Dimension of the samples.
     """
 
@@ -52,23 +55,53 @@ class _SampleStatistic(Reduction):
         "_points": "samples with a number for {name}",
     }
     unit_fields: ClassVar[UnitFieldsBySuffix] = {"": ("of",), "_stderr": ("of",)}
-    #: What it is, in words.
+    #: Description of the statistic for the attribute ``comment`` of the results.
     description: ClassVar[str]
 
-    #: Fewest samples of which it can be told with its error.
+    #: Minimum number of samples for which the statistic and its standard error are computed.
     min_samples: ClassVar[int] = 2
 
     def compute(self, of: xr.DataArray) -> tuple[xr.DataArray, xr.DataArray]:
-        """The statistic, and its standard error."""
+        """Compute the statistic and its standard error.
+
+        Parameters
+        ----------
+        of : xarray.DataArray
+            Values of the samples.
+
+        Returns
+        -------
+        value : xarray.DataArray
+            Statistic.
+        stderr : xarray.DataArray
+            Standard error.
+
+        Raises
+        ------
+        TypeError
+            If a subclass does not override this method.
+        """
         raise TypeError(f"{type(self).__name__} is no statistic")
 
     def __call__(self, dataset: xr.Dataset) -> xr.Dataset:
-        """Reduce along the dimension of the samples.
+        """Reduce the variable along the dimension of the samples.
+
+        Parameters
+        ----------
+        dataset : xarray.Dataset
+            Results of the cells, including the variable ``status``.
+
+        Returns
+        -------
+        xarray.Dataset
+            Statistic, standard error and number of samples. The values are NaN if samples failed,
+            if there are too few samples, or if the scale of the variable varies between the
+            samples.
 
         Raises
         ------
         InvalidValue
-            Where `of` does not lie along it.
+            If the variable does not have the dimension of the samples.
         """
         of, why = _select_sampled_variable(self, dataset), ""
         count = of.notnull().sum(self.over)
@@ -91,11 +124,24 @@ class _SampleStatistic(Reduction):
 def standard_deviation(
     values: xr.DataArray, sample_dimension: str, degrees_of_freedom_lost: int = 1
 ) -> xr.DataArray:
-    """Compute the standard deviation of samples, with n - ddof degrees of freedom.
+    """Compute the standard deviation of samples.
 
-    The result is NaN if there are no more than ``degrees_of_freedom_lost`` samples.
+    Parameters
+    ----------
+    values : xarray.DataArray
+        Values of the samples. NaN values are ignored.
+    sample_dimension : str
+        Dimension of the samples.
+    degrees_of_freedom_lost : int, default: 1
+        Difference between the number of samples and the number of degrees of freedom.
+
+    Returns
+    -------
+    xarray.DataArray
+        Standard deviation. NaN if the number of samples does not exceed
+        ``degrees_of_freedom_lost``.
     """
-    with warnings.catch_warnings():  # older versions of xarray let it through
+    with warnings.catch_warnings():  # raised by older versions of xarray
         warnings.filterwarnings("ignore", "Degrees of freedom", RuntimeWarning)
         return values.std(sample_dimension, ddof=degrees_of_freedom_lost)
 
@@ -103,18 +149,68 @@ def standard_deviation(
 @guard_methods
 @dataclass(frozen=True)
 class Mean(_SampleStatistic):
-    """Mean over samples."""
+    """Mean over samples.
+
+    Parameters
+    ----------
+    name : str
+        Name of the mean. Three more variables are returned: the sampling error ``<name>_stderr``,
+        the propagated numerical error ``<name>_error``, and the number of samples with a value
+        ``<name>_points``.
+    of : str
+        Name of the variable to reduce.
+    over : str, default: "sample"
+        Dimension of the samples.
+
+    Examples
+    --------
+    >>> import xarray as xr
+    >>> from rsfstudy.reductions import Mean
+    >>> dataset = xr.Dataset(
+    ...     {"drop": ("sample", [1.0, 2.0, 3.0, 4.0]), "status": ("sample", [0, 0, 0, 0])}
+    ... )
+    >>> mean = Mean(name="mean", of="drop")(dataset)
+    >>> float(mean["mean"]), round(float(mean["mean_stderr"]), 4)
+    (2.5, 0.6455)
+    """
 
     kind: ClassVar[str] = "mean"
     description: ClassVar[str] = "mean"
 
     def compute(self, of: xr.DataArray) -> tuple[xr.DataArray, xr.DataArray]:
-        """The mean, and sd/sqrt(n)."""
+        """Compute the mean and its standard error.
+
+        The standard error is the standard deviation divided by the square root of the number of
+        samples.
+
+        Parameters
+        ----------
+        of : xarray.DataArray
+            Values of the samples.
+
+        Returns
+        -------
+        value : xarray.DataArray
+            Mean.
+        stderr : xarray.DataArray
+            Standard error.
+        """
         count = of.notnull().sum(self.over)
         return of.mean(self.over), standard_deviation(of, self.over) / count**0.5
 
     def derivatives(self, dataset: xr.Dataset) -> DerivativesByVariable:
-        """1/n."""
+        """Return the reciprocal of the number of samples with a value.
+
+        Parameters
+        ----------
+        dataset : xarray.Dataset
+            Results of the cells, including the variable ``status``.
+
+        Returns
+        -------
+        sequence of (xarray.DataArray, mapping)
+            Derivatives with the positions of the cells, as described in the base class `Reduction`.
+        """
         has = _select_sampled_variable(self, dataset).notnull()
         return [(has / has.sum(self.over), {})]
 
@@ -122,11 +218,34 @@ class Mean(_SampleStatistic):
 @guard_methods
 @dataclass(frozen=True)
 class StandardDeviation(_SampleStatistic):
-    """Standard deviation over samples, of three at least.
+    """Standard deviation over at least three samples.
+
+    Parameters
+    ----------
+    name : str
+        Name of the standard deviation. Three more variables are returned: the sampling error
+        ``<name>_stderr``, the propagated numerical error ``<name>_error``, and the number of
+        samples with a value ``<name>_points``.
+    of : str
+        Name of the variable to reduce.
+    over : str, default: "sample"
+        Dimension of the samples.
 
     References
     ----------
-    Efron and Stein (1981), Annals of Statistics 9, 586-596: its standard error.
+    .. [1] Efron and Stein (1981), The jackknife estimate of variance. Annals of Statistics 9,
+    586-596.
+
+    Examples
+    --------
+    >>> import xarray as xr
+    >>> from rsfstudy.reductions import StandardDeviation
+    >>> dataset = xr.Dataset(
+    ...     {"drop": ("sample", [1.0, 2.0, 3.0]), "status": ("sample", [0, 0, 0])}
+    ... )
+    >>> deviation = StandardDeviation(name="deviation", of="drop")(dataset)
+    >>> float(deviation["deviation"])
+    1.0
     """
 
     kind: ClassVar[str] = "standard_deviation"
@@ -136,9 +255,26 @@ class StandardDeviation(_SampleStatistic):
     def compute(self, of: xr.DataArray) -> tuple[xr.DataArray, xr.DataArray]:
         """Compute the standard deviation and its standard error.
 
-        The standard deviation has n - 1 degrees of freedom. Its standard error is estimated by the
-        jackknife, from the standard deviations of the samples without one sample each. The estimate
-        requires independent samples but no particular distribution.
+        The standard deviation has n - 1 degrees of freedom. The standard error is a jackknife
+        estimate, which uses the standard deviations of all subsets of n - 1 samples [1]_. The
+        estimate requires independent samples but no particular distribution.
+
+        Parameters
+        ----------
+        of : xarray.DataArray
+            Values of the samples.
+
+        Returns
+        -------
+        value : xarray.DataArray
+            Standard deviation.
+        stderr : xarray.DataArray
+            Standard error.
+
+        References
+        ----------
+        .. [1] Efron and Stein (1981), The jackknife estimate of variance. Annals of Statistics 9,
+        586-596.
         """
         count, apart = of.notnull().sum(self.over), of - of.mean(self.over)
         rest = (apart**2).sum(self.over) - apart**2 * count / (count - 1.0)
@@ -147,7 +283,24 @@ class StandardDeviation(_SampleStatistic):
         return standard_deviation(of, self.over), scatter
 
     def derivatives(self, dataset: xr.Dataset) -> DerivativesByVariable:
-        """(y - mean)/((n - 1) sd)."""
+        r"""Compute the derivatives of the standard deviation.
+
+        Parameters
+        ----------
+        dataset : xarray.Dataset
+            Results of the cells, including the variable ``status``.
+
+        Returns
+        -------
+        sequence of (xarray.DataArray, mapping)
+            Derivatives with the positions of the cells, as described in the base class `Reduction`.
+
+        Notes
+        -----
+        The derivative of the standard deviation :math:`s` with respect to a sample :math:`y_i` is
+
+        .. math:: \frac{\partial s}{\partial y_i} = \frac{y_i - \bar{y}}{(n - 1) s}.
+        """
         of = _select_sampled_variable(self, dataset)
         freedom = of.notnull().sum(self.over) - 1
         by = (of - of.mean(self.over)) / (freedom * standard_deviation(of, self.over))
@@ -157,35 +310,85 @@ class StandardDeviation(_SampleStatistic):
 @guard_methods
 @dataclass(frozen=True)
 class Quantile(_SampleStatistic):
-    """Quantile over samples, between neighbours by their distance; its standard error is half the
-    distance of the quantiles a standard deviation of the binomial above and below.
+    """Quantile over samples.
+
+    The quantile is interpolated linearly between two neighbouring samples. The standard error is
+    half the difference between two quantiles, whose levels are one binomial standard deviation
+    above and below ``level``.
 
     Parameters
     ----------
-    level : float
-        Share of the samples below it.
+    name : str
+        Name of the quantile. Three more variables are returned: the sampling error
+        ``<name>_stderr``, the propagated numerical error ``<name>_error``, and the number of
+        samples with a value ``<name>_points``.
+    of : str
+        Name of the variable to reduce.
+    over : str, default: "sample"
+        Dimension of the samples.
+    level : float, default: 0.5
+        Probability of the quantile, between 0 and 1. The default is the median.
+
+    Raises
+    ------
+    InvalidValue
+        If ``level`` is not between 0 and 1.
+
+    Examples
+    --------
+    >>> import xarray as xr
+    >>> from rsfstudy.reductions import Quantile
+    >>> dataset = xr.Dataset(
+    ...     {"drop": ("sample", [1.0, 2.0, 4.0, 9.0]), "status": ("sample", [0, 0, 0, 0])}
+    ... )
+    >>> float(Quantile(name="median", of="drop")(dataset)["median"])
+    3.0
     """
 
     level: float = 0.5
     kind: ClassVar[str] = "quantile"
 
     def __post_init__(self) -> None:
+        """Check the level."""
         if not isinstance(self.level, int | float) or not 0.0 < self.level < 1.0:
             raise InvalidValue("level", self.level, "must be between 0 and 1")
 
     @property
     def description(self) -> str:  # type: ignore[override]
-        """What it is, in words."""
+        """Name and level of the statistic."""
         return f"quantile at {self.level:g}"
 
     @property
     def min_samples(self) -> int:  # type: ignore[override]
-        """So many that a standard deviation of the binomial stays between 0 and 1."""
+        """Minimum number of samples for the standard error.
+
+        With fewer samples, the level plus or minus one binomial standard deviation would be outside
+        of the range from 0 to 1.
+        """
         rarer = min(self.level, 1.0 - self.level)
         return max(2, math.ceil((1.0 - rarer) / rarer - 1e-9))
 
     def compute(self, of: xr.DataArray) -> tuple[xr.DataArray, xr.DataArray]:
-        """By the order of the samples."""
+        r"""Compute the quantile and its standard error.
+
+        Parameters
+        ----------
+        of : xarray.DataArray
+            Values of the samples.
+
+        Returns
+        -------
+        value : xarray.DataArray
+            Quantile.
+        stderr : xarray.DataArray
+            Standard error.
+
+        Notes
+        -----
+        The standard error of the quantile :math:`Q(p)` of :math:`n` samples is
+
+        .. math:: \frac{Q(p + s) - Q(p - s)}{2}, \quad s = \sqrt{\frac{p (1 - p)}{n}}.
+        """
         apart = (self.level * (1.0 - self.level) / of.notnull().sum(self.over)) ** 0.5
         found = [
             _interpolated_quantile(of, self.over, self.level + sign * apart)
@@ -194,8 +397,26 @@ class Quantile(_SampleStatistic):
         return found[0], 0.5 * (found[2] - found[1])
 
     def __call__(self, dataset: xr.Dataset) -> xr.Dataset:
-        """Reduce along the dimension of the samples; with what the errors of cells make of it: the
-        quantiles of values less and plus their errors bound it, however these change their order.
+        """Reduce the variable along the dimension of the samples.
+
+        If the variable has error estimates, the error of the quantile is computed from two bounds,
+        which are the quantiles of the values plus and minus their errors. The quantile of the exact
+        values is between the two bounds, even if the errors change the order of the samples.
+
+        Parameters
+        ----------
+        dataset : xarray.Dataset
+            Results of the cells, including the variable ``status``.
+
+        Returns
+        -------
+        xarray.Dataset
+            Quantile, standard error, number of samples, and numerical error.
+
+        Raises
+        ------
+        InvalidValue
+            If the variable does not have the dimension of the samples.
         """
         found, beside = super().__call__(dataset), f"{self.of}_error"
         if beside not in dataset:
@@ -216,7 +437,7 @@ class Quantile(_SampleStatistic):
 def _interpolated_quantile(
     values: xr.DataArray, sample_dimension: str, quantile_level: xr.DataArray
 ) -> xr.DataArray:
-    """A quantile: between the two samples whose ranks are beside it, by their distance."""
+    """Interpolate a quantile linearly between neighbouring samples."""
     place = values.get_axis_num(sample_dimension)
     ranks = values.copy(
         data=np.argsort(np.argsort(values.values, axis=place), axis=place).astype(float)
@@ -229,17 +450,31 @@ def _interpolated_quantile(
 @guard_methods
 @dataclass(frozen=True)
 class StatusShares(Reduction):
-    """Share of the samples that ended by each status, failures among them; its standard error is
-    that of a share of which one more ended so, and one more did not.
+    """Share of the samples that ended with each status, including failures.
+
+    The standard error of a share is the standard deviation of the posterior beta distribution for a
+    uniform prior. Therefore, the standard error is positive even if the share is 0 or 1.
 
     Parameters
     ----------
     name : str
-        Name of the shares, along the dimension ``ended``; ``<name>_stderr`` comes with it.
+        Name of the shares, which have the dimension ``ended``. The standard error is returned as
+        ``<name>_stderr``.
     of : str
-        A variable that was measured.
-    over : str
+        Name of a measured variable.
+    over : str, default: "sample"
         Dimension of the samples.
+
+    Examples
+    --------
+    >>> import xarray as xr
+    >>> from rsfstudy.reductions import StatusShares
+    >>> dataset = xr.Dataset(
+    ...     {"drop": ("sample", [1.0, 2.0, 3.0]), "status": ("sample", [0, 0, 3])}
+    ... )
+    >>> shares = StatusShares(name="share", of="drop")(dataset)["share"]
+    >>> round(float(shares.sel(ended="no_limit_cycle")), 4)
+    0.3333
     """
 
     over: str = "sample"
@@ -252,14 +487,44 @@ class StatusShares(Reduction):
 
     @property
     def quantities(self) -> Sequence[Quantity]:
+        """Quantities of the shares, their errors and the new dimension."""
         return [*super().quantities, Quantity("ended", "", "", "status with which a sample ended")]
 
     def support_status(self, status: xr.DataArray) -> xr.DataArray:
-        """Cells that are there, however they ended."""
+        """Replace the status of all computed cells by ``OK``.
+
+        Failed cells contribute to the shares, so they do not invalidate the result.
+
+        Parameters
+        ----------
+        status : xarray.DataArray
+            Status codes of all cells.
+
+        Returns
+        -------
+        xarray.DataArray
+            Status codes of the cells on which the results depend.
+        """
         return status.where(status == int(Status.PENDING), int(Status.OK))
 
     def __call__(self, dataset: xr.Dataset) -> xr.Dataset:
-        """Count along the dimension of the samples."""
+        """Compute the shares along the dimension of the samples.
+
+        Parameters
+        ----------
+        dataset : xarray.Dataset
+            Results of the cells, including the variable ``status``.
+
+        Returns
+        -------
+        xarray.Dataset
+            Shares and standard errors. NaN if there are pending samples.
+
+        Raises
+        ------
+        InvalidValue
+            If the variable does not have the dimension of the samples.
+        """
         _select_sampled_variable(self, dataset)
         status = dataset["status"].reset_coords(drop=True)
         statuses = [status for status in Status if status is not Status.PENDING]
@@ -277,21 +542,60 @@ class StatusShares(Reduction):
 @guard_methods
 @dataclass(frozen=True)
 class Logarithm(Reduction):
-    """Natural logarithm of a variable, in each cell where that is positive. Slopes of it over
-    natural logarithms are exponents; see `PowerLaw`.
+    """Natural logarithm of a variable.
+
+    The logarithm is NaN if the variable is not positive. The slope of a logarithm against the
+    natural logarithm of a coordinate is the exponent of a power law. See also `PowerLaw`.
+
+    Parameters
+    ----------
+    name : str
+        Name of the result.
+    of : str
+        Name of the variable to reduce.
+
+    Examples
+    --------
+    >>> import xarray as xr
+    >>> from rsfstudy.reductions import Logarithm
+    >>> dataset = xr.Dataset({"drop": ("phi", [1.0, 10.0]), "status": ("phi", [0, 0])})
+    >>> Logarithm(name="ln_drop", of="drop")(dataset)["ln_drop"].values.round(4).tolist()
+    [0.0, 2.3026]
     """
 
     kind: ClassVar[str] = "logarithm"
 
     def __call__(self, dataset: xr.Dataset) -> xr.Dataset:
-        """Ln of it, a pure number."""
+        """Compute the natural logarithm in each cell.
+
+        Parameters
+        ----------
+        dataset : xarray.Dataset
+            Results of the cells, including the variable ``status``.
+
+        Returns
+        -------
+        xarray.Dataset
+            Logarithm, which is dimensionless.
+        """
         of = dataset[self.of]
         logarithm: xr.DataArray = xr.apply_ufunc(np.log, of.where(of > 0.0))
         note = {"comment": f"natural logarithm of {self.of} in its unit"}
         return xr.Dataset({self.name: logarithm.drop_attrs(deep=False).assign_attrs(note)})
 
     def derivatives(self, dataset: xr.Dataset) -> DerivativesByVariable:
-        """One over the variable."""
+        """Return the reciprocal of the variable.
+
+        Parameters
+        ----------
+        dataset : xarray.Dataset
+            Results of the cells, including the variable ``status``.
+
+        Returns
+        -------
+        sequence of (xarray.DataArray, mapping)
+            Derivatives with the positions of the cells, as described in the base class `Reduction`.
+        """
         of = dataset[self.of]
         return [((1.0 / of.where(of > 0.0)).fillna(0.0), {})]
 
@@ -299,7 +603,10 @@ class Logarithm(Reduction):
 def _select_sampled_variable(
     reduction: _SampleStatistic | StatusShares, dataset: xr.Dataset
 ) -> xr.DataArray:
-    """What is reduced, without the coordinates beside its dimensions, which sums would carry."""
+    """Return the variable to reduce, without auxiliary coordinates.
+
+    Auxiliary coordinates are dropped because sums over the samples would keep them.
+    """
     of = dataset[reduction.of].reset_coords(drop=True)
     if reduction.over not in of.dims:
         rule = f"is no dimension of {reduction.of}"

@@ -1,4 +1,4 @@
-"""Results of a study of a rig in its units, cell by cell, for what is made of them."""
+"""Conversion of results to units of a rig, for use in other reductions."""
 
 from __future__ import annotations
 
@@ -18,14 +18,36 @@ from rsfstudy.study.reductions.base import DerivativesByVariable, Reduction
 @guard_methods
 @dataclass(frozen=True)
 class InUnits(Reduction):
-    """A variable in units of the rig, in each cell by its own scales: what a mean over samples
-    needs in which a scale varies.
+    """Variable in units of a rig, converted in each cell with its own scales.
+
+    Convert a variable before you compute its mean over samples with different scales. A mean of the
+    dimensionless values would combine values in different units.
 
     Parameters
     ----------
-    name, of : str
+    name : str
+        Name of the result.
+    of : str
+        Name of the variable to reduce.
     units : str
-        As in "s".
+        Units of the result, such as ``"s"``.
+
+    Examples
+    --------
+    >>> import xarray as xr
+    >>> from rsfstudy.reductions import InUnits
+    >>> attributes = {"units": "1", "scale": "D_c/V_*"}
+    >>> dataset = xr.Dataset(
+    ...     {"time": ("cell", [10.0, 20.0], attributes)},
+    ...     coords={
+    ...         "sigma_star": ((), 5.0, {"units": "MPa"}),
+    ...         "slip_distance": ((), 1e-5, {"units": "m"}),
+    ...         "reference_rate": ((), 0.2, {"units": "s-1"}),
+    ...     },
+    ... )
+    >>> seconds = InUnits(name="seconds", of="time", units="s")(dataset)
+    >>> seconds["seconds"].values.round(6).tolist()
+    [50.0, 100.0]
     """
 
     units: str = ""
@@ -33,19 +55,48 @@ class InUnits(Reduction):
 
     @property
     def quantities(self) -> Sequence[Quantity]:
+        """Quantity of the result, with the requested units."""
         return (Quantity(self.name, "", self.units, self.name.replace("_", " ")),)
 
     def __call__(self, dataset: xr.Dataset) -> xr.Dataset:
-        """The variable times its scale."""
+        """Multiply the variable by its scale in the requested units.
+
+        Parameters
+        ----------
+        dataset : xarray.Dataset
+            Results of the cells, including the variable ``status``.
+
+        Returns
+        -------
+        xarray.Dataset
+            Converted variable.
+
+        Raises
+        ------
+        InvalidValue
+            If the variable has no scale.
+        """
         about = {"units": self.units, "comment": f"{self.of}, each cell by its own scales"}
         values = (dataset[self.of] * self._scale_factor(dataset)).drop_attrs(deep=False)
         return xr.Dataset({self.name: values.assign_attrs(about)})
 
     def derivatives(self, dataset: xr.Dataset) -> DerivativesByVariable:
-        """The scale."""
+        """Return the scale factor of each cell.
+
+        Parameters
+        ----------
+        dataset : xarray.Dataset
+            Results of the cells, including the variable ``status``.
+
+        Returns
+        -------
+        sequence of (xarray.DataArray, mapping)
+            Derivatives with the positions of the cells, as described in the base class `Reduction`.
+        """
         return [(self._scale_factor(dataset) * xr.ones_like(dataset[self.of]), {})]
 
     def _scale_factor(self, dataset: xr.Dataset) -> xr.DataArray:
+        """Compute the scale of each cell in the requested units."""
         scale = find_scale_of_variable(dataset[self.of], read_si_scales(dataset))
         if scale is None:
             raise InvalidValue("of", self.of, "is a pure number, in no units of a rig")
