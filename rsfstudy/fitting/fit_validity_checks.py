@@ -310,7 +310,29 @@ def describe_unidentified_parameters(
 
 
 def describe_whiteness(p_value: float, noise_order: int, rows: int) -> str:
-    """Describe the result of the autocorrelation test of whitened residuals."""
+    """Describe the result of the autocorrelation test of whitened residuals.
+
+    Parameters
+    ----------
+    p_value : float
+        Result of the test.
+    noise_order : int
+        Order of the autoregressive noise model.
+    rows : int
+        Number of rows of the window.
+
+    Returns
+    -------
+    str
+        One line for the terminal.
+
+    Examples
+    --------
+    >>> from rsfstudy.fitting import describe_whiteness
+    >>> text = describe_whiteness(0.41, 1, 500)
+    >>> "0.41" in text
+    True
+    """
     verdict = (
         "are still autocorrelated" if p_value < SIGNIFICANCE_LEVEL else "show no autocorrelation"
     )

@@ -82,7 +82,7 @@ class FitWindow:
     >>> friction = np.full(200, 0.6)
     >>> record = Record({"time": time, "displacement": displacement, "friction": friction})
     >>> window = FitWindow(record, step_number=1, displacement_before=30.2)
-    >>> float(record.time[window.rows[0]])
+    >>> float(record.time[window.record_row_indices[0]])
     20.0
     """
 

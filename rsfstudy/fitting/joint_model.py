@@ -141,7 +141,7 @@ def window_values(values: Mapping[str, T], number: int) -> dict[str, T]:
 
     Examples
     --------
-    >>> from rsfstudy.fitting import window_values
+    >>> from rsfstudy.fitting.joint_model import window_values
     >>> window_values({"a": 0.01, "mu_star_1": 0.6, "mu_star_2": 0.62}, 2)
     {'a': 0.01, 'mu_star': 0.62}
     """
@@ -365,7 +365,7 @@ def fitted_fields(
     stiffness: float | None,
     velocity: float,
 ) -> dict[str, float]:
-    """Fields of the scene of the first window with the parameters that a fit found.
+    """Return the fields of the scene of the first window with the fitted parameters.
 
     Parameters
     ----------
@@ -379,6 +379,19 @@ def fitted_fields(
         Stiffness of the window, if it was not fitted.
     velocity : float
         Load point velocity before the step in um/s.
+
+    Returns
+    -------
+    dict of str to float
+        Field values by name.
+
+    Examples
+    --------
+    >>> from rsfstudy import Scene
+    >>> from rsfstudy.fitting import fitted_fields
+    >>> scene = Scene(a=0.01, b_over_a=1.3, stiffness=0.02)
+    >>> fitted_fields(scene, [12.0], {"a": 0.011}, None, 1.0)["a"]
+    0.011
     """
     values = scene_to_parameters(scene, *distances)
     if stiffness is not None:

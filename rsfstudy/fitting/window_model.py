@@ -556,7 +556,7 @@ def parameters_to_fields(values: ParameterValues, velocity: float) -> dict[str, 
 
     Examples
     --------
-    >>> from rsfstudy.fitting import parameters_to_fields
+    >>> from rsfstudy.fitting.window_model import parameters_to_fields
     >>> values = {"a": 0.01, "b": 0.015, "slip_distance": 10.0, "mu_star": 0.6, "stiffness": 0.002}
     >>> fields = parameters_to_fields(values, velocity=1.0)
     >>> {name: round(fields[name], 6) for name in ("stiffness", "reference_rate", "b_over_a")}
