@@ -390,7 +390,7 @@ def fitted_fields(
     >>> from rsfstudy import Scene
     >>> from rsfstudy.fitting import fitted_fields
     >>> scene = Scene(a=0.01, b_over_a=1.3, stiffness=0.02)
-    >>> fitted_fields(scene, [12.0], {"a": 0.011}, None, 1.0)["a"]
+    >>> fitted_fields(scene, [12.0, 12.0], {"a": 0.011}, None, 1.0)["a"]
     0.011
     """
     values = scene_to_parameters(scene, *distances)
