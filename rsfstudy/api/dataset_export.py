@@ -1,4 +1,4 @@
-"""Conversion of datasets to tables, and repetition of motions from their files."""
+"""Tables of datasets, and recomputation of stored motions."""
 
 from __future__ import annotations
 

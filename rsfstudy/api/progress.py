@@ -1,4 +1,4 @@
-"""Progress of a run: a bar on a terminal or in a notebook, and lines of text elsewhere."""
+"""Progress bars and progress lines of a run."""
 
 from __future__ import annotations
 
