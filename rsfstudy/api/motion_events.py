@@ -249,8 +249,9 @@ class _InterpolatedMotionRows:
                     best = max(best, through(at), key=lambda values: sign * values[column])
             found.append(best)
         many, fewer = found
-        # Times have few significant digits in a rupture. Because the extreme is flat, rounding shifts
-        # its time by the square root of the rounding error, and changes the other columns equally.
+        # Times have few significant digits in a rupture. Because the extreme is flat, rounding
+        # shifts its time by the square root of the rounding error, and the other columns change by
+        # the same relative amount.
         clock = 2.0 * np.spacing(times[-1]) / max(np.ptp(times), np.spacing(times[-1]))
         shares = np.full(len(many), math.sqrt(clock))
         shares[column] = clock

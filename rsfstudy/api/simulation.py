@@ -352,7 +352,7 @@ def motion_variable_attributes(quantity: Quantity, scene: Scene) -> dict[str, An
 
 
 def _state_quantity(state_number: int) -> Quantity:
-    """Return the quantity that describes a state of a law with several states."""
+    """Return the quantity of one state of a law with several states."""
     about = (
         f"state {state_number} of the law, as a part of the friction coefficient, freed of stress"
     )
@@ -360,7 +360,7 @@ def _state_quantity(state_number: int) -> Quantity:
 
 
 def _read_end_of_motion(motion: object, scene: Scene) -> Event:
-    """Return the end of a stored motion, from which the motion can continue."""
+    """Return the end of a stored motion, from which it can continue."""
     if not isinstance(motion, xr.Dataset) or MOTION_END_ATTRIBUTE_NAME not in motion.attrs:
         remedy = "Give a motion that simulate returned, and that lasted as long as was asked."
         raise InvalidValue("start", motion, "is no motion with an end", remedy=remedy)
@@ -396,7 +396,7 @@ def _log_slip_rate_limit_of_instability(scene: Scene) -> float:
 
 
 def _loading_duration(scene: Scene) -> float:
-    """Return the default duration of a motion, which depends on the loading."""
+    """Return the default duration of a motion for the loading."""
     loading = scene.parts.loading
     stated = float(loading.segment_table[-1][SEGMENT_START])
     if isinstance(loading, SampledHistory) or (
