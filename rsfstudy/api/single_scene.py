@@ -68,7 +68,7 @@ def critical_step(
     -------
     xarray.Dataset
         Dataset with scalar variables. The critical value is ``critical_velocity_ratio`` (in V_*),
-        ``critical_displacement`` (in D_c) or the critical change of normal stress (in sigma_*). The
+        ``critical_displacement`` (in D_c) or ``critical_normal_stress_step`` (in sigma_*). The
         critical value has the numerical error ``<name>_error`` and two verified neighbours. The
         slider settles after the step ``<name>_stable`` and becomes unstable after the step
         ``<name>_unstable``. ``rhs_evaluations`` is the work. The attributes ``status`` and

@@ -402,9 +402,10 @@ def plot(
         matplotlib settings, or a list of styles. For example, ``{"font.size": 9, "figure.figsize":
         (3.5, 2.6)}`` selects a width of 3.5 inches, which is one column of a journal. Colours and
         line styles follow ``axes.prop_cycle``.
-    user_figure : callable or module, optional
-        User-defined figure that was passed to ``Study(plot=...)``. The argument is required if the
-        dataset was read from a file and its figure is not part of rsfstudy.
+    user_figure : callable, module or Figure, optional
+        User-defined figure: a function ``draw(dataset, axes)``, a module with a function ``draw``,
+        or an ``rsfstudy.Figure``. The argument is required if the study was declared with a
+        user-defined figure, because results files contain no code.
 
     Returns
     -------
