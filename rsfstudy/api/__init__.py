@@ -34,4 +34,4 @@ __all__ = [
     "prepare_run_with_progress",
     "write_report",
 ]
-from rsfstudy.api import accessor as accessor  # registers the accessor of datasets
+from rsfstudy.api import accessor as accessor  # The import registers the accessor.

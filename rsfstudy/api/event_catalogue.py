@@ -108,7 +108,7 @@ def _build_unit_attributes(
     return {"units": f"{slip} {time}-1"} if time and slip else {}
 
 
-# ---- of a record --------------------------------------------------------------------------------
+# ---- detection of drops in records --------------------------------------------------------------
 
 
 @error_boundary
@@ -174,13 +174,15 @@ def events(
         no drop although stress falls by more than ten times ``smallest_drop``. In this case, the
         attribute ``comment`` of the dataset contains both numbers.
 
-    Notes ----- The detection compares the mean stress of a window with the mean stress of the next
-    window, at every sample. The window lengths are 4, 8, 16 and more sampling intervals, up to a
-    hundredth of the record. The noise is estimated from the most frequent differences between the
-    two means, because most differences occur during loading. The noise may be correlated over times
-    that are short compared with the longest window, and drops may take up to 40 % of the record.
-    The detection threshold corresponds to one false detection in 10,000 records of Gaussian noise.
-    If sampling intervals differ by more than a factor of three, as in triggered bursts, the samples
+    Notes
+    -----
+    The detection compares the mean stress of a window with the mean stress of the next window, at
+    every sample. The window lengths are 4, 8, 16 and more sampling intervals, up to a hundredth of
+    the record. The noise is estimated from the most frequent differences between the two means,
+    because most differences occur during loading. The noise may be correlated over times that are
+    short compared with the longest window, and drops may take up to 40 % of the record. The
+    detection threshold corresponds to one false detection in 10,000 records of Gaussian noise. If
+    sampling intervals differ by more than a factor of three, as in triggered bursts, the samples
     are first averaged over equal intervals of time.
 
     Three straight lines are then fitted to the samples before, during and after each drop. The

@@ -194,16 +194,14 @@ def fit(
         steps or records. Lengths are in um and velocities in um/s.
 
         - For each parameter, ``<name>`` is the best-fit value, ``<name>_stderr`` the standard
-        error,
-          ``<name>_low`` and ``<name>_high`` the ends of the 95 % confidence interval, and
+          error, ``<name>_low`` and ``<name>_high`` the ends of the 95 % confidence interval, and
           ``<name>_error`` the numerical error. ``a_minus_b`` is the difference of a and b.
         - ``covariance`` and ``correlation`` have the dimensions ``parameter`` and
-        ``other_parameter``. - The noise is described by ``noise_size``, ``noise_order``,
-        ``effective_samples`` and
+          ``other_parameter``.
+        - The noise is described by ``noise_size``, ``noise_order``, ``effective_samples`` and
           ``whiteness``, the p-value of a test for remaining autocorrelation.
         - ``fitted_friction``, ``residual`` and ``innovation`` (whitened residual) have the
-        dimension
-          ``row`` and are NaN outside the window.
+          dimension ``row`` and are NaN outside the window.
         - ``status`` is ``not_identified`` if the record does not constrain a parameter, and
           ``errors_not_valid`` if only the standard errors are invalid. ``message`` contains the
           reason.
@@ -232,8 +230,10 @@ def fit(
     return the fitted scene and rig, and ``dataset.rsf.sample_parameters()`` draws samples of the
     parameters. ``rsfstudy.measures.Fit`` describes the model.
 
-    Examples -------- Create a synthetic record of a velocity step from 1 to 10 um/s, and fit a, b
-    and the slip distance. The motions of the fit take several seconds without Numba.
+    Examples
+    --------
+    Create a synthetic record of a velocity step from 1 to 10 um/s, and fit a, b and the slip
+    distance. The motions of the fit take several seconds without Numba.
 
     >>> import numpy as np
     >>> from rsfstudy import fit, read_record

@@ -135,17 +135,15 @@ def simulate(
           several states, ``state_1``, ``state_2`` and so on are the states without their changes
           due to stress. If stress does not affect the states, they add up to ``state_variable``.
         - ``shear_stress`` is the spring stress. With radiation damping, the damping stress at V_*
-        is
-          subtracted, so that spring stress equals frictional stress in steady sliding at V_*.
+          is subtracted, so that spring stress equals frictional stress in steady sliding at V_*.
         - ``frictional_stress`` is the frictional resistance, and ``normal_stress_ratio`` is the
           effective normal stress in sigma_*.
         - ``load_point_displacement`` and ``friction_coefficient`` are the values that a laboratory
-        rig
-          measures. The friction coefficient is spring stress divided by the difference of normal
-          stress and the pore pressure outside the fault.
-        - ``porosity`` and ``pore_pressure`` exist for a dilatant fluid. - ``regime`` is the code of
-        the equations of motion. Its attribute ``flag_meanings`` lists the
-          names of the regimes.
+          rig measures. The friction coefficient is spring stress divided by the difference of
+          normal stress and the pore pressure outside the fault.
+        - ``porosity`` and ``pore_pressure`` exist for a dilatant fluid.
+        - ``regime`` is the code of the equations of motion. Its attribute ``flag_meanings`` lists
+          the names of the regimes.
         - ``instability_time`` exists if the motion exceeds the instability norm without inertia or
           radiation damping.
 
@@ -173,10 +171,12 @@ def simulate(
     rsfstudy.limit_cycle : Compute the limit cycle of a scene.
     rsfstudy.plot_motion : Plot a motion.
 
-    Notes ----- Time strictly increases. If a quantity jumps, the row at the time of the jump
-    contains the value before the jump, and the next row contains the value after the jump. The two
-    times differ by a few spacings of floating-point numbers. The same spacing separates the rows of
-    a rupture that is too short for the resolution of time.
+    Notes
+    -----
+    Time strictly increases. If a quantity jumps, the row at the time of the jump contains the value
+    before the jump, and the next row contains the value after the jump. The two times differ by a
+    few spacings of floating-point numbers. The same spacing separates the rows of a rupture that is
+    too short for the resolution of time.
 
     Without inertia and radiation damping, a motion has no physical meaning beyond the instability
     norm. The variable ``instability_time`` and the attribute ``beyond_instability_norm`` contain

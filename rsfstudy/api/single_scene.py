@@ -50,8 +50,8 @@ def critical_step(
         "normal_stress_step". "velocity_step" is an alias of "load_velocity_ratio". After a step of
         displacement or normal stress, the load point is held unless the scene specifies
         ``load_velocity_ratio``. Steps of normal stress require a normal stress that is "imposed" or
-        "variable". Because a decrease of normal stress triggers the instability, these steps
-        require ``direction="down"``.
+        "variable". If a decrease of normal stress triggers the instability, pass
+        ``direction="down"``.
     direction : {"up", "down"}, default: "up"
         Direction of the step.
     rtol : float, default: 1e-7
@@ -219,8 +219,10 @@ def to_si(
         If the dataset has already been converted, if rsfstudy has not created the dataset, or if
         the scale of an axis varies along another axis.
 
-    Notes ----- A scale that the dataset contains need not be passed. The results of a study with a
-    rig contain all scales, and each cell is converted with the scales of its own rig.
+    Notes
+    -----
+    A scale that the dataset contains need not be passed. The results of a study with a rig contain
+    all scales, and each cell is converted with the scales of its own rig.
 
     Examples
     --------

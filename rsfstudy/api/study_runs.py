@@ -570,7 +570,7 @@ def rerun(
     theirs = read_dataset(find_results(file, OUTPUT_DIRECTORY))
     if is_of_single_scene(theirs):
         if study is not None:
-            load_study(str(study))  # for the parts of its scene
+            load_study(str(study))  # The file defines user-defined parts of the scene.
         return dataset_export.rerun_motion(theirs)
     declared = rebuild_study(theirs, study)
     place = output_directory(output)

@@ -147,8 +147,7 @@ def fit_table(dataset: xr.Dataset) -> pd.DataFrame:
         Table with one row per fit. Lengths are in um. Parameters that were not free are NaN.
 
         - Columns ``<name>_std`` contain standard errors. The standard errors of a row with the
-        status
-          ``errors_not_valid`` are not valid.
+          status ``errors_not_valid`` are not valid.
         - Columns ``<name>_windows`` contain the range of a parameter over the windows.
         - ``k`` is the stiffness divided by the normal stress in 1/um.
         - ``normal_stress`` is the mean normal stress before the step in MPa.
