@@ -102,8 +102,8 @@ def fit(
 ) -> xr.Dataset:
     """Fit friction parameters to a laboratory record.
 
-    The function fits each step of load point velocity or normal stress separately, with each state
-    evolution law, unless ``together`` is True. The standard errors account for correlated noise.
+    By default, each step of load point velocity or normal stress is fitted separately. A fit is
+    computed for each state evolution law. The standard errors account for correlated noise.
 
     Parameters
     ----------

@@ -186,7 +186,7 @@ class _InterpolatedMotionRows:
         """Return True if rows are too far apart for interpolation.
 
         Rows are too far apart if slip rate changes by more than half a decade between the rows.
-        Such changes may occur if the motion was computed at requested times only.
+        Rows may be too far apart if the motion was computed at requested times only.
         """
         return bool(np.abs(np.diff(self._values[rows, 0])).max() > _MAX_LOG10_SLIP_RATE_STEP)
 

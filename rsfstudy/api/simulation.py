@@ -175,8 +175,8 @@ def simulate(
     -----
     Time strictly increases. If a quantity jumps, the row at the time of the jump contains the value
     before the jump, and the next row contains the value after the jump. The two times differ by a
-    few spacings of floating-point numbers. The same spacing separates the rows of a rupture that is
-    too short for the resolution of time.
+    few spacings of floating-point numbers. The rows of a rupture have the same spacing if the
+    rupture is too short for the resolution of time.
 
     Without inertia and radiation damping, a motion has no physical meaning beyond the instability
     norm. The variable ``instability_time`` and the attribute ``beyond_instability_norm`` contain

@@ -232,7 +232,7 @@ def apply_overrides_to_study(
     overrides : mapping of str to object
         Values that replace values of the axes, the scene or the measure.
     **accuracy_fields : object
-        Fields of ``Accuracy``, such as ``rtol``. Fields that are None are not changed.
+        Fields of ``Accuracy``, such as ``rtol``. A value of None leaves the field unchanged.
 
     Returns
     -------
@@ -460,8 +460,8 @@ def check(dataset: xr.Dataset | str | Path) -> pd.DataFrame:
     pandas.DataFrame
         Table with one row per claim. The columns include the published value ``published``, the
         computed value ``ours``, ``tolerance``, the ``reason`` for the tolerance, ``verdict`` and
-        ``moved``. ``moved`` is True if the verdict differs from the expected verdict. Claims do not
-        apply if the study was run with overrides that change them.
+        ``moved``. ``moved`` is True if the verdict differs from the expected verdict. If overrides
+        change the conditions of a claim, the claim does not apply.
 
     Raises
     ------

@@ -516,8 +516,8 @@ def note_on_norms_near_load_velocity(dataset: xr.Dataset) -> str:
     Returns
     -------
     str
-        Number of such results and the first message. The string is empty if there are no such
-        results, or if the study has no rig.
+        Number of results with a norm close to the load point velocity, and the first message. The
+        string is empty if the number is zero, or if the study has no rig.
     """
     if read_declaration(dataset).laboratory is None:
         return ""
