@@ -105,9 +105,9 @@ def simulate(
         D_c/V_* if the load point is held. If the loading has only one segment, the default is 50.
     times : array_like of shape (n,), optional
         Increasing times in D_c/V_* at which to return the motion, instead of ``duration``. With
-        inertia, slip rate adjusts to a step within the inertial time after the step, and only the
-        end of this adjustment is returned. By default, several times per integration step are
-        returned.
+        inertia, slip rate adjusts to a step within the inertial time. At requested times during the
+        adjustment, the function returns the final values of the adjustment. By default, several
+        times per integration step are returned.
     start : xarray.Dataset, optional
         Previous motion of the same scene, from whose end the motion continues. Time, slip and
         loading continue without interruption, and ``duration`` is counted from the end of the
