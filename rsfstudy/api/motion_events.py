@@ -168,8 +168,8 @@ class _InterpolatedMotionRows:
     def _interpolate_after_row(self, row: int, row_count: int) -> KroghInterpolator:
         """Interpolate around the interval between a row and the next row.
 
-        The time of the polynomial is measured from the row. Half of the rows precede the interval.
-        Rows on the other side of a jump are not used.
+        The polynomial is a function of the time since the row. Half of the rows precede the
+        interval. Rows on the other side of a jump are not used.
         """
         first = max(row + 1 - row_count // 2, 0)
         last = min(row + row_count // 2, len(self._times) - 1)

@@ -360,7 +360,7 @@ def _state_quantity(state_number: int) -> Quantity:
 
 
 def _read_end_of_motion(motion: object, scene: Scene) -> Event:
-    """Return the end of a stored motion, from which it can continue."""
+    """Return the final point of a stored motion."""
     if not isinstance(motion, xr.Dataset) or MOTION_END_ATTRIBUTE_NAME not in motion.attrs:
         remedy = "Give a motion that simulate returned, and that lasted as long as was asked."
         raise InvalidValue("start", motion, "is no motion with an end", remedy=remedy)
@@ -396,7 +396,7 @@ def _log_slip_rate_limit_of_instability(scene: Scene) -> float:
 
 
 def _loading_duration(scene: Scene) -> float:
-    """Return the default duration of a motion for the loading."""
+    """Return the default duration of a motion, given its loading."""
     loading = scene.parts.loading
     stated = float(loading.segment_table[-1][SEGMENT_START])
     if isinstance(loading, SampledHistory) or (
