@@ -397,7 +397,10 @@ def _check_step_can_be_fitted(record: Record, step_number: int, step: LoadingSte
 def _check_normal_stress_changes_for_alpha(
     records: Sequence[Record], loading_kind: str, step_numbers: Sequence[int]
 ) -> None:
-    """Raise ``InvalidValue`` if alpha is fitted but normal stress is constant."""
+    """Raise ``InvalidValue`` if ``alpha`` cannot be fitted.
+
+    The parameter ``alpha`` cannot be fitted at constant normal stress.
+    """
     for record in records:
         stress = record.columns.get("normal_stress", np.zeros(1))
         steps = [
@@ -475,7 +478,7 @@ def _initial_stiffness(
 def _check_normal_stress_is_compressive(
     records: Sequence[Record], step_numbers: Sequence[int]
 ) -> None:
-    """Raise ``InvalidValue`` if the normal stress before a step is not positive."""
+    """Raise ``InvalidValue`` if normal stress is not positive before a step."""
     for record in records:
         for number in step_numbers:
             if number > len(record.loading_steps):

@@ -377,7 +377,10 @@ def format_with_stderr(fit: xr.Dataset, parameter_name: str) -> str:
 
 
 def _format_rounded_to_error(value: float, error: float) -> str:
-    """Format a value with its standard error, rounded to two digits of the error."""
+    """Format a value with its standard error.
+
+    The value and the error are rounded to two digits of the error.
+    """
     if not math.isfinite(value):
         return "-"
     if error > _MAX_PRINTED_RELATIVE_ERROR * abs(value) > 0.0:
