@@ -168,8 +168,8 @@ def fit(
         the stiffness in 1/um refers to the first window, and is scaled by normal stress for the
         other windows.
     slip_distance : quantity, optional
-        Initial guess of the slip distance, such as "10 um", or a number in um. The fit also tries
-        five other values from a tenth to ten times this guess. The default is 5 % of the load point
+        Initial guess of the slip distance, such as "10 um", or a number in um. The fit tries five
+        values from a tenth to ten times this guess. The default is 5 % of the load point
         displacement after the step.
     engine : {"scipy", "python", "compiled"} or type, optional
         Engine that integrates the motions (see ``rsfstudy.run``). The default is "compiled" if
@@ -478,7 +478,10 @@ def _initial_stiffness(
 def _check_normal_stress_is_compressive(
     records: Sequence[Record], step_numbers: Sequence[int]
 ) -> None:
-    """Raise ``InvalidValue`` if normal stress is not positive before a step."""
+    """Raise ``InvalidValue`` if normal stress is not positive.
+
+    The function checks the mean normal stress before each step.
+    """
     for record in records:
         for number in step_numbers:
             if number > len(record.loading_steps):
