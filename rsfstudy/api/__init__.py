@@ -1,8 +1,8 @@
 """Functions that users call, and the accessor ``dataset.rsf``.
 
-``rsfstudy`` exports these functions. They check their arguments, and combine the packages below:
-running and opening studies, simulating motions, fitting records, and computing measures of one
-scene. The package contains no physics, and never prints.
+The namespace ``rsfstudy`` exports the functions of this package. The functions check their
+arguments and call other packages, which run studies, integrate motions and fit records. The package
+contains no physics and never prints.
 """
 
 from __future__ import annotations
@@ -34,4 +34,4 @@ __all__ = [
     "prepare_run_with_progress",
     "write_report",
 ]
-from rsfstudy.api import accessor as accessor  # registers the accessor of datasets
+from rsfstudy.api import accessor as accessor  # The import registers the accessor.

@@ -1,6 +1,6 @@
-"""The accessor ``.rsf`` of datasets: which scene or study they are of, and what can be asked of
-them. A dataset has it once xarray has opened a file, where this module is found as a backend, or
-rsfstudy has made the dataset.
+"""Accessor ``.rsf`` of xarray datasets, and the xarray backend of rsfstudy.
+
+The accessor is registered when xarray loads its backends, and when rsfstudy returns a dataset.
 """
 
 from __future__ import annotations
@@ -16,7 +16,8 @@ from rsfstudy._deprecation import renamed_members
 from rsfstudy.error_boundary import error_boundary
 from rsfstudy.errors import DataError
 
-# all else is loaded when asked for: xarray imports this module whatever file it opens
+# Other modules are imported inside the methods, because xarray imports this module even if it opens
+# a file that rsfstudy has not written.
 if TYPE_CHECKING:
     import pandas as pd
 
@@ -35,21 +36,37 @@ _FOREIGN_DATASET_MESSAGE = (
 @renamed_members
 @xr.register_dataset_accessor("rsf")  # type: ignore[no-untyped-call]
 class Accessor:
-    """What a dataset of rsfstudy says of itself: a motion, the answer for one scene, or the results
-    of a study.
+    """Accessor for datasets that rsfstudy has created.
+
+    The accessor is available as ``dataset.rsf``. The dataset is a motion, a critical step or a
+    limit cycle of one scene, a fit of laboratory records, or the results of a study.
 
     Parameters
     ----------
     dataset : xarray.Dataset
-        Any; one that is not of rsfstudy is refused with `DataError` when something is asked of it.
+        Dataset to access. The methods raise ``DataError`` if rsfstudy has not created the dataset.
+
+    Examples
+    --------
+    >>> from rsfstudy import Scene, simulate
+    >>> motion = simulate(Scene(load_velocity_ratio=2.0), duration=1.0)
+    >>> motion.rsf.scene.load_velocity_ratio
+    2.0
     """
 
     def __init__(self, dataset: xr.Dataset) -> None:
+        """Initialise the accessor.
+
+        Parameters
+        ----------
+        dataset : xarray.Dataset
+            Dataset to access.
+        """
         self._dataset = dataset
 
     @error_boundary
     def _repr_html_(self) -> str:
-        """Return an HTML table of the dataset and the verdicts of its claims."""
+        """Return the dataset and the verdicts of its claims as HTML."""
         from rsfstudy.api import html_report
 
         self._require_rsfstudy_dataset()
@@ -58,13 +75,24 @@ class Accessor:
     @property
     @error_boundary
     def scene(self) -> Scene:
-        """The scene: of results of a study that of the one cell that is selected, of a fit that
-        with the parameters found.
+        """Scene of the dataset.
+
+        If the dataset contains the results of a study, the property returns the scene of the
+        selected cell. If the dataset contains a fit, the property returns a scene with the fitted
+        parameters.
+
+        Returns
+        -------
+        Scene
+            Scene of the motion, of the cell or of the fit.
 
         Raises
         ------
+        DataError
+            If rsfstudy has not created the dataset.
         InvalidValue
-            Where no single cell is selected, or a part is a user's own and not known here.
+            If more than one cell or more than one fit is selected, or if the scene has a
+            user-defined part that is not available in this process.
         """
         from rsfstudy.api.fitted_parameters import fitted_scene
         from rsfstudy.reporting import is_fit
@@ -77,16 +105,24 @@ class Accessor:
     @property
     @error_boundary
     def rig(self) -> Rig:
-        """The rig of one fit of a record, whose scales are those of ``.scene``: the slip distance
-        and the stiffness of the fit, velocity and mean normal stress before the step. It turns
-        motions of that scene into its units, as in ``rig.in_units(motion, length="um")``.
+        """Rig that converts motions of a fit to the units of the record.
+
+        The slip distance and the stiffness of the rig are the fitted values. The reference velocity
+        and the normal stress of the rig are the mean values before the step. For example,
+        ``dataset.rsf.rig.in_units(motion, length="um")`` converts a motion of
+        ``dataset.rsf.scene``.
+
+        Returns
+        -------
+        Rig
+            Rig of the fit.
 
         Raises
         ------
         DataError
-            Where the dataset is no fit.
+            If the dataset is not a fit.
         InvalidValue
-            Where several fits are selected, or the record does not tell normal stress.
+            If more than one fit is selected, or if the record has no normal stress.
         """
         from rsfstudy.api.fitted_parameters import fitted_rig
 
@@ -95,14 +131,21 @@ class Accessor:
     @property
     @error_boundary
     def study(self) -> Study:
-        """The study that made the dataset, all of it, whatever is selected.
+        """Study that produced the dataset.
+
+        The study always contains all cells, even if only some cells of the dataset are selected.
+
+        Returns
+        -------
+        Study
+            Study with the axes, the measure and the reductions of the dataset.
 
         Raises
         ------
         DataError
-            Where the dataset is of one scene.
+            If the dataset belongs to a single scene.
         InvalidValue
-            Where the study has code of a user's own.
+            If the study contains user-defined code.
         """
         from rsfstudy.storage import study_of_dataset
 
@@ -111,12 +154,33 @@ class Accessor:
 
     @error_boundary
     def to_si(self, **scale_values: Any) -> xr.Dataset:
-        """The dataset in SI units.
+        """Convert the dataset to SI units.
 
         Parameters
         ----------
-        **scales
-            ``normal_stress``, ``slip_distance`` and ``reference_rate`` of `rsfstudy.to_si`.
+        **scale_values : quantity
+            Scales ``normal_stress`` (Pa), ``slip_distance`` (m) and ``reference_rate`` (1/s) that
+            the dataset does not contain. See ``rsfstudy.to_si``.
+
+        Returns
+        -------
+        xarray.Dataset
+            Dataset with stress in Pa, slip in m, time in s and slip rate in m/s.
+
+        Raises
+        ------
+        InvalidValue
+            If a scale is missing, not positive, or different from the scale in the dataset.
+        DataError
+            If the dataset has already been converted, or if rsfstudy has not created the dataset.
+
+        Examples
+        --------
+        >>> from rsfstudy import Scene, simulate
+        >>> motion = simulate(Scene(load_velocity_ratio=2.0), duration=1.0)
+        >>> converted = motion.rsf.to_si(normal_stress="5 MPa", slip_distance="10 um")
+        >>> converted["shear_stress"].attrs["units"]
+        'Pa'
         """
         from rsfstudy.api.single_scene import to_si
 
@@ -125,18 +189,50 @@ class Accessor:
 
     @error_boundary
     def in_units(self, *, stress: str = "MPa", length: str = "um", time: str = "s") -> xr.Dataset:
-        """The results of a study of a rig in these units, by the scales that each cell has; all of
-        them, as `rsfstudy.to_si` says.
+        """Convert the results of a study with a rig to other units.
+
+        Each cell is converted with the scales of its own rig.
 
         Parameters
         ----------
-        stress, length, time : str
-            Velocities and stiffnesses follow.
+        stress : str, default: "MPa"
+            Unit of stress.
+        length : str, default: "um"
+            Unit of length.
+        time : str, default: "s"
+            Unit of time. The units of slip rate and stiffness follow from the other units.
+
+        Returns
+        -------
+        xarray.Dataset
+            Dataset in the new units. Variables that lose their normalisation are renamed as in
+            ``rsfstudy.to_si``.
 
         Raises
         ------
+        DataError
+            If the dataset has already been converted, or if rsfstudy has not created the dataset.
         InvalidValue
-            For units of another kind, and for results that hold no scales: those of no rig.
+            If a unit has the wrong dimension, or if the dataset does not contain the scales of a
+            rig.
+
+        Examples
+        --------
+        >>> from rsfstudy import Axis, Rig, Study, run
+        >>> from rsfstudy.measures import LinearStability
+        >>> rig = Rig(normal_stress=5e6, slip_distance=1e-5, reference_velocity=1e-6, period=5.0)
+        >>> study = Study(
+        ...     name="example",
+        ...     title="Critical stiffness",
+        ...     base=rig.scene(normal_stress="constant", a=0.01),
+        ...     axes=[Axis("b_over_a", [1.5, 2.0])],
+        ...     measure=LinearStability(),
+        ...     rig=rig,
+        ... )
+        >>> results = run(study, workers=0, output=None, progress=False)
+        >>> converted = results.rsf.in_units(stress="kPa")
+        >>> converted["critical_stiffness"].attrs["units"]
+        'kPa um-1'
         """
         from rsfstudy.rig import convert_dataset_units, read_si_scales
 
@@ -147,8 +243,19 @@ class Accessor:
 
     @error_boundary
     def check(self) -> pd.DataFrame:
-        """The claims of the study held against the dataset, as `rsfstudy.check` gives them: none
-        applies in other units.
+        """Compare the dataset with the claims of its study.
+
+        Claims do not apply to datasets that have been converted to other units.
+
+        Returns
+        -------
+        pandas.DataFrame
+            Table with one row per claim, as ``rsfstudy.check`` returns it.
+
+        Raises
+        ------
+        DataError
+            If the dataset belongs to a single scene, or if only some cells are selected.
         """
         from rsfstudy.api import study_runs
 
@@ -158,14 +265,29 @@ class Accessor:
 
     @error_boundary
     def plot(self, *plot_arguments: Any, **plot_options: Any) -> Figure:
-        """The figure of the results of a study, or the picture of a motion or a limit cycle, in the
-        units that they have.
+        """Plot the results of a study, a motion or a limit cycle.
+
+        The axes are in the units of the dataset.
 
         Parameters
         ----------
-        *what, **how
-            As of `rsfstudy.plot` for the results of a study (`variable`, `style`), and as of
-            `rsfstudy.plot_motion` for a motion or a cycle (`rig`, `against`).
+        *plot_arguments : object
+            Positional arguments for ``rsfstudy.plot`` or ``rsfstudy.plot_motion``. The results of a
+            study are plotted with ``rsfstudy.plot``. Motions and limit cycles are plotted with
+            ``rsfstudy.plot_motion``.
+        **plot_options : object
+            Keyword arguments for the same function, such as ``variable`` and ``style`` for the
+            results of a study, or ``rig`` and ``against`` for a motion.
+
+        Returns
+        -------
+        matplotlib.figure.Figure
+            Figure of the dataset.
+
+        Raises
+        ------
+        DataError
+            If only some cells of a study are selected, or if the dataset cannot be plotted.
         """
         from rsfstudy.api import study_runs
         from rsfstudy.plots import plot_motion
@@ -177,29 +299,42 @@ class Accessor:
 
     @error_boundary
     def events(self, slip_rate: float | None = None) -> xr.Dataset:
-        """The events of a motion: what is faster than a slip rate.
+        """Find the events of a motion.
+
+        An event is a part of the motion with a slip rate above a threshold.
 
         Parameters
         ----------
         slip_rate : float, optional
-            Over V_*; by default ten times the fastest load point velocity of the scene.
+            Threshold of the slip rate in V_*. The default is 10 times the highest load point
+            velocity of the scene, and at least 10.
 
         Returns
         -------
         xarray.Dataset
-            Along ``event``, in the units of the motion: ``time``, ``duration``, ``interval`` (since
-            the event before began), ``peak_log10_slip_rate``, ``slip``, ``stress_before``,
-            ``stress_after`` (the extremes of spring stress on either side), ``static_stress_drop``
-            and ``dynamic_stress_drop``. Each is read within steps, and has beside it the error of
-            reading; that of the motion is as its ``rtol``. ``cut`` says of which event the motion
-            holds a part only: its numbers are those of that part.
+            Dataset along the dimension ``event``, in the units of the motion. The variables are
+            ``time``, ``duration``, ``interval`` (time since the beginning of the previous event),
+            ``peak_log10_slip_rate``, ``slip``, ``stress_before`` and ``stress_after`` (largest
+            spring stress before the event and smallest spring stress after the event),
+            ``static_stress_drop`` and ``dynamic_stress_drop``. Each variable has an interpolation
+            error ``<name>_error``, which does not include the error of the motion. ``cut`` is
+            nonzero if the motion contains only a part of the event. In this case, the variables
+            describe only this part.
 
         Raises
         ------
         DataError
-            Where the dataset is no motion.
+            If the dataset is not a motion.
         InvalidValue
-            For a slip rate that is not positive and finite.
+            If the slip rate is not positive and finite.
+
+        Examples
+        --------
+        >>> from rsfstudy import Scene, simulate
+        >>> scene = Scene(stiffness_ratio=2.0, load_velocity_ratio=2.0, normal_stress="constant")
+        >>> events = simulate(scene, duration=10.0).rsf.events(slip_rate=1.5)
+        >>> events["time"].values.round(3)
+        array([0.2])
         """
         from rsfstudy.api.motion_events import find_motion_events
 
@@ -209,26 +344,43 @@ class Accessor:
 
     @error_boundary
     def slip_mode(self, stick_slip_from: Any) -> xr.DataArray:
-        """What sliders do in the end, where stick-slip begins at a slip rate in units.
+        """Classify limit cycles by their peak slip rate.
+
+        The method distinguishes slow slip from stick-slip.
 
         Parameters
         ----------
         stick_slip_from : quantity
-            Peak slip rate from which a cycle is stick-slip and below which it is slow slip, as in
-            ``"1 mm/s"``, or a number in m/s; `LimitCycle` says what it is otherwise.
+            Peak slip rate at which stick-slip begins, such as ``"1 mm/s"``, or a number in m/s.
+            Limit cycles with a lower peak slip rate are slow slip.
 
         Returns
         -------
         xarray.DataArray
-            `slip_mode` of the dataset, each cell by its own V_*: of results of a rig, or of a limit
-            cycle in its units.
+            Variable ``slip_mode`` of the dataset with the new limit between slow slip and
+            stick-slip. The codes are 0 (steady), 1 (damped oscillation), 2 (slow slip) and 3
+            (stick-slip). The codes of cells that settle are unchanged.
 
         Raises
         ------
         InvalidValue
-            For what is no slip rate, and for a dataset that does not tell its scales.
+            If the argument is not a slip rate, or if the dataset does not contain the scales that
+            convert the peak slip rate to m/s.
         DataError
-            For a dataset without limit cycles.
+            If the dataset contains no limit cycles.
+
+        Notes
+        -----
+        ``rsfstudy.measures.LimitCycle`` defines the default limit between slow slip and stick-slip.
+
+        Examples
+        --------
+        >>> from rsfstudy import Scene, limit_cycle
+        >>> scene = Scene(normal_stress="constant", stiffness_ratio=0.8, radiation_damping=1e-3)
+        >>> cycle = limit_cycle(scene, rtol=1e-4)
+        >>> converted = cycle.rsf.to_si(normal_stress="5 MPa", slip_distance="10 um")
+        >>> float(converted.rsf.slip_mode("1 m/s"))
+        2.0
         """
         from rsfstudy.limit_cycles import SLIP_MODES
         from rsfstudy.rig import convert_to_si, unit_factor
@@ -244,14 +396,28 @@ class Accessor:
 
     @error_boundary
     def to_dataframe(self) -> pd.DataFrame:
-        """A table without columns that never change.
+        """Convert the dataset to a table without constant columns.
 
         Returns
         -------
         pandas.DataFrame
-            Of results of a study a row a cell, of a motion a row a time, with what there is for
-            each: orbits within cells are left out. Of another answer for one scene, its numbers in
-            one row. What never changes is in ``attrs["constant"]``.
+            Table with one row per cell of a study, or with one row per time of a motion. Orbits
+            inside the cells are omitted. For other datasets of one scene, the table has a single
+            row. The dictionary ``attrs["constant"]`` of the table contains the values of the
+            omitted columns.
+
+        Raises
+        ------
+        DataError
+            If rsfstudy has not created the dataset.
+
+        Examples
+        --------
+        >>> from rsfstudy import Scene, simulate
+        >>> scene = Scene(load_velocity_ratio=2.0)
+        >>> table = simulate(scene, times=[0.5, 1.0]).rsf.to_dataframe()
+        >>> table["load_point_displacement"].round(6).tolist()
+        [1.0, 2.0]
         """
         from rsfstudy.api.dataset_export import to_dataframe
 
@@ -260,18 +426,20 @@ class Accessor:
 
     @error_boundary
     def fit_table(self) -> pd.DataFrame:
-        """One row a fit of a record, with the columns that laboratories use; lengths in um.
+        """Return a table of fits with the column names used in laboratories.
 
         Returns
         -------
         pandas.DataFrame
-            ``a``, ``a_std``, ``b``, ``b_std``, ``Dc``, ``Dc_std`` and so on, of what was looked
-            for; ``V0``, ``V1``, ``law``, ``window``, ``R2`` and ``status``.
+            Table with one row per fit. The columns are the fitted parameters and their standard
+            errors (``a``, ``a_std``, ``b``, ``b_std``, ``Dc``, ``Dc_std`` and so on), the load
+            point velocities ``V0`` before and ``V1`` after the step, ``law``, ``window``, ``R2``,
+            ``p_value``, ``status`` and others. Lengths are in um and velocities in um/s.
 
         Raises
         ------
         DataError
-            Where the dataset is no fit.
+            If the dataset is not a fit.
         """
         from rsfstudy.reporting import fit_table
 
@@ -279,24 +447,30 @@ class Accessor:
 
     @error_boundary
     def sample_parameters(self, n: int, seed: int = 0) -> xr.Dataset:
-        """Samples of the parameters of one fit, as its errors let them be.
+        """Draw samples of the parameters of a fit.
+
+        The samples follow a multivariate t distribution with the covariance matrix of the fit. Slip
+        distances and stiffness are sampled on a logarithmic scale and are therefore positive.
 
         Parameters
         ----------
         n : int
-            How many.
-        seed : int
+            Number of samples.
+        seed : int, default: 0
+            Seed of the random number generator.
 
         Returns
         -------
         xarray.Dataset
-            Each parameter along ``draw``, in its units, by Student's t. Slip distances and
-            stiffness stay positive: their logarithms are drawn.
+            Samples of each parameter along the dimension ``draw``, in the units of the parameter.
 
         Raises
         ------
+        DataError
+            If the dataset is not a fit.
         InvalidValue
-            Where several fits are selected, or the record does not tell a parameter at all.
+            If more than one fit is selected, if ``n`` is not a positive integer, or if the fit has
+            no covariance matrix.
         """
         from rsfstudy.api.fitted_parameters import sample_parameters
 
@@ -304,13 +478,26 @@ class Accessor:
 
     @error_boundary
     def failures(self) -> pd.DataFrame:
-        """The cells that failed or gave no number.
+        """Return a table of the cells without a result.
 
         Returns
         -------
         pandas.DataFrame
-            One row a cell: its coordinates on the axes of the study, ``status`` and ``message``. Of
-            one scene, a row without coordinates, or none.
+            Table with one row per cell whose status is not ``ok``. The columns are the coordinates
+            of the cell on the axes of the study, ``status`` and ``message``. If the dataset belongs
+            to one scene, the table has no coordinates and at most one row.
+
+        Raises
+        ------
+        DataError
+            If rsfstudy has not created the dataset.
+
+        Examples
+        --------
+        >>> from rsfstudy import Scene, simulate
+        >>> motion = simulate(Scene(load_velocity_ratio=2.0), duration=1.0)
+        >>> len(motion.rsf.failures())
+        0
         """
         import pandas as pd
 
@@ -329,15 +516,17 @@ class Accessor:
 
     @property
     def _is_study(self) -> bool:
+        """True if the dataset contains the results of a study."""
         self._require_rsfstudy_dataset()
         return "declaration" in self._dataset.attrs
 
     def _require_rsfstudy_dataset(self) -> None:
+        """Raise ``DataError`` if rsfstudy has not created the dataset."""
         if not {"scene", "declaration"} & set(self._dataset.attrs):
             raise DataError(_FOREIGN_DATASET_MESSAGE)
 
     def _require_all_cells_present(self, requested_action: str) -> None:
-        """Refuse results of which cells were selected."""
+        """Raise ``DataError`` if a selection has removed an axis."""
         from rsfstudy.storage import read_declaration
 
         axes = [axis["dimension"] for axis in read_declaration(self._dataset).axes]
@@ -350,22 +539,38 @@ class Accessor:
             raise DataError(f"{text}. Ask the dataset as it was opened.")
 
     def _require_study(self) -> None:
+        """Raise ``DataError`` if the dataset is not from a study."""
         if not self._is_study:
             raise DataError("the dataset is of one scene: no study made it. Ask for its scene.")
 
 
 class Backend(BackendEntrypoint):
-    """``xarray.open_dataset(path, engine="rsfstudy")``, which checks the file as `rsfstudy.open`
-    does. xarray loads it with all its backends, and with it the accessor.
+    """Backend that lets xarray open and validate results files of rsfstudy.
+
+    The call ``xarray.open_dataset(path, engine="rsfstudy")`` opens a file in the same way as
+    ``rsfstudy.open``. xarray registers the accessor ``.rsf`` when it loads the backend.
     """
 
     description = "Results of rsfstudy, checked when they are opened"
     open_dataset_parameters = ("filename_or_obj", "drop_variables")
 
-    def open_dataset(  # type: ignore[override]  # no other options: the file is read whole
+    def open_dataset(  # type: ignore[override]  # files are read completely
         self, filename_or_obj: str | Path, *, drop_variables: str | Iterable[str] | None = None
     ) -> xr.Dataset:
-        """The results in a file, in memory."""
+        """Load a results file into memory.
+
+        Parameters
+        ----------
+        filename_or_obj : str or Path
+            Path of the file, or name of a study.
+        drop_variables : str or iterable of str, optional
+            Names of variables to omit.
+
+        Returns
+        -------
+        xarray.Dataset
+            Results of the study.
+        """
         from rsfstudy.api import study_runs
 
         return study_runs.open(filename_or_obj).drop_vars(drop_variables or [])

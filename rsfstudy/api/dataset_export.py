@@ -1,4 +1,4 @@
-"""Results and motions as tables, and motions computed again from their files."""
+"""Tables of datasets, and recomputation of stored motions."""
 
 from __future__ import annotations
 
@@ -15,11 +15,23 @@ from rsfstudy.storage import compare_same_lattice
 
 
 def to_dataframe(dataset: xr.Dataset) -> pd.DataFrame:
-    """A table of a dataset, as `Accessor.to_dataframe` says."""
+    """Convert a dataset to a table without constant columns.
+
+    Parameters
+    ----------
+    dataset : xarray.Dataset
+        Results of a study, or a dataset of one scene.
+
+    Returns
+    -------
+    pandas.DataFrame
+        Table as returned by ``Accessor.to_dataframe``. If the table would have fewer than two rows,
+        no columns are omitted.
+    """
     along = [name for name in ("time",) if name in dataset.dims]
     along = list(map(str, dataset["status"].dims)) if "status" in dataset else along
     kept = [name for name, values in dataset.variables.items() if set(values.dims) <= set(along)]
-    if not along:  # the numbers of one answer, in one row
+    if not along:
         return pd.DataFrame({str(n): [dataset[n].values.item()] for n in kept})
     table = dataset[kept].to_dataframe().reset_index()
     if len(table) < 2:
@@ -32,22 +44,23 @@ def to_dataframe(dataset: xr.Dataset) -> pd.DataFrame:
 
 
 def rerun_motion(motion: xr.Dataset) -> pd.DataFrame:
-    """Compute a motion again, and compare it with what its file holds.
+    """Compute a motion again, and compare it with the stored motion.
 
     Parameters
     ----------
     motion : xarray.Dataset
-        As a file holds it.
+        Stored motion.
 
     Returns
     -------
     pandas.DataFrame
-        As `rsfstudy.rerun` gives it.
+        Table with one row per variable, as ``rsfstudy.rerun`` returns it.
 
     Raises
     ------
     DataError
-        Where it is no motion, or one of which the file does not say how it was told.
+        If the dataset is not a motion from ``rsfstudy.simulate``, if the motion was computed at
+        requested times, or if the motion has units but no rig.
     """
     about = motion.attrs
     if "duration" not in about or about.get("told") != "as it moves":

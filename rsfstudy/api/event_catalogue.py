@@ -25,21 +25,39 @@ from rsfstudy.fitting import (
 from rsfstudy.netcdf_encoding import copy_with_cf_encoding
 from rsfstudy.rig import convert_to_si, read_table, unit_factor
 
-#: What quantities are measured in: as these variables, by their scales.
+#: Variables from which a quantity takes its units, by the scale of the quantity.
 _RECORD_VARIABLE_BY_SCALE = {"D_c/V_*": "time", "D_c": "slip", "sigma_*": "shear_stress"}
-#: Quantities that are read from displacement.
+#: Quantities that require displacement.
 _QUANTITIES_REQUIRING_DISPLACEMENT = ("slip", "peak_slip_rate", "dynamic_stress_drop")
-#: What part of an event is missing, by its flag.
+#: Meanings of the codes 0, 1, 2 and 3 of the variable ``cut``.
 _MEANINGS_OF_CUT_FLAGS = ("whole", "begins_before", "lasts_beyond", "both")
 
-#: Falls of stress, in smallest drops, from which it is suspect that no drop is found.
+#: Ratio of the largest stress decrease to the smallest detectable drop above which an empty
+#: catalogue causes a warning.
 _SUSPICIOUS_DECREASE_OVER_MIN_DROP = 10.0
 
 
 def build_catalogue(
     event_numbers: Sequence[EventNumbers], variable_attributes: Mapping[str, Mapping[Any, Any]]
 ) -> xr.Dataset:
-    """Events as a dataset, in the units of what they were read from."""
+    """Build a dataset from the measured quantities of events.
+
+    Parameters
+    ----------
+    event_numbers : sequence of (dict, int)
+        Quantities of each event, and the code of the missing part of the event. Each quantity is a
+        value with its error. The function adds the interval since the previous event to each
+        dictionary.
+    variable_attributes : mapping of str to mapping
+        Attributes of the variables ``time``, ``slip`` and ``shear_stress`` from which the events
+        were measured.
+
+    Returns
+    -------
+    xarray.Dataset
+        Variables along the dimension ``event``, in the units of the measured variables. Each
+        variable has an error estimate ``<name>_error``.
+    """
     rows = [numbers for numbers, _cut in event_numbers]
     for row, earlier in zip(rows, [{}, *rows], strict=False):
         (time, error), (before, unsure) = row["time"], earlier.get("time", (math.nan, math.nan))
@@ -90,7 +108,7 @@ def _build_unit_attributes(
     return {"units": f"{slip} {time}-1"} if time and slip else {}
 
 
-# ---- of a record --------------------------------------------------------------------------------
+# ---- detection of drops in records --------------------------------------------------------------
 
 
 @error_boundary
@@ -105,64 +123,41 @@ def events(
 ) -> xr.Dataset:
     """Detect drops of shear stress in a laboratory record.
 
-    A drop is a fall of shear stress that the noise of the record does not explain. The mean stress
-    of a window is compared with the mean of the next window, at every sample. The window lengths
-    are 4, 8, 16 and more sampling intervals, up to a hundredth of the record. The noise is
-    estimated from the most frequent differences between the two means, because most differences
-    occur during loading. The noise may be correlated over times that are short compared with the
-    longest window, and drops may take up to 40 % of the record. The threshold is chosen so that
-    one of 10,000 records of Gaussian noise contains a false detection. If sampling intervals differ
-    by more than a factor of three, as in triggered bursts, the samples are first averaged over
-    equal intervals of time.
-
-    Three straight lines are then fitted to the samples around each drop: before, during and after
-    the drop. The intersections of the lines are the beginning of the event, where stress is
-    highest, and the end of the event, where stress is lowest.
-
-    A drop of size ``smallest_drop`` is missed once in 1,000 cases, provided that the longest window
-    separates the drop from other drops. If the noise is white and the record has at least 3,200
-    samples, ``smallest_drop`` is less than three standard deviations of the noise. If the noise is
-    correlated, ``smallest_drop`` is larger. Spikes of single samples are not Gaussian noise and may
-    cause false detections. A relaxation of stress within a window, as in a hold, counts as a drop.
-
-    Slip is computed as displacement minus shear stress divided by ``stiffness``. If ``stiffness``
-    is not passed, displacement must be the slip of the fault. The function accepts displacement as
-    slip if displacement moves faster during the drops than before and after them, by three standard
-    deviations of its noise and by a tenth. The displacement of a load point does not pass this
-    test. Displacement is read a few samples away from each drop, because noise of stress may have
-    shifted the times of the drop.
+    A drop is a decrease of shear stress that the noise of the record does not explain.
 
     Parameters
     ----------
     record : xarray.Dataset, Record, str or Path, optional
-        Dataset with ``time``, ``shear_stress`` and, if measured, ``displacement``, with units. A
-        path names a CSV file with these columns, whose first line contains names and units
-        (``read_table``). The shear stress of a Record (``read_record``) is the product of friction
-        and normal stress, or friction if the record has no normal stress.
-    time, displacement, shear_stress : array_like
+        Dataset with the variables ``time``, ``shear_stress`` and, if measured, ``displacement``. A
+        path refers to a CSV file with columns of these names and units in the first line (see
+        ``rsfstudy.read_table``). The shear stress of a Record (see ``rsfstudy.read_record``) is the
+        product of friction and normal stress, or friction if the record has no normal stress.
+    time, displacement, shear_stress : array_like of shape (n,), optional
         Arrays to use instead of ``record``. If an array has the attribute ``units``, the results
-        keep these units. Otherwise the results have no attribute ``units``.
+        have the same units. Otherwise, the results have no attribute ``units``.
     stiffness : quantity, optional
-        Stiffness between the fault and the point where displacement is measured, in shear stress
-        over displacement: a string such as "0.05 MPa/um", or a number in the units of the record.
-        If displacement was measured at the load point, pass the stiffness of the rig. If
-        displacement is known to be the slip of the fault, pass ``inf``.
+        Stiffness between the fault and the point at which displacement is measured, in shear stress
+        over displacement. The stiffness is a string such as "0.05 MPa/um", or a number in the units
+        of the record. If displacement was measured at the load point, pass the stiffness of the
+        rig. If displacement is the slip of the fault, pass ``inf``. By default, displacement must
+        be the slip of the fault, and the function tests this assumption.
     sign : {1, -1}, optional
-        Sign of shear stress in the direction of slip. Stress is multiplied by ``sign``, so that
+        Sign of shear stress in the direction of slip. Stress is multiplied by the sign, so that
         stress falls during events. The default is -1 if all samples are negative, and 1 otherwise.
 
     Returns
     -------
     xarray.Dataset
-        Variables along ``event``, in the units of the record: ``time`` (of the beginning),
-        ``duration``, ``interval``, ``stress_before``, ``stress_after``, ``static_stress_drop`` and
-        ``cut`` (1 if the record begins within the event, 2 if the record ends within the event).
-        If displacement is known, the dataset also has ``slip``, ``peak_slip_rate`` between
-        neighbouring samples, and ``dynamic_stress_drop``. Values that do not exceed the noise are
-        NaN. Each variable has a companion ``<name>_error``, the half width of a 95 % confidence
-        interval. The scalar ``noise`` is the standard deviation of the noise, and ``smallest_drop``
-        is the smallest drop that can be detected. The attribute ``sign_of_shear_stress`` contains
-        the sign that was used.
+        Variables along the dimension ``event``, in the units of the record. ``time`` is the
+        beginning of the event. The other variables are ``duration``, ``interval`` (time since the
+        previous event), ``stress_before``, ``stress_after``, ``static_stress_drop`` and ``cut`` (0
+        for complete events, 1 if the record begins within the event, 2 if the record ends within
+        the event, 3 if both apply). If displacement is known, the dataset also has ``slip``,
+        ``peak_slip_rate`` between neighbouring samples, and ``dynamic_stress_drop``. Values that do
+        not exceed the noise are NaN. For each variable, ``<name>_error`` is the half width of a 95
+        % confidence interval. The scalar ``noise`` is the standard deviation of the noise, and
+        ``smallest_drop`` is the smallest drop that can be detected. The attribute
+        ``sign_of_shear_stress`` contains the sign that was used.
 
     Raises
     ------
@@ -173,10 +168,50 @@ def events(
     Warns
     -----
     NoResultWarning
-        If displacement does not move faster during the drops. Then ``slip``, ``peak_slip_rate`` and
-        ``dynamic_stress_drop`` are NaN, and the attribute ``comment`` of ``slip`` gives the reason.
-        The function also warns if no drop is found although stress falls by more than ten times
-        ``smallest_drop``. The attribute ``comment`` of the dataset then contains both numbers.
+        If displacement does not move faster during the drops than before and after the drops. In
+        this case, ``slip``, ``peak_slip_rate`` and ``dynamic_stress_drop`` are NaN, and the
+        attribute ``comment`` of ``slip`` contains the reason. The function also warns if it finds
+        no drop although stress falls by more than ten times ``smallest_drop``. In this case, the
+        attribute ``comment`` of the dataset contains both numbers.
+
+    Notes
+    -----
+    The detection compares the mean stress of a window with the mean stress of the next window, at
+    every sample. The window lengths are 4, 8, 16 and more sampling intervals, up to a hundredth of
+    the record. The noise is estimated from the most frequent differences between the two means,
+    because most differences occur during loading. The noise may be correlated over times that are
+    short compared with the longest window, and drops may take up to 40 % of the record. The
+    detection threshold corresponds to one false detection in 10,000 records of Gaussian noise. If
+    sampling intervals differ by more than a factor of three, as in triggered bursts, the samples
+    are first averaged over equal intervals of time.
+
+    Three straight lines are then fitted to the samples before, during and after each drop. The
+    intersections of the lines are the beginning of the event, where stress is highest, and the end
+    of the event, where stress is lowest.
+
+    A drop of size ``smallest_drop`` is missed once in 1,000 cases, provided that the longest window
+    separates the drop from other drops. If the noise is white and the record has at least 3,200
+    samples, ``smallest_drop`` is less than three standard deviations of the noise. If the noise is
+    correlated, ``smallest_drop`` is larger. Spikes of single samples are not Gaussian noise and may
+    cause false detections. The function also detects a relaxation of stress within a window, as in
+    a hold, as a drop.
+
+    Slip is displacement minus shear stress divided by ``stiffness``. If ``stiffness`` is not
+    passed, the function uses displacement as slip only if displacement moves faster during the
+    drops than before and after the drops. The difference must exceed 10 % and three standard
+    deviations of the noise of displacement. The displacement of a load point does not pass this
+    test. Displacement is read a few samples away from each drop, because noise of stress may have
+    shifted the times of the drop.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from rsfstudy import events
+    >>> time = 0.01 * np.arange(2000)
+    >>> noise = np.random.default_rng(0).normal(scale=0.01, size=2000)
+    >>> catalogue = events(time=time, shear_stress=5.0 + 0.1 * (time % 5.0) + noise)
+    >>> catalogue["static_stress_drop"].values.round(1)
+    array([0.5, 0.5, 0.5])
     """
     given = {"time": time, "displacement": displacement, "shear_stress": shear_stress}
     if isinstance(record, str | Path):
@@ -232,7 +267,7 @@ def events(
 
 
 def _parse_stiffness(stiffness: Any, variable_attributes: Mapping[str, Mapping[Any, Any]]) -> float:
-    """Shear stress over displacement, in the units of the record."""
+    """Convert the stiffness to the units of the record."""
     if isinstance(stiffness, str):
         stress, length = (
             variable_attributes[n].get("units") for n in ("shear_stress", "displacement")
@@ -250,7 +285,7 @@ def _parse_stiffness(stiffness: Any, variable_attributes: Mapping[str, Mapping[A
 
 
 def _check_record_samples(variable_name: str, values: Any) -> np.ndarray:
-    """Samples of a record, checked."""
+    """Convert samples of a record to a finite array of shape (n,)."""
     try:
         samples = np.asarray(values, dtype=float)
     except (TypeError, ValueError) as error:
@@ -298,12 +333,12 @@ def _find_stress_sign(stress: np.ndarray, stated_sign: int | None) -> float:
 
 
 def _warn_if_no_drop(detection: Detection) -> str:
-    """Warn if no drop is found although stress falls far more than the smallest drop.
+    """Warn if no drop is found although stress falls considerably.
 
     Returns
     -------
     str
-        The text of the warning. The string is empty if no warning was issued.
+        Message of the warning, or an empty string if no warning was issued.
     """
     if not detection.max_decrease > _SUSPICIOUS_DECREASE_OVER_MIN_DROP * detection.detectable_drop:
         return ""

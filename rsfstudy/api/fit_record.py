@@ -1,4 +1,8 @@
-"""Fits of friction parameters to records, as users ask for them; and what laboratories tabulate."""
+"""Fits of friction parameters to laboratory records.
+
+The main function is ``fit``. The function checks the arguments, builds a study with the measure
+``Fit``, and runs the study.
+"""
 
 from __future__ import annotations
 
@@ -34,7 +38,7 @@ from rsfstudy.rig import Rig, convert_to_si, is_friction_stiffness
 from rsfstudy.slider import Scene
 from rsfstudy.study import Study
 
-#: What is looked for unless something else is asked for, of those that any of the laws has.
+#: Default free parameters. Each law uses the parameters that the law has.
 DEFAULT_FREE_PARAMETERS = (
     "a",
     "b",
@@ -45,25 +49,26 @@ DEFAULT_FREE_PARAMETERS = (
     "mu_star",
     "trend1",
 )
-#: Those of which a law has its own, and what is said of them.
+#: Parameters that depend on the number of states of the law, and the remedy in error messages.
 _EVOLUTION_EFFECT_PARAMETERS = ("b", "b1", "b2")
 _STATE_PARAMETERS_REMEDY = (
     "One state has b; two states have b1, b2, slip_distance and slip_distance_2."
 )
-#: Slip distance to begin with, as part of the load point displacement that is fitted after a step.
+#: Initial guess of the slip distance, as a fraction of the load point displacement after a step.
 _SLIP_DISTANCE_GUESS_OVER_DISPLACEMENT = 0.05
-#: Largest number of windows.
+#: Maximum number of windows.
 _MAX_WINDOWS = 1000
-#: Jumps of displacement back, relative to its noise and to its changes nearby, and to its extent,
-#: that are a new zero; and rows from which noise is known.
+#: A backward jump of displacement is a reset to zero if the jump exceeds each of three limits: a
+#: multiple of the noise and of the neighbouring changes, and a fraction of the total displacement.
+#: The noise is estimated only if the record has more rows than the last number.
 (
     _MIN_DISPLACEMENT_RESET_OVER_NOISE,
     _MIN_DISPLACEMENT_RESET_OVER_EXTENT,
     _MIN_ROWS_FOR_NOISE_ESTIMATE,
 ) = 10.0, 0.01, 20
-#: Shortest of several windows, as a part of what follows a step.
+#: Length of the shortest window, as a fraction of the displacement after a step.
 _SHORTEST_WINDOW_FRACTION = 0.5
-#: First guesses of a scene: those of a record take their place.
+#: Initial values of the fields of a scene, which the values of the user override.
 _INITIAL_SCENE_FIELDS = {"a": 0.01, "mu_star": 0.6, "normal_stress": "constant"}
 _INITIAL_FIELDS_OF_ONE_STATE_LAW = {"b_over_a": 1.2}
 _INITIAL_FIELDS_OF_TWO_STATE_LAW = {"b1_over_a": 0.9, "b2_over_a": 0.3, "length_ratio": 10.0}
@@ -95,98 +100,155 @@ def fit(
     command: str = "rsfstudy.fit",
     **scene: Any,
 ) -> xr.Dataset:
-    """The friction parameters that a record tells, with errors that count correlated noise.
+    """Fit friction parameters to a laboratory record.
+
+    By default, each step of load point velocity or normal stress is fitted separately. A fit is
+    computed for each state evolution law. The standard errors account for correlated noise.
 
     Parameters
     ----------
     record : Record or sequence of Record
-        As `rsfstudy.read_record` gives it.
+        Records to fit, as returned by ``rsfstudy.read_record``.
     rig : Rig, optional
-        Its stiffness is that of the machine, its slip distance the first guess.
-    laws : sequence of str
-        State evolution laws, a fit by each.
-    free : sequence of str
-        What to look for: ``a``, ``b`` (``b1``, ``b2`` and ``slip_distance_2`` of laws with two
-        states), ``slip_distance``, ``mu_star``, ``stiffness``, ``alpha``, ``law_exponent`` (of
-        "family"), ``step_time``, and ``trend1``, ``trend2`` and so on. Each law is fitted with
-        those that it has. If none is given, a, all b and slip distances, ``mu_star`` and
-        ``trend1``.
-    steps : sequence of int
-        Numbers of the steps to fit, from 1; all of them, if none is given. ``record.steps()``
-        lists them.
-    together : bool
-        Fit these steps, of all records, as one: with one a, b and slip distance, and friction
-        before it, trends and time of its own for each step (``mu_star_1``, ``mu_star_2``).
-    before, after : quantity
-        Load point displacement that is fitted around each ("100 um"); 0: all up to the next step,
-        and half the way back to the one before.
-    windows : int
-        Number of windows, from half of what follows each step to all of it. The range of each
-        parameter among them is told beside its standard error (``_windows``): where that is more,
-        something else than noise is in the record, a trend that is none of those fitted, say.
-    noise : str
-        "ar" (autoregressive, of an order that a criterion chooses), "ar1" and so on, or "white":
-        errors by the usual formula, in which the load point has no noise either.
-    loading : {"steps", "recorded"}
-        The load point as its steps say, or as it was recorded, and normal stress with it where that
-        is no constant of the scene (``normal_stress="imposed"``).
+        Rig that recorded the data. The stiffness of the rig is the stiffness of the model, and the
+        slip distance of the rig is the initial guess. If the record has no normal stress, the
+        normal stress of the rig is used.
+    laws : sequence of str, default: ("slip", "slowness")
+        State evolution laws. A separate fit is computed for each law.
+    free : sequence of str, optional
+        Names of the free parameters: ``a``, ``b`` (``b1``, ``b2`` and ``slip_distance_2`` for laws
+        with two states), ``slip_distance``, ``mu_star``, ``stiffness``, ``alpha``, ``law_exponent``
+        (for the law "family"), ``step_time``, ``trend1``, ``trend2`` and so on. Each fit uses the
+        parameters that its law has. By default, the free parameters are ``a``, all b and slip
+        distances, ``mu_star`` and ``trend1``.
+    steps : sequence of int, optional
+        Numbers of the steps to fit, starting from 1. ``record.steps()`` lists the steps. By
+        default, all steps are fitted.
+    together : bool, default: False
+        If True, the steps of all records are fitted jointly. The joint fit has one set of ``a``,
+        ``b`` and slip distance. Each step has its own friction before the step, trend and step
+        time, with names such as ``mu_star_1`` and ``mu_star_2``.
+    before, after : quantity, default: 0.0
+        Load point displacement to fit before and after each step, such as "100 um", or a number in
+        um. If ``before`` is 0, the window begins halfway between the previous step and this step,
+        or at the beginning of the record. If ``after`` is 0, the window ends at the next step, or
+        at the end of the record.
+    windows : int, default: 1
+        Number of windows for each fit. The windows include between 50 and 100 % of the displacement
+        after the step. For each parameter, ``<name>_windows`` is the range of the parameter over
+        the windows. A range that is larger than the standard error indicates that the record
+        contains a signal that the model does not describe, such as a trend.
+    noise : str, default: "ar"
+        Noise model: "ar" for an autoregressive process with an automatic order, "ar1", "ar2" and so
+        on for a fixed order, or "white" for white noise. With "white", the standard errors follow
+        from the usual formula, and the load point displacement has no noise.
+    loading : {"steps", "recorded"}, default: "steps"
+        Loading of the model. "steps" uses constant velocities between the steps. "recorded" uses
+        the recorded load point displacement, and the recorded normal stress if the normal stress of
+        the scene is not constant (``normal_stress="imposed"``).
     averaging : quantity, optional
-        Time over which the data logger averaged friction about each row ("1 s", a plain number is
-        in s); "trailing 1 s" if the average ends at the row. The model is averaged in the same way.
+        Time over which the data logger averaged friction around each row, such as "1 s", or a
+        number in s. Use "trailing 1 s" if the average ends at the row. The same average is applied
+        to the model. By default, friction was not averaged.
     low_pass : str, optional
-        Low-pass filter that friction passed, with its corner frequency: "first_order 2 Hz",
-        "butterworth_2 2 Hz" or "butterworth_4 2 Hz". The model passes through the same filter.
-    posterior : int
-        Draws from the posterior (``posterior``, along ``draw``), by emcee, with flat priors between
-        the bounds of the search and the noise as the fit found it. A chain of some 1,000 to 10,000
-        motions: where the budget is spent before it is 50 autocorrelation times long, the fit ends
-        as ``work_budget_spent``.
+        Low-pass filter that was applied to friction, with its corner frequency: "first_order 2 Hz",
+        "butterworth_2 2 Hz" or "butterworth_4 2 Hz". The same filter is applied to the model. By
+        default, friction was not filtered.
+    posterior : int, default: 0
+        Number of draws from the posterior distribution, which are stored in ``posterior`` along the
+        dimension ``draw``. Sampling requires emcee. The priors are flat between the bounds of the
+        search, and the noise model is fixed. A chain needs about 1,000 to 10,000 motions. If the
+        budget is exceeded before the chain is 50 autocorrelation times long, the status of the fit
+        is ``work_budget_spent``.
     stiffness : quantity, optional
-        Of the machine, where no rig states it: over normal stress ("1.6e-3 1/um", a plain number
-        is in 1/um), or in MPa/um. Stiffness in MPa/um is divided by the mean normal stress in the
-        window before each step. The first guess, if ``free`` names it. In a joint fit it is that of
-        the first window, and the other windows follow by their normal stress.
+        Stiffness of the machine, required if there is no rig. The stiffness is a string in MPa/um,
+        a string in 1/um such as "1.6e-3 1/um" (stiffness divided by normal stress), or a number in
+        1/um. Stiffness in MPa/um is divided by the mean normal stress in the window before each
+        step. If ``free`` contains "stiffness", the argument is the initial guess. In a joint fit,
+        the stiffness in 1/um refers to the first window, and is scaled by normal stress for the
+        other windows.
     slip_distance : quantity, optional
-        First guess ("10 um", a plain number is in um); by default a twentieth of the way after the
-        step. Five others are tried, a tenth to ten times as long.
-    engine, rtol, budget, workers
-        As in `rsfstudy.run`; the engine is "compiled" where that is installed.
-    command : str
-        What to note in the history.
-    **scene
-        Other fields of the scene: what is not looked for, as in ``alpha=0.3`` beside
-        ``normal_stress="imposed"``, or ``a=0.01`` where ``free`` leaves it out.
+        Initial guess of the slip distance, such as "10 um", or a number in um. The fit tries five
+        values from a tenth to ten times this guess. The default is 5 % of the load point
+        displacement after the step.
+    engine : {"scipy", "python", "compiled"} or type, optional
+        Engine that integrates the motions (see ``rsfstudy.run``). The default is "compiled" if
+        Numba is installed, and "scipy" otherwise.
+    rtol : float, default: 1e-7
+        Relative tolerance of the motions.
+    budget : int, default: 50,000,000
+        Largest number of right-hand side evaluations of a fit.
+    workers : int, default: 0
+        Number of worker processes. With 0, the fits are computed in the current process.
+    command : str, default: "rsfstudy.fit"
+        Command line to record in the history of the dataset.
+    **scene : object
+        Values of other fields of the scene, which are not fitted. For example, ``alpha=0.3``
+        selects imposed normal stress with this coefficient, and ``a=0.01`` fixes the direct effect
+        if ``free`` does not contain "a".
 
     Returns
     -------
     xarray.Dataset
-        By law, and by step and record where there are several: each parameter with its standard
-        error (``_stderr``), the ends of its 95 % interval (``_low``, ``_high``) and its numerical
-        error (``_error``); ``a_minus_b``; ``covariance`` and ``correlation``; what the noise is
-        (``noise_size``, ``noise_order``, ``effective_samples``, ``whiteness``); the window; along
-        the rows of the record, ``fitted_friction``, ``residual`` and ``innovation``, NaN outside
-        the window. Lengths are in um, rates in um/s. ``status`` is ``not_identified`` if the record
-        does not constrain a parameter, and ``errors_not_valid`` if the values stand but their
-        standard errors do not; ``message`` gives the reason. ``dataset.rsf.table()``,
-        ``.rsf.plot()``, ``.rsf.scene``, ``.rsf.rig`` and ``.rsf.sample_parameters()`` say more.
+        Fits along the dimension ``law``, and along ``step`` and ``record`` if there are several
+        steps or records. Lengths are in um and velocities in um/s.
+
+        - For each parameter, ``<name>`` is the best-fit value, ``<name>_stderr`` the standard
+          error, ``<name>_low`` and ``<name>_high`` the ends of the 95 % confidence interval, and
+          ``<name>_error`` the numerical error. ``a_minus_b`` is the difference of a and b.
+        - ``covariance`` and ``correlation`` have the dimensions ``parameter`` and
+          ``other_parameter``.
+        - The noise is described by ``noise_size``, ``noise_order``, ``effective_samples`` and
+          ``whiteness``, the p-value of a test for remaining autocorrelation.
+        - ``fitted_friction``, ``residual`` and ``innovation`` (whitened residual) have the
+          dimension ``row`` and are NaN outside the window.
+        - ``status`` is ``not_identified`` if the record does not constrain a parameter, and
+          ``errors_not_valid`` if only the standard errors are invalid. ``message`` contains the
+          reason.
 
     Raises
     ------
     InvalidValue
-        For parameters that no law has, a law of which none is named, no stiffness, records without
-        steps, steps outside of the record, a load point that moves back, and alpha at constant
-        normal stress.
+        If a parameter does not exist in any of the laws, if a law has no free parameter, or if the
+        stiffness is missing. The error is also raised if a record has no steps, if a step is
+        outside the record, if the load point moves backwards, or if ``alpha`` is fitted to steps at
+        constant normal stress.
 
     Warns
     -----
     IncompleteWarning
-        Where a fit failed.
+        If a fit failed.
+
+    See Also
+    --------
+    rsfstudy.read_record : Read the record of an experiment.
+
+    Notes
+    -----
+    The accessor provides further results: ``dataset.rsf.fit_table()`` returns a table of the
+    parameters, ``dataset.rsf.plot()`` plots the fits, ``dataset.rsf.scene`` and ``dataset.rsf.rig``
+    return the fitted scene and rig, and ``dataset.rsf.sample_parameters()`` draws samples of the
+    parameters. ``rsfstudy.measures.Fit`` describes the model.
 
     Examples
     --------
-    >>> record = rsfstudy.read_record("record.csv", normal_stress="20 MPa")
-    >>> fit = rsfstudy.fit(record, stiffness="1.6e-3 1/um", laws=["slip"], after="250 um")
-    >>> fit.rsf.table()
+    Create a synthetic record of a velocity step from 1 to 10 um/s, and fit a, b and the slip
+    distance. The motions of the fit take several seconds without Numba.
+
+    >>> import numpy as np
+    >>> from rsfstudy import fit, read_record
+    >>> time = np.arange(-20.0, 41.0)
+    >>> displacement = np.where(time < 0.0, 1.0, 10.0) * time
+    >>> decay = np.exp(-np.maximum(displacement, 0.0) / 10.0)
+    >>> change = (0.01 - 0.015 * (1.0 - decay)) * np.log(10.0)
+    >>> friction = 0.6 + np.where(time > 0.0, change, 0.0)
+    >>> record = read_record({"time": time, "displacement": displacement, "friction": friction})
+    >>> record.steps()["velocity_after"].values.round(3)
+    array([10.])
+    >>> fits = fit(record, stiffness="0.1 1/um", slip_distance="10 um", laws=["slip"],
+    ...            free=["a", "b"], noise="white")  # doctest: +SKIP
+    >>> fits["b"].values.round(3)  # doctest: +SKIP
+    array([0.015])
     """
     if "law" in scene:
         remedy = f"Write laws={np.atleast_1d(scene['law']).tolist()}."
@@ -257,9 +319,15 @@ def fit(
 
 
 def _select_step_numbers(records: Sequence[Record], steps: Sequence[int]) -> tuple[int, ...]:
-    """Numbers of the steps to fit, from 1: those stated, or all.
+    """Return the numbers of the steps to fit, and check the steps.
 
-    Steps that lie outside of their record are refused, and a load point that does not move forward.
+    By default, all steps are fitted.
+
+    Raises
+    ------
+    InvalidValue
+        If the records have no steps, if a step is outside its record, or if the load point does not
+        move forward.
     """
     for record in records:
         _check_displacement_was_not_reset(record)
@@ -305,6 +373,10 @@ def _check_displacement_was_not_reset(record: Record) -> None:
 
 
 def _check_step_can_be_fitted(record: Record, step_number: int, step: LoadingStep) -> None:
+    """Raise ``InvalidValue`` if a step cannot be fitted.
+
+    A step cannot be fitted if it is outside the record, or if the load point does not move forward.
+    """
     time, moved = record.time, record.columns["displacement"]
     if not time[0] < step.start <= step.end < time[-1]:
         rule = f"is stated outside of {record.name}, {time[0]:g} to {time[-1]:g} s"
@@ -325,7 +397,10 @@ def _check_step_can_be_fitted(record: Record, step_number: int, step: LoadingSte
 def _check_normal_stress_changes_for_alpha(
     records: Sequence[Record], loading_kind: str, step_numbers: Sequence[int]
 ) -> None:
-    """Raise ``InvalidValue`` if alpha is fitted but normal stress is constant."""
+    """Raise ``InvalidValue`` if ``alpha`` cannot be fitted.
+
+    The parameter ``alpha`` cannot be fitted at constant normal stress.
+    """
     for record in records:
         stress = record.columns.get("normal_stress", np.zeros(1))
         steps = [
@@ -343,7 +418,7 @@ def _check_normal_stress_changes_for_alpha(
 def _guess_slip_distance(
     record: Record, rig: Rig | None, step_number: int, stated_slip_distance: Any
 ) -> float:
-    """Slip distance to begin with, in um."""
+    """Return the initial guess of the slip distance in um."""
     if stated_slip_distance is not None:
         return _to_micrometres("slip_distance", stated_slip_distance)
     if rig is not None:
@@ -361,7 +436,9 @@ def _initial_stiffness(
     free_parameters: Sequence[str],
     records: Sequence[Record],
 ) -> tuple[float, float]:
-    """Return the initial stiffness of the fit, in the units that the user chose.
+    """Return the initial stiffness of the fit.
+
+    The stiffness has the units in which the user has passed the stiffness.
 
     Returns
     -------
@@ -401,7 +478,10 @@ def _initial_stiffness(
 def _check_normal_stress_is_compressive(
     records: Sequence[Record], step_numbers: Sequence[int]
 ) -> None:
-    """Raise ``InvalidValue`` if the normal stress before a step is not positive."""
+    """Raise ``InvalidValue`` if normal stress is not positive.
+
+    The function checks the mean normal stress before each step.
+    """
     for record in records:
         for number in step_numbers:
             if number > len(record.loading_steps):
@@ -415,7 +495,7 @@ def _check_normal_stress_is_compressive(
 
 
 def _add_normal_stress_of_rig(record: Record, rig: Rig | None) -> Record:
-    """Return the record with the normal stress of the rig if it has none of its own."""
+    """Add the normal stress of the rig to a record without normal stress."""
     if rig is None or "normal_stress" in record.columns:
         return record
     stress = np.full(len(record), float(rig.normal_stress))
@@ -423,6 +503,7 @@ def _add_normal_stress_of_rig(record: Record, rig: Rig | None) -> Record:
 
 
 def _initial_scene(laws: Sequence[str], scene_fields: Mapping[str, Any], stiffness: float) -> Scene:
+    """Return the scene with the initial guesses of all parameters."""
     effects = (
         _INITIAL_FIELDS_OF_TWO_STATE_LAW
         if str(laws[0]).startswith("two_")
@@ -442,7 +523,14 @@ def _initial_scene(laws: Sequence[str], scene_fields: Mapping[str, Any], stiffne
 def _free_parameters(
     stated_parameters: Sequence[str], laws: Sequence[str], scene: Scene
 ) -> tuple[str, ...]:
-    """Parameters to look for: those stated, each of which some law has, or those of all laws."""
+    """Return the free parameters that at least one of the laws has.
+
+    Raises
+    ------
+    InvalidValue
+        If none of the laws has a parameter that the user requests, or if a law has no free
+        parameter or no free evolution effect.
+    """
     free = tuple(stated_parameters) or DEFAULT_FREE_PARAMETERS
     check_free_parameters(free)
     own = {law: parameters_of_law(scene.with_(law=law), free) for law in laws}
@@ -467,10 +555,10 @@ def _free_parameters(
 
 
 def _describe_filter(averaging: Any, low_pass: str) -> str:
-    """Return a string that names the filter and its size in s or Hz.
+    """Return the filter as a string that the measure expects.
 
-    The string is the argument that the measure expects. The string is empty if the user passes
-    neither ``averaging`` nor ``low_pass``.
+    The string contains the type of the filter and its duration in s or frequency in Hz. The string
+    is empty if the user passes neither ``averaging`` nor ``low_pass``.
     """
     if averaging is not None and low_pass:
         remedy = "Pass `averaging=` or `low_pass=`."
@@ -493,6 +581,7 @@ def _describe_filter(averaging: Any, low_pass: str) -> str:
 
 
 def _to_micrometres(argument_name: str, value: Any) -> float:
+    """Convert a quantity to um. A plain number is already in um."""
     return (
         float(value)
         if isinstance(value, int | float)

@@ -1,4 +1,4 @@
-"""Parameters of fits of records: samples of them, and the scene and the rig of a fit."""
+"""Samples of fitted parameters, and the scene and the rig of a fit."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from rsfstudy.storage import build_scene_from_stored
 
 
 def _require_single_fit(dataset: xr.Dataset) -> xr.Dataset:
-    """The one fit that a dataset holds."""
+    """Return the only fit of a dataset, or raise ``InvalidValue``."""
     found = split_fits(dataset)
     if len(found) != 1:
         remedy = "Select one first, as in dataset.sel(law='slip')."
@@ -29,11 +29,36 @@ def _require_single_fit(dataset: xr.Dataset) -> xr.Dataset:
 
 
 def sample_parameters(dataset: xr.Dataset, sample_count: int, seed: int = 0) -> xr.Dataset:
-    """Samples of the parameters of one fit, as `Accessor.sample_parameters` says."""
+    """Draw samples of the parameters of a fit.
+
+    The samples follow a multivariate t distribution. The logarithms of slip distances and stiffness
+    are sampled.
+
+    Parameters
+    ----------
+    dataset : xarray.Dataset
+        Dataset with a single fit.
+    sample_count : int
+        Number of samples.
+    seed : int, default: 0
+        Seed of the random number generator.
+
+    Returns
+    -------
+    xarray.Dataset
+        Samples of each parameter along the dimension ``draw``, in the units of the parameter.
+
+    Raises
+    ------
+    InvalidValue
+        If the dataset contains several fits, if ``sample_count`` is not a positive integer, or if
+        the covariance matrix is not finite.
+    """
     one = _require_single_fit(dataset)
     if not isinstance(sample_count, int) or sample_count < 1:
         raise InvalidValue("n", sample_count, "must be a whole number, 1 or more")
-    has = one["covariance"].notnull().any("other_parameter").values  # of other laws: NaN
+    # The covariance of parameters that the law does not have is NaN.
+    has = one["covariance"].notnull().any("other_parameter").values
     names = [str(name) for name in one["parameter"].values[has]]
     at = np.array([one[name].item() for name in names])
     covariance = one["covariance"].values[np.ix_(has, has)]
@@ -70,8 +95,20 @@ def sample_parameters(dataset: xr.Dataset, sample_count: int, seed: int = 0) -> 
 
 
 def fitted_scene(dataset: xr.Dataset) -> Scene:
-    """The scene of one fit, with the parameters that it found and the velocity step that it is of,
-    in units of its slip distance and of the velocity before the step.
+    """Return the scene of a fit with the fitted parameters.
+
+    The load point velocity changes in a single step. Quantities are in units of the fitted slip
+    distance and of the load point velocity before the step.
+
+    Parameters
+    ----------
+    dataset : xarray.Dataset
+        Dataset with a single fit.
+
+    Returns
+    -------
+    Scene
+        Scene of the fit.
     """
     one = _require_single_fit(dataset)
     plain = json.loads(dataset.attrs["declaration"])
@@ -89,7 +126,24 @@ def fitted_scene(dataset: xr.Dataset) -> Scene:
 
 
 def fitted_rig(dataset: xr.Dataset) -> Rig:
-    """The rig of one fit, as `Accessor.rig` says."""
+    """Return the rig of a fit.
+
+    Parameters
+    ----------
+    dataset : xarray.Dataset
+        Dataset with a single fit.
+
+    Returns
+    -------
+    Rig
+        Rig with the fitted slip distance and stiffness, and with the load point velocity and the
+        mean normal stress before the step.
+
+    Raises
+    ------
+    InvalidValue
+        If the record has no normal stress.
+    """
     one, slider = _require_single_fit(dataset), fitted_scene(dataset)
     stress = one["normal_stress_before"].item() if "normal_stress_before" in one else math.nan
     if not stress > 0.0:

@@ -1,4 +1,8 @@
-"""One page of HTML of all results in a directory, complete by itself."""
+"""Self-contained HTML report of all results in a directory.
+
+The main function is ``report``. Each results file has a row in the summary at the top of the page,
+and a section with figures and tables below.
+"""
 
 from __future__ import annotations
 
@@ -40,14 +44,14 @@ from rsfstudy.status import Status
 from rsfstudy.storage import is_of_single_scene, read_dataset, read_declaration
 
 _UNREADABLE_FILE_STATUS = "cannot be read"
-#: What begins a page of ours, and a figure.
+#: HTML tag that identifies reports of rsfstudy, and signature at the beginning of PNG files.
 _GENERATOR_TAG = b'<meta name="generator" content="rsfstudy">'
 _PNG_SIGNATURE = b"\x89PNG\r\n\x1a\n"
 
 
 @dataclass(frozen=True)
 class _ResultSection:
-    """One results file: what the summary tells, and what the page shows below."""
+    """Section of the page for a results file, and its row in the summary."""
 
     path: Path
     title: str = ""
@@ -58,29 +62,55 @@ class _ResultSection:
 
     @property
     def anchor(self) -> str:
+        """Anchor of the section, which the row of the summary links to."""
         return re.sub(r"\W+", "-", self.path.name)
 
 
 @error_boundary
 def report(directory: str | Path = OUTPUT_DIRECTORY, output: str | Path | None = None) -> Path:
-    """Path of one page of HTML, which is written: it shows all results in a directory.
+    """Write an HTML report of all results in a directory.
 
-    The page holds verdicts, figures, reductions, failed cells and where each file comes from. It
-    needs no other file and no network, and prints. A file that cannot be read is told on it.
+    The report is a single page with verdicts, figures, reductions, failed cells and the provenance
+    of each file. The page needs no other files and no network, and has a layout for printing.
 
     Parameters
     ----------
-    directory : path
-        With files of studies, fits and motions, as `run`, `fit` and `simulate` write them.
-    output : path, optional
-        The file to write; ``report.html`` in the directory, unless stated.
+    directory : str or Path, default: "outputs"
+        Directory with results of studies, fits and motions (files with the suffix ``.nc`` or
+        ``.zarr``). Files that cannot be read are listed in the report with the reason.
+    output : str or Path, optional
+        Path of the page, with the suffix ``.html``. The default is ``report.html`` in the
+        directory.
+
+    Returns
+    -------
+    Path
+        Path of the page.
 
     Raises
     ------
     InvalidValue
-        If the directory is none, or the page has another ending than ``.html``.
+        If the directory does not exist, if the suffix of the page is not ``.html``, or if the page
+        would replace a file that is not a report.
     DataError
-        If the directory holds no results, or the page cannot be written.
+        If the directory contains no results, or if the page cannot be written.
+
+    See Also
+    --------
+    rsfstudy.open : Load the results of a study into memory.
+
+    Examples
+    --------
+    >>> import tempfile
+    >>> from pathlib import Path
+    >>> from rsfstudy import Scene, critical_step, report
+    >>> scene = Scene(normal_stress="constant")
+    >>> result = critical_step(scene, of="displacement_step", rtol=1e-4)
+    >>> with tempfile.TemporaryDirectory() as directory:
+    ...     _ = result.to_netcdf(Path(directory) / "step.nc")
+    ...     page = report(directory)
+    >>> page.name
+    'report.html'
     """
     return write_report(directory, output)[0]
 
@@ -88,7 +118,29 @@ def report(directory: str | Path = OUTPUT_DIRECTORY, output: str | Path | None =
 def write_report(
     directory: str | Path, output: str | Path | None = None
 ) -> tuple[Path, list[Path]]:
-    """Path of the page, which is written, and the files that could not be read."""
+    """Write a report, and return its path and the unreadable files.
+
+    Parameters
+    ----------
+    directory : str or Path
+        Directory with results.
+    output : str or Path, optional
+        Path of the page. The default is ``report.html`` in the directory.
+
+    Returns
+    -------
+    page : Path
+        Path of the page.
+    unreadable : list of Path
+        Results files that could not be read.
+
+    Raises
+    ------
+    InvalidValue
+        If the directory or the path of the page is invalid.
+    DataError
+        If the directory contains no results, or if the page cannot be written.
+    """
     from rsfstudy.plots import write_image
 
     place = output_directory(directory)
@@ -115,7 +167,7 @@ def write_report(
 
 
 def _build_page(directory: Path, file_sections: list[_ResultSection]) -> str:
-    """The whole page."""
+    """Return the HTML text of the page."""
     rows = [
         {
             "results": HtmlMarkup(f'<a href="#{one.anchor}">{_escape(one.path.stem)}</a>'),
@@ -145,12 +197,15 @@ def _build_page(directory: Path, file_sections: list[_ResultSection]) -> str:
 
 
 def _build_section_of_file(results_path: Path, page_directory: Path) -> _ResultSection:
-    """What is told of a file, whatever it holds."""
+    """Build the section of a results file.
+
+    If the file cannot be read, the section contains the reason.
+    """
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always")
         try:
             found = _build_section_of_dataset(results_path, read_dataset(results_path))
-        except Exception as error:  # damaged files raise almost anything
+        except Exception as error:  # Damaged files raise many types of exceptions.
             why = str(error) if isinstance(error, RsfStudyError) else format_exception(error)
             found = _ResultSection(
                 results_path,
@@ -168,10 +223,10 @@ def _build_section_of_file(results_path: Path, page_directory: Path) -> _ResultS
 
 
 def _build_section_of_dataset(results_path: Path, dataset: xr.Dataset) -> _ResultSection:
-    """What is told of a file that can be read."""
+    """Build the section of a dataset."""
     title = str(dataset.attrs.get("title", "answer for one scene"))
     numbers = dataset_html(dataset)
-    # the accessor, which this module cannot import: it shows these tables
+    # The module uses the accessor without an import, because the accessor imports this module.
     if is_of_single_scene(dataset):
         figure = (
             _format_figure_as_html(results_path, dataset.rsf.plot)
@@ -213,7 +268,19 @@ def _build_section_of_dataset(results_path: Path, dataset: xr.Dataset) -> _Resul
 
 
 def dataset_html(dataset: xr.Dataset) -> str:
-    """The numbers of a dataset in HTML, and the verdicts on those of a study."""
+    """Return the summary of a dataset as HTML.
+
+    Parameters
+    ----------
+    dataset : xarray.Dataset
+        Results of a study, or a dataset of one scene.
+
+    Returns
+    -------
+    str
+        HTML with the tables of the summary. The results of a study are followed by the verdicts of
+        the claims, and other datasets are followed by their provenance.
+    """
     parts = list(map(_format_summary_piece_as_html, build_summary_pieces(dataset)))
     if is_of_single_scene(dataset):
         parts.append(_format_summary_piece_as_html(describe_dataset_origin(dataset)))
@@ -222,21 +289,24 @@ def dataset_html(dataset: xr.Dataset) -> str:
     return "\n".join(filter(None, parts))
 
 
-# ---- pieces of HTML ------------------------------------------------------------------------------
+# ---- elements of HTML ----------------------------------------------------------------------------
 
 
 def _escape(text: object) -> str:
-    """A text as HTML; control characters, which no browser shows, are spelt out."""
+    """Escape a text and its control characters for HTML."""
     return escape_html(text)
 
 
 def _html_paragraph(text: str, colour: str = "") -> str:
+    """Return a paragraph of HTML."""
     return f'<p class="{colour}">{_escape(text)}</p>'
 
 
 def _format_summary_piece_as_html(piece: TableMappingOrSentence) -> str:
-    """A sentence, what is what, or a table, in a box of its own that scrolls where it is too wide;
-    nothing of what is empty.
+    """Format a sentence, a mapping or a table as HTML.
+
+    A wide table is placed in a box that scrolls. If the mapping or the table is empty, the function
+    returns an empty string.
     """
     if isinstance(piece, str):
         return _html_paragraph(piece)
@@ -258,7 +328,11 @@ def _format_summary_piece_as_html(piece: TableMappingOrSentence) -> str:
 
 
 def _format_figure_as_html(results_path: Path, draw_figure: Callable[[], Any]) -> str:
-    """The figure beside results, drawn anew where it is missing or older than they are."""
+    """Return the figure of a results file as an embedded image.
+
+    The function uses the PNG file next to the results if the PNG file is not older than the
+    results, and draws the figure otherwise.
+    """
     from rsfstudy.plots import render_figure, style_context
 
     beside = results_path.with_suffix(".png")
@@ -269,7 +343,7 @@ def _format_figure_as_html(results_path: Path, draw_figure: Callable[[], Any]) -
         if not image.startswith(_PNG_SIGNATURE):
             with style_context(None):
                 image = render_figure(draw_figure(), "png")
-    except Exception as error:  # of whatever kind, the numbers are there
+    except Exception as error:  # The report shows the numbers even if the figure fails.
         return _html_paragraph(f"no figure: {error}", "yellow")
     data = base64.b64encode(image).decode()
     inches = _png_width_in_inches(image)
@@ -278,14 +352,20 @@ def _format_figure_as_html(results_path: Path, draw_figure: Callable[[], Any]) -
 
 
 def _png_width_in_inches(image: bytes) -> float:
-    """Width of a PNG on paper, by which letters of all figures are of one size."""
+    """Return the printed width of a PNG image in inches.
+
+    The page scales all figures by this width, so that letters have the same size in all figures.
+    """
     at = image.find(b"pHYs") + 4
     pixels, per_metre = (int.from_bytes(image[n : n + 4]) for n in (16, at))
     return pixels / per_metre / 0.0254 if at > 3 and per_metre else 100.0
 
 
 def _format_file_links_as_html(results_path: Path, page_directory: Path) -> str:
-    """Links to the results and to what lies beside them, from where the page is."""
+    """Return links to the results file and to files with the same name.
+
+    The links are relative to the directory of the page.
+    """
     endings = [
         results_path.suffix,
         *(f".{form}" for form in FIGURE_FORMATS),

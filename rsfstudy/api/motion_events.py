@@ -1,4 +1,4 @@
-"""The events of a motion, read between its rows."""
+"""Events of a motion, interpolated between the rows of the motion."""
 
 from __future__ import annotations
 
@@ -17,33 +17,46 @@ from rsfstudy.fitting import EventNumbers
 from rsfstudy.rig import slip_rate_from_log
 from rsfstudy.slider import Scene
 
-#: Slip rate over that of the load point from which on a motion is an event. Steady sliding is 1,
-#: and a step of the load point that a stable slider follows overshoots by less.
+#: Ratio of slip rate to load point velocity above which a motion is an event. The ratio is 1 for
+#: steady sliding. A stable slider overshoots a step of the load point velocity by less than this
+#: ratio.
 _EVENT_SLIP_RATE_OVER_LOAD_VELOCITY = 10.0
-#: Rows of a motion between which is read: by the polynomial through six, of which the one through
-#: four tells the error. There are six rows in each step of a motion.
+#: Number of rows of the interpolating polynomial, and of the second polynomial that estimates the
+#: error. A motion has six rows per integration step.
 _ROWS_PER_INTERPOLANT, _ROWS_PER_ERROR_CHECK_INTERPOLANT = 6, 4
-#: Rows that are so few floating-point numbers apart are two sides of a jump.
+#: Maximum time difference between the two sides of a jump, in spacings of floating-point numbers.
 _MAX_FLOAT_SPACINGS_OF_JUMP = 16
-#: Decades of slip rate between rows, beyond which nothing is read between them. In the steps
-#: of motions that are accurate to 1e-4 rows are up to 0.37 apart, but where a rupture begins or
-#: ends at once.
+#: Maximum change of log10 slip rate between rows for interpolation. Motions with a tolerance of
+#: 1e-4 have rows that differ by up to 0.37, except at the sudden beginning or end of a rupture.
 _MAX_LOG10_SLIP_RATE_STEP = 0.5
 
 
 def find_motion_events(
     motion: xr.Dataset, slip_rate: float | None, scene: Callable[[], Scene]
 ) -> xr.Dataset:
-    """The events of a motion, as `Accessor.events` says.
+    """Find the events of a motion.
 
     Parameters
     ----------
     motion : xarray.Dataset
-        As `rsfstudy.simulate` gives it, in any units.
+        Motion from ``rsfstudy.simulate``, in any units.
     slip_rate : float, optional
-        Over V_*, above which there is an event.
-    scene : function
-        What gives the scene, where the slip rate follows from it.
+        Threshold of the slip rate in V_*. The default is 10 times the highest load point velocity
+        of the scene, and at least 10.
+    scene : callable
+        Function that returns the scene, which is called only if ``slip_rate`` is None.
+
+    Returns
+    -------
+    xarray.Dataset
+        Variables along the dimension ``event``, as returned by ``Accessor.events``.
+
+    Raises
+    ------
+    DataError
+        If the dataset is not a motion.
+    InvalidValue
+        If the slip rate is not positive and finite.
     """
     names = ("time", "log10_slip_rate", "slip", "shear_stress")
     for name in names:
@@ -61,7 +74,7 @@ def find_motion_events(
     found = [rows.measure_event(*ends) for ends in rows.iterate_event_row_spans()]
     about = {name: motion[name].attrs for name in names}
     told = build_catalogue(found, about).assign_attrs(slip_rate_threshold=slip_rate)
-    if "slip_rate" in motion and motion.sizes["time"]:  # in units
+    if "slip_rate" in motion and motion.sizes["time"]:  # The motion has units.
         rate = motion["slip_rate"]
         size = float(rate[0]) / 10.0 ** float(motion["log10_slip_rate"][0])
         told = told.assign(slip_rate_from_log(told, "peak_log10_slip_rate", size, rate.units))
@@ -69,9 +82,26 @@ def find_motion_events(
 
 
 class _InterpolatedMotionRows:
-    """Rows of a motion, and what lies between them."""
+    """Interpolation between the rows of a motion.
+
+    Parameters
+    ----------
+    times : numpy.ndarray of shape (n,)
+        Times of the rows.
+    values : numpy.ndarray of shape (n, 3)
+        Logarithm (base 10) of slip rate, slip and shear stress.
+    event_slip_rate_level : float
+        Logarithm (base 10) of the slip rate above which the motion is an event.
+    """
 
     def __init__(self, times: np.ndarray, values: np.ndarray, event_slip_rate_level: float) -> None:
+        """Initialise the interpolation.
+
+        Parameters
+        ----------
+        times, values, event_slip_rate_level
+            See the class.
+        """
         self._times, self._values, self._event_slip_rate_level = (
             times,
             values,
@@ -79,12 +109,32 @@ class _InterpolatedMotionRows:
         )
 
     def iterate_event_row_spans(self) -> list[tuple[int, int]]:
-        """First and last row above the level, of each event."""
+        """Return the first and last row above the threshold per event.
+
+        Returns
+        -------
+        list of (int, int)
+            Row numbers of each event.
+        """
         above = label(self._values[:, 0] > self._event_slip_rate_level)[0]
         return [(part.start, part.stop - 1) for (part,) in find_objects(above)]
 
     def measure_event(self, first_row: int, last_row: int) -> EventNumbers:
-        """The numbers of an event, each with its error, and which part of it is missing."""
+        """Measure the quantities of an event with their interpolation errors.
+
+        Parameters
+        ----------
+        first_row, last_row : int
+            First and last row above the threshold.
+
+        Returns
+        -------
+        quantities : dict of str to (float, float)
+            Value and error of each quantity.
+        cut : int
+            Code of the missing part of the event: 0 if the event is complete, 1 if the motion
+            begins within the event, 2 if the motion ends within the event, and 3 if both apply.
+        """
         end, stress = len(self._times) - 1, self._values[:, 2]
         peak = first_row + int(np.argmax(self._values[first_row : last_row + 1, 0]))
         highest, lowest = first_row, last_row
@@ -116,8 +166,10 @@ class _InterpolatedMotionRows:
         }, cut
 
     def _interpolate_after_row(self, row: int, row_count: int) -> KroghInterpolator:
-        """The polynomial through as many rows about that between a row and the next, in time since
-        that row, but for those beyond a jump.
+        """Interpolate around the interval between a row and the next row.
+
+        The polynomial is a function of the time since the row. Half of the rows precede the
+        interval. Rows on the other side of a jump are not used.
         """
         first = max(row + 1 - row_count // 2, 0)
         last = min(row + row_count // 2, len(self._times) - 1)
@@ -131,18 +183,25 @@ class _InterpolatedMotionRows:
         return KroghInterpolator(self._times[rows] - self._times[row], self._values[rows])
 
     def _is_too_coarse_to_interpolate(self, rows: slice) -> bool:
-        """True where slip rate changes too much between rows to be read between them, as in a
-        motion that is told at given times only.
+        """Return True if rows are too far apart for interpolation.
+
+        Rows are too far apart if slip rate changes by more than half a decade between the rows.
+        Rows may be too far apart if the motion was computed at requested times only.
         """
         return bool(np.abs(np.diff(self._values[rows, 0])).max() > _MAX_LOG10_SLIP_RATE_STEP)
 
     @staticmethod
     def _interpolant_slope(interpolant: KroghInterpolator, time: float, column: int) -> float:
+        """Return the slope of a column of the interpolating polynomial."""
         return float(interpolant.derivative(time)[column])
 
     def _level_crossing(self, row: int) -> tuple[np.ndarray, np.ndarray]:
-        """Time and slip where slip rate passes the level between a row and the next, and their
-        errors.
+        """Find the threshold crossing between a row and the next row.
+
+        Returns
+        -------
+        values, errors : numpy.ndarray of shape (2,)
+            Time and slip of the crossing, and their errors.
         """
         found = []
         for number in (_ROWS_PER_INTERPOLANT, _ROWS_PER_ERROR_CHECK_INTERPOLANT):
@@ -157,12 +216,18 @@ class _InterpolatedMotionRows:
         return many, error + self._is_too_coarse_to_interpolate(sides) * np.array(left)
 
     def _values_at_end_row(self, row: int) -> tuple[np.ndarray, np.ndarray]:
-        """Time and slip at the first or the last row, without errors."""
+        """Return time and slip at the first or the last row without errors."""
         return np.array([self._times[row], self._values[row, 1]]), np.zeros(2)
 
     def _find_extreme(self, row: int, column: int, sign: float) -> tuple[np.ndarray, np.ndarray]:
-        """The values where that of a column is largest about a row (smallest, where `sign` is
-        negative), and their errors.
+        """Find the extreme of a column near a row.
+
+        The extreme is a maximum if ``sign`` is positive, and a minimum if ``sign`` is negative.
+
+        Returns
+        -------
+        values, errors : numpy.ndarray of shape (3,)
+            All columns at the extreme, and their errors.
         """
         sides = slice(max(row - 1, 0), row + 2)
         times, found = self._times[sides], []
@@ -184,7 +249,9 @@ class _InterpolatedMotionRows:
                     best = max(best, through(at), key=lambda values: sign * values[column])
             found.append(best)
         many, fewer = found
-        # the clock has few digits in a rupture; an extreme is flat, and its place errs by the root
+        # Times have few significant digits in a rupture. Because the extreme is flat, rounding
+        # shifts its time by the square root of the rounding error, and the other columns change by
+        # the same relative amount.
         clock = 2.0 * np.spacing(times[-1]) / max(np.ptp(times), np.spacing(times[-1]))
         shares = np.full(len(many), math.sqrt(clock))
         shares[column] = clock

@@ -1,4 +1,4 @@
-"""Progress of a run: a bar on a terminal and in a notebook, lines everywhere else."""
+"""Progress bars and progress lines of a run."""
 
 from __future__ import annotations
 
@@ -15,13 +15,26 @@ from rsfstudy.execution import ProgressCallback
 from rsfstudy.motion import compilation_log, import_compiled_engine
 from rsfstudy.slider import Scene
 
-#: Most lines of a whole run, where there is no bar, and s between two of them.
+#: Maximum number of progress lines of a run, and minimum time in s between two lines.
 _MAX_PROGRESS_LINES, _MIN_PROGRESS_LINE_INTERVAL = 10, 10.0
 
 
 @contextlib.contextmanager
 def show_progress(study_name: str, is_shown: bool) -> Iterator[ProgressCallback]:
-    """Display of how far the run of a study has come, on the standard error."""
+    """Show the progress of a run on standard error.
+
+    Parameters
+    ----------
+    study_name : str
+        Name of the study, which is displayed next to the bar.
+    is_shown : bool
+        If False, nothing is displayed.
+
+    Yields
+    ------
+    callable
+        Function ``update(done, total)`` that displays the number of completed cells.
+    """
     console = Console(stderr=True)
     if not is_shown:
         yield lambda _done, _all: None
@@ -35,7 +48,8 @@ def show_progress(study_name: str, is_shown: bool) -> Iterator[ProgressCallback]
         task = bar.add_task(study_name, total=None)
 
         def update(done: int, total: int) -> None:
-            bar.start()  # only now, because a run may fail before its first report
+            """Update the bar."""
+            bar.start()  # The bar starts late because a run may fail before its first report.
             bar.update(task, completed=done, total=total)
 
         try:
@@ -45,13 +59,16 @@ def show_progress(study_name: str, is_shown: bool) -> Iterator[ProgressCallback]
 
 
 def _print_progress_lines(study_name: str, console: Console) -> ProgressCallback:
-    """A line for each tenth of the cells, but no two at once, for log files and pipes; a run that
-    is soon over has one.
+    """Return a function that prints progress lines for log files and pipes.
+
+    The function prints at most one line per tenth of the cells, and at most one line in ten seconds
+    except for the last line. A short run therefore prints a single line.
     """
     began = said = time.monotonic()
     told = 0
 
     def update(done: int, total: int) -> None:
+        """Print a line if enough cells have been completed."""
         nonlocal said, told
         now, part = time.monotonic(), _MAX_PROGRESS_LINES * done // total
         if part > told and (
@@ -67,8 +84,19 @@ def _print_progress_lines(study_name: str, console: Console) -> ProgressCallback
 def compile_scenes_with_notice(
     example_scenes: Sequence[Scene], with_time_variants: Sequence[bool], is_shown: bool
 ) -> None:
-    """Compile what such scenes need, with time or without it, before any cell is timed, and say how
-    long it took.
+    """Compile the equations of scenes, and print the compilation time.
+
+    The compilation precedes the first cell, so that measured times of cells do not include the
+    compilation.
+
+    Parameters
+    ----------
+    example_scenes : sequence of Scene
+        Scenes whose equations are compiled. Scenes with the same parts share their equations.
+    with_time_variants : sequence of bool
+        Variants of the equations to compile. True selects the equations with time as a variable.
+    is_shown : bool
+        If False, nothing is displayed.
     """
     console, before = Console(stderr=True, quiet=not is_shown), replace(compilation_log)
     with console.status("compiling the equations ..."):

@@ -1,4 +1,4 @@
-"""Paths of results: the directory of a run, and the file or store of a study."""
+"""Paths of output directories and of results files."""
 
 from __future__ import annotations
 
@@ -11,12 +11,22 @@ from rsfstudy.study import load_study, study_names
 
 
 def output_directory(output: str | Path | None) -> Path | None:
-    """Directory of results, which need not be there yet; None for nowhere.
+    """Convert the argument ``output`` to a path.
+
+    Parameters
+    ----------
+    output : str, Path or None
+        Directory of the results, which need not exist. None disables writing.
+
+    Returns
+    -------
+    Path or None
+        Path of the directory, or None if ``output`` is None.
 
     Raises
     ------
     InvalidValue
-        For what cannot be the path of one.
+        If ``output`` is not a valid path.
     """
     if output is None:
         return None
@@ -26,14 +36,29 @@ def output_directory(output: str | Path | None) -> Path | None:
 
 
 def find_results(study_or_file: str | Path, output_path: str | Path | None) -> Path:
-    """The results of a named study, or of the study that a file declares, in a directory; or the
-    results file that is named itself. A file that declares a study is run, because results bear the
-    name that its `Study` states.
+    """Find the results file of a study.
+
+    Parameters
+    ----------
+    study_or_file : str or Path
+        Path of a results file (``.nc`` or ``.zarr``), name of a study, or path of a Python file
+        that declares a study. The function executes a Python file to obtain the name of its study.
+    output_path : str, Path or None
+        Directory that contains the results. If None, the default output directory is used.
+
+    Returns
+    -------
+    Path
+        Path of the results file. If ``study_or_file`` is the path of a results file, or if a named
+        study has not been run, the file may be missing.
 
     Raises
     ------
-    DataError, InvalidValue
-        If there are none.
+    DataError
+        If the directory contains results in both formats, if the run is incomplete, or if the
+        directory cannot be read.
+    InvalidValue
+        If ``study_or_file`` is neither a path nor the name of a study.
     """
     check_path("study", study_or_file)
     path = Path(study_or_file)
@@ -49,7 +74,7 @@ def find_results(study_or_file: str | Path, output_path: str | Path | None) -> P
 
 
 def _result_path_of_study(study_name: str, output_path: Path) -> Path:
-    """The results of a study, by its name."""
+    """Return the path of the NetCDF file or Zarr store of a study."""
     file, in_pieces = output_path / f"{study_name}.nc", output_path / f"{study_name}.zarr"
     if file.exists() and in_pieces.exists():
         raise DataError(f"{file} and {in_pieces} are both there: name one, ending and all.")

@@ -1,4 +1,7 @@
-"""One motion of one scene, as a labelled trajectory."""
+"""Integration of a motion of one scene, and its conversion to a dataset.
+
+The main function is ``simulate``.
+"""
 
 from __future__ import annotations
 
@@ -43,11 +46,12 @@ from rsfstudy.slider import RUPTURE_REGIME, MotionPoint, SampledHistory, Scene, 
 from rsfstudy.status import Status
 from rsfstudy.vocabulary import find_quantity
 
-#: Times that follow each other differ by so many floating-point numbers, and by so much, at least:
-#: they still differ in other units, where each is rounded anew.
+#: Minimum difference of successive times, in spacings of floating-point numbers and as an absolute
+#: value. The times remain different when they are rounded in a conversion to other units.
 _MIN_TIME_ULPS, _MIN_TIME_DIFFERENCE = 4, 1e-290
 
-#: Time that a step is followed for, and load point displacement beyond what a protocol states.
+#: Default duration after a step in D_c/V_*, and load point displacement in D_c that is added after
+#: the last segment of a protocol.
 _DEFAULT_DURATION, _DISPLACEMENT_AFTER_PROTOCOL = 50.0, 20.0
 _NOTHING_STEPPED_MESSAGE = (
     "nothing is stepped: the motion is steady sliding at V_*. State load_velocity_ratio, "
@@ -57,16 +61,17 @@ _INSTABILITY_TIME_LONG_NAME = "time at which slip rate first passed the instabil
 _INSTABILITY_TIME_QUANTITY = Quantity(
     "instability_time", "$t V_*/D_c$", "1", _INSTABILITY_TIME_LONG_NAME, "D_c/V_*"
 )
-#: Attribute that says from when on a motion is no physics.
+#: Attribute that contains the time after which a motion has no physical meaning.
 BEYOND_NORM_ATTRIBUTE_NAME = "beyond_instability_norm"
-#: Attribute that holds time, slip and point of the end of a motion.
+#: Attribute that contains time, slip and motion point at the end of a motion.
 MOTION_END_ATTRIBUTE_NAME = "end"
-#: Slip rate over that of the load point that counts as instability where the load point alone
-#: reaches the norm, as it may where the period is not that of the slider.
+#: Ratio of slip rate to load point velocity that defines instability if the load point velocity
+#: itself exceeds the norm. This case may occur if the period of the scene is not the period of the
+#: slider.
 _INSTABILITY_SLIP_RATE_OVER_LOAD_RATE = 1e6
-#: Variables along motions that are made of spring stress.
+#: Variables of motions that are computed from spring stress.
 _VARIABLES_OF_SPRING_STRESS = ("shear_stress", "friction_coefficient")
-#: Those of our own dynamics; others stand behind them.
+#: Names of the regimes of the built-in dynamics. Regimes of user-defined dynamics have later codes.
 _STANDARD_REGIMES = ("quasi_static", "slow_manifold", RUPTURE_REGIME, "quasi_dynamic")
 
 
@@ -83,68 +88,110 @@ def simulate(
     accuracy: Accuracy | None = None,
     meter: WorkMeter | None = None,
 ) -> xr.Dataset:
-    """Follow the motion of a scene from the instant after its step.
+    """Integrate the motion of a scene.
+
+    The motion begins at time 0, immediately after the step of the loading, with the initial values
+    of the scene.
 
     Parameters
     ----------
     scene : Scene
-        The slider, its effects and its loading.
+        Scene to integrate.
+    *extra_positional_arguments : Never
+        All other arguments are keyword-only. A positional argument raises ``InvalidValue``.
     duration : float, optional
-        Time to follow it for, in D_c/V_*. By default 50; of a protocol, all that it states, and 20
-        D_c of the load point beyond where it does not say how long its last segment lasts.
-    times : sequence of float, optional
-        Times in D_c/V_* at which to tell what the slider does, to the accuracy of the motion; with
-        mass, but for the inertial time after a step, in which slip rate follows: of that only where
-        it ends is told. By default all of it is told, several times within each step.
+        Duration in D_c/V_*. By default, the motion includes the whole loading. If the last segment
+        of the loading has no end, it continues for 20 D_c of load point displacement, or for 50
+        D_c/V_* if the load point is held. If the loading has only one segment, the default is 50.
+    times : array_like of shape (n,), optional
+        Increasing times in D_c/V_* at which to return the motion, instead of ``duration``. With
+        inertia, slip rate adjusts to a step within the inertial time. At requested times during the
+        adjustment, the function returns the final values of the adjustment. By default, several
+        times per integration step are returned.
     start : xarray.Dataset, optional
-        A motion of this scene, from whose end it goes on as if uninterrupted: time, slip and
-        loading do. A duration counts from there.
-    rtol : float
-        Accuracy of the motion.
-    budget : int
-        Right-hand sides it may cost.
-    engine : {"scipy", "python", "compiled"}, or type
-        What integrates; compiled, which needs Numba, is much faster. A stepper of your own is given
-        by its class.
+        Previous motion of the same scene, from whose end the motion continues. Time, slip and
+        loading continue without interruption, and ``duration`` is counted from the end of the
+        previous motion.
+    rtol : float, default: 1e-7
+        Relative tolerance of the motion.
+    budget : int, default: 500,000
+        Largest number of right-hand side evaluations.
+    engine : {"scipy", "python", "compiled"} or type, default: "scipy"
+        Engine that integrates the motion. "compiled" is much faster, and requires Numba. A
+        user-defined stepper is passed as a class.
     accuracy, meter : Accuracy and WorkMeter, optional
-        The arguments of `Measure.compute`, if you call `simulate` in a user-defined measure. They
-        replace `rtol`, `budget` and `engine`; the right-hand sides count as work of the cell, and a
-        motion that cannot go on ends the cell with its status.
+        Arguments of ``Measure.compute``, which a user-defined measure passes to ``simulate``. The
+        two arguments replace ``rtol``, ``budget`` and ``engine``. The right-hand side evaluations
+        are then added to the work of the cell, and a motion that cannot continue ends the cell with
+        the status of the motion.
 
     Returns
     -------
     xarray.Dataset
-        ``slip``, ``log10_slip_rate``, ``shear_stress`` (of the spring), ``frictional_stress``,
-        ``normal_stress_ratio`` (effective), ``state_variable``, ``regime``, and what a rig reads,
-        ``load_point_displacement`` and ``friction_coefficient`` (spring stress over normal stress
-        less pore pressure outside the fault), along ``time``; ``porosity`` and ``pore_pressure`` of
-        a dilatant fault; and of a law with several states ``state_1``, ``state_2`` and so on, each
-        freed of what stress has taken from it: where stress takes nothing, they add up to
-        ``state_variable``.
-        Time strictly increases: where a quantity jumps at an instant, what it was is kept at that
-        time and what it then is a few floating-point numbers later, as are the points of a rupture
-        too short for its times to differ. A motion that cannot go on ends early, with its
-        ``status`` and ``message`` in the attributes. With radiation damping, ``shear_stress`` is
-        the spring stress less the damping stress at V_*, ``eta V_*``, so that it equals the
-        frictional stress in steady sliding at V_*. Beyond the instability norm a motion with
-        neither mass nor radiation damping is no physics: from when on, say ``instability_time`` and
-        the attribute ``beyond_instability_norm``. (Where the load point itself is beyond the norm:
-        from a million times its velocity.)
+        Motion along the dimension ``time`` with n rows. Quantities are dimensionless, with stress
+        in sigma_*, slip in D_c, time in D_c/V_* and slip rate in V_*.
+
+        - ``slip``, ``log10_slip_rate`` and ``state_variable`` describe the slider. For laws with
+          several states, ``state_1``, ``state_2`` and so on are the states without their changes
+          due to stress. If stress does not affect the states, they add up to ``state_variable``.
+        - ``shear_stress`` is the spring stress. With radiation damping, the damping stress at V_*
+          is subtracted, so that spring stress equals frictional stress in steady sliding at V_*.
+        - ``frictional_stress`` is the frictional resistance, and ``normal_stress_ratio`` is the
+          effective normal stress in sigma_*.
+        - ``load_point_displacement`` and ``friction_coefficient`` are the values that a laboratory
+          rig measures. The friction coefficient is spring stress divided by the difference of
+          normal stress and the pore pressure outside the fault.
+        - ``porosity`` and ``pore_pressure`` exist for a dilatant fluid.
+        - ``regime`` is the code of the equations of motion. Its attribute ``flag_meanings`` lists
+          the names of the regimes.
+        - ``instability_time`` exists if the motion exceeds the instability norm without inertia or
+          radiation damping.
+
+        The attributes include ``scene``, ``status``, ``message``, ``duration``, ``rtol``,
+        ``budget``, ``engine`` and ``rhs_evaluations``. If the motion cannot continue, it ends
+        early, and the attributes ``status`` and ``message`` contain the reason.
 
     Raises
     ------
     InvalidValue
-        For a start that is no motion of this scene with an end; for a duration that is not positive
-        and finite, or is given without its name; and for times that do not increase, or beside a
-        duration.
+        If ``start`` is not a complete motion of this scene, if the duration is not positive and
+        finite, if the times do not increase, or if both ``times`` and ``duration`` are passed.
 
     Warns
     -----
     IncompleteWarning
-        Where the motion ends early, with the status and the reason.
+        If the motion ends early.
     NoResultWarning
-        Where nothing is stepped: the slider goes on as it began, in steady sliding at V_*. And
-        where it passes the instability norm with neither mass nor radiation damping.
+        If the scene has no step, so that the slider slides steadily at V_*, or if the motion
+        exceeds the instability norm without inertia or radiation damping.
+
+    See Also
+    --------
+    rsfstudy.critical_step : Compute the critical step of a scene.
+    rsfstudy.limit_cycle : Compute the limit cycle of a scene.
+    rsfstudy.plot_motion : Plot a motion.
+
+    Notes
+    -----
+    Time strictly increases. If a quantity jumps, the row at the time of the jump contains the value
+    before the jump, and the next row contains the value after the jump. The two times differ by a
+    few spacings of floating-point numbers. The rows of a rupture have the same spacing if the
+    rupture is too short for the resolution of time.
+
+    Without inertia and radiation damping, a motion has no physical meaning beyond the instability
+    norm. The variable ``instability_time`` and the attribute ``beyond_instability_norm`` contain
+    the time at which the slip rate first exceeds the norm. If the load point velocity itself
+    exceeds the norm, the limit is :math:`10^6` times the load point velocity.
+
+    Examples
+    --------
+    >>> from rsfstudy import Scene, simulate
+    >>> scene = Scene(
+    ...     normal_stress="constant", mu_star=0.6, stiffness_ratio=2.0, load_velocity_ratio=2.0
+    ... )
+    >>> motion = simulate(scene, times=[1.0, 5.0, 10.0])
+    >>> motion["friction_coefficient"].values.round(4)
+    array([0.5841, 0.5901, 0.59  ])
     """
     if extra_positional_arguments:
         remedy = f"Write duration={shorten_text(extra_positional_arguments[0])}, in D_c/V_*."
@@ -282,8 +329,21 @@ def _recording_to_dataset(
 def motion_variable_attributes(quantity: Quantity, scene: Scene) -> dict[str, Any]:
     """Return the attributes of a variable of a motion.
 
-    If the scene has radiation damping, spring stress is reported minus the radiation damping stress
-    at V_*. Spring stress and frictional stress are then equal at V_*.
+    If the scene has radiation damping, the radiation damping stress at V_* is subtracted from the
+    spring stress, and the long name describes the subtraction. Spring stress and frictional stress
+    are then equal at V_*.
+
+    Parameters
+    ----------
+    quantity : Quantity
+        Quantity of the variable.
+    scene : Scene
+        Scene of the motion.
+
+    Returns
+    -------
+    dict
+        Attributes of the variable.
     """
     attributes = quantity.attributes
     if quantity.name in _VARIABLES_OF_SPRING_STRESS and scene.dynamics.radiated_stress_slope(0.0):
@@ -292,6 +352,7 @@ def motion_variable_attributes(quantity: Quantity, scene: Scene) -> dict[str, An
 
 
 def _state_quantity(state_number: int) -> Quantity:
+    """Return the quantity of one state of a law with several states."""
     about = (
         f"state {state_number} of the law, as a part of the friction coefficient, freed of stress"
     )
@@ -299,7 +360,7 @@ def _state_quantity(state_number: int) -> Quantity:
 
 
 def _read_end_of_motion(motion: object, scene: Scene) -> Event:
-    """The end of a motion of a scene, from which it can go on."""
+    """Return the final point of a stored motion."""
     if not isinstance(motion, xr.Dataset) or MOTION_END_ATTRIBUTE_NAME not in motion.attrs:
         remedy = "Give a motion that simulate returned, and that lasted as long as was asked."
         raise InvalidValue("start", motion, "is no motion with an end", remedy=remedy)
@@ -312,7 +373,10 @@ def _read_end_of_motion(motion: object, scene: Scene) -> Event:
 
 
 def _build_history_variable(history: SampledHistory) -> xr.Variable:
-    """The samples of a history, by which its scene can be made again."""
+    """Convert the samples of a loading history to a variable.
+
+    The scene can be recreated from the variable.
+    """
     about = {
         "long_name": "time, load point velocity, fall and rate of normal stress of the loading",
         "of_stress": int(history.of_stress),
@@ -322,7 +386,7 @@ def _build_history_variable(history: SampledHistory) -> xr.Variable:
 
 
 def _log_slip_rate_limit_of_instability(scene: Scene) -> float:
-    """ln(V/V_*) beyond which a motion is no physics."""
+    """Return ln(V/V_*) beyond which a motion has no physical meaning."""
     if scene.has_mass or scene.dynamics.radiated_stress_slope(0.0):
         return math.inf
     loads = np.asarray(scene.parts.loading.segment_table)[:, SEGMENT_VELOCITY]
@@ -332,7 +396,7 @@ def _log_slip_rate_limit_of_instability(scene: Scene) -> float:
 
 
 def _loading_duration(scene: Scene) -> float:
-    """Time that the loading of a scene takes."""
+    """Return the default duration of a motion, given its loading."""
     loading = scene.parts.loading
     stated = float(loading.segment_table[-1][SEGMENT_START])
     if isinstance(loading, SampledHistory) or (
@@ -351,7 +415,7 @@ def _loading_duration(scene: Scene) -> float:
 def _check_requested_times(
     times: Any, duration: float | None, start_time: float
 ) -> np.ndarray | None:
-    """Times that were asked for, checked."""
+    """Return the requested times as an array of shape (n,), or None."""
     if times is None:
         return None
     if duration is not None:
@@ -374,11 +438,22 @@ def _check_requested_times(
 
 
 def with_increasing_times(table: np.ndarray) -> np.ndarray:
-    """A recorded motion whose times strictly increase.
+    """Return a recorded motion with strictly increasing times.
 
-    A regime or segment begins with a row at the time at which another has ended. It takes the place
-    of one that holds the same; where they differ, it follows a few floating-point numbers later, as
-    do rows of a rupture shorter than the spacing of those numbers.
+    A regime or a segment of the loading begins with a row at the time at which the previous regime
+    or segment ended. If the two rows are equal, the first row is removed. Otherwise, the time of
+    the second row is increased by a few spacings of floating-point numbers. The times of a rupture
+    that is shorter than this spacing are increased as well.
+
+    Parameters
+    ----------
+    table : numpy.ndarray of shape (rows, columns)
+        Recorded motion. The first column is time.
+
+    Returns
+    -------
+    numpy.ndarray
+        Recorded motion with strictly increasing times.
     """
     same = (np.diff(np.delete(table, [REGIME_COLUMN, SAMPLE_COLUMN], axis=1), axis=0) == 0.0).all(
         axis=1

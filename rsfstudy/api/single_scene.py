@@ -1,4 +1,4 @@
-"""Functions for one scene: its critical step or limit cycle; and quantities in SI units."""
+"""Functions for one scene, and conversion of datasets to SI units."""
 
 from __future__ import annotations
 
@@ -39,40 +39,71 @@ def critical_step(
     engine: Any = SCIPY,
     budget: int = DEFAULT_EVALUATION_BUDGET,
 ) -> xr.Dataset:
-    """The critical step of one scene.
+    r"""Compute the smallest step that causes an instability.
 
     Parameters
     ----------
     scene : Scene
-        The slider; whatever value it holds for the quantity sought is ignored.
-    of : {"load_velocity_ratio", "displacement_step", "normal_stress_step"}
-        What is stepped; "velocity_step" is another name of "load_velocity_ratio". After a step of
-        displacement or of normal stress the load point is held unless the scene states its
-        `load_velocity_ratio`. Steps of normal stress, which trigger by
-        a fall (`direction="down"`), need normal stress that is "imposed" or "variable".
-    direction : {"up", "down"}
-        Steps that increase, or decrease.
-    rtol : float
-        Relative accuracy of V_0/V_* - 1, of the displacement, or of the logarithm of normal stress.
-    engine : {"scipy", "python", "compiled"}, or type
-        What integrates motions; compiled, which needs Numba, is much faster. A stepper of your own
-        is given by its class.
-    budget : int
-        Right-hand sides it may evaluate before it ends as `work_budget_spent`.
+        Scene of the slider. The value of the stepped quantity in the scene is ignored.
+    of : str, default: "load_velocity_ratio"
+        Quantity that is stepped: "load_velocity_ratio", "displacement_step" or
+        "normal_stress_step". "velocity_step" is an alias of "load_velocity_ratio". After a step of
+        displacement or normal stress, the load point is held unless the scene specifies
+        ``load_velocity_ratio``. Steps of normal stress require a normal stress that is "imposed" or
+        "variable". If a decrease of normal stress triggers the instability, pass
+        ``direction="down"``.
+    direction : {"up", "down"}, default: "up"
+        Direction of the step.
+    rtol : float, default: 1e-7
+        Relative tolerance of :math:`V_0/V_* - 1`, of the displacement, or of the logarithm of the
+        normal stress ratio.
+    engine : {"scipy", "python", "compiled"} or type, default: "scipy"
+        Engine that integrates the motions. "compiled" is much faster, and requires Numba. A
+        user-defined stepper is passed as a class.
+    budget : int, default: 500,000
+        Largest number of right-hand side evaluations. If the budget is exceeded, the status is
+        ``work_budget_spent``.
 
     Returns
     -------
     xarray.Dataset
-        The critical value, its numerical error, and the values beside it that were verified as
-        stable and as unstable; the status, the message and the work.
+        Dataset with scalar variables. The critical value is ``critical_velocity_ratio`` (in V_*),
+        ``critical_displacement`` (in D_c) or ``critical_normal_stress_step`` (in sigma_*). The
+        dataset also contains the numerical error ``<name>_error`` and two steps that verify the
+        critical value. The slider settles after the step ``<name>_stable`` and becomes unstable
+        after the step ``<name>_unstable``. ``rhs_evaluations`` is the work. The attributes
+        ``status`` and ``message`` describe the outcome. If there is no critical step, the critical
+        value is NaN.
+
+    Raises
+    ------
+    InvalidValue
+        If ``scene`` is not a scene, or if ``of`` or ``direction`` is not one of the choices.
 
     Warns
     -----
     NoResultWarning
-        Where there is no critical step, with the status and the message; its numbers are NaN.
+        If there is no critical step.
     UserWarning
-        Where the instability norm is hardly faster than the load point, as on rigs whose period is
-        short: ``instability_slip_rate`` tells how fast it is.
+        If the instability norm is close to the load point velocity, for example because the period
+        of a rig is short. The coordinate ``instability_slip_rate`` contains the norm as a slip rate
+        in V_*.
+
+    See Also
+    --------
+    rsfstudy.measures.CriticalStep : Measure with the equations and references.
+    rsfstudy.limit_cycle : Compute the limit cycle of a scene.
+
+    Examples
+    --------
+    At constant normal stress and critical stiffness, the critical displacement is
+    :math:`D_c\,a/(b - a)`.
+
+    >>> from rsfstudy import Scene, critical_step
+    >>> scene = Scene(normal_stress="constant", b_over_a=2.0)
+    >>> result = critical_step(scene, of="displacement_step", rtol=1e-5)
+    >>> round(result["critical_displacement"].item(), 4)
+    1.0
     """
     return _measure_scene_to_dataset(
         CriticalStep(of=of, direction=direction), scene, Accuracy(rtol, budget, engine=engine)
@@ -88,32 +119,59 @@ def limit_cycle(
     engine: Any = SCIPY,
     budget: int = DEFAULT_EVALUATION_BUDGET,
 ) -> xr.Dataset:
-    """The stick-slip limit cycle of one scene.
+    r"""Compute the stick-slip limit cycle of a scene.
 
     Parameters
     ----------
     scene : Scene
-        The slider, with the load point velocity after the step; usually with inertia.
-    events : int
-        Most events to wait for a cycle that repeats.
-    rtol : float
-        Relative accuracy of the recurrence interval and the stress drops, and of ln V.
-    engine, budget
-        As in `critical_step`.
+        Scene of the slider, usually with inertia or radiation damping. ``load_velocity_ratio`` is
+        the load point velocity of the cycle.
+    events : int, default: 300
+        Largest number of events until the motion repeats.
+    rtol : float, default: 1e-7
+        Relative tolerance of the recurrence interval and the stress drops, and tolerance of
+        :math:`\ln(V/V_*)`.
+    engine : {"scipy", "python", "compiled"} or type, default: "scipy"
+        Engine that integrates the motions. "compiled" is much faster, and requires Numba. A
+        user-defined stepper is passed as a class.
+    budget : int, default: 500,000
+        Largest number of right-hand side evaluations. If the budget is exceeded, the status is
+        ``work_budget_spent``.
 
     Returns
     -------
     xarray.Dataset
-        Recurrence interval, static and dynamic stress drop and range of slip rate, each with its
-        numerical error: from one maximum of spring stress to the next; where the motion repeats
-        itself after several events only, as the message then says, those of the event with the
-        fastest peak. The orbit along ``phase``; the status (``no_limit_cycle`` where the motion
-        settles), the message and the work.
+        Dataset with scalar variables and with the orbit along the dimension ``phase`` (400 points).
+        The scalars include ``recurrence_interval`` (in D_c/V_*), ``static_stress_drop`` and
+        ``dynamic_stress_drop`` (in sigma_*), the range of slip rate, and ``rhs_evaluations``. The
+        numerical error of a variable is ``<name>_error``. A cycle begins and ends at a maximum of
+        spring stress. If the motion repeats only after several events, the results describe the
+        event with the highest slip rate, and the message reports the number of events. The
+        attribute ``status`` is ``no_limit_cycle`` if the motion settles. If there is no limit
+        cycle, the results are NaN.
+
+    Raises
+    ------
+    InvalidValue
+        If ``scene`` is not a scene, or if ``events`` is not a positive integer.
 
     Warns
     -----
     NoResultWarning
-        Where there is no cycle, with the status and the message; its numbers are NaN.
+        If there is no limit cycle. The warning contains the status and the message.
+
+    See Also
+    --------
+    rsfstudy.measures.LimitCycle : Measure with definitions and error estimates.
+    rsfstudy.plot_motion : Plot the orbit.
+
+    Examples
+    --------
+    >>> from rsfstudy import Scene, limit_cycle
+    >>> scene = Scene(normal_stress="constant", stiffness_ratio=0.8, radiation_damping=1e-3)
+    >>> cycle = limit_cycle(scene, rtol=1e-4)
+    >>> round(cycle["recurrence_interval"].item(), 3)
+    9.061
     """
     return _measure_scene_to_dataset(
         LimitCycle(events=events), scene, Accuracy(rtol, budget, engine=engine)
@@ -128,36 +186,53 @@ def to_si(
     slip_distance: Any = None,
     reference_rate: Any = None,
 ) -> xr.Dataset:
-    """A dataset in SI units, all of it: stress in Pa, slip in m, time in s, slip rates in m/s.
+    r"""Convert a dataset to SI units.
 
-    What is no ratio any more is not called one: ``critical_velocity``, ``load_velocity`` and
-    ``effective_normal_stress``; ``slip_rate`` stands beside its logarithm. Pure numbers, such as
-    friction and that logarithm, stay as they are, and so does porosity, for want of a
-    compressibility.
+    Stress is converted to Pa, slip to m, time to s and slip rate to m/s.
 
     Parameters
     ----------
     dataset : xarray.Dataset
-        Results, or a trajectory: variables whose attribute ``scale`` says what they are measured
-        in.
-    normal_stress : quantity
-        sigma_*: a number in Pa, or a text with units ("5 MPa").
-    slip_distance : quantity
-        D_c, in m ("10 um").
-    reference_rate : quantity
-        V_*/D_c, in 1/s.
+        Results of a study, or a dataset of one scene. The attribute ``scale`` of each variable
+        contains the unit by which the variable is normalised.
+    normal_stress : quantity, optional
+        Scale of stress :math:`\sigma_*`, such as "5 MPa", or a number in Pa.
+    slip_distance : quantity, optional
+        Scale of slip :math:`D_c`, such as "10 um", or a number in m.
+    reference_rate : quantity, optional
+        Scale of rates :math:`V_*/D_c`, such as "0.1 1/s", or a number in 1/s.
 
-    A dataset that holds one of these, as results of a rig hold all, needs none, and is converted by
-    its own, cell by cell.
+    Returns
+    -------
+    xarray.Dataset
+        Dataset in SI units. Variables that are no longer ratios are renamed to
+        ``critical_velocity``, ``load_velocity`` and ``effective_normal_stress``. ``slip_rate`` is
+        added next to its logarithm. Dimensionless variables, such as friction and the logarithm of
+        slip rate, are unchanged. Porosity is also unchanged, because the compressibility is
+        unknown.
 
     Raises
     ------
     InvalidValue
-        For scales that are no quantities or not positive; for one that the dataset does not hold
-        and is not stated, or that is stated and is not that of all its cells.
+        If a scale is not a positive quantity, if a scale is missing, or if a scale differs from the
+        scale in the dataset.
     DataError
-        For a dataset that is in other units already, or not of rsfstudy; or where the scale of an
-        axis varies along another.
+        If the dataset has already been converted, if rsfstudy has not created the dataset, or if
+        the scale of an axis varies along another axis.
+
+    Notes
+    -----
+    A scale that the dataset contains need not be passed. The results of a study with a rig contain
+    all scales, and each cell is converted with the scales of its own rig.
+
+    Examples
+    --------
+    >>> from rsfstudy import Scene, simulate, to_si
+    >>> scene = Scene(load_velocity_ratio=2.0, reference_rate=0.1)
+    >>> motion = simulate(scene, times=[0.5, 1.0])
+    >>> converted = to_si(motion, normal_stress="5 MPa", slip_distance="10 um")
+    >>> converted["time"].values
+    array([ 5., 10.])
     """
     units = {"normal_stress": "Pa", "slip_distance": "m", "reference_rate": "1/s"}
     given = (normal_stress, slip_distance, reference_rate)
@@ -170,8 +245,9 @@ def to_si(
 
 
 def _measure_scene_to_dataset(measure: Measure, scene: Scene, accuracy: Accuracy) -> xr.Dataset:
-    """A measure's named numbers as a small dataset that bears the names of the lattice; those that
-    are None are missing.
+    """Compute a measure of a scene, and return the outputs as a dataset.
+
+    The variables have the same names as in the results of studies. Outputs without a value are NaN.
     """
     check_scene(scene)
     check_engine_is_usable(accuracy.engine)

@@ -1,4 +1,7 @@
-"""Functions for a study: run it, open its results, check and rerun them."""
+"""Functions that run studies and process their results.
+
+The main functions are ``run`` and ``open``.
+"""
 
 from __future__ import annotations
 
@@ -46,9 +49,10 @@ if TYPE_CHECKING:
 
 
 class StudiesByName(dict[str, Study]):
-    """Studies by name; a notebook shows what each is about."""
+    """Dictionary of studies with an HTML table for notebooks."""
 
     def _repr_html_(self) -> str:
+        """Return an HTML table of the studies."""
         rows = [
             (name, study.title, f"{study.size:,}", ", ".join({c.id: c for c in study.claims}))
             for name, study in self.items()
@@ -58,7 +62,19 @@ class StudiesByName(dict[str, Study]):
 
 @error_boundary
 def studies() -> dict[str, Study]:
-    """The named studies, by name."""
+    """Return the named studies.
+
+    Returns
+    -------
+    dict of str to Study
+        Studies by name. In a notebook, the dictionary is displayed as a table.
+
+    Examples
+    --------
+    >>> import rsfstudy
+    >>> "linear_stability" in rsfstudy.studies()
+    True
+    """
     return StudiesByName({name: load_study(name) for name in study_names()})
 
 
@@ -82,63 +98,107 @@ def run(
     command: str = "rsfstudy.run",
     **overrides: Any,
 ) -> xr.Dataset:
-    """Run a study and return its dataset, which is written to ``output/NAME.nc`` too.
+    """Run a study, and return the results.
+
+    The results are also written to the directory ``output``, together with a journal of finished
+    cells. If a run is interrupted, the next run continues with the remaining cells.
 
     Parameters
     ----------
     study : str, Path or Study
-        A named study, the path of a file that declares one, or a study of your own.
-    workers : int
-        Worker processes of a Dask cluster made for this run; 0 computes in this process.
+        Name of a study, path of a Python file that declares a study, or a study.
+    workers : int, default: 2
+        Number of worker processes of a local Dask cluster. With 0, the cells are computed in the
+        current process.
     client : distributed.Client, optional
-        An existing Dask cluster to use instead.
-    output : path, optional
-        Directory for the results and the journal of finished cells; None writes nothing.
-    progress : bool
-        Show a progress bar, or lines where the standard error is no terminal.
-    fresh : bool
-        Forget the finished cells and compute all again.
+        Client of an existing Dask cluster, which replaces the local cluster.
+    output : str, Path or None, default: "outputs"
+        Directory for the results ``NAME.nc`` and the journal. If None, nothing is written.
+    progress : bool, default: True
+        If True, show a progress bar. If standard error is not a terminal, lines of text replace the
+        bar.
+    fresh : bool, default: False
+        If True, discard the finished cells of previous runs, and compute all cells.
     rtol : float, optional
-        Accuracy of the cells.
-    engine : {"scipy", "python", "compiled"}, or a class, optional
-        What integrates motions; compiled, which needs Numba, is much faster.
+        Relative tolerance of the cells. The default is the tolerance that the study declares.
+    engine : {"scipy", "python", "compiled"} or type, optional
+        Engine that integrates the motions. "compiled" is much faster, and requires Numba. A
+        user-defined stepper is passed as a class. The default is the engine that the study
+        declares.
     budget : int, optional
-        Right-hand sides a cell may evaluate before it ends as `work_budget_spent`. Cells that have
-        an answer keep it where more is allowed.
-    time_limit : float
-        CPU time in s after which a worker gives up on a cell; for one that sleeps or waits, ten
-        times as much wall time. There is no limit in this process (``workers=0``).
-    keep_going : bool
-        Go on if the first cells all fail, instead of stopping early.
-    despite_failures : bool
-        Leave failed cells out of the reductions; the results say so.
-    format : {"netcdf", "zarr"}
-        One NetCDF file, or a Zarr store written in pieces, for lattices that do not fit in memory.
-    command : str
-        What to note in the history.
-    **overrides
-        Other axis values (``b_over_a=[2, 3]``), other fixed values of the scene or of the measure
-        (``stiffness_ratio=1.1``), or, for a fixed value, a list that makes it an axis.
+        Largest number of right-hand side evaluations of a cell. If the budget is exceeded, the
+        status of the cell is ``work_budget_spent``. If the budget is increased in a later run,
+        finished cells with a result are not recomputed.
+    time_limit : float, default: 600.0
+        CPU time in s after which a worker stops a cell. The limit of the wall time is ten times
+        ``time_limit``, for cells that sleep or wait. The limit does not apply if ``workers`` is 0.
+    keep_going : bool, default: False
+        If True, continue even if the first cells all fail.
+    despite_failures : bool, default: False
+        If True, compute reductions without the failed cells. The results contain a remark.
+    format : {"netcdf", "zarr"}, default: "netcdf"
+        Format of the results: a NetCDF file, or a Zarr store that is written in pieces. Use Zarr
+        for lattices that do not fit into memory.
+    command : str, default: "rsfstudy.run"
+        Command line to record in the history of the dataset.
+    **overrides : object
+        Values that replace values of the study: other values of an axis (``b_over_a=[2, 3]``), or
+        another value of a field of the scene or the measure (``stiffness_ratio=1.1``). A list for a
+        fixed field turns the field into an axis.
 
     Returns
     -------
     xarray.Dataset
-        Lattice, reductions and attributes.
+        Results on the lattice, with the axes of the study as dimensions. The variables are the
+        outputs of the measure and their errors, the reductions, and ``status``, ``message``,
+        ``rhs_evaluations`` and ``wall_time`` of each cell. The coordinates include the fields of
+        the scene. The attributes contain the declaration and the provenance of the study. Each
+        variable has the attribute ``units``, and ``scale`` if the variable is normalised.
 
     Raises
     ------
     InvalidValue
-        For a wrong declaration or override, before anything is computed.
-    DataError, RunError
-        If results cannot be kept, or the run cannot start or finish.
+        If the study or an override is invalid. The error is raised before any cell is computed.
+    DataError
+        If the results cannot be written.
+    RunError
+        If the run cannot start or finish.
 
     Warns
     -----
     IncompleteWarning
-        Where cells failed: how many, and with which status; and where a reduction refused to draw
-        on its cells, with the reason.
+        If cells failed, or if a reduction could not be computed because of its cells.
     UserWarning
-        Where answers for a rig are for an instability norm near the load point velocity.
+        If a study of a rig has results for which the instability norm is close to the load point
+        velocity.
+
+    See Also
+    --------
+    rsfstudy.open : Load the results of a study into memory.
+    rsfstudy.rerun : Recompute the results in a file, and compare the values.
+
+    Examples
+    --------
+    >>> from rsfstudy import Axis, Scene, Study, run
+    >>> from rsfstudy.measures import LinearStability
+    >>> study = Study(
+    ...     name="example",
+    ...     title="Critical stiffness",
+    ...     base=Scene(normal_stress="constant", a=0.01),
+    ...     axes=[Axis("b_over_a", [1.5, 2.0])],
+    ...     measure=LinearStability(),
+    ... )
+    >>> results = run(study, workers=0, output=None, progress=False)
+    >>> results["critical_stiffness"].values.round(6)
+    array([0.005, 0.01 ])
+    >>> results["critical_stiffness"].dims
+    ('b_over_a',)
+
+    Override the values of the axis:
+
+    >>> results = run(study, workers=0, output=None, progress=False, b_over_a=[3.0])
+    >>> results["critical_stiffness"].values.round(6)
+    array([0.02])
     """
     declared = apply_overrides_to_study(study, overrides, rtol=rtol, engine=engine, budget=budget)
     keeping = OutputOptions(
@@ -163,7 +223,27 @@ def run(
 def apply_overrides_to_study(
     study: str | Path | Study, overrides: Mapping[str, Any], **accuracy_fields: Any
 ) -> Study:
-    """A study with other values and fields of its accuracy, those that are not None; checked."""
+    """Return a study with overrides of its values and its accuracy.
+
+    Parameters
+    ----------
+    study : str, Path or Study
+        Name of a study, path of a Python file that declares a study, or a study.
+    overrides : mapping of str to object
+        Values that replace values of the axes, the scene or the measure.
+    **accuracy_fields : object
+        Fields of ``Accuracy``, such as ``rtol``. A value of None leaves the field unchanged.
+
+    Returns
+    -------
+    Study
+        Study with the overrides.
+
+    Raises
+    ------
+    InvalidValue
+        If an override is invalid.
+    """
     declared = study if isinstance(study, Study) else load_study(str(study))
     changes = {name: value for name, value in accuracy_fields.items() if value is not None}
     if changes:
@@ -177,15 +257,34 @@ def prepare_run_with_progress(
     worker_pool: WorkerPool,
     show_progress_bar: bool = True,
 ) -> Callable[[], xr.Dataset]:
-    """A function that runs the study, once everything has been checked; `progress` shows how
-    far it has come.
+    """Check a study, and return a function that runs the study.
 
-    Raises `InvalidValue` for anything wrong with the study or the options.
+    Parameters
+    ----------
+    study : Study
+        Study to run.
+    output_options : OutputOptions
+        Options for the output of the run.
+    worker_pool : WorkerPool
+        Workers that compute the cells.
+    show_progress_bar : bool, default: True
+        If True, show the progress of the run.
+
+    Returns
+    -------
+    callable
+        Function without arguments that runs the study and returns the results.
+
+    Raises
+    ------
+    InvalidValue
+        If the study or an option is invalid.
     """
     check_engine_is_usable(study.accuracy.engine)
     ready = prepare_study_run(study, output_options, worker_pool)
 
     def run() -> xr.Dataset:
+        """Compile the equations if necessary, and run the study."""
         if study.accuracy.engine == COMPILED:
             compile_scenes_with_notice(
                 ready.plan.example_scenes, study.measure.needs_time, show_progress_bar
@@ -198,12 +297,49 @@ def prepare_run_with_progress(
 
 @error_boundary
 def open(name: str | Path, output: str | Path = OUTPUT_DIRECTORY) -> xr.Dataset:
-    """Load the results of a named study, or a results file, into memory.
+    """Load the results of a study into memory.
+
+    Parameters
+    ----------
+    name : str or Path
+        Name of a study, path of a Python file that declares a study, or path of a results file
+        (``.nc`` or ``.zarr``).
+    output : str or Path, default: "outputs"
+        Directory of the results, if ``name`` is not the path of a results file.
+
+    Returns
+    -------
+    xarray.Dataset
+        Results, as returned by ``rsfstudy.run``.
 
     Raises
     ------
+    InvalidValue
+        If ``name`` is neither a path nor the name of a study.
     DataError
-        If there is no such file, or it was not written by rsfstudy.
+        If the file does not exist, if it is damaged, or if rsfstudy has not written it.
+
+    See Also
+    --------
+    rsfstudy.run : Run a study, and return the results.
+
+    Examples
+    --------
+    >>> import tempfile
+    >>> import rsfstudy
+    >>> from rsfstudy.measures import LinearStability
+    >>> study = rsfstudy.Study(
+    ...     name="example",
+    ...     title="Critical stiffness",
+    ...     base=rsfstudy.Scene(normal_stress="constant", a=0.01),
+    ...     axes=[rsfstudy.Axis("b_over_a", [1.5, 2.0])],
+    ...     measure=LinearStability(),
+    ... )
+    >>> with tempfile.TemporaryDirectory() as directory:
+    ...     _ = rsfstudy.run(study, workers=0, output=directory, progress=False)
+    ...     results = rsfstudy.open("example", output=directory)
+    >>> results["b_over_a"].values
+    array([1.5, 2. ])
     """
     if not isinstance(name, str | Path):
         raise InvalidValue("name", name, "must be the name of a study, or a path")
@@ -211,12 +347,23 @@ def open(name: str | Path, output: str | Path = OUTPUT_DIRECTORY) -> xr.Dataset:
 
 
 def read_results(path: Path) -> xr.Dataset:
-    """Load the results of a study, as `read_dataset` does.
+    """Load a results file into memory.
+
+    Parameters
+    ----------
+    path : Path
+        Path of the file.
+
+    Returns
+    -------
+    xarray.Dataset
+        Results of a study.
 
     Raises
     ------
     DataError
-        If it is missing, unreadable, not written by rsfstudy, damaged, or of one scene.
+        If the file does not exist, if it is damaged, if rsfstudy has not written it, or if it
+        belongs to one scene.
     """
     dataset = read_dataset(path)
     check_is_of_study(dataset, shorten_text(path))
@@ -224,7 +371,7 @@ def read_results(path: Path) -> xr.Dataset:
 
 
 def _resolve_results_dataset(dataset: xr.Dataset | str | Path) -> xr.Dataset:
-    """Results, as they are given or as their file holds them."""
+    """Return results, which are loaded if a name or a path is passed."""
     if not isinstance(dataset, xr.Dataset):
         return open(dataset)
     check_is_of_study(dataset, "the dataset")
@@ -240,33 +387,57 @@ def plot(
     style: Any = None,
     user_figure: Any = None,
 ) -> Figure:
-    """The figure of a dataset (or of a named study's results, or of a file), as its study declares
-    it; a notebook shows it, and its `savefig` writes it.
+    """Plot the results of a study.
 
     Parameters
     ----------
     dataset : xarray.Dataset, str or Path
+        Results of a study, name of a study, or path of a results file.
     variable : str, optional
-        Draw this variable instead: as maps over two numeric axes, else as lines.
-    style : path, str, dict or list of those, optional
-        A style on top of the style of rsfstudy: a style sheet (a file that ends in
-        ``.mplstyle``), the name of a style in ``matplotlib.style.available``, or settings such as
-        ``{"font.size": 9, "figure.figsize": (3.5, 2.6)}``, which is one column of a journal in
-        inches. All colours and line styles come from ``axes.prop_cycle``. Unknown settings are
-        rejected.
-    user_figure : function or module, optional
-        What draws it, where that is not part of rsfstudy: what ``Study(plot=...)`` was given.
+        Name of a variable to plot. If the lattice has two numeric axes, the variable is plotted as
+        maps, and otherwise as lines. By default, the figure that the study declares is plotted.
+    style : path, str, dict or list, optional
+        Style that overrides the style of rsfstudy: the path of a style sheet with the suffix
+        ``.mplstyle``, the name of a style in ``matplotlib.style.available``, a dictionary of
+        matplotlib settings, or a list of styles. For example, ``{"font.size": 9, "figure.figsize":
+        (3.5, 2.6)}`` selects a width of 3.5 inches, which is one column of a journal. Colours and
+        line styles follow ``axes.prop_cycle``.
+    user_figure : callable, module or Figure, optional
+        User-defined figure: a function ``draw(dataset, axes)``, a module with a function ``draw``,
+        or an ``rsfstudy.Figure``. The argument is required if the study was declared with a
+        user-defined figure, because results files contain no code.
 
     Returns
     -------
     matplotlib.figure.Figure
-        Yours to change: its ``axes`` are the panels, in the order of their letters, and
-        ``figure.axes[0].set_title("")`` and its like work as ever.
+        Figure, which can be modified with the methods of matplotlib. ``figure.axes`` contains the
+        panels in the order of their letters. A notebook displays the figure, and ``figure.savefig``
+        writes it to a file.
 
     Raises
     ------
     InvalidValue
-        For a variable or a style that is none, and for a figure that does not fit.
+        If the variable does not exist, if the style is invalid or contains an unknown setting, or
+        if the figure cannot be drawn from the dataset.
+
+    See Also
+    --------
+    rsfstudy.plot_motion : Plot a motion or a limit cycle.
+
+    Examples
+    --------
+    >>> from rsfstudy import Axis, Scene, Study, plot, run
+    >>> from rsfstudy.measures import LinearStability
+    >>> study = Study(
+    ...     name="example",
+    ...     title="Critical stiffness",
+    ...     base=Scene(normal_stress="constant", a=0.01),
+    ...     axes=[Axis("b_over_a", [1.5, 2.0, 3.0])],
+    ...     measure=LinearStability(),
+    ... )
+    >>> figure = plot(run(study, workers=0, output=None, progress=False))
+    >>> figure.axes[0].get_xlabel() != ""
+    True
     """
     from rsfstudy.plots import draw_figure
 
@@ -277,13 +448,45 @@ def plot(
 
 @error_boundary
 def check(dataset: xr.Dataset | str | Path) -> pd.DataFrame:
-    """Compare a dataset (or a named study's results, or a file) with the claims of its study.
+    """Compare the results of a study with the published values that it claims.
+
+    Parameters
+    ----------
+    dataset : xarray.Dataset, str or Path
+        Results of a study, name of a study, or path of a results file.
 
     Returns
     -------
     pandas.DataFrame
-        One row a claim: published value, ours, tolerance and its reason, verdict, and ``moved``
-        where the verdict is not the expected one.
+        Table with one row per claim. The columns include the published value ``published``, the
+        computed value ``ours``, ``tolerance``, the ``reason`` for the tolerance, ``verdict`` and
+        ``moved``. ``moved`` is True if the verdict differs from the expected verdict. If overrides
+        change the conditions of a claim, the claim does not apply.
+
+    Raises
+    ------
+    DataError
+        If the dataset is not the result of a study, or if the file cannot be read.
+    InvalidValue
+        If the argument is neither a dataset nor the name of a study or a path.
+
+    See Also
+    --------
+    rsfstudy.Claim : Claim of a study.
+
+    Examples
+    --------
+    >>> from rsfstudy import Axis, Claim, Scene, Study, check, run
+    >>> from rsfstudy.measures import LinearStability
+    >>> study = Study(
+    ...     name="example",
+    ...     title="Critical stiffness",
+    ...     base=Scene(normal_stress="constant", a=0.01),
+    ...     axes=[Axis("b_over_a", [1.5, 2.0])],
+    ...     measure=LinearStability(),
+    ... )
+    >>> len(check(run(study, workers=0, output=None, progress=False)))
+    0
     """
     results = _resolve_results_dataset(dataset)
     declared = read_declaration(results)
@@ -301,37 +504,73 @@ def rerun(
     progress: bool = True,
     time_limit: float = CELL_TIME_LIMIT,
 ) -> pd.DataFrame:
-    """Compute the cells of a results file, or a motion, again from what the file says, and compare
-    the numbers.
+    """Recompute the results in a file, and compare the values.
+
+    The function recreates the study or the scene from the file. Code is never executed from a
+    results file.
 
     Parameters
     ----------
-    file : path
-        A results file, or that of a motion.
-    study : path, optional
-        The file that declares the study, where its measure is not part of rsfstudy; code is never
-        taken from a results file.
-    workers, client, output, progress, time_limit
-        As in `run`; by default nothing is written.
+    file : str or Path
+        Path of a results file or of a motion, or name of a study.
+    study : str or Path, optional
+        Path of the Python file that declares the study. The argument is required if the measure or
+        a reduction is not part of rsfstudy.
+    workers : int, default: 2
+        Number of worker processes of a local Dask cluster. With 0, the cells are computed in the
+        current process.
+    client : distributed.Client, optional
+        Client of an existing Dask cluster, which replaces the local cluster.
+    output : str or Path, optional
+        Directory for the new results. The directory must not contain results of the same study. By
+        default, nothing is written.
+    progress : bool, default: True
+        If True, show the progress of the run.
+    time_limit : float, default: 600.0
+        CPU time in s after which a worker stops a cell.
 
     Returns
     -------
     pandas.DataFrame
-        One row a variable: how many values are identical, how many there are, the largest
-        difference, and how many differ by more than both error estimates. In its ``attrs``, under
-        ``differs``, what decides a number and is not as it was.
+        Table with one row per variable. The columns are ``variable``, ``values`` (number of
+        values), ``identical`` (number of identical values), ``largest_difference``, and
+        ``beyond_errors`` (number of values that differ by more than the sum of both error
+        estimates, or NaN if there are no error estimates). The dictionary ``attrs["differs"]`` of
+        the table lists differences in provenance that affect the results.
 
     Raises
     ------
     InvalidValue
-        Where the study's measure or a reduction is not part of rsfstudy.
-    DataError, RunError
-        Where the file is damaged, or the run cannot finish.
+        If the measure or a reduction is not part of rsfstudy and ``study`` is not passed, or if
+        ``output`` already contains results of the study.
+    DataError
+        If the file is damaged, or if its motion cannot be recomputed.
+    RunError
+        If the run cannot start or finish.
+
+    See Also
+    --------
+    rsfstudy.compare : Compare two datasets.
+    rsfstudy.recompute_cell : Recompute one cell of a results file.
+
+    Examples
+    --------
+    >>> import tempfile
+    >>> from pathlib import Path
+    >>> import rsfstudy
+    >>> scene = rsfstudy.Scene(load_velocity_ratio=2.0)
+    >>> motion = rsfstudy.simulate(scene, duration=1.0)
+    >>> with tempfile.TemporaryDirectory() as directory:
+    ...     file = Path(directory) / "motion.nc"
+    ...     _ = motion.to_netcdf(file)
+    ...     table = rsfstudy.rerun(file)
+    >>> bool((table["identical"] == table["values"]).all())
+    True
     """
     theirs = read_dataset(find_results(file, OUTPUT_DIRECTORY))
     if is_of_single_scene(theirs):
         if study is not None:
-            load_study(str(study))  # for the parts of its scene
+            load_study(str(study))  # The file defines user-defined parts of the scene.
         return dataset_export.rerun_motion(theirs)
     declared = rebuild_study(theirs, study)
     place = output_directory(output)
@@ -353,27 +592,52 @@ def rerun(
 
 @error_boundary
 def compare(first: xr.Dataset | str | Path, second: xr.Dataset | str | Path) -> Comparison:
-    """Differences between two datasets (or named studies' results, or files): in declaration, in
-    what made them, and in numbers, cell by cell where both have the same place on every axis.
+    """Compare two datasets of results.
+
+    The function compares the declarations, the provenance and the values. Values are compared for
+    cells that have the same coordinates on all axes.
 
     Parameters
     ----------
     first, second : xarray.Dataset, str or Path
-        Their lattices may differ.
+        Results of a study, name of a study, or path of a results file. The two lattices may differ.
 
     Returns
     -------
     Comparison
-        Its ``numbers`` is a pandas.DataFrame, one row a variable, which tells in how many cells the
-        two differ by more than the sum of both error estimates; ``agrees`` is true where none do,
-        no status differs, and there is something to compare.
+        Differences between the datasets. The attribute ``agreement_table`` is a table with one row
+        per variable, which includes the number of values that differ by more than the sum of both
+        error estimates. The attribute ``agrees`` is True if the datasets have common cells, all
+        common cells have the same status, and no value differs beyond the errors.
 
     Raises
     ------
     InvalidValue
-        Where an axis of one has no counterpart in the other, not even a fixed value.
+        If an axis of one dataset corresponds neither to an axis nor to a fixed value of the other
+        dataset.
     DataError
-        Where a file is missing or damaged.
+        If a file does not exist or is damaged.
+
+    See Also
+    --------
+    rsfstudy.rerun : Recompute the results in a file, and compare the values.
+
+    Examples
+    --------
+    >>> from rsfstudy import Axis, Scene, Study, compare, run
+    >>> from rsfstudy.measures import LinearStability
+    >>> study = Study(
+    ...     name="example",
+    ...     title="Critical stiffness",
+    ...     base=Scene(normal_stress="constant", a=0.01),
+    ...     axes=[Axis("b_over_a", [1.5, 2.0])],
+    ...     measure=LinearStability(),
+    ... )
+    >>> first = run(study, workers=0, output=None, progress=False)
+    >>> second = run(study, workers=0, output=None, progress=False, b_over_a=[2.0, 3.0])
+    >>> comparison = compare(first, second)
+    >>> comparison.agrees, comparison.finished_cell_counts
+    (True, (1, 1, 1))
     """
     return compare_results(_resolve_results_dataset(first), _resolve_results_dataset(second))
 
@@ -382,30 +646,63 @@ def compare(first: xr.Dataset | str | Path, second: xr.Dataset | str | Path) -> 
 def recompute_cell(
     file: str | Path, place: Mapping[str, Any], *, study: str | Path | None = None
 ) -> tuple[Scene, Outcome]:
-    """Compute one cell of a results file alone, in this process; what it raises is not caught.
+    """Recompute one cell of a results file in the current process.
+
+    Exceptions that the computation raises are not caught, so that a debugger can inspect them.
 
     Parameters
     ----------
-    file : path
-        A results file.
-    place : mapping of str to value
-        Where the cell is: the value, or label, on each axis; numbers may be text too.
-    study : path, optional
-        The file that declares the study, where its measure is not part of rsfstudy.
+    file : str or Path
+        Path of a results file, or name of a study.
+    place : mapping of str to object
+        Coordinates of the cell: the value or label on each axis. Numbers may be passed as strings.
+    study : str or Path, optional
+        Path of the Python file that declares the study. The argument is required if the measure is
+        not part of rsfstudy.
 
     Returns
     -------
-    Scene, Outcome
+    scene : Scene
+        Scene of the cell.
+    outcome : Outcome
+        Status, values, message and work of the cell.
 
     Raises
     ------
     InvalidValue
-        Where there is no such cell.
+        If the cell does not exist.
+    DataError
+        If the file does not exist or is damaged.
 
     Warns
     -----
     UserWarning
-        Where something that decides its numbers has changed since the file was made.
+        If a dependency of the results, such as the version of the code, has changed since the file
+        was written.
+
+    See Also
+    --------
+    rsfstudy.rerun : Recompute all cells of a results file.
+
+    Examples
+    --------
+    >>> import tempfile
+    >>> from pathlib import Path
+    >>> import rsfstudy
+    >>> from rsfstudy.measures import LinearStability
+    >>> study = rsfstudy.Study(
+    ...     name="example",
+    ...     title="Critical stiffness",
+    ...     base=rsfstudy.Scene(normal_stress="constant", a=0.01),
+    ...     axes=[rsfstudy.Axis("b_over_a", [1.5, 2.0])],
+    ...     measure=LinearStability(),
+    ... )
+    >>> with tempfile.TemporaryDirectory() as directory:
+    ...     _ = rsfstudy.run(study, workers=0, output=directory, progress=False)
+    ...     file = Path(directory) / "example.nc"
+    ...     scene, outcome = rsfstudy.recompute_cell(file, {"b_over_a": 1.5})
+    >>> round(outcome.values["critical_stiffness"], 6)
+    0.005
     """
     declared, number, differs = _find_cell_in_results_file(file, place, study)
     for name, (theirs, ours) in differs.items():
@@ -419,7 +716,17 @@ def recompute_cell(
 def _find_cell_in_results_file(
     results_file: str | Path, cell_coordinates: Mapping[str, Any], study_file: str | Path | None
 ) -> tuple[Study, int, Mapping[str, tuple[Any, Any]]]:
-    """The study of a file, the number of a cell, and what else decided it and has changed."""
+    """Find a cell of a results file.
+
+    Returns
+    -------
+    study : Study
+        Study of the file.
+    number : int
+        Number of the cell in row-major order.
+    differences : mapping of str to (object, object)
+        Dependencies of the results that have changed, with the stored and the current value.
+    """
     results = open(results_file)
     number = find_cell_number(results, cell_coordinates)
     declared = rebuild_study(results, study_file)

@@ -1,7 +1,7 @@
 """Tables and summaries of results, for the command line and the HTML report.
 
-Functions take a results dataset and return tables of plain text: reductions, claims, failed cells,
-fits, and the origin of a file. The package never computes results and never prints.
+The functions take a dataset and return tables of plain text, such as tables of reductions, claims,
+failed cells and fits. The package never computes results and never prints.
 """
 
 from __future__ import annotations

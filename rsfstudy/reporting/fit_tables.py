@@ -1,5 +1,7 @@
-"""Fits of records as laboratories tabulate them: tables, samples of parameters, scenes; and as a
-command prints them and a report shows them, those of one step beside each other.
+"""Tables of fits, for users, commands and reports.
+
+``fit_table`` returns a table for users. ``summarise_fits`` yields the tables and remarks that
+commands print and reports show.
 """
 
 from __future__ import annotations
@@ -23,7 +25,7 @@ from rsfstudy.reporting.tables import TextTable
 from rsfstudy.status import STATUS_LABELS, Status
 from rsfstudy.storage import read_declaration
 
-#: What laboratories call parameters, where not as they are called here.
+#: Names of parameters in laboratories, if they differ from the names in rsfstudy.
 _PARAMETER_NAMES_IN_LABORATORIES = {
     "slip_distance": "Dc",
     "slip_distance_2": "Dc2",
@@ -31,27 +33,56 @@ _PARAMETER_NAMES_IN_LABORATORIES = {
     "stiffness": "k",
     "trend1": "trend",
 }
-#: Most fits beside each other.
+#: Maximum number of fits next to each other in a table.
 _MAX_FITS_PER_TABLE = 3
-#: What is told of a fit in short.
+#: Headings of the parameters in the final table.
 _PARAMETERS_IN_FIT_SUMMARY = ("a", "b", "b1", "b2", "Dc")
-#: How fits end that have numbers.
+#: Status of fits that have values and valid standard errors.
 _STATUS_LABELS_OF_FITS_WITH_VALUES = (Status.OK.label, Status.NOT_IDENTIFIED.label)
-#: Error over the number beyond which neither is printed.
+#: Ratio of the standard error to the value above which neither is printed.
 _MAX_PRINTED_RELATIVE_ERROR = 1e4
-#: Difference of criteria that decides between laws.
+#: Difference of AIC above which the comparison of two laws is decisive.
 _DECISIVE_AIC_DIFFERENCE = 10.0
-#: Mark of standard errors that are not valid.
+#: Mark of invalid standard errors.
 _INVALID_ERROR_MARK = "*"
 
 
 def is_fit(dataset: xr.Dataset) -> bool:
-    """True of fits of records."""
+    """Return True if a dataset contains fits of records.
+
+    Parameters
+    ----------
+    dataset : xarray.Dataset
+        Dataset to check.
+
+    Returns
+    -------
+    bool
+        True if the dataset contains fits.
+    """
     return "rows_fitted" in dataset
 
 
 def split_fits(dataset: xr.Dataset) -> list[xr.Dataset]:
-    """The fits that a dataset holds, one by one; of several windows, that of the whole one."""
+    """Split a dataset into its fits.
+
+    If the fits have several windows, only the fits of the longest window are returned.
+
+    Parameters
+    ----------
+    dataset : xarray.Dataset
+        Dataset from ``rsfstudy.fit``.
+
+    Returns
+    -------
+    list of xarray.Dataset
+        One dataset per fit.
+
+    Raises
+    ------
+    DataError
+        If the dataset contains no fits.
+    """
     if not is_fit(dataset):
         raise DataError("the dataset holds no fit: it is not what rsfstudy.fit gives")
     if "part" in dataset.dims:
@@ -62,19 +93,36 @@ def split_fits(dataset: xr.Dataset) -> list[xr.Dataset]:
 
 
 def record_and_step_of_fit(fit: xr.Dataset) -> dict[str, Any]:
-    """Record and step of a fit, where there are several."""
+    """Return the record and the step of a fit.
+
+    Parameters
+    ----------
+    fit : xarray.Dataset
+        Dataset with a single fit.
+
+    Returns
+    -------
+    dict of str to object
+        The keys are ``record`` and ``step``. A key is missing if the dataset has no coordinate of
+        this name, because all fits have the same record or step.
+    """
     found = {n: fit[n].item() for n in ("record", "step") if n in fit.coords}
     return {n: value if n == "record" else int(value) for n, value in found.items()}
 
 
 def parameter_headings(fit: xr.Dataset) -> dict[str, str]:
-    """Return the column headings of the fitted parameters, in the order of the table.
+    """Return the column headings of the fitted parameters.
+
+    Parameters
+    ----------
+    fit : xarray.Dataset
+        Dataset with a single fit.
 
     Returns
     -------
     dict of str to str
-        Name of each variable of the dataset, and its heading in the notation of laboratories, such
-        as ``Dc`` and ``mu_0``.
+        Heading of each variable in the notation of laboratories, such as ``Dc`` and ``mu_0``. The
+        headings have the order of the table.
     """
     names, found = [*map(str, fit["parameter"].values), "a_minus_b"], {}
     for short in dict.fromkeys(("a", "b", "b1", "b2", "a_minus_b", *PARAMETERS)):
@@ -86,14 +134,29 @@ def parameter_headings(fit: xr.Dataset) -> dict[str, str]:
 
 
 def fit_table(dataset: xr.Dataset) -> pd.DataFrame:
-    """Return a table with one row per fit and the column names used in laboratories.
+    """Return a table of fits with the column names used in laboratories.
 
-    Lengths are in um. The columns ``<name>_std`` contain standard errors. If the status of a row is
-    ``errors_not_valid``, the standard errors of the row are not valid. The columns
-    ``<name>_windows`` contain the range of a parameter over the windows. The column ``p_value``
-    contains the p-value of the autocorrelation test of the whitened residuals. The column
-    ``normal_stress`` contains the mean normal stress before the step in MPa, and ``k`` contains the
-    stiffness divided by this normal stress, in 1/um. Parameters that were not free are NaN.
+    Parameters
+    ----------
+    dataset : xarray.Dataset
+        Dataset from ``rsfstudy.fit``.
+
+    Returns
+    -------
+    pandas.DataFrame
+        Table with one row per fit. Lengths are in um. Parameters that were not free are NaN.
+
+        - Columns ``<name>_std`` contain standard errors. The standard errors of a row with the
+          status ``errors_not_valid`` are not valid.
+        - Columns ``<name>_windows`` contain the range of a parameter over the windows.
+        - ``k`` is the stiffness divided by the normal stress in 1/um.
+        - ``normal_stress`` is the mean normal stress before the step in MPa.
+        - ``p_value`` is the p-value of the autocorrelation test of the whitened residuals.
+
+    Raises
+    ------
+    DataError
+        If the dataset contains no fits.
     """
     rows = []
     for one in split_fits(dataset):
@@ -118,8 +181,8 @@ def fit_table(dataset: xr.Dataset) -> pd.DataFrame:
 def _normal_stresses_in_mpa(fit: xr.Dataset) -> dict[str, float]:
     """Return the normal stress before each step in MPa.
 
-    If the fit has one step, the key is ``normal_stress``. If the fit has several steps, there is
-    one numbered key per step. Normal stresses that are not finite are left out.
+    If the fit has one step, the key is ``normal_stress``. If the fit has several steps, each step
+    has a numbered key. Normal stresses that are not finite are omitted.
     """
     names = [str(n) for n in fit.data_vars if str(n).startswith("normal_stress_before_")]
     stresses = {n: fit[n].item() * 1e-6 for n in names or ["normal_stress_before"] if n in fit}
@@ -128,17 +191,41 @@ def _normal_stresses_in_mpa(fit: xr.Dataset) -> dict[str, float]:
 
 
 def status_label_of_fit(fit: xr.Dataset) -> str:
-    """Label of the status of a fit."""
+    """Return the label of the status of a fit.
+
+    Parameters
+    ----------
+    fit : xarray.Dataset
+        Dataset with a single fit.
+
+    Returns
+    -------
+    str
+        Label such as ``ok`` or ``not_identified``.
+    """
     return STATUS_LABELS[int(fit["status"])]
 
 
-# ---- as it is printed and shown -----------------------------------------------------------------
+# ---- tables for commands and reports ------------------------------------------------------------
 
 
 def all_fits_are_valid(dataset: xr.Dataset) -> bool:
-    """Return True if each fit has verified values and valid standard errors.
+    """Return True if each fit has values and valid standard errors.
 
-    The status ``not_identified`` counts as answered.
+    Parameters
+    ----------
+    dataset : xarray.Dataset
+        Dataset from ``rsfstudy.fit``.
+
+    Returns
+    -------
+    bool
+        True if the status of each fit is ``ok`` or ``not_identified``.
+
+    Raises
+    ------
+    DataError
+        If the dataset contains no fits.
     """
     return all(
         status_label_of_fit(one) in _STATUS_LABELS_OF_FITS_WITH_VALUES
@@ -147,7 +234,20 @@ def all_fits_are_valid(dataset: xr.Dataset) -> bool:
 
 
 def summarise_fits(dataset: xr.Dataset) -> Iterator[TextTable | str]:
-    """All fits, and what is to be said of each; of several steps one row each in the end."""
+    """Yield tables of all fits, with remarks on each fit.
+
+    Parameters
+    ----------
+    dataset : xarray.Dataset
+        Dataset from ``rsfstudy.fit``.
+
+    Yields
+    ------
+    TextTable or str
+        Parameter tables, with up to three fits of one step next to each other, followed by remarks
+        and a comparison of the laws. If there are several steps or records, a final table has one
+        row per fit.
+    """
     places: dict[str, list[xr.Dataset]] = {}
     for one in split_fits(dataset):
         where = ", ".join(f"{n} {value}" for n, value in record_and_step_of_fit(one).items())
@@ -169,7 +269,10 @@ def summarise_fits(dataset: xr.Dataset) -> Iterator[TextTable | str]:
 
 
 def _compare_laws_of_fits(fits: Sequence[xr.Dataset]) -> Iterator[str]:
-    """Which law explains a record best, and whether by enough."""
+    """Yield a sentence that names the law with the lowest AIC.
+
+    The sentence also reports if the difference to the next law is decisive.
+    """
     known = [(one["criterion"].item(), str(one["law"].item())) for one in fits]
     known = sorted(pair for pair in known if math.isfinite(pair[0]))
     if len(known) > 1:
@@ -184,7 +287,7 @@ def _compare_laws_of_fits(fits: Sequence[xr.Dataset]) -> Iterator[str]:
 
 
 def _summary_row_of_fit(fit: xr.Dataset) -> dict[str, str]:
-    """Row of a fit in the table of all."""
+    """Return the row of a fit in the final table."""
     few = {
         n: format_with_stderr(fit, name)
         for name, n in parameter_headings(fit).items()
@@ -195,6 +298,7 @@ def _summary_row_of_fit(fit: xr.Dataset) -> dict[str, str]:
 
 
 def _parameter_table(table_title: str, fits: Sequence[xr.Dataset]) -> TextTable:
+    """Return a table of the parameters with one column per fit."""
     columns = {str(one["law"].item()): _build_parameter_column(one) for one in fits}
     headings = next(iter(columns.values()))
     rows = [{"parameter": h, **{law: c[h] for law, c in columns.items()}} for h in headings]
@@ -203,7 +307,7 @@ def _parameter_table(table_title: str, fits: Sequence[xr.Dataset]) -> TextTable:
 
 
 def _build_parameter_column(fit: xr.Dataset) -> dict[str, str]:
-    """The parameters of a fit, how well it explains its rows, and the noise that is left."""
+    """Return the parameters, the quality and the noise of a fit."""
     found = {
         n + _bracketed_units(split_window_number(name)[0]): format_with_stderr(fit, name)
         for name, n in parameter_headings(fit).items()
@@ -227,7 +331,10 @@ def _build_parameter_column(fit: xr.Dataset) -> dict[str, str]:
 
 
 def _bracketed_units(parameter_name: str) -> str:
-    """Units of a parameter, in brackets behind its name."""
+    """Return the units of a parameter in brackets.
+
+    The string is empty if the parameter is dimensionless.
+    """
     units = PARAMETERS[parameter_name].units if parameter_name in PARAMETERS else "1"
     if units.startswith("um-"):
         units = f"1/um^{units[3:]}".removesuffix("^1")
@@ -235,7 +342,7 @@ def _bracketed_units(parameter_name: str) -> str:
 
 
 def _describe_window(fit: xr.Dataset) -> str:
-    """The step and the window of a fit."""
+    """Describe the velocities of the step and the fitted window."""
     speeds = (fit[n].item() for n in ("velocity_before", "velocity_after"))
     ends = (fit[n].item() for n in ("window_begins", "window_ends"))
     rows = int(fit["rows_fitted"].item())
@@ -246,9 +353,21 @@ def _describe_window(fit: xr.Dataset) -> str:
 
 
 def format_with_stderr(fit: xr.Dataset, parameter_name: str) -> str:
-    """Format a value with its standard error, rounded to two digits of the error.
+    """Format a fitted parameter with its standard error.
 
-    An asterisk marks a standard error that is not valid.
+    The value and the error are rounded to two digits of the error.
+
+    Parameters
+    ----------
+    fit : xarray.Dataset
+        Dataset with a single fit.
+    parameter_name : str
+        Name of the parameter.
+
+    Returns
+    -------
+    str
+        Formatted parameter. An asterisk marks a standard error that is not valid.
     """
     text = _format_rounded_to_error(
         fit[parameter_name].item(), fit[f"{parameter_name}_stderr"].item()
@@ -258,7 +377,10 @@ def format_with_stderr(fit: xr.Dataset, parameter_name: str) -> str:
 
 
 def _format_rounded_to_error(value: float, error: float) -> str:
-    """Format a value with its standard error, rounded to two digits of the error."""
+    """Format a value with its standard error.
+
+    The value and the error are rounded to two digits of the error.
+    """
     if not math.isfinite(value):
         return "-"
     if error > _MAX_PRINTED_RELATIVE_ERROR * abs(value) > 0.0:
@@ -278,8 +400,8 @@ def _format_rounded_to_error(value: float, error: float) -> str:
 def _iterate_fit_remarks(fit: xr.Dataset) -> Iterator[str]:
     """Yield remarks on a fit.
 
-    The remarks are the message of the fit, the differences between windows, the intervals of the
-    posterior, and the result of the autocorrelation test.
+    The remarks include the message of the fit, the differences between windows, the credible
+    intervals of the posterior, and the result of the autocorrelation test.
     """
     law, message = fit["law"].item(), str(fit["message"].item())
     if status_label_of_fit(fit) == Status.ERRORS_NOT_VALID.label:

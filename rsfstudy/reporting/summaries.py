@@ -1,5 +1,6 @@
-"""Summary of a dataset, whatever it is of: tables, lists and sentences, which a terminal prints,
-and a page or a notebook shows.
+"""Summaries of datasets for commands, reports and notebooks.
+
+The main function is ``build_summary_pieces``. A summary consists of tables, mappings and sentences.
 """
 
 from __future__ import annotations
@@ -26,8 +27,18 @@ TableMappingOrSentence = TextTable | Mapping[str, str] | str
 
 
 def build_summary_pieces(dataset: xr.Dataset) -> Iterator[TableMappingOrSentence]:
-    """The numbers of a dataset: the headline and the slopes of a study, the parameters of fits, or
-    what a reader of a motion, or of another answer for one scene, looks for first.
+    """Yield the summary of a dataset.
+
+    Parameters
+    ----------
+    dataset : xarray.Dataset
+        Results of a study, fits, or a dataset of one scene.
+
+    Yields
+    ------
+    TextTable, mapping of str to str, or str
+        The summary of a study includes the primary output and the reductions. The summary of a
+        motion includes its extremes, the stability of the scene and the events.
     """
     if fit_tables.is_fit(dataset):
         yield from fit_tables.summarise_fits(dataset)
@@ -41,7 +52,7 @@ def build_summary_pieces(dataset: xr.Dataset) -> Iterator[TableMappingOrSentence
         try:
             yield describe_stability(dataset.rsf.scene)
             yield build_events_table(dataset.rsf.events())
-        except InvalidValue as error:  # a part of its scene is a user's own
+        except InvalidValue as error:  # The scene has a user-defined part.
             yield f"neither its stability nor its events: {error}"
     else:
         yield tables.build_scene_answer_table(dataset)
@@ -50,18 +61,55 @@ def build_summary_pieces(dataset: xr.Dataset) -> Iterator[TableMappingOrSentence
 def motion_pieces(
     motion: xr.Dataset, scene: Scene, catalogue: xr.Dataset
 ) -> list[TableMappingOrSentence]:
-    """What a reader of a motion looks for first, the stability of its scene, and its events."""
+    """Return the summary of a motion.
+
+    Parameters
+    ----------
+    motion : xarray.Dataset
+        Motion from ``rsfstudy.simulate``.
+    scene : Scene
+        Scene of the motion.
+    catalogue : xarray.Dataset
+        Events of the motion.
+
+    Returns
+    -------
+    list of (mapping of str to str, str, or TextTable)
+        Extremes of the motion, stability of the scene, and table of the events.
+    """
     return [summarise_motion(motion), describe_stability(scene), build_events_table(catalogue)]
 
 
 def is_motion(dataset: xr.Dataset) -> bool:
-    """True of a motion, or a part of one that still holds what is told of it."""
+    """Return True if a dataset is a motion or a part of a motion.
+
+    Parameters
+    ----------
+    dataset : xarray.Dataset
+        Dataset to check.
+
+    Returns
+    -------
+    bool
+        True if the dataset has at least one time and all variables that the summary needs.
+    """
     told = {"load_point_displacement", "friction_coefficient", "log10_slip_rate", "shear_stress"}
     return dataset.sizes.get("time", 0) > 0 and {*told, "slip"} <= set(dataset.variables)
 
 
 def describe_dataset_origin(dataset: xr.Dataset) -> dict[str, str]:
-    """What a dataset is of, and where it comes from, by what each is."""
+    """Describe the contents and the provenance of a dataset.
+
+    Parameters
+    ----------
+    dataset : xarray.Dataset
+        Results of a study, or a dataset of one scene.
+
+    Returns
+    -------
+    dict of str to str
+        Descriptions of the scene or the lattice, the command, the versions and the status.
+    """
     if not is_of_single_scene(dataset):
         return tables.describe_study_origin(dataset)
     about, scene = dataset.attrs, read_scene_fields(dataset)
@@ -76,7 +124,19 @@ def describe_dataset_origin(dataset: xr.Dataset) -> dict[str, str]:
 
 
 def summarise_motion(dataset: xr.Dataset) -> dict[str, str]:
-    """What a reader of a motion looks for first."""
+    """Summarise a motion by its duration and its extremes.
+
+    Parameters
+    ----------
+    dataset : xarray.Dataset
+        Motion from ``rsfstudy.simulate``, in any units.
+
+    Returns
+    -------
+    dict of str to str
+        Duration, peak friction, peak slip rate, and friction at the end. If the motion exceeds the
+        instability norm without inertia or radiation damping, the time is included.
+    """
     time, friction = dataset["time"], dataset["friction_coefficient"]
     over_reference = (10.0 ** dataset["log10_slip_rate"]).assign_attrs(scale="V_*")
     rate, unit = dataset.get("slip_rate", over_reference), format_units(time)
@@ -93,14 +153,36 @@ def summarise_motion(dataset: xr.Dataset) -> dict[str, str]:
 
 
 def describe_stability(scene: Scene) -> str:
-    """Whether steady sliding at V_* is stable, by the stiffness."""
+    """Describe the stability of steady sliding at V_*.
+
+    Parameters
+    ----------
+    scene : Scene
+        Scene to describe.
+
+    Returns
+    -------
+    str
+        Sentence with the ratio of the stiffness to the critical stiffness.
+    """
     sliding = "stable" if scene.stiffness_ratio > 1.0 else "unstable"
     ratio = f"{scene.stiffness_ratio:.4g} of the critical"
     return f"stiffness is {ratio}: steady sliding at V_* is {sliding}"
 
 
 def build_events_table(event_catalogue: xr.Dataset) -> TextTable | str:
-    """The events of a motion, without their errors."""
+    """Build a table of the events of a motion, without errors.
+
+    Parameters
+    ----------
+    event_catalogue : xarray.Dataset
+        Events of a motion.
+
+    Returns
+    -------
+    TextTable or str
+        Table of the first 24 events, or a sentence if there is no event.
+    """
     limit = f"faster than {event_catalogue.attrs['slip_rate_threshold']:g} V_*"
     count = event_catalogue.sizes["event"]
     if not count:

@@ -1,4 +1,4 @@
-"""Tables of results, as texts: what commands print, and what a report shows."""
+"""Tables of results as plain text, for commands and reports."""
 
 from __future__ import annotations
 
@@ -34,36 +34,37 @@ from rsfstudy.storage import find_primary_output, read_declaration, read_provena
 from rsfstudy.study import NOT_APPLICABLE_VERDICT, VERDICTS, format_verdict_row
 from rsfstudy.vocabulary import find_quantity
 
-#: Most cells of a lattice that are shown, unless few more are all; and most that failed.
+#: Maximum number of cells in a table of a thinned lattice, maximum number of cells of a lattice
+#: that is not thinned, and maximum number of failed cells in a table.
 MAX_CELLS_SHOWN, _MAX_CELLS_SHOWN_WITHOUT_THINNING, _MAX_FAILURES = 24, 36, 20
-#: Quantities that are set at one point beyond which fewer cells are shown.
+#: Number of fields per point of a numbered axis above which fewer cells are shown.
 _MAX_POINT_FIELDS_WITHOUT_THINNING = 4
-#: Digits of a float.
+#: Maximum number of significant digits of a float.
 _MAX_DIGITS = 15
-#: What is told of a slope, by the ends of names: headings and formats.
+#: Headings and formats of the columns of a slope table, by the suffix of the variable name.
 _COLUMNS_OF_SLOPE_TABLE = {
     "stderr": ("standard error", ".2g"),
     "misfit": ("largest misfit", ".2g"),
     "points": ("points", ".0f"),
     "error": ("numerical error", ".2g"),
 }
-#: Variables of columns, each with what makes a text of a value, by the headings.
+#: Name of a variable and function that formats a value, by the column heading.
 VariableAndFormatByHeading = dict[str, tuple[str, Callable[[Any], str]]]
 
 
 @dataclass(frozen=True)
 class TextTable:
-    """Rows of texts under headings.
+    """Table with rows of text.
 
     Parameters
     ----------
-    rows : sequence of mapping
-        Each a row, by the headings.
-    caption : str
-        What it shows.
-    wrappable_columns : collection of str
-        Headings of columns whose texts may be broken between words; no other is.
-    colours : sequence of str
+    rows : sequence of mapping of str to str
+        Rows of the table. The keys are the column headings.
+    caption : str, optional
+        Caption of the table.
+    wrappable_columns : collection of str, optional
+        Headings of the columns whose texts may be wrapped between words.
+    colours : sequence of str, optional
         Colour of the last cell of each row.
     """
 
@@ -74,12 +75,39 @@ class TextTable:
 
 
 def format_number_or_dash(value: float, format_specification: str = ".8g") -> str:
-    """A number, or a dash where there is none."""
+    """Format a number, or return a dash for NaN.
+
+    Parameters
+    ----------
+    value : float
+        Number to format.
+    format_specification : str, default: ".8g"
+        Format specification.
+
+    Returns
+    -------
+    str
+        Formatted number.
+    """
     return "-" if np.isnan(value) else format(value, format_specification)
 
 
 def format_rounded_to_error(value: float, error: float) -> str:
-    """A number to two digits of its error; to eight where it has none, or is all error."""
+    """Format a number, rounded to two digits of its error.
+
+    Parameters
+    ----------
+    value : float
+        Number to format.
+    error : float
+        Error of the number.
+
+    Returns
+    -------
+    str
+        Formatted number. If the error is zero, NaN, or larger than the number, the number has eight
+        significant digits.
+    """
     if not 0.0 < error < abs(value):
         return format_number_or_dash(value)
     digits = math.floor(math.log10(abs(value))) - math.floor(math.log10(error)) + 2
@@ -87,8 +115,18 @@ def format_rounded_to_error(value: float, error: float) -> str:
 
 
 def build_scene_answer_table(dataset: xr.Dataset) -> TextTable:
-    """The numbers of an answer for one scene, each with its units and its error estimate; words for
-    codes.
+    """Build a table of the scalar variables of a dataset of one scene.
+
+    Parameters
+    ----------
+    dataset : xarray.Dataset
+        Dataset of one scene, such as a critical step.
+
+    Returns
+    -------
+    TextTable
+        Table with one row per variable: name, value with units, error estimate, and description.
+        Codes of categorical variables are replaced by their meanings.
     """
     rows = []
     for name, values in dataset.data_vars.items():
@@ -108,19 +146,54 @@ def build_scene_answer_table(dataset: xr.Dataset) -> TextTable:
 
 
 def format_units(variable: xr.DataArray) -> str:
-    """The units of values, or what those without units are measured in; "1" for numbers."""
+    """Format the units of a variable.
+
+    Parameters
+    ----------
+    variable : xarray.DataArray
+        Variable with the attribute ``units`` or ``scale``.
+
+    Returns
+    -------
+    str
+        Units, or the scale by which the variable is normalised. The string is "1" if the variable
+        is a pure number.
+    """
     units = re.sub(r" (s|[num]?m)-1\b", r"/\1", units_or_scale_of_variable(variable.attrs) or "1")
     return re.sub(r" \((\w+)\)-1| (\(.*?\))-1", r"/\1\2", units)
 
 
 def format_axis_name(axis_coordinate: xr.DataArray) -> str:
-    """The name of an axis, and its units where it is that of a rig."""
+    """Format the name of an axis, with units if the axis has units.
+
+    Parameters
+    ----------
+    axis_coordinate : xarray.DataArray
+        Coordinate of the axis.
+
+    Returns
+    -------
+    str
+        Name, followed by the units in brackets if the units differ from the usual units.
+    """
     name, units = str(axis_coordinate.name), axis_coordinate.attrs.get("units", "1")
     return name if units in ("1", find_quantity(name).units) else f"{name} ({units})"
 
 
 def format_status_counts(dataset: xr.Dataset) -> str:
-    """How many cells ended how, with what that means where none is ok, and their work."""
+    """Format the number of cells per status, and their work.
+
+    Parameters
+    ----------
+    dataset : xarray.Dataset
+        Results of a study.
+
+    Returns
+    -------
+    str
+        Counts and the total number of right-hand side evaluations. If no cell has the status
+        ``ok``, each status is followed by its meaning.
+    """
     work, counts = int(dataset["rhs_evaluations"].sum()), count_statuses(dataset)
     nothing = Status.OK.label not in counts
     told = ", ".join(
@@ -136,8 +209,24 @@ def describe_scene_and_rig_fields(
     rig_values: Mapping[str, float],
     varied_names: Collection[str] = (),
 ) -> dict[str, str]:
-    """Fields of a scene that have a value, under the heading stated, those that are 0, and what the
-    rig states, but for what is varied; nothing of what there is none of.
+    """Describe the fields of a scene and of a rig.
+
+    Parameters
+    ----------
+    heading : str
+        Key of the fields that have a nonzero value.
+    scene_fields : mapping of str to object
+        Fields of the scene.
+    rig_values : mapping of str to float
+        Quantities of the rig in SI units.
+    varied_names : collection of str, optional
+        Names of the fields that vary along an axis, which are omitted.
+
+    Returns
+    -------
+    dict of str to str
+        Descriptions of the nonzero fields, the zero fields, the rig, and the slip rate of the
+        instability norm. Empty descriptions are omitted.
     """
     scene_fields = {n: v for n, v in scene_fields.items() if n not in varied_names}
     sizes = in_display_units(rig_values, varied_names)
@@ -151,13 +240,25 @@ def describe_scene_and_rig_fields(
     norm, period = scene_fields.get("instability_norm"), scene_fields.get("period")
     if norm and period and {"slip_distance", "reference_velocity"} <= set(sizes):
         rate = norm * math.tau * sizes["slip_distance"][0] / period
-        if rate > sizes["reference_velocity"][0]:  # else it is no norm that tells anything
+        # A norm below the reference velocity does not indicate an instability.
+        if rate > sizes["reference_velocity"][0]:
             told["unstable from"] = f"a slip rate of {rate:.4g} um/s on"
     return {name: text for name, text in told.items() if text}
 
 
 def describe_study_origin(dataset: xr.Dataset) -> dict[str, str]:
-    """What the results of a study are of, and where they come from, by what each is."""
+    """Describe the lattice and the provenance of the results of a study.
+
+    Parameters
+    ----------
+    dataset : xarray.Dataset
+        Results of a study.
+
+    Returns
+    -------
+    dict of str to str
+        Descriptions of the lattice, the fixed fields, the cells, the command and the versions.
+    """
     attrs, about = dataset.attrs, read_provenance(dataset)
     dims, declared = dataset["status"].dims, read_declaration(dataset)
     varied = {
@@ -180,7 +281,22 @@ def describe_study_origin(dataset: xr.Dataset) -> dict[str, str]:
 def build_rows_along_dimensions(
     dataset: xr.Dataset, dimensions: Iterable[Hashable], columns: VariableAndFormatByHeading
 ) -> list[dict[str, str]]:
-    """A row for each point of some dimensions: where it is, then columns of variables."""
+    """Build one row for each point of some dimensions.
+
+    Parameters
+    ----------
+    dataset : xarray.Dataset
+        Dataset with the variables of the columns.
+    dimensions : iterable of hashable
+        Dimensions of the rows.
+    columns : dict of str to (str, callable)
+        Variable of each column, and the function that formats a value, by heading.
+
+    Returns
+    -------
+    list of dict of str to str
+        Rows with the coordinates of the point, followed by the columns.
+    """
     dimensions, found = list(map(str, dimensions)), []
     for at in np.ndindex(*(dataset.sizes[d] for d in dimensions)):
         one = dataset.isel(dict(zip(dimensions, at, strict=True)))
@@ -190,8 +306,20 @@ def build_rows_along_dimensions(
 
 
 def build_primary_output_table(dataset: xr.Dataset) -> TextTable:
-    """The headline along the axes, with what is set at points that only have numbers, its error
-    estimate and how each cell ended; no row where there is none.
+    """Build a table of the primary output along the axes.
+
+    The table contains the coordinates, the error estimates, and the status if some cells have no
+    result. If the lattice has many cells, the table contains a selection of the cells.
+
+    Parameters
+    ----------
+    dataset : xarray.Dataset
+        Results of a study.
+
+    Returns
+    -------
+    TextTable
+        Table, which is empty if the study has no primary output.
     """
     name = find_primary_output(dataset)
     if name is None:
@@ -226,7 +354,7 @@ def build_primary_output_table(dataset: xr.Dataset) -> TextTable:
 
 
 def _fields_along_numbered_axes(dataset: xr.Dataset) -> list[str]:
-    """What is set along axes whose points only have numbers: samples, and cases."""
+    """Return the fields that vary along numbered axes, such as samples."""
     axes = [axis["values"] for axis in read_declaration(dataset).axes]
     columns = [
         v for v in axes if isinstance(v, Mapping) and isinstance(next(iter(v.values())), list)
@@ -235,7 +363,18 @@ def _fields_along_numbered_axes(dataset: xr.Dataset) -> list[str]:
 
 
 def summarise_study_in_lines(dataset: xr.Dataset) -> list[str]:
-    """The headline and the slopes in a line each, and how cells ended in another."""
+    """Summarise the results of a study in lines of text.
+
+    Parameters
+    ----------
+    dataset : xarray.Dataset
+        Results of a study.
+
+    Returns
+    -------
+    list of str
+        Range of the primary output, one line per slope, and the counts of the status.
+    """
     lines, converted = [], convert_to_display_units(dataset)
     if (name := find_primary_output(dataset)) is not None:
         values = converted[name if name in converted else drop_ratio_from_name(name)]
@@ -250,8 +389,18 @@ def summarise_study_in_lines(dataset: xr.Dataset) -> list[str]:
 
 
 def reduction_tables(dataset: xr.Dataset) -> Iterator[TextTable]:
-    """Slopes and their like, those with a standard error, with one row for each point of their
-    dimensions; and, where integrators were compared, the cheapest for each number of digits.
+    """Yield tables of the slopes and of the comparison of integrators.
+
+    Parameters
+    ----------
+    dataset : xarray.Dataset
+        Results of a study.
+
+    Yields
+    ------
+    TextTable
+        One table for each reduction with a standard error, such as a slope. If the study compares
+        integrators, a final table lists the cheapest integrator for each accuracy.
     """
     converted = convert_to_display_units(dataset)
     for slope in _names_of_slope_reductions(converted):
@@ -271,16 +420,38 @@ def reduction_tables(dataset: xr.Dataset) -> Iterator[TextTable]:
 
 
 def reduction_pieces(dataset: xr.Dataset) -> Iterator[TextTable | str]:
-    """The tables of reductions, and a sentence on each reduction that has no results."""
+    """Yield the tables of reductions, and the reasons for missing reductions.
+
+    Parameters
+    ----------
+    dataset : xarray.Dataset
+        Results of a study.
+
+    Yields
+    ------
+    TextTable or str
+        Tables, followed by one sentence per reduction without results.
+    """
     yield from reduction_tables(dataset)
     for name, why in missing_result_reasons(dataset).items():
         yield f"no {name}: {why}"
 
 
 def find_refusal_reasons(dataset: xr.Dataset) -> dict[str, str]:
-    """Why reductions refuse to draw on cells, by their names."""
+    """Find the reasons why reductions were not computed from their cells.
+
+    Parameters
+    ----------
+    dataset : xarray.Dataset
+        Results of a study.
+
+    Returns
+    -------
+    dict of str to str
+        Reasons by the name of the reduction.
+    """
     named = [str(reduction["name"]) for reduction in read_declaration(dataset).reductions]
-    named.sort(key=len, reverse=True)  # a name may begin with another
+    named.sort(key=len, reverse=True)  # A name may begin with another name.
     found: dict[str, str] = {}
     for result, values in dataset.data_vars.items():
         name = next((n for n in named if f"{result}_".startswith(f"{n}_")), "")
@@ -290,7 +461,18 @@ def find_refusal_reasons(dataset: xr.Dataset) -> dict[str, str]:
 
 
 def incomplete_notes(results: xr.Dataset) -> list[str]:
-    """How many cells failed, with which status, and which reductions refused to draw on cells."""
+    """Describe failed cells and reductions that could not be computed.
+
+    Parameters
+    ----------
+    results : xarray.Dataset
+        Results of a study.
+
+    Returns
+    -------
+    list of str
+        Notes, or an empty list if the results are complete.
+    """
     told = [f"no {name}: {why}" for name, why in find_refusal_reasons(results).items()]
     if failed := count_failures(results):
         each = ", ".join(f"{label} {number}" for label, number in failed.items())
@@ -300,7 +482,18 @@ def incomplete_notes(results: xr.Dataset) -> list[str]:
 
 
 def missing_result_reasons(dataset: xr.Dataset) -> dict[str, str]:
-    """Why reductions have no results, by their names."""
+    """Find the reasons why reductions have no results.
+
+    Parameters
+    ----------
+    dataset : xarray.Dataset
+        Results of a study.
+
+    Returns
+    -------
+    dict of str to str
+        Reasons by the name of the reduction.
+    """
     found, there = find_refusal_reasons(dataset), tuple(map(str, dataset.data_vars))
     for stated_as in read_declaration(dataset).reductions:
         about: Mapping[str, Any] = {**stated_as}
@@ -313,8 +506,18 @@ def missing_result_reasons(dataset: xr.Dataset) -> dict[str, str]:
 
 
 def note_on_norms_near_load_velocity(dataset: xr.Dataset) -> str:
-    """How many answers of a study of a rig are for a norm near the load point velocity, and what
-    the first of them says; empty where there are none.
+    """Describe results of a rig with a norm close to the load point velocity.
+
+    Parameters
+    ----------
+    dataset : xarray.Dataset
+        Results of a study.
+
+    Returns
+    -------
+    str
+        Number of results with a norm close to the load point velocity, and the first message. The
+        string is empty if the number is zero, or if the study has no rig.
     """
     if read_declaration(dataset).laboratory is None:
         return ""
@@ -324,12 +527,13 @@ def note_on_norms_near_load_velocity(dataset: xr.Dataset) -> str:
 
 
 def _names_of_slope_reductions(dataset: xr.Dataset) -> list[str]:
-    """Names of the reductions that have a standard error."""
+    """Return the names of the reductions that have a standard error."""
     named = [reduction["name"] for reduction in read_declaration(dataset).reductions]
     return [name for name in named if {name, f"{name}_stderr"} <= set(dataset.data_vars)]
 
 
 def _slope_table(dataset: xr.Dataset, reduction_name: str) -> TextTable:
+    """Return a table of a slope with its standard error and misfit."""
     dims, words = (
         dataset[reduction_name].dims,
         dataset[reduction_name].attrs.get("comment", reduction_name),
@@ -354,8 +558,18 @@ def _slope_table(dataset: xr.Dataset, reduction_name: str) -> TextTable:
 
 
 def claims_table(verdicts: pd.DataFrame) -> TextTable | str:
-    """Claims and their verdicts, as `rsfstudy.check` gives them, of one study or of several; a
-    sentence where none applies.
+    """Build a table of claims and their verdicts.
+
+    Parameters
+    ----------
+    verdicts : pandas.DataFrame
+        Verdicts of one or several studies, from ``rsfstudy.check``.
+
+    Returns
+    -------
+    TextTable or str
+        Table of the claims. If no claim applies, the function returns a sentence, which is empty if
+        there are no claims.
     """
     rows = verdicts.to_dict("records")
     if not any(row["verdict"] != NOT_APPLICABLE_VERDICT for row in rows):
@@ -374,7 +588,18 @@ def claims_table(verdicts: pd.DataFrame) -> TextTable | str:
 
 
 def count_verdicts(verdicts: pd.DataFrame) -> str:
-    """How many claims have which verdict; where none applies, why."""
+    """Count the claims per verdict.
+
+    Parameters
+    ----------
+    verdicts : pandas.DataFrame
+        Verdicts, from ``rsfstudy.check``.
+
+    Returns
+    -------
+    str
+        Number of claims per verdict. If no claim applies, the string contains the reason.
+    """
     given = list(verdicts["verdict"])
     if set(given) == {NOT_APPLICABLE_VERDICT}:
         return "other values or units have no published numbers"
@@ -382,7 +607,22 @@ def count_verdicts(verdicts: pd.DataFrame) -> str:
 
 
 def summarise_verdicts(dataset: xr.Dataset, verdicts: pd.DataFrame) -> tuple[str, list[str]]:
-    """How many claims have which verdict, and what went wrong, in words."""
+    """Summarise the verdicts of claims and the failures of cells.
+
+    Parameters
+    ----------
+    dataset : xarray.Dataset
+        Results of a study.
+    verdicts : pandas.DataFrame
+        Verdicts, from ``rsfstudy.check``.
+
+    Returns
+    -------
+    counts : str
+        Number of claims per verdict.
+    problems : list of str
+        Failures of cells, and claims whose verdict differs from the expected verdict.
+    """
     wrong = [f"{count} {label}" for label, count in count_failures(dataset).items()]
     wrong += [f"{claim} moved" for claim in dict.fromkeys(verdicts["id"][verdicts["moved"]])]
     return count_verdicts(verdicts), wrong
@@ -391,7 +631,22 @@ def summarise_verdicts(dataset: xr.Dataset, verdicts: pd.DataFrame) -> tuple[str
 def build_frame_of_cells(
     dataset: xr.Dataset, cell_mask: xr.DataArray, axis_names: Sequence[str]
 ) -> pd.DataFrame:
-    """Some cells, one row each: their places on axes, how each ended, and the message."""
+    """Build a table of selected cells.
+
+    Parameters
+    ----------
+    dataset : xarray.Dataset
+        Results of a study.
+    cell_mask : xarray.DataArray
+        True for the selected cells.
+    axis_names : sequence of str
+        Names of the axes.
+
+    Returns
+    -------
+    pandas.DataFrame
+        Table with one row per cell: coordinates on the axes, ``status`` and ``message``.
+    """
     at = cell_mask.values
     columns = {name: dataset[name].broadcast_like(cell_mask).values[at] for name in axis_names}
     columns["status"] = [STATUS_LABELS[code] for code in dataset["status"].values[at].tolist()]
@@ -399,7 +654,22 @@ def build_frame_of_cells(
 
 
 def failures_table(dataset: xr.Dataset, file: str) -> tuple[TextTable, list[str]]:
-    """The first cells that failed, and the commands that compute each alone from a file."""
+    """Build a table of the first failed cells, and the commands to rerun them.
+
+    Parameters
+    ----------
+    dataset : xarray.Dataset
+        Results of a study.
+    file : str
+        Path of the results file.
+
+    Returns
+    -------
+    table : TextTable
+        Table with up to 20 failed cells.
+    commands : list of str
+        Commands that recompute each of the cells.
+    """
     status = dataset["status"]
     failed = (status >= int(Status.WORK_BUDGET_SPENT)) & (status != int(Status.PENDING))
     found = build_frame_of_cells(dataset, failed, list(map(str, failed.dims)))
@@ -420,7 +690,22 @@ def failures_table(dataset: xr.Dataset, file: str) -> tuple[TextTable, list[str]
 def format_recompute_command(
     dataset: xr.Dataset, results_file: str, cell_coordinates: Mapping[str, Any]
 ) -> str:
-    """The command that computes one cell alone."""
+    """Format the command that recomputes one cell.
+
+    Parameters
+    ----------
+    dataset : xarray.Dataset
+        Results of a study.
+    results_file : str
+        Path of the results file.
+    cell_coordinates : mapping of str to object
+        Coordinates of the cell on the axes.
+
+    Returns
+    -------
+    str
+        Command for a shell.
+    """
     words = ["rsfstudy", "rerun", results_file]
     declared_in = read_provenance(dataset)["declared_in"]
     if declared_in:
@@ -431,20 +716,40 @@ def format_recompute_command(
 
 
 def count_pending(dataset: xr.Dataset) -> int:
-    """Number of cells that are not computed yet."""
+    """Count the cells that have not been computed.
+
+    Parameters
+    ----------
+    dataset : xarray.Dataset
+        Results of a study.
+
+    Returns
+    -------
+    int
+        Number of cells.
+    """
     return int((dataset["status"] == int(Status.PENDING)).sum())
 
 
 def select_thinned_points(
     dimension_sizes: Mapping[str, int], max_cells: int
 ) -> dict[str, np.ndarray]:
-    """Points of each dimension, both ends and some between, that make so many cells at most.
+    """Select points of each dimension so that the number of cells is limited.
+
+    The first and the last point of a dimension are selected if at least two points of the dimension
+    are selected.
 
     Parameters
     ----------
     dimension_sizes : mapping of str to int
+        Size of each dimension.
     max_cells : int
-        The longest dimensions are thinned first.
+        Maximum number of selected cells. The longest dimensions are thinned first.
+
+    Returns
+    -------
+    dict of str to numpy.ndarray
+        Indices of the selected points of each dimension.
     """
     kept = {dimension: min(size, max_cells) for dimension, size in dimension_sizes.items()}
     while math.prod(kept.values()) > max_cells:
@@ -456,13 +761,35 @@ def select_thinned_points(
 
 
 def count_statuses(dataset: xr.Dataset) -> Mapping[str, int]:
-    """Number of cells that ended with each status."""
+    """Count the cells per status.
+
+    Parameters
+    ----------
+    dataset : xarray.Dataset
+        Results of a study.
+
+    Returns
+    -------
+    mapping of str to int
+        Number of cells by the label of the status.
+    """
     status = np.asarray(dataset["status"].values)
     return {s.label: int((status == int(s)).sum()) for s in Status if (status == int(s)).any()}
 
 
 def count_failures(dataset: xr.Dataset) -> Mapping[str, int]:
-    """Number of cells that failed with each status."""
+    """Count the failed cells per status.
+
+    Parameters
+    ----------
+    dataset : xarray.Dataset
+        Results of a study.
+
+    Returns
+    -------
+    mapping of str to int
+        Number of failed cells by the label of the status.
+    """
     return {
         label: n
         for label, n in count_statuses(dataset).items()
