@@ -40,7 +40,7 @@ def test_eq_3():
 
 
 def test_eq_4b():
-    """dTheta per unit slip is b dtheta/theta per unit slip, with dtheta/dt = 1 - theta V."""
+    """DTheta per unit slip is b dtheta/theta per unit slip, with dtheta/dt = 1 - theta V."""
     b, theta, rate = 0.029, 0.7, 3.0
     per_slip = build_single_state_evolution_function(Scene(law="slowness", a=b / 2.0))(
         math.log(rate), b * math.log(theta)

@@ -282,7 +282,6 @@ def test_results_say_what_they_are_of(cycles):
 
     Quantities that vary along an axis are omitted.
     """
-
     of = summaries.describe_dataset_origin(cycles)
     assert {"a = 0.01", "b_over_a = 1.4"} <= set(of["fixed"].split(", "))
     # In units of the slider, the stiffness depends on D_c and sigma_*.

@@ -87,7 +87,7 @@ def sample_parameters(dataset: xr.Dataset, sample_count: int, seed: int = 0) -> 
     about = {
         "title": "Samples of the parameters of a fit",
         "Conventions": "CF-1.11",
-        **provenance_attributes("dataset.rsf.draw"),
+        **provenance_attributes("dataset.rsf.sample_parameters"),
     }
     return copy_with_cf_encoding(
         xr.Dataset(data, {"draw": ("draw", np.arange(sample_count), number)}, about)

@@ -406,8 +406,21 @@ def build_point_evaluator(rate_function: Function, point_function: Function) -> 
 def scalar_function_for_engine(
     function: Callable[..., Any], engine: str, *arguments: float | Numbers
 ) -> Any:
-    """A function of floats and of tuples of floats as an engine calls it: compiled, for arguments
-    of this form, where its loop is.
+    """Compile a function if the engine is the compiled engine.
+
+    Parameters
+    ----------
+    function : callable
+        Function of floats and of tuples of floats.
+    engine : str
+        Name of the engine.
+    *arguments : float or tuple of float
+        Arguments with the types for which the function is compiled.
+
+    Returns
+    -------
+    callable
+        The compiled function, or the function itself for the other engines.
     """
     return (
         import_compiled_engine().compile_scalar_function(function, *arguments)

@@ -152,6 +152,17 @@ def _build_rate_and_lag_change_function(
 
 
 def build_single_state_evolution_function(scene: Scene) -> Callable[[float, float], float]:
-    """The law of a scene with one state: (ln(V/V_*), Theta) -> dTheta per unit slip."""
+    """Return the state evolution law of a scene with one state.
+
+    Parameters
+    ----------
+    scene : Scene
+        Scene with one state.
+
+    Returns
+    -------
+    callable
+        Function ``(ln(V/V_*), state) -> change of the state per unit slip``.
+    """
     evolve = build_state_evolution_function(scene)
     return lambda log_slip_rate, state: evolve(log_slip_rate, (state,), 0.0)[0]

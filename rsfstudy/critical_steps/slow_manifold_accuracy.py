@@ -7,17 +7,46 @@ from rsfstudy.slider import Scene
 
 
 def inertia_matters_below_norm(scene: Scene, accuracy: Accuracy) -> bool:
-    """True if mass matters up to the instability norm, beyond what the slow manifold holds of
-    it.
+    """Return True if the slow manifold is not accurate enough up to the instability norm.
+
+    Parameters
+    ----------
+    scene : Scene
+        Scene with or without inertia.
+    accuracy : Accuracy
+        Requested accuracy.
+
+    Returns
+    -------
+    bool
+        True if the scene has inertia, and if the relative error of a boundary that is computed on
+        the slow manifold exceeds a tenth of the requested accuracy.
     """
     return scene.has_mass and slow_manifold_relative_error(scene) > 0.1 * accuracy.rtol
 
 
 def slow_manifold_relative_error(scene: Scene) -> float:
-    """Relative error of a boundary computed on the slow manifold up to the norm w of a scene:
-    ``3 [(K/a) w**2]**2``.
+    r"""Estimate the relative error of a boundary that is computed on the slow manifold.
 
-    Mass moves a boundary in proportion to (K/a) w**2, by up to 0.8 of it where the norm is a slip
-    rate of a few V_*; the slow manifold leaves up to 0.9 of its square (the tests measure it).
+    Parameters
+    ----------
+    scene : Scene
+        Scene with inertia.
+
+    Returns
+    -------
+    float
+        Upper estimate of the relative error.
+
+    Notes
+    -----
+    The estimate is
+
+    .. math:: 3 \left(\frac{K}{a} w^2\right)^2
+
+    with the stiffness :math:`K` and the instability norm :math:`w`. Inertia moves a boundary by up
+    to :math:`0.8 (K/a) w^2`, if the norm corresponds to a slip rate of a few :math:`V_*`. The error
+    of the slow manifold is at most 0.9 times the square of this effect. The tests measure both
+    coefficients.
     """
     return 3.0 * (scene.stiffness / scene.a * scene.instability_norm**2) ** 2

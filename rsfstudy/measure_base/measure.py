@@ -567,7 +567,10 @@ def _check_declared_names(measure: Measure) -> None:
 
 
 def relative_work_at_rtol(rtol: float, work_by_digits: Mapping[float, float]) -> float:
-    """Cost of an accuracy over that of the default one, from measured costs by digits."""
+    """Return the cost of an accuracy relative to the cost of the default accuracy.
+
+    The function interpolates costs that were measured for several numbers of digits.
+    """
     known = sorted(work_by_digits)
     digits = min(-math.log10(rtol), known[-1] + 2.0)
     above = next((d for d in known[1:] if d >= digits), known[-1])

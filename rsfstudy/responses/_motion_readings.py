@@ -1,4 +1,4 @@
-"""Readings along a motion that measures of responses use."""
+"""Quantities at points and events of a motion, for the measures of responses."""
 
 from __future__ import annotations
 
@@ -18,8 +18,22 @@ MIN_SQUARED_PATH_ANGLE_COSINE = 1e-12
 
 
 def distance_from_steady_sliding(scene: Scene, point: MotionPoint, load_velocity: float) -> float:
-    """Distance of a point from steady sliding at a load point velocity, in ln V or in the state
-    over b.
+    """Compute the distance of a point from steady sliding at a load point velocity.
+
+    Parameters
+    ----------
+    scene : Scene
+        Scene of the motion.
+    point : MotionPoint
+        Point of the motion.
+    load_velocity : float
+        Load point velocity in units of V_*.
+
+    Returns
+    -------
+    float
+        Larger of two distances: the difference of ln V, and the distance of the state from its
+        steady-state value in units of b.
     """
     size = scene.a * scene.parts.law.state_change_over_a
     return max(
@@ -37,9 +51,16 @@ def growth_rate_along_path(scene: Scene, event: Event, load_velocity: float) -> 
     Parameters
     ----------
     scene : Scene
+        Scene of the motion.
     event : Event
+        Event of the motion.
     load_velocity : float
-        Load point velocity V_0/V_*.
+        Load point velocity in units of V_*.
+
+    Returns
+    -------
+    float
+        Growth rate per unit path length.
     """
     growth = event.point.log_slip_rate_derivative
     if event.regime != RUPTURE_REGIME:
@@ -56,9 +77,22 @@ def growth_rate_along_path(scene: Scene, event: Event, load_velocity: float) -> 
 
 
 def friction_quantity_for_events(scene: Scene) -> tuple[str, float]:
-    """Quantity that an engine watches to tell extrema and levels of the friction coefficient that
-    is read, and what it is above it: spring stress itself where nothing changes normal stress and
-    slip rate alone tells where that is extreme.
+    """Return the quantity at whose extrema and levels friction events are located.
+
+    If normal stress is constant and the law is not regularised, events of the friction coefficient
+    coincide with events of the spring stress.
+
+    Parameters
+    ----------
+    scene : Scene
+        Scene of the motion.
+
+    Returns
+    -------
+    quantity : str
+        Attribute of ``MotionPoint``: ``"spring_stress"`` or ``"apparent_friction"``.
+    offset : float
+        Friction coefficient minus the quantity.
     """
     parts = scene.parts
     stressed = parts.normal_stress.normal_stress is not None or parts.loading.unknowns
