@@ -1,5 +1,6 @@
-"""Misprints that `studies/MISPRINTS.md` corrects: the corrected formula holds, the printed one does
-not.
+"""Tests of the misprints in ``studies/MISPRINTS.md``.
+
+The corrected formulas hold, and the printed formulas do not.
 """
 
 import math
@@ -21,7 +22,10 @@ PAGE = (Path(__file__).parent.parent / "studies" / "MISPRINTS.md").read_text()
 
 
 def test_eq_3():
-    """A jump of normal stress at V = V_*, by the assembled relation of stress, state and rate."""
+    """Corrected eq. 3 describes a jump of normal stress at V = V_*.
+
+    The reference is the assembled friction relation.
+    """
     scene = Scene(alpha=0.56, phi=60.0)
     stress = 0.3  # of shear stress; normal stress follows
     change = cot_phi(scene) * stress
@@ -40,7 +44,10 @@ def test_eq_3():
 
 
 def test_eq_4b():
-    """DTheta per unit slip is b dtheta/theta per unit slip, with dtheta/dt = 1 - theta V."""
+    """The state evolves by dTheta = b dtheta/theta per slip.
+
+    The reference is dtheta/dt = 1 - theta V.
+    """
     b, theta, rate = 0.029, 0.7, 3.0
     per_slip = build_single_state_evolution_function(Scene(law="slowness", a=b / 2.0))(
         math.log(rate), b * math.log(theta)
@@ -49,7 +56,10 @@ def test_eq_4b():
 
 
 def test_eq_11():
-    """Exact at k = k_cr, and too high elsewhere by what the page says."""
+    """Eq. 11 is exact at k = k_cr and too high at other stiffnesses.
+
+    The differences agree with the page.
+    """
     run = {"workers": 0, "output": None, "progress": False}
     ratios = [1.0, 1.1, 1.25, 1.5, 2.0]
     dataset = rsfstudy.run(

@@ -1,4 +1,4 @@
-"""Scenes, studies and verdicts as tables of a notebook; numbers of a file in the terminal."""
+"""Tests of HTML tables in notebooks, and of numbers in the terminal."""
 
 import math
 import re
@@ -29,7 +29,7 @@ from rsfstudy.study.verdict_table import VerdictTable
 
 
 def rows(html):
-    """The texts of each row of a table; it is well-formed."""
+    """Return the text of each table row, and assert that it is well-formed."""
     tree = ElementTree.fromstring(f"<div>{html}</div>")
     return [["".join(cell.itertext()) for cell in row] for row in tree.iter("tr")]
 
@@ -108,7 +108,10 @@ def test_texts_of_strangers_stay_texts():
 
 
 def test_the_accessor_shows_numbers_and_verdicts():
-    """One line stands for claims of which none applies."""
+    """Results are shown with verdicts, and motions with their events.
+
+    Claims that are not applicable are summarised in one line.
+    """
     declared = study_loader.load_study("linear_stability")
     few = run(declared.with_(b_over_a=2.0, phi=[40]), rtol=1e-3).rsf._repr_html_()
     assert "11 claims not checked: other values or units have no published numbers" in few
@@ -151,7 +154,10 @@ def told_of(dataset, tmp_path, monkeypatch) -> str:
 @pytest.mark.parametrize("value", [36.815156940184394, -77608.42471489437, 3.152948907494519e-9])
 @pytest.mark.parametrize("share", [3.1e-2, 9.9e-7, 1e-11])
 def test_numbers_have_the_digits_that_their_errors_leave(value, share):
-    """What is left out is a twentieth of the error at most; one digit less would be too few."""
+    """The rounding error is at most a twentieth of the error estimate.
+
+    The number of digits is the smallest number for which this holds.
+    """
     error = share * abs(value)
     text = format_rounded_to_error(value, error)
     assert abs(float(text) - value) <= 0.05 * error
@@ -181,7 +187,7 @@ def test_an_answer_for_one_scene_has_units_and_words(tmp_path):
 
 
 def test_a_motion_by_a_law_that_is_not_known_is_shown(tmp_path):
-    """With its stiffness and its events, once a study file makes the law known."""
+    """Stability and events are shown if a study file defines the law."""
     motion = rsfstudy.simulate(Scene(load_velocity_ratio=2.0), duration=0.1)
     scene = motion.attrs["scene"].replace('"law": "slip"', '"law": "of_a_stranger"')
     motion.assign_attrs(scene=scene).to_netcdf(tmp_path / "motion.nc")
@@ -233,8 +239,10 @@ def test_a_small_one_is_whole_and_names_how_cells_ended(map_of_stiffness, tmp_pa
 
 
 def test_indices_that_are_refused_say_why(tmp_path, monkeypatch):
-    """In the run's warning, and wherever numbers are shown: some samples are softer than critical,
-    where any step triggers.
+    """The reason for missing indices is shown with the numbers.
+
+    A warning of the run contains the reason too. Some samples are softer than critical, so
+    any step triggers instability.
     """
     uncertain = {"b_over_a": norm(2.0, 0.1), "stiffness_ratio": uniform(0.9, 0.2)}
     axis = Axis.samples(uncertain, 2, seed=1, method="saltelli")

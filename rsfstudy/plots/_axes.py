@@ -90,7 +90,7 @@ def read_flag_words(variable: xr.DataArray) -> dict[float, str]:
     ----------
     variable : xarray.DataArray
         Variable of a dataset. The flags are described by the CF attributes ``flag_values`` and
-        ``read_flag_words``.
+        ``flag_meanings``.
 
     Returns
     -------
