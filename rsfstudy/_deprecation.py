@@ -380,7 +380,7 @@ RENAMED: Mapping[str, Mapping[str, str]] = {
     },
     "rsfstudy.measure_base._recorded_motion": {
         "Recorded": "RecordingMeasure",
-        "recorded": "outputs_along_phase",
+        "recorded": "create_outputs_along_phase",
     },
     "rsfstudy.measure_base.measure:Measure": {
         "find": "compute",

@@ -210,7 +210,7 @@ def units_or_scale_of_variable(attributes: Mapping[Any, Any]) -> str:
     return format_unit_quotient([scale, *split_unit_quotient(units)[1:]]) if scale else units
 
 
-def parse_heading(text: str) -> tuple[str, str] | None:
+def split_heading_into_name_and_units(text: str) -> tuple[str, str] | None:
     """Split a column heading into a name and units.
 
     Parameters
@@ -232,8 +232,8 @@ def parse_heading(text: str) -> tuple[str, str] | None:
 #: Column headings of a table of quantities.
 _QUANTITY_TABLE_HEADINGS = ("field", "symbol", "value", "unit", "meaning")
 _FUNCTION_NAMES_IN_FORMULAS = ("ln", "log", "exp")
-_HTML_TAGS_OF_SUB_AND_SUPERSCRIPTS = {"_": "sub", "^": "sup"}
-_CELL_STYLE = 'style="text-align: left; vertical-align: top"'
+_HTML_TAG_BY_SUB_OR_SUPERSCRIPT_MARK = {"_": "sub", "^": "sup"}
+_HTML_CELL_STYLE_ATTRIBUTE = 'style="text-align: left; vertical-align: top"'
 
 
 def escape_html(text: object) -> str:
@@ -280,9 +280,15 @@ def html_table(
         Table with inline styles.
     """
     above = f"<p><b>{_format_html_table_cell(caption)}</b></p>" if caption else ""
-    head = "".join(f"<th {_CELL_STYLE}>{_format_html_table_cell(text)}</th>" for text in headings)
+    head = "".join(
+        f"<th {_HTML_CELL_STYLE_ATTRIBUTE}>{_format_html_table_cell(text)}</th>"
+        for text in headings
+    )
     lines = (
-        "".join(f"<td {_CELL_STYLE}>{_format_html_table_cell(value)}</td>" for value in row)
+        "".join(
+            f"<td {_HTML_CELL_STYLE_ATTRIBUTE}>{_format_html_table_cell(value)}</td>"
+            for value in row
+        )
         for row in rows
     )
     body = "".join(f"<tr>{line}</tr>" for line in lines)
@@ -317,9 +323,15 @@ def html_quantities_table(
     )
 
 
-def _quantity_row(about: Quantity, value: object) -> tuple[object, ...]:
+def _quantity_row(quantity: Quantity, value: object) -> tuple[object, ...]:
     """Return the table row of a quantity, in the order of the headings."""
-    return about.name, html_symbol(about.symbol), value, html_unit(about), about.long_name
+    return (
+        quantity.name,
+        html_symbol(quantity.symbol),
+        value,
+        html_unit(quantity),
+        quantity.long_name,
+    )
 
 
 class HtmlTableMixin:
@@ -404,7 +416,7 @@ def _html_character_entity(character_name: str) -> str:
 
 def _format_html_script(match: re.Match[str]) -> str:
     """Format a subscript or superscript in HTML."""
-    tag = _HTML_TAGS_OF_SUB_AND_SUPERSCRIPTS[match[1]]
+    tag = _HTML_TAG_BY_SUB_OR_SUPERSCRIPT_MARK[match[1]]
     return f"<{tag}>{match[2] if match[2] is not None else match[3]}</{tag}>"
 
 

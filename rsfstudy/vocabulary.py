@@ -16,7 +16,7 @@ from types import MappingProxyType
 from typing import Any
 
 from rsfstudy.quantities import Quantity
-from rsfstudy.slider import FIELD_QUANTITIES as SCENE
+from rsfstudy.slider import SCENE_FIELD_QUANTITIES as SCENE
 
 
 def _read_vocabulary() -> Iterator[Quantity]:
@@ -35,7 +35,7 @@ QUANTITY_BY_NAME: dict[str, Quantity] = {
     about.name: about for about in (*SCENE, *_read_vocabulary())
 }
 
-_SUFFIX_DESCRIPTIONS = {
+_DESCRIPTION_BY_VARIABLE_SUFFIX = {
     "error": "numerical error estimate of",
     "stable": "value verified as stable beside",
     "unstable": "value verified as unstable beside",
@@ -73,7 +73,7 @@ FORMULAS_OF_DERIVED_COORDINATES: dict[str, tuple[str, Callable[[float], float]]]
 }
 
 
-def coverage_content_type(variable_name: str) -> str:
+def find_coverage_content_type(variable_name: str) -> str:
     """Return the content type of a variable, as a term of ISO 19115-1.
 
     Parameters
@@ -122,7 +122,7 @@ def find_quantity(
         return extra_quantities[variable_name]
     if variable_name in QUANTITY_BY_NAME:
         return QUANTITY_BY_NAME[variable_name]
-    match = re.fullmatch(rf"(\w+)_({'|'.join(_SUFFIX_DESCRIPTIONS)})", variable_name)
+    match = re.fullmatch(rf"(\w+)_({'|'.join(_DESCRIPTION_BY_VARIABLE_SUFFIX)})", variable_name)
     if match:
         of = find_quantity(match[1], extra_quantities)
         units = "1" if match[2] in _SUFFIXES_OF_COUNT_VARIABLES else of.units
@@ -131,7 +131,7 @@ def find_quantity(
             variable_name,
             of.symbol,
             units,
-            f"{_SUFFIX_DESCRIPTIONS[match[2]]} {of.long_name}",
+            f"{_DESCRIPTION_BY_VARIABLE_SUFFIX[match[2]]} {of.long_name}",
             scale,
         )
     return Quantity(variable_name, "", "1", variable_name.replace("_", " "))

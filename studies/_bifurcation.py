@@ -30,8 +30,8 @@ from rsfstudy.limit_cycles.return_map import (
     ReturnMap,
     section_vector_at,
 )
-from rsfstudy.limit_cycles.stick_slip_cycles import LN10, Cycle, more_events_remedy
-from rsfstudy.measure_base import check_loading_lets_motion_settle
+from rsfstudy.limit_cycles.stick_slip_cycles import LN10, Cycle, suggest_raising_event_limit
+from rsfstudy.measure_base import check_loading_changes_stress_only_in_steps
 from rsfstudy.measures import Measure, Outcome, Output, Quantity, Status
 from rsfstudy.motion import WorkMeter, estimate_error
 
@@ -175,7 +175,7 @@ class Bifurcation(Measure):
         Outcome
             Outcome with the status ``not_periodic`` if the motion does not approach a cycle.
         """
-        check_loading_lets_motion_settle(scene)
+        check_loading_changes_stress_only_in_steps(scene)
         if scene.log_load_velocity == -math.inf:
             return Outcome(Status.NO_LIMIT_CYCLE, message="the load point is held")
         if not scene.is_perturbed:
@@ -191,7 +191,7 @@ class Bifurcation(Measure):
         if motion.orbit is None:
             growth = _mean_growth(ReturnMap(scene, accuracy, meter), motion.cycles, self.events)
             values |= zip(("lyapunov_exponent", "lyapunov_exponent_stderr"), growth, strict=True)
-            remedy = more_events_remedy(max(self.transient, self.events), "transient")
+            remedy = suggest_raising_event_limit(max(self.transient, self.events), "transient")
             ended = outcome_of_aperiodic_motion(scene, motion, remedy)
             if status is Status.OK:
                 status, why = ended.status, ended.message

@@ -16,8 +16,8 @@ import numpy as np
 
 from rsfstudy import Accuracy, Scene
 from rsfstudy.errors import InvalidValue
-from rsfstudy.measure_base import RecordingMeasure, outputs_along_phase
-from rsfstudy.measure_base._recorded_motion import PHASE_VARIABLES
+from rsfstudy.measure_base import RecordingMeasure, create_outputs_along_phase
+from rsfstudy.measure_base._recorded_motion import VARIABLES_RECORDED_ALONG_PHASE
 from rsfstudy.measures import Outcome, Output, Status
 from rsfstudy.motion import Event, WorkMeter, integrate_events
 from rsfstudy.responses import estimate_errors_at_instants
@@ -86,7 +86,7 @@ _OUTPUTS = (
         "number of periods of forcing after which the response repeats itself",
     ),
     Output("settled", "", "1", "whether one period of the response is as another later on"),
-    *outputs_along_phase(*PHASE_VARIABLES),
+    *create_outputs_along_phase(*VARIABLES_RECORDED_ALONG_PHASE),
 )
 
 

@@ -16,10 +16,10 @@ from rsfstudy import Accuracy, Scene
 from rsfstudy.errors import InvalidValue
 from rsfstudy.measure_base import (
     RecordingMeasure,
-    check_loading_lets_motion_settle,
-    outputs_along_phase,
+    check_loading_changes_stress_only_in_steps,
+    create_outputs_along_phase,
 )
-from rsfstudy.measure_base._recorded_motion import PHASE_VARIABLES
+from rsfstudy.measure_base._recorded_motion import VARIABLES_RECORDED_ALONG_PHASE
 from rsfstudy.measures import Outcome, Output, Status
 from rsfstudy.motion import (
     MOTION_VARIABLES,
@@ -32,7 +32,7 @@ from rsfstudy.motion import (
     recorded_friction_coefficient,
     resample_motion_along_path,
 )
-from rsfstudy.responses import estimate_errors_at_instants, flag_of_settled_friction
+from rsfstudy.responses import compute_settled_friction_flag, estimate_errors_at_instants
 
 #: Final fraction of the record over which friction must be constant, and the tolerance of this
 #: condition relative to the remaining transient at ``fit_from``.
@@ -82,7 +82,7 @@ _OUTPUTS = (
         "1",
         "largest departure of friction, where it is read, from that of a stiff slider",
     ),
-    *outputs_along_phase(*PHASE_VARIABLES),
+    *create_outputs_along_phase(*VARIABLES_RECORDED_ALONG_PHASE),
 )
 
 
@@ -229,7 +229,7 @@ class NormalStressTransient(RecordingMeasure):
         Outcome
             Outcome of the measure.
         """
-        check_loading_lets_motion_settle(scene)
+        check_loading_changes_stress_only_in_steps(scene)
         step = scene.parts.loading.segments[0]
         if not step.normal_stress:
             return Outcome(Status.NO_STEP, message="normal stress does not change at once")
@@ -401,7 +401,7 @@ class NormalStressTransient(RecordingMeasure):
         path = resample_motion_along_path(rows, self.phases, RECORDED_VARIABLES)
         return {
             "direct_change": _direct_change(scene, record),
-            "settled": flag_of_settled_friction(scene.segment_scene(-1), is_flat=is_flat),
+            "settled": compute_settled_friction_flag(scene.segment_scene(-1), is_flat=is_flat),
             "closed_form_departure": self._departure_from_rigid(scene, record),
             "time": path["time"],
             "load_point_displacement": path["time"],

@@ -17,7 +17,7 @@ from study_runs import SMALL_STUDY, run, run_command
 import rsfstudy
 from rsfstudy import Scene
 from rsfstudy.errors import DataError, InvalidValue
-from rsfstudy.slider.part_registry import FIELD_NAMES
+from rsfstudy.slider.part_registry import SCENE_FIELD_NAMES
 from rsfstudy.study import study_loader
 
 #: Values that a user, a JSON file or a notebook may pass instead of a valid value.
@@ -29,7 +29,7 @@ ODD = st.one_of(
 
 # ---- declarations -------------------------------------------------------------------------------
 @settings(max_examples=50)
-@given(st.dictionaries(st.sampled_from(FIELD_NAMES) | st.text(max_size=6), ODD, max_size=4))
+@given(st.dictionaries(st.sampled_from(SCENE_FIELD_NAMES) | st.text(max_size=6), ODD, max_size=4))
 def test_a_scene_is_made_or_refused(fields):
     try:
         stiffness = Scene(**fields).stiffness
@@ -42,7 +42,7 @@ def test_a_scene_is_made_or_refused(fields):
     assert any(name in said for name in named), said
 
 
-NAMES = st.sampled_from(FIELD_NAMES) | st.text(max_size=6)
+NAMES = st.sampled_from(SCENE_FIELD_NAMES) | st.text(max_size=6)
 
 
 @given(st.dictionaries(NAMES, ODD | st.lists(ODD, max_size=3), max_size=3))
@@ -61,11 +61,11 @@ SETTINGS = st.one_of(
     st.text(max_size=12),
     st.builds(
         "{}={}".format,
-        st.sampled_from([*FIELD_NAMES, "case", "b_over"]),
+        st.sampled_from([*SCENE_FIELD_NAMES, "case", "b_over"]),
         st.text(alphabet=string.digits + ".,:-+eainf ", max_size=10),
     ),
     st.builds(
-        "{}={}:{}:{}".format, st.sampled_from(FIELD_NAMES), st.floats(), st.floats(),
+        "{}={}:{}:{}".format, st.sampled_from(SCENE_FIELD_NAMES), st.floats(), st.floats(),
         st.integers(-2, 30) | st.floats(),
     ),
 )  # fmt: skip

@@ -15,7 +15,7 @@ from study_runs import run
 import rsfstudy
 from rsfstudy import Rig, Study
 from rsfstudy.limit_cycles.limit_cycle import LimitCycle
-from rsfstudy.rig.units import unit_factor
+from rsfstudy.rig.units import compute_conversion_factor
 
 NAMES = {
     "Pa": ("Pa", "kPa", "MPa", "GPa", "bar", "N/m^2", "N/cm^2"),
@@ -47,7 +47,7 @@ def stated(size, kind):
     """
 
     def text(unit):
-        value = Fraction(size) / unit_factor("x", unit, kind)
+        value = Fraction(size) / compute_conversion_factor("x", unit, kind)
         return f"{float(value)!r} {unit}" if Fraction(repr(float(value))) == value else None
 
     return st.sampled_from([text(unit) for unit in UNITS[kind] if text(unit)])

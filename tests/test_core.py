@@ -21,7 +21,7 @@ from rsfstudy.motion.event_integration import iterate_events_of_equations
 from rsfstudy.motion.work_meter import MotionStopped, WorkMeter
 from rsfstudy.slider.equations import (
     Equations,
-    equations_against_displacement,
+    build_equations_against_displacement,
     equations_between_ruptures,
 )
 from rsfstudy.slider.motion_point import MotionPoint
@@ -193,7 +193,7 @@ def test_rates_along_the_path_are_those_by_displacement_over_its_length(law, log
     """
     scene = Scene(law=law, normal_stress="constant", load_velocity_ratio=3.0)
     state = (0.01, 0.01 - scene.a * log_slip_rate)
-    by = equations_against_displacement(scene)
+    by = build_equations_against_displacement(scene)
     growth = by.evaluate_point(state).log_slip_rate_derivative
     along = equations_between_ruptures(scene, with_time=False).evaluate_rates(state)
     for ours, theirs in zip(along, by.evaluate_rates(state), strict=True):

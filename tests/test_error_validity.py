@@ -54,7 +54,11 @@ def test_autocorrelated_whitened_residuals_change_the_status() -> None:
 def test_tables_mark_standard_errors_that_are_not_valid() -> None:
     assert not fit_tables.all_fits_are_valid(naive())  # The exit status is 1.
     assert fit_tables.format_with_stderr(naive().squeeze(), "a").endswith("*")
-    texts = [piece for piece in summaries.build_summary_pieces(naive()) if isinstance(piece, str)]
+    texts = [
+        piece
+        for piece in summaries.build_summary_tables_and_sentences(naive())
+        if isinstance(piece, str)
+    ]
     assert any("standard errors marked by * are not valid" in text for text in texts)
 
 

@@ -25,8 +25,8 @@ from rsfstudy.responses.linear_stability import LinearStability
 from rsfstudy.slider import laws, stability, steady_state
 from rsfstudy.slider.equations import (
     Equations,
-    equations_against_displacement,
-    equations_against_inertial_time,
+    build_equations_against_displacement,
+    build_equations_against_inertial_time,
     equations_between_ruptures,
 )
 from rsfstudy.status import Status
@@ -91,7 +91,10 @@ def test_growth_rates_are_eigenvalues_of_the_assembled_equations(fields, ratio, 
     """
     scene = scene_of(fields, ratio, log_slip_rate)
     found = steady_state.steady_sliding(scene, log_slip_rate)
-    equations, at = equations_against_displacement(scene), (found.spring_stress, *found.states)
+    equations, at = (
+        build_equations_against_displacement(scene),
+        (found.spring_stress, *found.states),
+    )
     assert np.abs(equations.evaluate_rates(at)).max() < 1e-13
     ours, theirs = (
         0.5 * stability.linear_growth_rates(scene, log_slip_rate),
@@ -111,7 +114,7 @@ def test_growth_rates_with_mass_are_eigenvalues_of_the_full_equations(fields):
     found = steady_state.steady_sliding(scene, 0.0)
     at = (found.spring_stress, 0.0, found.frictional_stress, *found.states[1:])
     ours = scene.inertial_time * stability.linear_growth_rates(scene, 0.0)
-    theirs = eigenvalues(equations_against_inertial_time(scene), at)
+    theirs = eigenvalues(build_equations_against_inertial_time(scene), at)
     np.testing.assert_allclose(np.sort_complex(ours), theirs, rtol=1e-6)
 
 

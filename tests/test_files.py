@@ -24,7 +24,7 @@ from rsfstudy.execution.provenance import read_git_commit_and_state
 from rsfstudy.measures import Measure, Outcome
 from rsfstudy.status import Status
 from rsfstudy.storage import dataset_files, rebuild_from_file, schema
-from rsfstudy.storage.cell_journal import CellJournal, OutputPacking
+from rsfstudy.storage.cell_journal import CellJournal, OutputPacker
 from rsfstudy.study import study_index, study_loader
 
 
@@ -115,7 +115,7 @@ class Pair(Measure):
     inner_coordinates = {"phase": np.arange(2.0)}  # noqa: RUF012
 
 
-LAYOUT = OutputPacking(Pair())
+LAYOUT = OutputPacker(Pair())
 DONE = (Outcome(Status.OK, {"v": 1.5, "profile": np.array([1.0, np.nan])}, "", 42), 0.1)
 KEYS = np.array([cell_key(Scene(b_over_a=b), Pair()) for b in (2.0, 3.0)], dtype="V16")
 

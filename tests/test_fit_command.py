@@ -81,7 +81,7 @@ def test_what_it_finds_is_what_the_record_was_made_of(written):
     here, _said = written
     found = rsfstudy.open(here / "fit.nc")
     for name in ("a", "b", "slip_distance", "trend1"):
-        for one in fit_tables.split_fits(found):
+        for one in fit_tables.split_into_single_fits(found):
             off = (one[name].item() - TRUE[name]) / one[f"{name}_stderr"].item()
             assert abs(off) < 4.0, (name, off)
 

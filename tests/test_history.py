@@ -226,7 +226,7 @@ def test_the_files_that_ship_are_followed():
 
 # Other modules load the file of this stepper as a study file, which defines the name with
 # another class.
-engines._USER_STEPPERS.pop(OrderFour.name)
+engines._USER_STEPPER_CLASS_BY_NAME.pop(OrderFour.name)
 
 
 class Followed(OrderFour):

@@ -15,7 +15,7 @@ from rsfstudy.errors import DataError, InvalidValue, NoResultWarning
 from rsfstudy.limit_cycles.limit_cycle import LimitCycle
 from rsfstudy.plots._motion import plot_motion
 from rsfstudy.slider.loading import Segment
-from rsfstudy.slider.part_registry import FIELD_QUANTITIES
+from rsfstudy.slider.part_registry import SCENE_FIELD_QUANTITIES
 
 SIGMA, D_C, V = 5e6, 1e-5, 1e-6
 RIG = Rig(
@@ -68,7 +68,9 @@ CALLS: dict[str, dict] = {
 }
 
 
-@pytest.mark.parametrize("about", [q for q in FIELD_QUANTITIES if q.scale], ids=lambda q: q.name)
+@pytest.mark.parametrize(
+    "about", [q for q in SCENE_FIELD_QUANTITIES if q.scale], ids=lambda q: q.name
+)
 def test_every_field_with_a_scale_takes_units(about):
     text, value = VALUES[about.scale]
     rig = Rig(normal_stress=SIGMA, slip_distance=D_C, reference_velocity=V)

@@ -11,7 +11,7 @@ from rsfstudy import Axis, Panel, Scene, Study, plots
 from rsfstudy.errors import DataError
 from rsfstudy.plots import _text, lines
 from rsfstudy.responses.linear_stability import LinearStability
-from rsfstudy.rig.dataset_scales import UnitScale, apply_scales_to_dataset
+from rsfstudy.rig.dataset_scales import UnitScale, convert_dataset_by_unit_scales
 from rsfstudy.status import Status
 from rsfstudy.study import study_loader
 
@@ -133,7 +133,7 @@ def test_what_is_in_units_is_called_no_ratio():
     held = {"scale": "D_c", "units": "1", "long_name": "load point displacement"}
     ratio = xr.Dataset({"moved": ((), 2.0, {**held, "symbol": r"$\delta_0/D_c$"})})
     scales = {"D_c": UnitScale(10.0, "um"), "V_*": UnitScale(1.0, "um s-1")}
-    moved = apply_scales_to_dataset(ratio, scales)["moved"]
+    moved = convert_dataset_by_unit_scales(ratio, scales)["moved"]
     assert moved.attrs == {"units": "um", "long_name": "load point displacement"}
 
 

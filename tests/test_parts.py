@@ -40,8 +40,8 @@ def test_orbits_of_another_law_need_not_close_at_critical_stiffness():
 
 def test_a_part_owns_its_fields():
     """Each field is described once, by its part."""
-    described = {quantity.name for quantity in part_registry.FIELD_QUANTITIES}
-    assert described == set(part_registry.FIELD_NAMES)
+    described = {quantity.name for quantity in part_registry.SCENE_FIELD_QUANTITIES}
+    assert described == set(part_registry.SCENE_FIELD_NAMES)
     assert Scene(inertia=True, radiation_damping=0.0).inertia is True
     assert Scene(normal_stress="constant", alpha=None).alpha is None
 

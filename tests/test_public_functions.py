@@ -31,7 +31,7 @@ from rsfstudy.errors import DataError, InvalidValue, RsfStudyError
 from rsfstudy.fitting.record import Record
 from rsfstudy.referee.problem_files import shipped_problem_files
 from rsfstudy.responses.linear_stability import LinearStability
-from rsfstudy.slider.part_registry import FIELD_NAMES
+from rsfstudy.slider.part_registry import SCENE_FIELD_NAMES
 from rsfstudy.storage import cell_journal
 from rsfstudy.study.claims import Claim
 
@@ -137,7 +137,7 @@ def functions() -> list[tuple[str, str]]:
         # A user-defined client or figure may be any object.
         if parameter not in ("client", "own", "workers", "progress")
         # The constructors are tested with fields of scenes.
-        and not (name == "run" and parameter in FIELD_NAMES)
+        and not (name == "run" and parameter in SCENE_FIELD_NAMES)
         and kind.kind not in (inspect.Parameter.VAR_KEYWORD, inspect.Parameter.VAR_POSITIONAL)
     ]
 

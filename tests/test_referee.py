@@ -87,7 +87,9 @@ def test_files_of_problems_hold_all_that_they_are_asked_for(number):
 
 
 # ---- ours ----------------------------------------------------------------------------------------
-def told_of(table: reference_answers.AnswerTable) -> dict[str, external_answers.ReportedQuantity]:
+def told_of(
+    table: reference_answers.AnswerColumnByQuantity,
+) -> dict[str, external_answers.ReportedQuantity]:
     return {name: external_answers.ReportedQuantity(values, 0.0) for name, values in table.items()}
 
 
@@ -209,7 +211,7 @@ def test_conventions_of_the_problem_explain_a_difference(number, changes, explan
         DEFAULT_REQUIRED_DIGITS,
     )
     assert not found.has_required_digits
-    assert explanation in found.explanation
+    assert explanation in found.explanation_of_disagreement
 
 
 @pytest.mark.parametrize(

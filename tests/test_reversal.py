@@ -13,7 +13,7 @@ from rsfstudy.motion.engines import COMPILED, ENGINES
 from rsfstudy.motion.event_integration import integrate_events
 from rsfstudy.motion.events import EventKind, maximum, minimum
 from rsfstudy.motion.work_meter import WorkMeter
-from rsfstudy.responses._motion_readings import friction_quantity_for_events
+from rsfstudy.responses._motion_readings import choose_friction_quantity_for_events
 from rsfstudy.responses.linear_stability import LinearStability
 from rsfstudy.slider import stability
 from rsfstudy.slider.equations import build_friction_relation
@@ -143,7 +143,7 @@ def test_slip_back_is_a_mirror_of_slip_forward(law):
 def test_stress_turns_first_where_slip_back_is_as_fast_as_the_load_point():
     fields = {"law": "slowness", "a": 0.01, "b_over_a": 1.4, "stiffness": 0.02, **CONSTANT}
     scene = Scene(**fields, regularised=True, loading=protocol([{"velocity": -1.0}]))
-    of = friction_quantity_for_events(scene)[0]
+    of = choose_friction_quantity_for_events(scene)[0]
     watches = [minimum(of, terminal=True), maximum(of, terminal=True)]
     *_before, turn = integrate_events(scene, Accuracy(1e-6), WorkMeter(10**5), watches, until=100.0)
     assert turn.kind is EventKind.MINIMUM

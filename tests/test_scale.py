@@ -83,7 +83,7 @@ def test_a_zarr_store_holds_the_same_as_the_file(numbers, tmp_path, monkeypatch)
 
     No temporary files remain.
     """
-    monkeypatch.setattr(zarr_store, "_NUMBERS_PER_SLAB", numbers)
+    monkeypatch.setattr(zarr_store, "_MAX_VALUES_PER_SLAB", numbers)
     in_pieces = run(SMALL_STUDY, output=tmp_path, format="zarr")
     have_same_numbers(in_pieces.load().map(plain), in_memory())
     assert sorted(os.listdir(tmp_path)) == ["small.cells.sqlite", "small.zarr"]
@@ -100,7 +100,7 @@ def plain(values: xr.DataArray) -> xr.DataArray:
 
 
 def test_reductions_and_claims_of_a_zarr_store(tmp_path, monkeypatch):
-    monkeypatch.setattr(zarr_store, "_NUMBERS_PER_SLAB", 100)
+    monkeypatch.setattr(zarr_store, "_MAX_VALUES_PER_SLAB", 100)
     options = {"workers": 0, "progress": False, "output": tmp_path, "b_over_a": [2.0, 3.0, 5.0]}
     store = rsfstudy.run("rate_step_boundary", format="zarr", **options)
     file = rsfstudy.run("rate_step_boundary", **options)
@@ -118,7 +118,7 @@ def test_a_store_that_is_there_is_not_replaced(tmp_path):
 
 def test_a_store_cut_short_is_not_taken_for_one(tmp_path, monkeypatch):
     """An interrupted write leaves the journal only, and the run resumes."""
-    monkeypatch.setattr(zarr_store, "_NUMBERS_PER_SLAB", 3)
+    monkeypatch.setattr(zarr_store, "_MAX_VALUES_PER_SLAB", 3)
     original, written = zarr_store.build_lattice_variables, []
 
     def interrupted(*words):

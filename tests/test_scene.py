@@ -15,7 +15,7 @@ from hypothesis import strategies as st
 import rsfstudy
 from rsfstudy import Axis, Scene
 from rsfstudy.slider import field_name_hints, laws
-from rsfstudy.slider.part_registry import FIELD_NAMES
+from rsfstudy.slider.part_registry import SCENE_FIELD_NAMES
 from rsfstudy.slider.parts import number
 
 
@@ -31,9 +31,9 @@ def test_a_field_of_a_users_own_may_bear_any_name():
 
 def test_every_synonym_leads_to_a_field_or_law_that_is_there():
     for name, remedy in field_name_hints._HINT_BY_WRONG_FIELD_NAME.items():
-        assert name not in FIELD_NAMES
+        assert name not in SCENE_FIELD_NAMES
         if remedy.startswith("Write "):
-            assert re.match(r"Write (\w+)", remedy)[1] in FIELD_NAMES
+            assert re.match(r"Write (\w+)", remedy)[1] in SCENE_FIELD_NAMES
     assert set(field_name_hints._LAW_NAME_BY_ALIAS.values()) <= set(laws.BUILT_IN_PARTS)
 
 
@@ -98,7 +98,7 @@ def test_tab_completion_offers_what_users_call_and_nothing_else():
 
 def test_the_signature_of_a_scene_names_its_fields():
     stated = inspect.signature(Scene).parameters
-    assert tuple(stated) == (*FIELD_NAMES, "dynamics", "loading")
+    assert tuple(stated) == (*SCENE_FIELD_NAMES, "dynamics", "loading")
     assert stated["law"].default == "slip"
     assert stated["a"].default == Scene().a
 

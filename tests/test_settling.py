@@ -17,7 +17,7 @@ from rsfstudy.motion.event_integration import integrate_events
 from rsfstudy.motion.events import EventKind, approach_to_steady_state, rise
 from rsfstudy.motion.work_meter import MotionStopped, WorkMeter
 from rsfstudy.quantities import Quantity
-from rsfstudy.responses._recorded_motion import flag_of_settled_friction
+from rsfstudy.responses._recorded_motion import compute_settled_friction_flag
 from rsfstudy.responses.step_response import StepResponse
 from rsfstudy.slider.fluid import Fluid
 from rsfstudy.slider.parameter_layout import FLUID, LARGEST_LOG_SLOWNESS
@@ -185,5 +185,5 @@ def test_growth_of_zero_is_undecided(off, settles):
 @pytest.mark.parametrize(("ratio", "flag"), [(0.99, 0.0), (1.0, math.nan), (1.2, 1.0)])
 def test_a_flat_record_has_settled_only_if_small_changes_decay(ratio, flag):
     scene = Scene(law="slip", normal_stress="constant", a=0.01, stiffness_ratio=ratio)
-    assert flag_of_settled_friction(scene, is_flat=True) == pytest.approx(flag, nan_ok=True)
-    assert flag_of_settled_friction(scene, is_flat=False) == 0.0
+    assert compute_settled_friction_flag(scene, is_flat=True) == pytest.approx(flag, nan_ok=True)
+    assert compute_settled_friction_flag(scene, is_flat=False) == 0.0

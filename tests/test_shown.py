@@ -19,7 +19,7 @@ from rsfstudy.errors import IncompleteWarning
 from rsfstudy.quantities import html_symbol, html_table
 from rsfstudy.reductions import SobolIndices
 from rsfstudy.reporting import tables
-from rsfstudy.reporting.tables import build_scene_answer_table, format_rounded_to_error
+from rsfstudy.reporting.tables import build_single_scene_result_table, format_rounded_to_error
 from rsfstudy.responses.linear_stability import LinearStability
 from rsfstudy.status import Status
 from rsfstudy.storage import dataset_files, rebuild_from_file
@@ -171,7 +171,7 @@ def test_an_answer_for_one_scene_has_units_and_words(tmp_path):
     scene = rig.scene(law="slowness", a=0.01, b_over_a=1.4, load_velocity_ratio=10)
     cycle = rsfstudy.limit_cycle(scene, rtol=1e-4, engine="compiled")
     cycle = rig.in_units(cycle, stress="MPa", length="um")
-    shown = {row["number"]: row["value"] for row in build_scene_answer_table(cycle).rows}
+    shown = {row["number"]: row["value"] for row in build_single_scene_result_table(cycle).rows}
     interval, units = shown["recurrence_interval"].split()
     left_out = abs(float(interval) - float(cycle.recurrence_interval))
     assert left_out <= 0.05 * float(cycle.recurrence_interval_error)

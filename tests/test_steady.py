@@ -14,7 +14,10 @@ from hypothesis import strategies as st
 from rsfstudy import Scene
 from rsfstudy.responses.linear_stability import compute_jacobian, max_growth_rate
 from rsfstudy.slider import closed_forms, laws, stability, steady_state
-from rsfstudy.slider.equations import effective_normal_stress_at, equations_against_displacement
+from rsfstudy.slider.equations import (
+    build_equations_against_displacement,
+    effective_normal_stress_at,
+)
 from rsfstudy.slider.laws.composite import lambert_w
 
 #: Laws with a single b, whose steady friction is mu_* + (a - b) ln(V/V_*).
@@ -149,7 +152,9 @@ def test_growth_close_to_critical_stiffness(off, effects):
     scene = Scene(stiffness_ratio=1.0 + off, **effects)
     expected = -0.25 * (scene.b_over_a - 1.0) * off
     # Central differences have an error of 6e-10 for rates of order one.
-    grows = max_growth_rate(compute_jacobian(equations_against_displacement(scene), (0.0, 0.0)))
+    grows = max_growth_rate(
+        compute_jacobian(build_equations_against_displacement(scene), (0.0, 0.0))
+    )
     assert grows == pytest.approx(expected, rel=1e-5, abs=1e-9)
     assert grows * off < 0.0
 

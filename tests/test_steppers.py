@@ -20,14 +20,17 @@ from rsfstudy.motion import array_layout
 from rsfstudy.motion.accuracy import Accuracy
 from rsfstudy.motion.engines import PYTHON, SCIPY
 from rsfstudy.motion.event_integration import integrate_events, iterate_events_of_equations
-from rsfstudy.motion.in_place_functions import build_in_place_functions, build_unpack_function
+from rsfstudy.motion.in_place_functions import (
+    build_array_unpacking_function,
+    build_in_place_functions,
+)
 from rsfstudy.motion.motion_loop import advance_to_step_end
 from rsfstudy.motion.steppers import Stepper, unrolled_step
 from rsfstudy.motion.steppers.order_eight import OrderEightStepper
 from rsfstudy.motion.steppers.scipy import (
     SCIPY_SOLVER_BY_METHOD_NAME,
     SciPyStepper,
-    _build_float_interpolant,
+    _build_interpolant_of_unknowns,
 )
 from rsfstudy.motion.work_meter import MotionStopped, WorkMeter
 from rsfstudy.motion.workspace import Workspace, create_workspace, workspace_size
@@ -89,7 +92,7 @@ def plain_step(equations: Equations, y, length: float, tolerance: float):
 def test_the_unrolled_step_is_that_of_plain_loops_to_the_bit(equations, y, length):
     n, tolerance = len(y), 1e-6
     attempt = unrolled_step.build_step_attempt_function(
-        equations.rate_function, n, build_unpack_function(len(equations.parameters))
+        equations.rate_function, n, build_array_unpacking_function(len(equations.parameters))
     )
     block = [math.nan] * (unrolled_step.HEADER_SIZE + 2 * n)
     block[unrolled_step.LENGTH_INDEX], block[unrolled_step.TOLERANCE_INDEX] = length, tolerance
@@ -229,7 +232,7 @@ def test_values_within_a_step_are_those_of_scipy(method):
     solver.step()
     dense = solver.dense_output()
     for clock in np.linspace(solver.t_old, solver.t, 7).tolist():
-        assert list(_build_float_interpolant(dense)(clock)) == pytest.approx(
+        assert list(_build_interpolant_of_unknowns(dense)(clock)) == pytest.approx(
             dense(clock).tolist(), rel=1e-14
         )
 

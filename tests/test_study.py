@@ -230,7 +230,7 @@ def test_a_worker_computes_the_cells_of_the_declaration(name, monkeypatch):
     task = cell_computation.CellTask(study.base, study.measure, study.accuracy)
     monkeypatch.setattr(cell_computation, "_load_cell_task", lambda _sent: task)
     monkeypatch.setattr(cell_computation, "_FINISHED_CELLS_HANDOVER_INTERVAL", np.inf)
-    monkeypatch.setattr(task.output_packing, "pack_cell", lambda *finished: finished)
+    monkeypatch.setattr(task.output_packer, "pack_cell", lambda *finished: finished)
     monkeypatch.setattr(cell_computation, "compute_cell", lambda _task, cell: (cell, 0.0))
     found = pickle.loads(
         cell_computation.compute_batch(b"", cell_computation.pack_cell_batch(plan, numbers))

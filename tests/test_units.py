@@ -16,7 +16,7 @@ from hypothesis import strategies as st
 
 from rsfstudy import Rig, read_protocol
 from rsfstudy.errors import InvalidValue
-from rsfstudy.rig.units import _KNOWN_UNITS, convert_to_si, unit_factor
+from rsfstudy.rig.units import _KNOWN_UNITS, compute_conversion_factor, convert_to_si
 
 RIG = Rig(normal_stress="5 MPa", slip_distance="10 um", reference_velocity="1 um/s")
 
@@ -116,7 +116,7 @@ def product(number, unit):
     The result is infinity in case of overflow.
     """
     try:
-        return float(Fraction(repr(float(number))) * unit_factor("x", unit, "Pa"))
+        return float(Fraction(repr(float(number))) * compute_conversion_factor("x", unit, "Pa"))
     except OverflowError:
         return math.inf
 

@@ -25,7 +25,7 @@ from rsfstudy.reductions import (
 from rsfstudy.reporting import tables
 from rsfstudy.responses.linear_stability import LinearStability
 from rsfstudy.rig.dataset_scales import convert_to_display_units
-from rsfstudy.study.reductions.base import read_undocumented_quantities
+from rsfstudy.study.reductions.base import read_quantities_not_in_vocabulary
 from rsfstudy.study.reductions.unit_conversion import InUnits
 
 X = np.geomspace(1.0, 30.0, 12)
@@ -104,7 +104,7 @@ def test_what_is_made_of_a_lattice_in_units_is_that_of_numbers_in_units():
         np.testing.assert_allclose(ours[name], theirs[name], rtol=1e-10, err_msg=str(name))
     # Similar names do not affect the description.
     assert made["static_slope"].attrs["long_name"] == "static slope"
-    assert read_undocumented_quantities(made)["static_slope"].scale == "D_c/V_*"
+    assert read_quantities_not_in_vocabulary(made)["static_slope"].scale == "D_c/V_*"
     assert ours["zeta_misfit"].attrs["units"] == "s"
 
 
@@ -167,4 +167,4 @@ def test_tables_tell_them():
     assert slope[0] == "static_slope (MPa/um/(um/s))"
     assert slope[2] == "largest misfit (MPa/um)"
     assert decade[:2] == ["per_decade (MPa/um)", "standard error"]
-    assert any(line.endswith(" MPa/um") for line in tables.summarise_study_in_lines(of_rig))
+    assert any(line.endswith(" MPa/um") for line in tables.summarise_study_as_text_lines(of_rig))

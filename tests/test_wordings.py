@@ -39,7 +39,7 @@ from rsfstudy.quantities import Output
 from rsfstudy.reductions import Reduction
 from rsfstudy.rig.units import convert_to_si
 from rsfstudy.slider.part_registry import PART_CLASS_BY_FIELD_NAME, SLOTS
-from rsfstudy.slider.parts import VALUE_RULES, field_names, is_boolean_field
+from rsfstudy.slider.parts import CONDITION_BY_VALUE_RULE, field_names, is_boolean_field
 from rsfstudy.slider.slider_parameters import SliderParameters
 from rsfstudy.study import study_loader
 from rsfstudy.study.claims import Claim
@@ -74,7 +74,7 @@ def calling(part: type) -> dict[str, Any]:
     slot = next(slot for slot in SLOTS if part in slot.built_in_parts.values())
     return (
         {slot.name: part.name}
-        if not slot.parts_by_selecting_field and part.name != slot.default_part_name
+        if not slot.part_class_by_selecting_field and part.name != slot.default_part_name
         else {}
     )
 
@@ -91,7 +91,7 @@ def broken() -> Iterator[tuple[dict[str, Any], str, str]]:
 
 
 def test_every_rule_is_broken_here():
-    assert set(BREAKING) == set(VALUE_RULES)
+    assert set(BREAKING) == set(CONDITION_BY_VALUE_RULE)
 
 
 @pytest.mark.parametrize(("fields", "name", "rule"), list(broken()), ids=str)
@@ -227,7 +227,7 @@ def kept() -> dict[str, str]:
 def test_a_message_is_worded_as_it_was_read(asked, message, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     # Other tests register user-defined steppers.
-    monkeypatch.setattr(engines, "_USER_STEPPERS", {})
+    monkeypatch.setattr(engines, "_USER_STEPPER_CLASS_BY_NAME", {})
     assert answered(asked) == message
     assert set(os.listdir(tmp_path)) <= {"record.csv"}
 

@@ -383,14 +383,17 @@ class Accessor:
         2.0
         """
         from rsfstudy.limit_cycles import SLIP_MODES
-        from rsfstudy.rig import convert_to_si, unit_factor
+        from rsfstudy.rig import compute_conversion_factor, convert_to_si
 
         least = convert_to_si("stick_slip_from", stick_slip_from, "m/s")
         if "slip_mode" not in self._dataset:
             raise DataError("slip_mode is not there: the dataset is of no limit cycles")
         there = self._dataset if "max_slip_rate" in self._dataset else self.to_si()
         peak = there["max_slip_rate"]
-        fast = peak * float(unit_factor("max_slip_rate", peak.attrs["units"], "m/s")) >= least
+        fast = (
+            peak * float(compute_conversion_factor("max_slip_rate", peak.attrs["units"], "m/s"))
+            >= least
+        )
         modes, slow = self._dataset["slip_mode"], SLIP_MODES.index("slow_slip")
         return modes.where(~(modes >= slow), slow + fast).assign_attrs(modes.attrs)
 

@@ -10,7 +10,7 @@ import xarray as xr
 
 from rsfstudy.api.simulation import simulate
 from rsfstudy.errors import DataError
-from rsfstudy.rig import SCALES_ATTRIBUTE, Rig
+from rsfstudy.rig import NAME_OF_SCALES_ATTRIBUTE, Rig
 from rsfstudy.storage import compare_same_lattice
 
 
@@ -73,7 +73,7 @@ def rerun_motion(motion: xr.Dataset) -> pd.DataFrame:
             f"simulate`) without times; this is of one scene ({title}). With the options that made "
             f"it, {call}, rtol={about.get('rtol', '...')}) computes it anew."
         )
-    if SCALES_ATTRIBUTE in about and "laboratory" not in about:
+    if NAME_OF_SCALES_ATTRIBUTE in about and "laboratory" not in about:
         raise DataError(
             "it is in units of no rig: keep motions as simulate gives them, or by a rig"
         )

@@ -23,7 +23,7 @@ from rsfstudy.fitting import (
     read_drops,
 )
 from rsfstudy.netcdf_encoding import copy_with_cf_encoding
-from rsfstudy.rig import convert_to_si, read_table, unit_factor
+from rsfstudy.rig import compute_conversion_factor, convert_to_si, read_table
 
 #: Variables from which a quantity takes its units, by the scale of the quantity.
 _RECORD_VARIABLE_BY_SCALE = {"D_c/V_*": "time", "D_c": "slip", "sigma_*": "shear_stress"}
@@ -275,7 +275,9 @@ def _parse_stiffness(stiffness: Any, variable_attributes: Mapping[str, Mapping[A
         if not (stress and length):
             remedy = "Give it as a number in the units of the record."
             raise InvalidValue("stiffness", stiffness, "the record states no units", remedy=remedy)
-        ours = unit_factor("shear_stress", stress, "Pa") / unit_factor("displacement", length, "m")
+        ours = compute_conversion_factor("shear_stress", stress, "Pa") / compute_conversion_factor(
+            "displacement", length, "m"
+        )
         return _parse_stiffness(
             convert_to_si("stiffness", stiffness, "Pa/m") / float(ours), variable_attributes
         )

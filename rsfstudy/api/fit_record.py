@@ -34,7 +34,7 @@ from rsfstudy.fitting import (
 from rsfstudy.measures import Fit
 from rsfstudy.motion import COMPILED, DEFAULT_RTOL, SCIPY, Accuracy, is_engine_installed
 from rsfstudy.reductions import Range
-from rsfstudy.rig import Rig, convert_to_si, is_friction_stiffness
+from rsfstudy.rig import Rig, convert_to_si, is_stiffness_over_normal_stress
 from rsfstudy.slider import Scene
 from rsfstudy.study import Study
 
@@ -456,7 +456,9 @@ def _initial_stiffness(
         remedy = "Give --stiffness (stiffness=), as in '1.6e-3 /um', "
         remedy += "or look for it: --free (free=)."
         raise InvalidValue("stiffness", None, "is needed, and not stated", remedy=remedy)
-    over_stress = isinstance(stated_stiffness, Real) or is_friction_stiffness(stated_stiffness)
+    over_stress = isinstance(stated_stiffness, Real) or is_stiffness_over_normal_stress(
+        stated_stiffness
+    )
     if isinstance(stated_stiffness, Real):
         found = float(stated_stiffness)
     else:

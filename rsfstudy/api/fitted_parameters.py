@@ -12,7 +12,7 @@ from rsfstudy.errors import InvalidValue
 from rsfstudy.execution import provenance_attributes
 from rsfstudy.fitting import LOGARITHMIC_PARAMETERS, fitted_fields
 from rsfstudy.netcdf_encoding import copy_with_cf_encoding
-from rsfstudy.reporting import split_fits
+from rsfstudy.reporting import split_into_single_fits
 from rsfstudy.rig import Rig
 from rsfstudy.slider import Scene
 from rsfstudy.status import STATUS_LABELS
@@ -21,7 +21,7 @@ from rsfstudy.storage import build_scene_from_stored
 
 def _require_single_fit(dataset: xr.Dataset) -> xr.Dataset:
     """Return the only fit of a dataset, or raise ``InvalidValue``."""
-    found = split_fits(dataset)
+    found = split_into_single_fits(dataset)
     if len(found) != 1:
         remedy = "Select one first, as in dataset.sel(law='slip')."
         raise InvalidValue("dataset", len(found), "holds several fits", remedy=remedy)

@@ -29,11 +29,11 @@ from rsfstudy.execution import provenance_attributes
 from rsfstudy.formatting import format_overrides, pluralize
 from rsfstudy.quantities import HtmlMarkup, escape_html, html_table
 from rsfstudy.reporting import (
-    TableMappingOrSentence,
+    SummaryTableOrSentence,
     TextTable,
-    build_summary_pieces,
+    build_summary_tables_and_sentences,
     claims_table,
-    count_pending,
+    count_pending_cells,
     count_statuses,
     describe_dataset_origin,
     failures_table,
@@ -178,7 +178,7 @@ def _build_page(directory: Path, file_sections: list[_ResultSection]) -> str:
         for one in file_sections
     ]
     colours = [one.status_colour for one in file_sections]
-    summary = TextTable(rows, wrappable_columns={"title", "claims", "status"}, colours=colours)
+    summary = TextTable(rows, wrappable_columns={"title", "claims", "status"}, row_colours=colours)
     made = provenance_attributes("rsfstudy report")
     when, by = made["history"].split()[0], made["source"].partition(",")[0]
     sections = (
@@ -246,7 +246,7 @@ def _build_section_of_dataset(results_path: Path, dataset: xr.Dataset) -> _Resul
         )
     parts += [_format_figure_as_html(results_path, dataset.rsf.plot), numbers]
     verdicts, wrong = summarise_verdicts(dataset, study_runs.check(dataset))
-    if undone := count_pending(dataset):
+    if undone := count_pending_cells(dataset):
         wrong.append(f"{undone} cells not computed")
     failed, commands = failures_table(dataset, results_path.name)
     if commands:
@@ -281,7 +281,7 @@ def dataset_html(dataset: xr.Dataset) -> str:
         HTML with the tables of the summary. The results of a study are followed by the verdicts of
         the claims, and other datasets are followed by their provenance.
     """
-    parts = list(map(_format_summary_piece_as_html, build_summary_pieces(dataset)))
+    parts = list(map(_format_summary_piece_as_html, build_summary_tables_and_sentences(dataset)))
     if is_of_single_scene(dataset):
         parts.append(_format_summary_piece_as_html(describe_dataset_origin(dataset)))
     elif claimed := claims_table(study_runs.check(dataset)):
@@ -302,7 +302,7 @@ def _html_paragraph(text: str, colour: str = "") -> str:
     return f'<p class="{colour}">{_escape(text)}</p>'
 
 
-def _format_summary_piece_as_html(piece: TableMappingOrSentence) -> str:
+def _format_summary_piece_as_html(piece: SummaryTableOrSentence) -> str:
     """Format a sentence, a mapping or a table as HTML.
 
     A wide table is placed in a box that scrolls. If the mapping or the table is empty, the function
@@ -314,7 +314,7 @@ def _format_summary_piece_as_html(piece: TableMappingOrSentence) -> str:
         rows = (f"<dt>{_escape(n)}</dt><dd>{_escape(value)}</dd>" for n, value in piece.items())
         return f"<dl>{''.join(rows)}</dl>" if piece else ""
     rows_ = []
-    for row, colour in zip(piece.rows, piece.colours or [""] * len(piece.rows), strict=True):
+    for row, colour in zip(piece.rows, piece.row_colours or [""] * len(piece.rows), strict=True):
         whole = {head: "" if head in piece.wrappable_columns else "whole" for head in row}
         whole[list(row)[-1]] += f" {colour}"
         texts = {head: c if isinstance(c, HtmlMarkup) else _escape(c) for head, c in row.items()}

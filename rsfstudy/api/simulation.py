@@ -34,10 +34,10 @@ from rsfstudy.motion import (
     WorkMeter,
     check_engine_is_usable,
     integrate_events,
-    larger_budget_remedy,
     recorded_friction_coefficient,
     recorded_load_point_displacement,
     rise,
+    suggest_raising_budget,
 )
 from rsfstudy.netcdf_encoding import copy_with_cf_encoding
 from rsfstudy.parts import SEGMENT_START, SEGMENT_VELOCITY
@@ -242,7 +242,7 @@ def simulate(
             raise
         status, message = halt.status, str(halt)
         if status is Status.WORK_BUDGET_SPENT:
-            message += larger_budget_remedy(budget)
+            message += suggest_raising_budget(budget)
     seen = recording.as_table(scene)
     seen = with_increasing_times(seen) if at is None else seen
     dataset = _recording_to_dataset(scene, seen, recording.regime_names)

@@ -27,11 +27,11 @@ from rsfstudy.measures import Outcome
 from rsfstudy.motion import COMPILED, check_engine_is_usable
 from rsfstudy.netcdf_encoding import copy_with_cf_encoding
 from rsfstudy.quantities import html_table
-from rsfstudy.reporting import incomplete_notes, note_on_norms_near_load_velocity
-from rsfstudy.slider import Scene, with_scene_field_signature
+from rsfstudy.reporting import format_notes_on_incomplete_results, note_on_norms_near_load_velocity
+from rsfstudy.slider import Scene, add_scene_fields_to_signature
 from rsfstudy.storage import (
     Comparison,
-    check_is_of_study,
+    check_contains_study_results,
     compare_results,
     compare_same_lattice,
     find_cell_number,
@@ -79,7 +79,7 @@ def studies() -> dict[str, Study]:
 
 
 @error_boundary
-@with_scene_field_signature()
+@add_scene_fields_to_signature()
 def run(
     study: str | Path | Study,
     *,
@@ -213,7 +213,7 @@ def run(
         results = copy_with_cf_encoding(
             prepare_run_with_progress(declared, keeping, where, progress)()
         )
-    if told := incomplete_notes(results):
+    if told := format_notes_on_incomplete_results(results):
         warnings.warn("; ".join(told), IncompleteWarning, stacklevel=user_stacklevel())
     if slow := note_on_norms_near_load_velocity(results):
         warnings.warn(slow, RsfStudyWarning, stacklevel=user_stacklevel())
@@ -366,7 +366,7 @@ def read_results(path: Path) -> xr.Dataset:
         belongs to one scene.
     """
     dataset = read_dataset(path)
-    check_is_of_study(dataset, shorten_text(path))
+    check_contains_study_results(dataset, shorten_text(path))
     return dataset
 
 
@@ -374,7 +374,7 @@ def _resolve_results_dataset(dataset: xr.Dataset | str | Path) -> xr.Dataset:
     """Return results, which are loaded if a name or a path is passed."""
     if not isinstance(dataset, xr.Dataset):
         return open(dataset)
-    check_is_of_study(dataset, "the dataset")
+    check_contains_study_results(dataset, "the dataset")
     return dataset
 
 

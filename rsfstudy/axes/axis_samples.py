@@ -15,7 +15,7 @@ from scipy.stats import qmc
 
 from rsfstudy.argument_checks import MAX_ITEMS
 from rsfstudy.errors import InvalidValue
-from rsfstudy.quantities import parse_heading
+from rsfstudy.quantities import split_heading_into_name_and_units
 
 #: Source of a field: the name of a sampled quantity, or a function of all sampled quantities.
 QuantityNameOrFunction = str | Callable[[Mapping[str, np.ndarray]], Any]
@@ -303,7 +303,7 @@ def read_table_columns_and_units(table: Any) -> tuple[dict[str, Any], dict[str, 
         heading, column = str(key), table[key]
         stated = getattr(column, "attrs", {}).get("units", getattr(column, "units", ""))
         stated = stated.get(heading, "") if isinstance(stated, Mapping) else stated
-        name, of_heading = parse_heading(heading) or (heading, "")
+        name, of_heading = split_heading_into_name_and_units(heading) or (heading, "")
         if name in found:
             raise InvalidValue("column", name, "stands twice in the table")
         if stated and of_heading and stated != of_heading:

@@ -16,7 +16,7 @@ from rsfstudy.cli.options import CommandOptions
 from rsfstudy.errors import InvalidValue
 from rsfstudy.referee import (
     AnswerComparison,
-    compare_file,
+    compare_file_with_known_answer,
     summarise_comparisons,
     write_problems,
 )
@@ -62,7 +62,10 @@ def verify(options: CommandOptions) -> int:
         raise InvalidValue("--digits", options.digits, "must be a number, from 1 to 12")
     columns = assignment_parsing.parse_column_assignments(options.columns)
     problem = options.problem or ""
-    found = [compare_file(file, problem, columns, options.digits) for file in options.files]
+    found = [
+        compare_file_with_known_answer(file, problem, columns, options.digits)
+        for file in options.files
+    ]
     for file, one in zip(options.files, found, strict=True):
         _print_verdict(file, one)
     stdout_console.print(summarise_comparisons(found), style="bold")
@@ -84,9 +87,8 @@ def _print_verdict(answer_file: Path, comparison: AnswerComparison) -> None:
     for line in comparison.describe_agreements():
         stdout_console.print(line)
     if not comparison.has_required_digits:
-        stdout_console.print(
-            f"  {comparison.explanation or 'no usual difference of conventions explains it'}"
-        )
+        unexplained = "no usual difference of conventions explains it"
+        stdout_console.print(f"  {comparison.explanation_of_disagreement or unexplained}")
 
 
 def _draw_agreement(comparisons: list[AnswerComparison], figure_path: Path) -> None:

@@ -21,10 +21,10 @@ from rsfstudy.fitting import LoadingStep, Record
 from rsfstudy.plots import save_figure
 from rsfstudy.reporting import (
     TextTable,
-    build_summary_pieces,
+    build_motion_tables_and_sentences,
+    build_summary_tables_and_sentences,
     is_fit,
     is_motion,
-    motion_pieces,
 )
 from rsfstudy.rig import DISPLAY_BASE_UNITS
 from rsfstudy.status import Status
@@ -107,7 +107,7 @@ def _write_motion_and_figure(motion: xr.Dataset, rig: Rig | None, options: Comma
         found = [motion, motion.rsf.events()]
         if rig:
             found = [rig.in_units(of, **DISPLAY_BASE_UNITS) for of in found]
-        for piece in motion_pieces(found[0], motion.rsf.scene, found[1]):
+        for piece in build_motion_tables_and_sentences(found[0], motion.rsf.scene, found[1]):
             table_layout.print_summary_piece(piece)
     stdout_console.print(f"{said}\nwrote {options.output} and {data}")
 
@@ -142,7 +142,7 @@ def fit(options: CommandOptions) -> int:
     )
     dataset = write_dataset(dataset, data)
     save_figure(dataset, options.output)
-    for piece in build_summary_pieces(dataset):
+    for piece in build_summary_tables_and_sentences(dataset):
         table_layout.print_summary_piece(piece)
     stdout_console.print(f"wrote {options.output} and {data}", soft_wrap=True)
     return printed_reports.exit_status_of_dataset(dataset)

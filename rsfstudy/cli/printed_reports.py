@@ -32,9 +32,10 @@ from rsfstudy.motion import DEFAULT_RTOL
 from rsfstudy.reporting import (
     TextTable,
     all_fits_are_valid,
-    build_summary_pieces,
+    build_reduction_tables_and_sentences,
+    build_summary_tables_and_sentences,
     claims_table,
-    count_pending,
+    count_pending_cells,
     count_verdicts,
     describe_dataset_origin,
     describe_scene_and_rig_fields,
@@ -43,14 +44,13 @@ from rsfstudy.reporting import (
     format_status_counts,
     is_fit,
     note_on_norms_near_load_velocity,
-    reduction_pieces,
-    summarise_study_in_lines,
+    summarise_study_as_text_lines,
     summarise_verdicts,
 )
 from rsfstudy.status import Status
 from rsfstudy.storage import Comparison, is_of_single_scene, read_declaration, read_provenance
 from rsfstudy.study import NOT_APPLICABLE_VERDICT
-from rsfstudy.vocabulary import coverage_content_type
+from rsfstudy.vocabulary import find_coverage_content_type
 
 if TYPE_CHECKING:
     from rsfstudy.plots import Figure
@@ -221,7 +221,7 @@ def print_run_report(
     written_files : sequence of Path
         Results file and figure.
     """
-    for piece in reduction_pieces(dataset):
+    for piece in build_reduction_tables_and_sentences(dataset):
         table_layout.print_summary_piece(piece)
     if slow := note_on_norms_near_load_velocity(dataset):
         stdout_console.print(slow, style="yellow")
@@ -254,7 +254,7 @@ def print_short_run_report(
     overrides = read_declaration(dataset).overrides
     for line in (
         *([f"not as declared: {format_overrides(overrides)}"] if overrides else []),
-        *summarise_study_in_lines(dataset),
+        *summarise_study_as_text_lines(dataset),
         f"claims: {summary_of_run.verdicts}",
         f"in {summary_of_run.time}, wrote {' and '.join(map(str, written_files))}",
     ):
@@ -277,7 +277,7 @@ def print_run_summaries(run_summaries: Sequence[RunSummary]) -> None:
     ]
     colours = [end.colour for end in run_summaries]
     table_layout.print_summary_piece(
-        TextTable(rows, wrappable_columns={"verdicts", "status"}, colours=colours)
+        TextTable(rows, wrappable_columns={"verdicts", "status"}, row_colours=colours)
     )
 
 
@@ -303,7 +303,7 @@ def print_results_summary(dataset: xr.Dataset, results_file: str) -> int:
     name = f"{dataset.attrs['id']}: " if "id" in dataset.attrs else ""
     stdout_console.print(f"{name}{title}\n", style="bold")
     table_layout.print_summary_piece(describe_dataset_origin(dataset))
-    for piece in build_summary_pieces(dataset):
+    for piece in build_summary_tables_and_sentences(dataset):
         table_layout.print_summary_piece(piece)
     if not is_of_single_scene(dataset) and not is_fit(dataset):
         table_layout.print_summary_piece(build_contents_table(dataset))
@@ -346,7 +346,7 @@ def print_failures(dataset: xr.Dataset, results_file: str = "") -> int:
         Exit status. The status is ``EXIT_STATUS_FAILED`` if a cell failed or has not been computed
         yet.
     """
-    if undone := count_pending(dataset):
+    if undone := count_pending_cells(dataset):
         size = dataset["status"].size
         stdout_console.print(f"{undone} of {pluralize(size, 'cell')} not computed yet", style="red")
     failed, commands = failures_table(dataset, results_file)
@@ -595,7 +595,9 @@ def print_comparison(
                 )
     _print_differing_statuses(comparison.statuses)
     differs = comparison.agreement_table["identical"] < comparison.agreement_table["values"]
-    is_result = comparison.agreement_table["variable"].map(coverage_content_type) == "modelResult"
+    is_result = (
+        comparison.agreement_table["variable"].map(find_coverage_content_type) == "modelResult"
+    )
     _print_agreement_table(
         comparison.agreement_table[
             is_result & (differs | comparison.agreement_table["beyond_errors"].notna())
@@ -670,6 +672,6 @@ def build_contents_table(dataset: xr.Dataset) -> TextTable:
             "what": f"{v.attrs.get('long_name', '')} ({', '.join(map(str, v.dims))})".strip(),
         }
         for name, v in dataset.data_vars.items()
-        if coverage_content_type(str(name)) == "modelResult"
+        if find_coverage_content_type(str(name)) == "modelResult"
     ]
     return TextTable(rows, wrappable_columns={"what"})

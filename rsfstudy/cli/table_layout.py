@@ -15,13 +15,13 @@ from rich.padding import Padding
 from rich.text import Text
 
 from rsfstudy.cli.console import make_text_printable, stdout_console
-from rsfstudy.reporting import TableMappingOrSentence, TextTable
+from rsfstudy.reporting import SummaryTableOrSentence, TextTable
 
 #: Number of characters between columns, and minimum width of a column of prose.
 _CHARACTERS_BETWEEN_COLUMNS, _MIN_WIDTH_OF_PROSE_COLUMN = 2, 20
 
 
-def print_summary_piece(summary_piece: TableMappingOrSentence) -> None:
+def print_summary_piece(summary_piece: SummaryTableOrSentence) -> None:
     """Print a table, a list of headings and values, or a sentence.
 
     Parameters
@@ -53,7 +53,7 @@ def _print_table(table: TextTable) -> None:
     most = [max(map(cell_len, (h, *c))) for h, c in zip(heads, columns, strict=True)]
     room = stdout_console.width - _CHARACTERS_BETWEEN_COLUMNS * (len(heads) - 1)
     if sum(least) > room:
-        for row, style in zip(rows, table.colours or [""] * len(rows), strict=True):
+        for row, style in zip(rows, table.row_colours or [""] * len(rows), strict=True):
             _print_row_as_list(row, prose, style)
         return
     printed = rich_table.Table(box=box.SIMPLE_HEAD, show_edge=False, padding=(0, 1, 0, 0))
@@ -62,7 +62,7 @@ def _print_table(table: TextTable) -> None:
     for head, column, width in zip(heads, columns, widths, strict=True):
         side = "right" if all(map(_is_number_text, column)) else "left"
         printed.add_column(Text(head), width=width, justify=side)  # type: ignore[arg-type]
-    for row, style in zip(rows, table.colours or [""] * len(rows), strict=True):
+    for row, style in zip(rows, table.row_colours or [""] * len(rows), strict=True):
         *texts, last = row.values()
         printed.add_row(*map(Text, texts), Text(last, style=style))
     stdout_console.print(printed)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 from rsfstudy.errors import InvalidValue
-from rsfstudy.measure_base import Outcome, check_loading_lets_motion_settle
+from rsfstudy.measure_base import Outcome, check_loading_changes_stress_only_in_steps
 from rsfstudy.slider import Scene, SliderParameters
 from rsfstudy.status import Status
 
@@ -28,7 +28,7 @@ def check_loading_is_single_step(scene: Scene) -> None:
     InvalidValue
         If the loading has several segments, or changes stress continuously.
     """
-    check_loading_lets_motion_settle(scene)
+    check_loading_changes_stress_only_in_steps(scene)
     loading = scene.parts.loading
     if len(loading.segments) > 1:
         rule = "is no single step, after which a motion decides"

@@ -32,7 +32,7 @@ from rsfstudy.measures import Measure, Outcome
 from rsfstudy.motion import Accuracy, compilation_log, register_user_steppers
 from rsfstudy.slider import Scene, UserPart, register_user_parts
 from rsfstudy.status import Status
-from rsfstudy.storage import OutputPacking, StoredCellRow
+from rsfstudy.storage import OutputPacker, StoredCellRow
 from rsfstudy.study import STUDIES_PACKAGE, Cell, CellChanges
 
 if TYPE_CHECKING:
@@ -88,9 +88,9 @@ class CellTask:
     origin_process_id: str = _PROCESS_ID
 
     @functools.cached_property
-    def output_packing(self) -> OutputPacking:
+    def output_packer(self) -> OutputPacker:
         """Layout of the outputs of a cell."""
-        return OutputPacking(self.measure)
+        return OutputPacker(self.measure)
 
 
 #: Function that takes a task and an iterator of batches, and yields finished cells in any order.
@@ -121,7 +121,7 @@ def compute_serially(task: CellTask, batches: CellBatchIterator) -> Generator[St
     for key, changes in (cell for some in batches for cell in batches.plan.select_cells(some)):
         cell = changes.build_cell(task.base_scene)
         outcome, seconds = compute_cell(task, cell, propagated_exceptions=(KeyboardInterrupt,))
-        finished.append(task.output_packing.pack_cell(key, outcome, seconds))
+        finished.append(task.output_packer.pack_cell(key, outcome, seconds))
         if (
             len(finished) >= max(1, handed_over)
             or time.monotonic() - since > _FINISHED_CELLS_HANDOVER_INTERVAL
@@ -251,7 +251,7 @@ def compute_batch(serialized_task: bytes, packed_batch: bytes) -> bytes:
         task.origin_process_id == _PROCESS_ID
     )  # A worker may be a thread of the process of the user.
     if not ours:
-        compilation_log.context_while_compiling = _cpu_time_limits.suspend_temporarily
+        compilation_log.create_context_while_compiling = _cpu_time_limits.suspend_temporarily
     with (
         contextlib.nullcontext()
         if ours
@@ -261,7 +261,7 @@ def compute_batch(serialized_task: bytes, packed_batch: bytes) -> bytes:
         register_user_steppers(task.user_stepper_classes)
         for key, *changes in pickle.loads(zlib.decompress(packed_batch)):
             cell = CellChanges(*changes).build_cell(task.base_scene)
-            finished.append(task.output_packing.pack_cell(key, *compute_cell(task, cell)))
+            finished.append(task.output_packer.pack_cell(key, *compute_cell(task, cell)))
             if time.monotonic() - began > _FINISHED_CELLS_HANDOVER_INTERVAL:
                 break
     return pickle.dumps(finished)

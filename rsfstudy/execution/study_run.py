@@ -28,7 +28,7 @@ from rsfstudy.storage import (
     assemble_dataset,
     check_store_does_not_exist,
     check_zarr_installed,
-    clean_attributes,
+    convert_attributes_for_netcdf,
     write_dataset,
     write_store,
 )
@@ -126,7 +126,7 @@ class StudyRun:
         the user has overridden values of the study.
         """
         pending = CellColumns.build_pending_cells(
-            self.study.size, self.task.output_packing.packed_number_count
+            self.study.size, self.task.output_packer.packed_number_count
         )
         lattice = assemble_dataset(self.study, pending, self.provenance)
         for reduction in self.study.reductions:
@@ -196,7 +196,7 @@ class StudyRun:
         if keeping.format == "zarr":
             check_store_does_not_exist(self.output_path(".zarr"))
         path = None if keeping.output is None else self.output_path(".cells.sqlite")
-        fingerprint, layout = self.provenance["fingerprint"], self.task.output_packing
+        fingerprint, layout = self.provenance["fingerprint"], self.task.output_packer
         with CellJournal(path, fingerprint, layout, fresh=keeping.fresh) as journal:
             try:
                 self._compute_missing(journal, cell_batch_mapper, progress_callback)
@@ -272,7 +272,7 @@ class StudyRun:
         except Exception as error:  # A reduction may raise any exception.
             raise RunError(f"cannot be reduced ({type(error).__name__}: {error})") from error
         if self.options.output is None:
-            return clean_attributes(results)
+            return convert_attributes_for_netcdf(results)
         written = results if zarr else write_dataset(results, self.output_path(".nc"))
         for stale in (".partial.nc", ".partial.png"):
             self.output_path(stale).unlink(missing_ok=True)

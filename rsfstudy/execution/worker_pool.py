@@ -223,8 +223,8 @@ def make_dask_batch_mapper(
                 if (finished := _batch_result(future)) is not None:
                     return finished
                 if (seconds := time.monotonic() - began) > task.time_limit:
-                    return [task.output_packing.pack_cell(key, _timeout_outcome(task), seconds)]
-            return [task.output_packing.pack_cell(key, _worker_lost_outcome(), math.nan)]
+                    return [task.output_packer.pack_cell(key, _timeout_outcome(task), seconds)]
+            return [task.output_packer.pack_cell(key, _worker_lost_outcome(), math.nan)]
 
         try:
             while True:

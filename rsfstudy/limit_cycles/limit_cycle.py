@@ -32,14 +32,14 @@ from rsfstudy.limit_cycles.return_map import PeriodicOrbit, ReturnMap
 from rsfstudy.limit_cycles.stick_slip_cycles import (
     LN10,
     Cycle,
-    more_events_remedy,
     recorded_rows_of_cycles,
+    suggest_raising_event_limit,
 )
 from rsfstudy.measure_base import (
     Outcome,
     RecordingMeasure,
-    check_loading_lets_motion_settle,
-    outputs_along_phase,
+    check_loading_changes_stress_only_in_steps,
+    create_outputs_along_phase,
 )
 from rsfstudy.motion import (
     MAX_ERROR_OVER_RTOL,
@@ -111,7 +111,7 @@ _OUTPUTS = (
         "what the slider does in the end, by its peak slip rate",
         flags=SLIP_MODES,
     ),
-    *outputs_along_phase(*MOTION_VARIABLES),
+    *create_outputs_along_phase(*MOTION_VARIABLES),
 )
 
 
@@ -200,7 +200,7 @@ class LimitCycle(RecordingMeasure):
         Outcome
             Status, results and message.
         """
-        check_loading_lets_motion_settle(scene)
+        check_loading_changes_stress_only_in_steps(scene)
         if scene.log_load_velocity == -math.inf:
             return Outcome(Status.NO_LIMIT_CYCLE, message="the load point is held")
         if not scene.is_perturbed:
@@ -243,7 +243,9 @@ class LimitCycle(RecordingMeasure):
         if motion is None:
             return outcome_of_settling_motion(scene)
         if motion.orbit is None:
-            return outcome_of_aperiodic_motion(scene, motion, more_events_remedy(self.events))
+            return outcome_of_aperiodic_motion(
+                scene, motion, suggest_raising_event_limit(self.events)
+            )
         return self._close_known_orbit(
             scene, accuracy, work_meter, motion.orbit.starting_at_largest_event, len(motion.cycles)
         )

@@ -47,10 +47,10 @@ from rsfstudy.limit_cycles.return_map import (
 )
 from rsfstudy.limit_cycles.stick_slip_cycles import (
     LN10,
-    PRIMARY_OUTPUTS_PER_CYCLE,
+    PRIMARY_OUTPUT_COUNT_PER_CYCLE,
     Cycle,
     iterate_cycles,
-    more_events_remedy,
+    suggest_raising_event_limit,
 )
 from rsfstudy.motion import Accuracy, MotionStopped, WorkMeter
 from rsfstudy.slider import Scene, critical_stiffness
@@ -104,12 +104,12 @@ class LimitCycleSearch:
         #: Columns b and c of P', the derivatives of the image with respect to spring stress and
         #: state, and True if the derivatives are known.
         self._derivatives, self._has_derivatives = (
-            2 * ([0.0] * (2 + PRIMARY_OUTPUTS_PER_CYCLE),),
+            2 * ([0.0] * (2 + PRIMARY_OUTPUT_COUNT_PER_CYCLE),),
             False,
         )
         #: Section s at which the last cycle begins, its image P(s), and the difference dP from the
         #: previous image.
-        self._section, self._image = (0.0, 0.0), [0.0] * (2 + PRIMARY_OUTPUTS_PER_CYCLE)
+        self._section, self._image = (0.0, 0.0), [0.0] * (2 + PRIMARY_OUTPUT_COUNT_PER_CYCLE)
         self._image_change = self._image
         #: Vector from s to the fixed point, and the resulting change of the image.
         self._correction, self._image_correction = self._section, self._image
@@ -147,7 +147,9 @@ class LimitCycleSearch:
                 if self._has_converged():
                     return True
                 if len(self.cycles) >= max_cycles:
-                    remedy = self._critical_stiffness_text or more_events_remedy(max_cycles)
+                    remedy = self._critical_stiffness_text or suggest_raising_event_limit(
+                        max_cycles
+                    )
                     text = f"no cycle repeats within {max_cycles} events; {remedy}"
                     raise MotionStopped(Status.WORK_BUDGET_SPENT, text)
                 if self._should_leap_to_fixed_point():
@@ -205,7 +207,9 @@ class LimitCycleSearch:
             if abs(by_stress) > (1000.0 if self._has_derivatives else 1.0) * self._noise:
                 self._has_derivatives = True
                 # Spring stress does not change when the motion passes a section.
-                (_none, way), passed = self._return_map.motion_direction_and_effect(begin)
+                (_none, way), passed = self._return_map.compute_motion_direction_and_image_change(
+                    begin
+                )
                 along = [change / way for change in passed]
                 pairs = zip(changes, along, strict=True)
                 self._derivatives = [(x - by_state * y) / by_stress for x, y in pairs], along

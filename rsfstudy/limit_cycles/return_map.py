@@ -43,7 +43,7 @@ from scipy.linalg.lapack import dgesv
 
 from rsfstudy.limit_cycles.stick_slip_cycles import (
     MIN_LOG_SLIP_RATE_RANGE,
-    PRIMARY_OUTPUTS_PER_CYCLE,
+    PRIMARY_OUTPUT_COUNT_PER_CYCLE,
     Cycle,
     iterate_cycles,
 )
@@ -52,9 +52,9 @@ from rsfstudy.motion import (
     MotionStopped,
     Recording,
     WorkMeter,
+    compute_restart_point,
     inertia_matters_at,
     point_with_slip_rate,
-    restart_point,
 )
 from rsfstudy.slider import MotionPoint, Numbers, Scene, equations_without_mass
 from rsfstudy.status import Status
@@ -274,7 +274,7 @@ class ReturnMap:
             If forward slip is impossible at this spring stress.
         """
         spring_stress, *psis = section.tolist()
-        point = restart_point(self.scene, spring_stress, tuple(psis))
+        point = compute_restart_point(self.scene, spring_stress, tuple(psis))
         return (
             point_with_slip_rate(self.scene, point, self.scene.log_load_velocity)
             if self._inertia_matters_at(point)
@@ -376,7 +376,9 @@ class ReturnMap:
             current = None if after is None else after[: len(current)]
         return tuple(found)
 
-    def motion_direction_and_effect(self, point: MotionPoint) -> tuple[Numbers, Numbers]:
+    def compute_motion_direction_and_image_change(
+        self, point: MotionPoint
+    ) -> tuple[Numbers, Numbers]:
         """Return the direction of the motion at a section.
 
         The function also returns the effect of a displacement in this direction. If the effect of
@@ -401,7 +403,7 @@ class ReturnMap:
         rates = equations_without_mass(scene, with_time=True).evaluate_rates(
             (spring_stress, *point.psis, 0.0)
         )
-        rest = (0.0,) * (PRIMARY_OUTPUTS_PER_CYCLE - 1)
+        rest = (0.0,) * (PRIMARY_OUTPUT_COUNT_PER_CYCLE - 1)
         return (0.0, *rates[1:-1]), (*(0.0,) * (1 + states), -rates[-1], *rest)
 
     def _differentiate_cycle(
@@ -413,14 +415,14 @@ class ReturnMap:
         a motion does not complete the cycle.
         """
         point = self.point_at_section(start_section)
-        way, passed = self.motion_direction_and_effect(point)
+        way, passed = self.compute_motion_direction_and_image_change(point)
         directions = np.linalg.qr(np.column_stack([way, np.eye(len(start_section))]))[0]
         columns = list[np.ndarray]()
         for unit in directions.T:
             if not columns and not self._inertia_matters_at(point):
                 columns.append(np.array(passed) / (unit @ way))
                 continue
-            slope = np.zeros(len(start_section) + PRIMARY_OUTPUTS_PER_CYCLE)
+            slope = np.zeros(len(start_section) + PRIMARY_OUTPUT_COUNT_PER_CYCLE)
             for number, weight in _DIFFERENCE_WEIGHTS:
                 ahead = self.follow_one_cycle(start_section + number * difference_step * unit)
                 behind = self.follow_one_cycle(start_section - number * difference_step * unit)

@@ -35,7 +35,7 @@ from rsfstudy.slider import RUPTURE_REGIME, MotionPoint, Scene
 
 LN10 = math.log(10.0)
 #: Number of main results of a cycle.
-PRIMARY_OUTPUTS_PER_CYCLE = 5
+PRIMARY_OUTPUT_COUNT_PER_CYCLE = 5
 #: Kinds of events. Module variables avoid the attribute lookup, which would take as long as the
 #: rest of the work per event.
 _START, _RISE, _FALL = EventKind.START, EventKind.RISE, EventKind.FALL
@@ -46,7 +46,7 @@ _get_log_slip_rate, _get_spring_stress = attrgetter("log_slip_rate"), attrgetter
 #: with decreasing ranges after which a motion may be approaching steady sliding.
 MIN_LOG_SLIP_RATE_RANGE, _MIN_SHRINKING_CYCLES = 1e-3, 30
 #: Fraction of the largest distance from steady sliding below which a motion has settled.
-_SETTLED_FRACTION_OF_MAX_DISTANCE = 1e-6
+_SETTLING_TOLERANCE_OVER_MAX_DISTANCE = 1e-6
 
 
 class Cycle(NamedTuple):
@@ -176,7 +176,8 @@ def iterate_cycles(
             cycle = _cycle_from_events(begin, begun, seen)
             swings.append(cycle.log_slip_rate_range)
             if (
-                swings[-1] < MIN_LOG_SLIP_RATE_RANGE or _log_rate_ranges_vanish(swings)
+                swings[-1] < MIN_LOG_SLIP_RATE_RANGE
+                or _are_log_rate_ranges_approaching_zero(swings)
             ) and steady_sliding_is_linearly_stable(scene):
                 yield None
                 return
@@ -184,7 +185,7 @@ def iterate_cycles(
         begin, begun, fallen, seen = event.point, event.time, False, []
 
 
-def more_events_remedy(event_count: int, option_name: str = "events") -> str:
+def suggest_raising_event_limit(event_count: int, option_name: str = "events") -> str:
     """Return the advice to allow more events, for use in a message.
 
     Parameters
@@ -248,11 +249,11 @@ def _cycle_event_specifications(log_load_velocity: float) -> tuple[EventSpecific
         minimum("log_slip_rate", may_defer=True),
         rise("log_slip_rate", log_load_velocity),
         fall("log_slip_rate", log_load_velocity, may_defer=True),
-        approach_to_steady_state(_SETTLED_FRACTION_OF_MAX_DISTANCE),
+        approach_to_steady_state(_SETTLING_TOLERANCE_OVER_MAX_DISTANCE),
     )
 
 
-def _log_rate_ranges_vanish(log_slip_rate_ranges: list[float]) -> bool:
+def _are_log_rate_ranges_approaching_zero(log_slip_rate_ranges: list[float]) -> bool:
     """Return True if the decreasing ranges of ln V approach zero.
 
     The last three ranges, with differences d_1 and d_2, are extrapolated as a geometric series. The

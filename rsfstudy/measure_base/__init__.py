@@ -14,8 +14,8 @@ from rsfstudy._lazy_exports import lazy_exports
 
 if TYPE_CHECKING:
     from rsfstudy.measure_base._declaration_checks import OutputValue
-    from rsfstudy.measure_base._loading_checks import check_loading_lets_motion_settle
-    from rsfstudy.measure_base._recorded_motion import RecordingMeasure, outputs_along_phase
+    from rsfstudy.measure_base._loading_checks import check_loading_changes_stress_only_in_steps
+    from rsfstudy.measure_base._recorded_motion import RecordingMeasure, create_outputs_along_phase
     from rsfstudy.measure_base.elasticities import Elasticities
     from rsfstudy.measure_base.measure import Measure, Outcome
     from rsfstudy.measure_base.settling_checks import steady_sliding_is_linearly_stable
@@ -24,8 +24,8 @@ else:
         __name__,
         {
             "measure_base._declaration_checks": ("OutputValue",),
-            "measure_base._loading_checks": ("check_loading_lets_motion_settle",),
-            "measure_base._recorded_motion": ("RecordingMeasure", "outputs_along_phase"),
+            "measure_base._loading_checks": ("check_loading_changes_stress_only_in_steps",),
+            "measure_base._recorded_motion": ("RecordingMeasure", "create_outputs_along_phase"),
             "measure_base.elasticities": ("Elasticities",),
             "measure_base.measure": ("Measure", "Outcome"),
             "measure_base.settling_checks": ("steady_sliding_is_linearly_stable",),
@@ -38,7 +38,7 @@ __all__ = [
     "Outcome",
     "OutputValue",
     "RecordingMeasure",
-    "check_loading_lets_motion_settle",
-    "outputs_along_phase",
+    "check_loading_changes_stress_only_in_steps",
+    "create_outputs_along_phase",
     "steady_sliding_is_linearly_stable",
 ]

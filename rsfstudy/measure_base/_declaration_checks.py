@@ -21,7 +21,9 @@ OutputValue = float | np.ndarray
 PlainValue = int | float | str | bool
 
 
-def check_declared_work(typical_work: object, expected_work: Callable[[Accuracy], float]) -> None:
+def check_declared_work_estimates(
+    typical_work: object, expected_work: Callable[[Accuracy], float]
+) -> None:
     """Check that the typical and the expected work are positive numbers.
 
     Parameters
@@ -44,14 +46,16 @@ def check_declared_work(typical_work: object, expected_work: Callable[[Accuracy]
             raise InvalidValue("expected_work", expected, f"must exceed 0, at rtol {rtol:g}")
 
 
-def check_measure_description(measure_name: str, describe: Callable[[], Mapping[str, Any]]) -> None:
+def check_measure_description(
+    measure_name: str, describe_measure: Callable[[], Mapping[str, Any]]
+) -> None:
     """Check that a file can store the description of a measure.
 
     Parameters
     ----------
     measure_name : str
         Name of the measure.
-    describe : callable
+    describe_measure : callable
         Function that returns the description as a dictionary.
 
     Raises
@@ -60,7 +64,7 @@ def check_measure_description(measure_name: str, describe: Callable[[], Mapping[
         If the description is not plain data, or if its name is not a string.
     """
     try:
-        name: object = json.loads(json.dumps(describe()))["name"]
+        name: object = json.loads(json.dumps(describe_measure()))["name"]
     except (TypeError, ValueError) as error:
         remedy = "Use Python's own numbers and texts, and tuples of them."
         rule = f"is no plain data ({error})"

@@ -6,7 +6,7 @@ from rsfstudy.errors import InvalidValue
 from rsfstudy.slider import Scene
 
 
-def check_loading_lets_motion_settle(scene: Scene) -> None:
+def check_loading_changes_stress_only_in_steps(scene: Scene) -> None:
     """Check that the loading changes stress only in sudden steps.
 
     A motion cannot settle or repeat if the loading changes stress continuously.

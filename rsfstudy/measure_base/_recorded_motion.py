@@ -16,7 +16,7 @@ from rsfstudy.quantities import Output
 from rsfstudy.slider import cached_attribute
 
 #: Variables along ``phase`` that are recorded if normal stress changes.
-PHASE_VARIABLES = (
+VARIABLES_RECORDED_ALONG_PHASE = (
     "time",
     "load_point_displacement",
     "slip",
@@ -26,7 +26,7 @@ PHASE_VARIABLES = (
 )
 
 
-def outputs_along_phase(*names: str) -> tuple[Output, ...]:
+def create_outputs_along_phase(*names: str) -> tuple[Output, ...]:
     """Return outputs along the dimension ``phase``.
 
     Parameters

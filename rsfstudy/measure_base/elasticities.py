@@ -16,34 +16,34 @@ from rsfstudy.errors import InvalidValue
 from rsfstudy.measure_base.measure import Measure, Outcome, OutputValue
 from rsfstudy.motion import Accuracy, MotionStopped, WorkMeter
 from rsfstudy.quantities import Output, Quantity
-from rsfstudy.slider import FIELD_TYPES, Scene
+from rsfstudy.slider import SCENE_FIELD_TYPES, Scene
 from rsfstudy.status import Status
 
 #: Fields of a scene that hold numbers.
 NUMERIC_SCENE_FIELDS = tuple(
-    name for name, kind in FIELD_TYPES.items() if kind in (float, float | None)
+    name for name, kind in SCENE_FIELD_TYPES.items() if kind in (float, float | None)
 )
 #: Parameters of a rig that are not fields of a scene, and advice on computing elasticities with
 #: respect to these parameters.
-_RIG_QUANTITIES_WITHOUT_ELASTICITY = (
+_RIG_QUANTITIES_THAT_ARE_NOT_SCENE_FIELDS = (
     "b",
     "slip_distance",
     "normal_stress",
     "sigma_star",
     "reference_velocity",
 )
-_RIG_ELASTICITIES_REMEDY = (
+_REMEDY_FOR_RIG_QUANTITY_ELASTICITIES = (
     "b at constant a is b_over_a; of a time in s, D_c is 1 + stiffness - reference_rate, normal "
     "stress is -stiffness, and V_* is reference_rate - 1."
 )
 #: Largest step of ln p. The finite-difference formula spans four steps.
-_MAX_LOG_STEP = 0.05
+_MAX_LOG_PARAMETER_STEP = 0.05
 #: Points of the finite-difference formula in units of the step, and weights of the fourth
 #: difference.
 _STENCIL, _FOURTH_DIFFERENCE_WEIGHTS = (-2.0, -1.0, 1.0, 2.0), (1.0, -4.0, 6.0, -4.0, 1.0)
 #: Truncation error as a fraction of the difference between the fourth-order and the second-order
 #: formula. In random scenes, the largest fraction is 0.14, for the largest steps.
-_CORRECTION_ERROR_FRACTION = 0.25
+_TRUNCATION_ERROR_OVER_FORMULA_DIFFERENCE = 0.25
 #: Fractions of the step that are tried in turn if the result does not exist on one side, or if the
 #: relative error of the derivative exceeds the second number. The third number limits the work of
 #: an evaluation with a shorter step, relative to the work at the scene itself.
@@ -140,20 +140,20 @@ class Elasticities(Measure):
             rule = "must be a measure whose headline is one number"
             raise InvalidValue("measure", self.measure, rule)
         object.__setattr__(
-            self, "parameters", tuple(self.parameters) or self._changeable_parameters
+            self, "parameters", tuple(self.parameters) or self._differentiable_parameter_names
         )
         for name in self.parameters:
-            if name not in self._changeable_parameters:
+            if name not in self._differentiable_parameter_names:
                 rule = f"is no number of a scene that {self.measure.name} leaves as it is"
                 choices, remedy = (
-                    ((), _RIG_ELASTICITIES_REMEDY)
-                    if name in _RIG_QUANTITIES_WITHOUT_ELASTICITY
-                    else (self._changeable_parameters, "")
+                    ((), _REMEDY_FOR_RIG_QUANTITY_ELASTICITIES)
+                    if name in _RIG_QUANTITIES_THAT_ARE_NOT_SCENE_FIELDS
+                    else (self._differentiable_parameter_names, "")
                 )
                 raise InvalidValue("parameters", name, rule, choices=choices, remedy=remedy)
 
     @cached_property
-    def _changeable_parameters(self) -> tuple[str, ...]:
+    def _differentiable_parameter_names(self) -> tuple[str, ...]:
         return tuple(
             name for name in NUMERIC_SCENE_FIELDS if name not in self.measure.solved_fields
         )
@@ -241,7 +241,7 @@ class Elasticities(Measure):
             return Outcome(Status.NOT_APPLICABLE, values, why)
         most = min(accuracy.budget, _MAX_EVALUATION_RATIO * (outcome.rhs_evaluations or 1))
         accuracies = accuracy, *3 * (replace(accuracy, budget=most),)
-        step = min(_MAX_LOG_STEP, (0.5 * here.error) ** (1.0 / 3.0))
+        step = min(_MAX_LOG_PARAMETER_STEP, (0.5 * here.error) ** (1.0 / 3.0))
         found = np.full((len(self.parameters), 2), np.nan)
         lacking, stated = [], scene.as_dict()
         for place, name in enumerate(self.parameters):
@@ -262,7 +262,7 @@ class Elasticities(Measure):
         parameter_name: str,
         central_value: _LogValueWithError,
         log_step: float,
-        accuracies: Sequence[Accuracy],
+        accuracies_of_step_fractions: Sequence[Accuracy],
         work_meter: WorkMeter,
     ) -> tuple[float, float]:
         """Compute the derivative with respect to one parameter, and its error.
@@ -280,7 +280,7 @@ class Elasticities(Measure):
             Value at the scene itself.
         log_step : float
             Largest step of ln p.
-        accuracies : sequence of Accuracy
+        accuracies_of_step_fractions : sequence of Accuracy
             Accuracy for each step.
         work_meter : WorkMeter
             Counter of right-hand-side evaluations.
@@ -291,7 +291,7 @@ class Elasticities(Measure):
             The derivative and its error. Both are NaN if the result does not exist on either side.
         """
         found: list[tuple[bool, float, float]] = []
-        for part, accuracy in zip(_STEP_FRACTIONS, accuracies, strict=True):
+        for part, accuracy in zip(_STEP_FRACTIONS, accuracies_of_step_fractions, strict=True):
             size = part * log_step
             try:
                 sides = [
@@ -417,7 +417,9 @@ def _central_difference(
         )
         # The bound assumes that the fifth derivative is at most the fourth derivative divided by
         # the distance of the outer points.
-        left = _CORRECTION_ERROR_FRACTION * abs(correction) + fourth / (12.0 * log_step)
+        left = _TRUNCATION_ERROR_OVER_FORMULA_DIFFERENCE * abs(correction) + fourth / (
+            12.0 * log_step
+        )
         return near + correction, left + of_levels, of_levels
     if below and above:
         slope = (above.value - below.value) / (2.0 * log_step)

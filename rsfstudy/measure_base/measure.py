@@ -30,10 +30,10 @@ from rsfstudy.motion import (
     Accuracy,
     MotionStopped,
     WorkMeter,
-    larger_budget_remedy,
+    suggest_raising_budget,
 )
 from rsfstudy.quantities import Output, Quantity, is_variable_name
-from rsfstudy.slider import FIELD_NAMES, Scene, cached_attribute
+from rsfstudy.slider import SCENE_FIELD_NAMES, Scene, cached_attribute
 from rsfstudy.status import Status
 from rsfstudy.vocabulary import FORMULAS_OF_DERIVED_COORDINATES
 
@@ -75,7 +75,7 @@ RESERVED_NAMES = frozenset(
         "message",
         "rhs_evaluations",
         "wall_time",
-        *FIELD_NAMES,
+        *SCENE_FIELD_NAMES,
         *FORMULAS_OF_DERIVED_COORDINATES,
     }
 )
@@ -345,10 +345,10 @@ class Measure(CheckedKeywords):
                     rule = f"has a {name} of its own"
                     remedy = "Write compute: what it gives is checked."
                     raise InvalidValue("measure", self.name, rule, remedy=remedy)
-            _check_declared_names(self)
+            _check_names_declared_by_measure(self)
             for name, values in self.inner_coordinates.items():
                 _declaration_checks.check_coordinate_values(name, values)
-            _declaration_checks.check_declared_work(self.typical_work, self.expected_work)
+            _declaration_checks.check_declared_work_estimates(self.typical_work, self.expected_work)
             _declaration_checks.check_measure_description(self.name, self.describe)
         except InvalidValue:
             raise
@@ -375,7 +375,7 @@ class Measure(CheckedKeywords):
         """
         outcome, meter = self.run_metered(scene, accuracy)
         if outcome.status is Status.WORK_BUDGET_SPENT and meter.evaluations > meter.budget:
-            return replace(outcome, message=outcome.message + larger_budget_remedy(meter.budget))
+            return replace(outcome, message=outcome.message + suggest_raising_budget(meter.budget))
         return outcome
 
     def run_nested(self, scene: Scene, accuracy: Accuracy, meter: WorkMeter) -> Outcome:
@@ -423,7 +423,7 @@ class Measure(CheckedKeywords):
         try:
             outcome = self._validate_outcome(self.compute(scene, accuracy, meter))
             if outcome.status.has_values:
-                outcome = self._flag_large_errors(accuracy.rtol, scene, outcome)
+                outcome = self._mark_unverified_if_errors_are_large(accuracy.rtol, scene, outcome)
         except MotionStopped as halt:
             outcome = Outcome(halt.status, message=str(halt))
         spent = _declaration_checks.check_evaluation_count(meter.evaluations)
@@ -481,7 +481,9 @@ class Measure(CheckedKeywords):
                 return name
         return None
 
-    def _flag_large_errors(self, rtol: float, scene: Scene, outcome: Outcome) -> Outcome:
+    def _mark_unverified_if_errors_are_large(
+        self, rtol: float, scene: Scene, outcome: Outcome
+    ) -> Outcome:
         """Set the status to ``unverified`` if an error is too large."""
         values, doubts = outcome.values, []
         for name, scale in self.error_scales(scene, values).items():
@@ -523,7 +525,7 @@ class Measure(CheckedKeywords):
         return {}
 
 
-def _check_declared_names(measure: Measure) -> None:
+def _check_names_declared_by_measure(measure: Measure) -> None:
     """Check the names of results, dimensions, quantities and solved fields.
 
     Raises
@@ -560,9 +562,9 @@ def _check_declared_names(measure: Measure) -> None:
             odd = about.name if isinstance(about, Quantity) else about
             raise InvalidValue("quantities", odd, "describes nothing measured", choices=known)
     for name in measure.solved_fields:
-        if name not in FIELD_NAMES:
+        if name not in SCENE_FIELD_NAMES:
             raise InvalidValue(
-                "solved_fields", name, "is not a field of a scene", choices=FIELD_NAMES
+                "solved_fields", name, "is not a field of a scene", choices=SCENE_FIELD_NAMES
             )
 
 

@@ -47,10 +47,10 @@ if TYPE_CHECKING:
         rise,
     )
     from rsfstudy.motion.initial_points import (
+        compute_restart_point,
         initial_point,
         point_before_start,
         point_with_slip_rate,
-        restart_point,
         slow_manifold_point,
     )
     from rsfstudy.motion.motion_driver import MotionDriver, iterate_events_of_equations
@@ -75,7 +75,7 @@ if TYPE_CHECKING:
         MIN_LOCAL_TOLERANCE,
         MotionStopped,
         WorkMeter,
-        larger_budget_remedy,
+        suggest_raising_budget,
     )
 else:
     __getattr__, __dir__ = lazy_exports(
@@ -117,7 +117,7 @@ else:
                 "initial_point",
                 "slow_manifold_point",
                 "point_before_start",
-                "restart_point",
+                "compute_restart_point",
                 "point_with_slip_rate",
             ),
             "motion.event_integration": ("integrate_events",),
@@ -125,7 +125,7 @@ else:
                 "MIN_LOCAL_TOLERANCE",
                 "MotionStopped",
                 "WorkMeter",
-                "larger_budget_remedy",
+                "suggest_raising_budget",
             ),
             "motion.neglected_inertia_error": ("estimate_neglected_inertia_error",),
             "motion.recorded_motion_readings": (
@@ -186,7 +186,7 @@ __all__ = [
     "initial_point",
     "integrate_events",
     "is_engine_installed",
-    "larger_budget_remedy",
+    "suggest_raising_budget",
     "recorded_load_point_displacement",
     "slow_manifold_point",
     "maximum",
@@ -194,7 +194,7 @@ __all__ = [
     "point_before_start",
     "recorded_row",
     "register_user_steppers",
-    "restart_point",
+    "compute_restart_point",
     "rise",
     "resample_motion_along_path",
     "find_user_stepper",

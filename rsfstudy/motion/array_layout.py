@@ -59,7 +59,7 @@ import struct
 import numpy as np
 
 #: State of a motion, which persists between calls of the loop. The first fields are the arguments
-#: of the motion (``CALL_ARGUMENT_FIELDS``), and the next fields are the counters.
+#: of the motion (``MOTION_STATE_FIELDS_SET_BY_CALLER``), and the next fields are the counters.
 MOTION_STATE_DTYPE = np.dtype(
     [
         ("end_time", "f8"),  # duration of the loading segment
@@ -109,14 +109,14 @@ MOTION_STATE_DTYPE = np.dtype(
 )
 #: Formats of the arguments and the counters. Packing bytes is much faster than record fields.
 CALL_FORMAT, COUNTER_FORMAT = struct.Struct("=7d4q"), struct.Struct("=6q")
-CALL_ARGUMENT_FIELDS = (MOTION_STATE_DTYPE.names or ())[:11]
+MOTION_STATE_FIELDS_SET_BY_CALLER = (MOTION_STATE_DTYPE.names or ())[:11]
 #: Rows of the function table: slow manifold and ruptures.
 SLOW_REGIME, FAST_REGIME = 0, 1
 #: Number of functions in each row, in the order of ``in_place_functions.InPlaceFunctions``.
-FUNCTIONS_PER_REGIME = 4
+FUNCTION_COUNT_PER_REGIME = 4
 
 #: Columns of the table of event specifications.
-SPECIFICATION_COLUMNS = (
+EVENT_SPECIFICATION_COLUMNS = (
     SPEC_KIND,
     SPEC_QUANTITY,
     SPEC_LEVEL,
@@ -171,4 +171,4 @@ APPARENT_FRICTION, APPARENT_FRICTION_RATE, FIRST_STATE = 10, 11, 12
     SEGMENT_ENDED,
 ) = range(8)
 #: Return code of ``step_integration.take_step`` for a successful step.
-STEP_TAKEN = -1
+STEP_TAKEN_CODE = -1

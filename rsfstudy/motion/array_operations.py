@@ -8,7 +8,7 @@ replace the functions of this module.
 from __future__ import annotations
 
 
-def evaluate_in_place(function, y, rates, parameters, result):
+def evaluate_function_into_array(function, y, rates, parameters, result):
     """Call a function that fills an array.
 
     Parameters
@@ -24,7 +24,7 @@ def evaluate_in_place(function, y, rates, parameters, result):
 
 
 def array_as_pointer(array):
-    """Return an array in the form that ``offset_pointer`` accepts.
+    """Return an array in the form that ``advance_pointer_by_items`` accepts.
 
     Parameters
     ----------
@@ -39,7 +39,7 @@ def array_as_pointer(array):
     return array
 
 
-def offset_pointer(array, item_count):
+def advance_pointer_by_items(array, item_count):
     """Return the part of an array that begins at an index.
 
     Parameters

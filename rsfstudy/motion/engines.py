@@ -20,7 +20,7 @@ from rsfstudy.quantities import is_variable_name
 SCIPY, PYTHON, COMPILED = "scipy", "python", "compiled"
 ENGINES = (SCIPY, PYTHON, COMPILED)
 #: User-defined steppers that are registered in this process.
-_USER_STEPPERS: dict[str, type] = {}
+_USER_STEPPER_CLASS_BY_NAME: dict[str, type] = {}
 
 
 def engine_name(engine: Any) -> str:
@@ -55,11 +55,11 @@ def engine_name(engine: Any) -> str:
     if not isinstance(name, str) or not is_variable_name(name):
         rule = f"must be named by a Python identifier, not {name!r}"
         raise InvalidValue("engine", engine, rule, remedy='Write name = "..." in its class.')
-    known = _USER_STEPPERS.get(name, engine)
+    known = _USER_STEPPER_CLASS_BY_NAME.get(name, engine)
     if name in ENGINES or _qualified_name_of_stepper(known) != _qualified_name_of_stepper(engine):
         rule = f"takes the name {name!r}, which stands for another engine"
         raise InvalidValue("engine", engine, rule, remedy="Give it another name.")
-    _USER_STEPPERS[name] = engine
+    _USER_STEPPER_CLASS_BY_NAME[name] = engine
     return name
 
 
@@ -76,7 +76,11 @@ def find_user_stepper(stepper_name: str) -> tuple[type, ...]:
     tuple of type
         Tuple with the stepper class, or an empty tuple if no stepper has this name.
     """
-    return (_USER_STEPPERS[stepper_name],) if stepper_name in _USER_STEPPERS else ()
+    return (
+        (_USER_STEPPER_CLASS_BY_NAME[stepper_name],)
+        if stepper_name in _USER_STEPPER_CLASS_BY_NAME
+        else ()
+    )
 
 
 def register_user_steppers(steppers: Iterable[type]) -> None:
@@ -90,7 +94,7 @@ def register_user_steppers(steppers: Iterable[type]) -> None:
         Stepper classes.
     """
     for stepper in steppers:
-        _USER_STEPPERS[stepper.name] = stepper  # type: ignore[attr-defined]
+        _USER_STEPPER_CLASS_BY_NAME[stepper.name] = stepper  # type: ignore[attr-defined]
 
 
 def _qualified_name_of_stepper(stepper: type) -> tuple[str, str]:
@@ -114,7 +118,9 @@ def unknown_engine_error(engine: Any) -> InvalidValue:
     InvalidValue
         Error with the allowed choices.
     """
-    return InvalidValue("engine", engine, "is unknown", choices=(*ENGINES, *_USER_STEPPERS))
+    return InvalidValue(
+        "engine", engine, "is unknown", choices=(*ENGINES, *_USER_STEPPER_CLASS_BY_NAME)
+    )
 
 
 @dataclass
@@ -129,14 +135,16 @@ class CompilationLog:
         Number of compiled programs.
     total_compilation_seconds : float, default: 0.0
         Total compilation time in seconds.
-    context_while_compiling : callable, optional
+    create_context_while_compiling : callable, optional
         Function that returns a context manager for the compilation. A time limit or a timer can
         exclude the compilation with it. By default, the context manager does nothing.
     """
 
     compiled_program_count: int = 0
     total_compilation_seconds: float = 0.0
-    context_while_compiling: Callable[[], AbstractContextManager[None]] = contextlib.nullcontext
+    create_context_while_compiling: Callable[[], AbstractContextManager[None]] = (
+        contextlib.nullcontext
+    )
 
 
 compilation_log = CompilationLog()

@@ -28,7 +28,7 @@ from rsfstudy.parts import (
     SEGMENT_START,
 )
 from rsfstudy.slider import (
-    ENDLESS_SEGMENT_TABLE,
+    SINGLE_ENDLESS_SEGMENT_TABLE,
     MotionPoint,
     Numbers,
     Scene,
@@ -91,12 +91,12 @@ def integrate_events(
     chains = (
         scene.continuous_segments
         if start is None
-        else ((scene.segment_scene(-1), ENDLESS_SEGMENT_TABLE),)
+        else ((scene.segment_scene(-1), SINGLE_ENDLESS_SEGMENT_TABLE),)
     )
     with_time = with_time or until < math.inf or len(chains) > 1 or len(chains[0][1]) > 1
     time, slip, before, told = 0.0, 0.0, None, scene.parts.loading.reported_segment_count
     if resume_from is not None:
-        chains, start = _remaining_segment_chains(scene, resume_from)
+        chains, start = _find_remaining_segment_chains(scene, resume_from)
         time, slip = resume_from.time, resume_from.slip
     for number, (acting, table) in enumerate(chains):
         if start is None:
@@ -133,7 +133,7 @@ def integrate_events(
             return
         for last in motion:
             if before is not None and last.kind is EventKind.START:
-                for event in _segment_start_events(last, before, acting, asked):
+                for event in _iterate_segment_start_events(last, before, acting, asked):
                     yield event
                     if event.specification is not None and event.specification.terminal:
                         return
@@ -145,7 +145,7 @@ def integrate_events(
             # The located end time has a rounding error.
             last = last._replace(time=end)
             if recording is not None:
-                recording.clip_times_to(end)
+                recording.clip_recorded_times(end)
         if end >= until:
             yield last
             return
@@ -156,7 +156,7 @@ def integrate_events(
         time, slip = last.time, last.slip
 
 
-def _remaining_segment_chains(
+def _find_remaining_segment_chains(
     scene: Scene, resume_from: Event
 ) -> tuple[Sequence[tuple[Scene, np.ndarray]], MotionPoint]:
     """Return the chains after the end of a motion, and the initial point.
@@ -188,7 +188,7 @@ def _truncate_segments_at(segment_table: np.ndarray, end_time: float) -> np.ndar
     return cut
 
 
-def _segment_start_events(
+def _iterate_segment_start_events(
     event: Event,
     point_and_parameters_before: tuple[MotionPoint, Numbers],
     segment_scene: Scene,

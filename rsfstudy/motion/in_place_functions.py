@@ -82,8 +82,8 @@ def _build_in_place_functions_cached(
 ) -> InPlaceFunctions:
     """Convert functions, once for each combination of parts."""
     of_unknowns, numbers = (
-        build_unpack_function(unknown_count),
-        build_unpack_function(parameter_count),
+        build_array_unpacking_function(unknown_count),
+        build_array_unpacking_function(parameter_count),
     )
     return InPlaceFunctions(
         fill_rates=build_fill_rates_function(rate_function, of_unknowns, numbers, unknown_count),
@@ -93,7 +93,9 @@ def _build_in_place_functions_cached(
         ),
         fill_balance=force_balance_function
         and build_fill_balance_function(
-            force_balance_function, build_unpack_function(state_count, first_index=1), numbers
+            force_balance_function,
+            build_array_unpacking_function(state_count, first_index=1),
+            numbers,
         ),
     )
 
@@ -197,7 +199,7 @@ def build_fill_balance_function(
 
 
 @cache
-def build_unpack_function(item_count: int, first_index: int = 0) -> Callable[..., Numbers]:
+def build_array_unpacking_function(item_count: int, first_index: int = 0) -> Callable[..., Numbers]:
     """Build a function that converts items of an array to a tuple.
 
     Parameters

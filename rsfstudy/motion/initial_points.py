@@ -23,7 +23,7 @@ from rsfstudy.slider import (
 )
 from rsfstudy.status import Status
 
-_UNEVALUATED_FIELDS = (math.nan,) * len(MotionPoint._fields[5:-1])
+_NAN_FOR_UNEVALUATED_POINT_FIELDS = (math.nan,) * len(MotionPoint._fields[5:-1])
 
 
 def initial_point(scene: Scene) -> MotionPoint:
@@ -48,11 +48,11 @@ def initial_point(scene: Scene) -> MotionPoint:
     MotionStopped
         If normal stress vanishes or shear stress reverses in the step.
     """
-    check_start_has_friction(scene)
+    check_forward_slip_is_possible_at_start(scene)
     psis, log_slip_rate = compute_steady_states(scene, 0.0, 0.0), 0.0
     if scene.starts_unsteady:
         psis, log_slip_rate = _find_specified_initial_states(scene, psis)
-    psis = _replace_loading_unknowns(scene, psis)
+    psis = _reset_loading_unknowns(scene, psis)
     stress = scene.parts.slider.initial_stress + scene.spring_stress_step
     stepped = point_without_derived_values(scene, stress, psis)
     return point_with_slip_rate(scene, stepped, log_slip_rate) if scene.has_mass else stepped
@@ -108,10 +108,10 @@ def point_without_derived_values(
     """
     psi = scene.equation_functions.friction_functions.state_sum(states)
     known = log_slip_rate, math.nan, spring_stress, frictional_stress, psi
-    return MotionPoint._make((*known, *_UNEVALUATED_FIELDS, states))
+    return MotionPoint._make((*known, *_NAN_FOR_UNEVALUATED_POINT_FIELDS, states))
 
 
-def restart_point(scene: Scene, spring_stress: float, states: Numbers) -> MotionPoint:
+def compute_restart_point(scene: Scene, spring_stress: float, states: Numbers) -> MotionPoint:
     """Return a point on the slow manifold, from which a motion can restart.
 
     Parameters
@@ -137,11 +137,11 @@ def restart_point(scene: Scene, spring_stress: float, states: Numbers) -> Motion
         spring_stress, states, scene.parameter_values
     )
     point = point_without_derived_values(scene, spring_stress, states, x, friction)
-    check_start_has_friction(scene, point)
+    check_forward_slip_is_possible_at_start(scene, point)
     return point
 
 
-def _replace_loading_unknowns(scene: Scene, states: Numbers) -> Numbers:
+def _reset_loading_unknowns(scene: Scene, states: Numbers) -> Numbers:
     """Replace the unknowns of the loading by their initial values.
 
     The unknowns of the loading follow the states of the law. Unknowns of an earlier loading are
@@ -192,9 +192,9 @@ def point_after_loading_jump(scene: Scene, point: MotionPoint) -> MotionPoint:
     MotionStopped
         If normal stress vanishes or shear stress reverses in the jump.
     """
-    psis = _replace_loading_unknowns(scene, point.psis)
+    psis = _reset_loading_unknowns(scene, point.psis)
     after = point._replace(spring_stress=point.spring_stress + scene.spring_stress_step, psis=psis)
-    check_start_has_friction(scene, after)
+    check_forward_slip_is_possible_at_start(scene, after)
     return point_with_slip_rate(scene, after, point.log_slip_rate) if scene.has_mass else after
 
 
@@ -249,7 +249,9 @@ def slow_manifold_point(scene: Scene, spring_stress: float, states: Numbers) -> 
     )
 
 
-def check_start_has_friction(scene: Scene, start_point: MotionPoint | None = None) -> None:
+def check_forward_slip_is_possible_at_start(
+    scene: Scene, start_point: MotionPoint | None = None
+) -> None:
     """Raise MotionStopped if a step makes forward slip impossible.
 
     Parameters

@@ -30,14 +30,14 @@ from rsfstudy.motion.recording import (
     Recording,
 )
 from rsfstudy.motion.regime_switching import (
-    NO_SWITCH_THRESHOLDS,
+    UNUSED_SWITCH_THRESHOLDS,
     SwitchThresholds,
-    termination_error,
+    build_termination_error,
 )
-from rsfstudy.motion.step_events import BEFORE_JUMP, NO_EVENT, find_jump_side
+from rsfstudy.motion.step_events import BEFORE_JUMP, NO_EVENT, find_jump_side_of_event
 from rsfstudy.motion.work_meter import (
     MIN_LOCAL_TOLERANCE,
-    REFERENCE_TOLERANCE_OF_STEP_LIMIT,
+    TOLERANCE_FOR_SPECIFIED_MAX_STEP_LENGTHS,
     MotionStopped,
     WorkMeter,
 )
@@ -65,7 +65,7 @@ _POINT_COLUMN_BY_QUANTITY = {
     name: column for column, name in enumerate(MotionPoint._fields[:-1])
 } | {"": 0}
 #: Events that the table always contains. Their negative codes are list indices from the end.
-_UNREQUESTED_EVENTS = [
+_KINDS_AND_SPECS_OF_UNREQUESTED_EVENTS = [
     (k, None)
     for k in (
         EventKind.SEGMENT,
@@ -76,10 +76,10 @@ _UNREQUESTED_EVENTS = [
     )
 ]
 #: Constructor of named tuples that takes half the time of a call of the class.
-_make_named_tuple_quickly = tuple.__new__
+_make_named_tuple_without_checks = tuple.__new__
 _STEP_TOO_SHORT_TEXT = "a step would be shorter than the spacing of numbers around the clock"
-_NO_RECORDING_TABLES = array_layout.RECORD_NEVER, np.empty(0), np.empty((0, FIRST_STATE_COLUMN))
-_NO_KINKS = np.empty((0, SEGMENT_STRESS_FALL + 1)), 0
+_EMPTY_RECORDING_TABLES = array_layout.RECORD_NEVER, np.empty(0), np.empty((0, FIRST_STATE_COLUMN))
+_EMPTY_KINK_TABLE_AND_ZERO_COUNT = np.empty((0, SEGMENT_STRESS_FALL + 1)), 0
 
 
 class PythonBackend:
@@ -116,14 +116,14 @@ class PythonBackend:
         initial_state : dict of str to float
             Initial values of the fields, from ``initial_state_values``.
         call_arguments : tuple of float
-            Values of the fields in ``array_layout.CALL_ARGUMENT_FIELDS``.
+            Values of the fields in ``array_layout.MOTION_STATE_FIELDS_SET_BY_CALLER``.
 
         Returns
         -------
         PythonMotionState
             State of the motion.
         """
-        called = zip(array_layout.CALL_ARGUMENT_FIELDS, call_arguments, strict=True)
+        called = zip(array_layout.MOTION_STATE_FIELDS_SET_BY_CALLER, call_arguments, strict=True)
         return PythonMotionState(**{**initial_state, **dict(called)})
 
     def build_function_table(self, equations_by_regime: tuple[Equations, ...]) -> np.ndarray:
@@ -140,7 +140,7 @@ class PythonBackend:
             Functions that fill arrays, one row per regime. Both rows contain the force balance
             function of the slow manifold.
         """
-        rows = np.zeros((2, array_layout.FUNCTIONS_PER_REGIME), dtype=object)
+        rows = np.zeros((2, array_layout.FUNCTION_COUNT_PER_REGIME), dtype=object)
         for row, system in zip(rows, equations_by_regime, strict=False):
             row[:] = build_in_place_functions(system)
         rows[array_layout.FAST_REGIME, -1] = rows[array_layout.SLOW_REGIME, -1]
@@ -290,10 +290,10 @@ class MotionDriver:
         duration_start_time_and_slip: tuple[float, float, float] = (math.inf, 0.0, 0.0),
         backward: bool = False,
         parameters: Numbers | None = None,
-        switch_thresholds: SwitchThresholds = NO_SWITCH_THRESHOLDS,
+        switch_thresholds: SwitchThresholds = UNUSED_SWITCH_THRESHOLDS,
         evaluation_budget: float = math.inf,
         recording: Recording | None = None,
-        kinks_and_reported_count: tuple[np.ndarray, int] = _NO_KINKS,
+        kinks_and_reported_count: tuple[np.ndarray, int] = _EMPTY_KINK_TABLE_AND_ZERO_COUNT,
         initial_imposed_stress: float | None = None,
     ) -> Iterator[Event]:
         """Yield the events of a motion in the order of their occurrence.
@@ -347,7 +347,7 @@ class MotionDriver:
             start_point_or_unknowns = (
                 start_point_or_unknowns
                 if initial_imposed_stress is None
-                else _add_to_stresses(
+                else _shift_stresses_of_point(
                     start_point_or_unknowns,
                     initial_imposed_stress - start_point_or_unknowns.psis[-1],
                 )
@@ -378,7 +378,7 @@ class MotionDriver:
                 *(*duration_start_time_and_slip, stress, tolerance),
                 # The step limit depends on the tolerance. Otherwise, two runs with different
                 # tolerances could share an error, and their difference would not reveal the error.
-                (tolerance / REFERENCE_TOLERANCE_OF_STEP_LIMIT) ** 0.125,
+                (tolerance / TOLERANCE_FOR_SPECIFIED_MAX_STEP_LENGTHS) ** 0.125,
                 -1.0 if backward else 1.0,
                 int(min(evaluation_budget, work_meter.budget - work_meter.evaluations)),
                 *(records, turns, kinks_and_reported_count[1]),
@@ -411,14 +411,14 @@ class MotionDriver:
                 recording.append_rows(kept, regimes)
             for line in events[:happened].tolist():
                 code, regime, clock, time, slip, spent = line[: array_layout.EVENT_POINT]
-                point = _make_named_tuple_quickly(
+                point = _make_named_tuple_without_checks(
                     MotionPoint, (*line[array_layout.EVENT_POINT : psis], tuple(line[psis:]))
                 )
                 if initial_imposed_stress is not None:
-                    point = _add_to_stresses(point, point.psis[-1] - initial_imposed_stress)
+                    point = _shift_stresses_of_point(point, point.psis[-1] - initial_imposed_stress)
                 kind, spec = meanings[int(code)]
                 name, work = regimes[int(regime)], others + int(spent)
-                yield _make_named_tuple_quickly(
+                yield _make_named_tuple_without_checks(
                     Event, (kind, spec, time, slip, point, name, work, clock)
                 )
             work_meter.check_budget()
@@ -426,7 +426,7 @@ class MotionDriver:
             raise _motion_stopped_error(end, state, regimes, stepper)
 
 
-def _add_to_stresses(point: MotionPoint, stress_change: float) -> MotionPoint:
+def _shift_stresses_of_point(point: MotionPoint, stress_change: float) -> MotionPoint:
     """Return a point with another spring stress and frictional stress."""
     return point._replace(
         spring_stress=point.spring_stress + stress_change,
@@ -512,7 +512,7 @@ def _prepare_recording_tables(
 ) -> tuple[int, np.ndarray, np.ndarray]:
     """Return the recording mode, requested samples and output table."""
     if recording is None:
-        return _NO_RECORDING_TABLES
+        return _EMPTY_RECORDING_TABLES
     if recording.sample_times is None:
         return (
             array_layout.RECORD_WITHIN_STEPS,
@@ -556,11 +556,11 @@ def find_events_at_jump(
     last, first = _pack_point(point_before).tolist(), _pack_point(point_after).tolist()
     table = (
         _pack_event_specifications(tuple(event_specs))[0]
-        .reshape(-1, len(array_layout.SPECIFICATION_COLUMNS))
+        .reshape(-1, len(array_layout.EVENT_SPECIFICATION_COLUMNS))
         .tolist()
     )
     for spec, row in zip(event_specs, table, strict=True):
-        where = find_jump_side(row, last, parameters_before, first, parameters_after)
+        where = find_jump_side_of_event(row, last, parameters_before, first, parameters_after)
         if where != NO_EVENT:
             yield spec, point_before if where == BEFORE_JUMP else point_after
 
@@ -570,8 +570,11 @@ def _pack_event_specifications(
     event_specs: tuple[EventSpecification, ...],
 ) -> tuple[np.ndarray, list[tuple[EventKind, EventSpecification | None]]]:
     """Return the table of event specifications and the meanings of codes."""
-    meanings = [*((spec.kind, spec) for spec in event_specs), *_UNREQUESTED_EVENTS]
-    asked = np.zeros((len(event_specs), len(array_layout.SPECIFICATION_COLUMNS)))
+    meanings = [
+        *((spec.kind, spec) for spec in event_specs),
+        *_KINDS_AND_SPECS_OF_UNREQUESTED_EVENTS,
+    ]
+    asked = np.zeros((len(event_specs), len(array_layout.EVENT_SPECIFICATION_COLUMNS)))
     for row, spec in zip(asked, event_specs, strict=True):
         row[array_layout.SPEC_KIND], row[array_layout.SPEC_QUANTITY] = (
             _EVENT_KIND_CODES[spec.kind],
@@ -592,7 +595,7 @@ def _motion_stopped_error(
 ) -> MotionStopped:
     """Return the exception for a motion that cannot continue."""
     if return_code == array_layout.TERMINATED:
-        return termination_error(
+        return build_termination_error(
             int(motion_state.get_state_field("termination")),
             motion_state.get_state_field("final_normal_stress"),
         )

@@ -27,12 +27,13 @@ that write them. Steppers only take steps. The loop detects and locates the even
 
 The module uses only Python that Numba can compile. To debug a rupture, simulate a scene with
 ``inertia=True`` and ``engine="scipy"``, or ``engine="python"`` to debug the stages of a step. Set a
-breakpoint in ``truncate_step_at_regime_or_time_end`` with the condition ``motion.regime == 1``
-(``FAST_REGIME``). The debugger then stops once in every step of the rupture. The points at both
+breakpoint in ``truncate_step_at_end_of_regime_or_segment`` with the condition ``motion.regime ==
+1`` (``FAST_REGIME``). The debugger then stops once in every step of the rupture. The points at both
 ends of the step are ``workspace.point_at_begin`` and ``workspace.point_at_end``. Their columns are
 numbered by ``array_layout.LOG_SLIP_RATE`` and the following constants. To stop at the end of a
-rupture, set a breakpoint with the same condition at ``return REGIME_ENDED`` in ``follow_regime``.
-To stop at the beginning of a rupture, use the condition ``motion.regime == 0`` there.
+rupture, set a breakpoint with the same condition at ``return REGIME_ENDED`` in
+``integrate_one_regime``. To stop at the beginning of a rupture, use the condition ``motion.regime
+== 0`` there.
 """
 
 from __future__ import annotations
@@ -41,10 +42,11 @@ import math
 
 from rsfstudy.motion.array_layout import (
     END_CODE,
+    EVENT_SPECIFICATION_COLUMNS,
     FAST_REGIME,
     FIRST_STATE,
     FRICTIONAL_STRESS,
-    FUNCTIONS_PER_REGIME,
+    FUNCTION_COUNT_PER_REGIME,
     INVALID_STEP,
     KINK_CODE,
     LOG_SLIP_RATE,
@@ -58,25 +60,24 @@ from rsfstudy.motion.array_layout import (
     SAMPLED_CODE,
     SEGMENT_ENDED,
     SLOW_REGIME,
-    SPECIFICATION_COLUMNS,
     SPRING_STRESS,
     START_CODE,
-    STEP_TAKEN,
+    STEP_TAKEN_CODE,
     TERMINATED,
 )
 from rsfstudy.motion.array_operations import (
+    advance_pointer_by_items,
     array_as_pointer,
     copy_values,
-    evaluate_in_place,
-    offset_pointer,
+    evaluate_function_into_array,
 )
 from rsfstudy.motion.recording import SAMPLES_PER_STEP
 from rsfstudy.motion.regime_switching import (
     CONTINUES,
     SwitchThresholds,
+    compute_margin_to_termination,
     find_termination_status,
-    margin_to_termination,
-    may_switch_back_to_slow_manifold,
+    is_slip_slow_enough_for_slow_manifold,
     should_switch_back_to_slow_manifold,
     starts_on_slow_manifold,
 )
@@ -87,16 +88,16 @@ from rsfstudy.motion.step_events import (
     append_events_in_step,
     append_start_events,
     append_step_end_event,
+    compute_excess_over_switch_threshold,
     has_deferrable_event,
     is_step_recorded,
     locate_sign_change,
     record_regime_start,
     record_step,
-    regime_switch_excess,
     slip_since_start,
 )
 from rsfstudy.motion.step_integration import (
-    halve_unresolved_step,
+    halve_step_until_dense_output_is_accurate,
     take_step,
     time_at_step_begin,
     time_at_step_end,
@@ -120,10 +121,10 @@ from rsfstudy.parts import (
 )
 
 #: Number of corrections of the clock at which the last step of a loading segment ends.
-END_TIME_CORRECTION_COUNT = 2
+CORRECTION_COUNT_OF_SEGMENT_END_CLOCK = 2
 #: Change of ln V_0 at a kink above which the stepper selects a new initial step size. The path
 #: length depends on V + V_0, so the former step size would be rejected several times.
-MAX_LOG_LOAD_RATE_CHANGE = 3.0
+MAX_LOG_LOAD_RATE_CHANGE_KEEPING_STEP_SIZE = 3.0
 
 
 def advance_motion(
@@ -155,7 +156,7 @@ def advance_motion(
         Scales of the unknowns of both regimes, function table with one row per regime, switch
         thresholds, parameters of the scene, and memory for the parameters before the last kink.
     event_specs : array of shape (specifications * 7,)
-        Event specifications. The columns are ``array_layout.SPECIFICATION_COLUMNS``.
+        Event specifications. The columns are ``array_layout.EVENT_SPECIFICATION_COLUMNS``.
     kinks : array of shape (segments, 6)
         Rows of the segment table for the loading segments after the first segment.
     requested_samples : array
@@ -189,7 +190,7 @@ def advance_motion(
     limits = SwitchThresholds(*numbers)
     given = (
         array_as_pointer(event_specs),
-        len(event_specs) // len(SPECIFICATION_COLUMNS),
+        len(event_specs) // len(EVENT_SPECIFICATION_COLUMNS),
         p,
         p_before,
         limits,
@@ -202,11 +203,11 @@ def advance_motion(
         unknowns, first = motion.unknowns, 0
         if motion.regime == FAST_REGIME:
             unknowns, first = motion.unknowns_fast, motion.unknowns
-        own, equations = offset_pointer(scales, first), functions[motion.regime]
+        own, equations = advance_pointer_by_items(scales, first), functions[motion.regime]
         workspace = create_workspace(
             workspace_block, y, unknowns, own, motion.states, equations, given
         )
-        end = follow_regime(
+        end = integrate_one_regime(
             motion, workspace, last_point, requested_samples, event_table, recording_table
         )
         if end == REGIME_ENDED:
@@ -259,7 +260,10 @@ def start_next_segment(motion, workspace, last_point, kinks, recording_table):
         recording_table[motion.recorded_rows - 1, 0] = motion.time
     copy_values(p, workspace.parameters_before, LAW)
     # The step size remains valid unless the load point velocity changes strongly.
-    if not abs(kinks[n, SEGMENT_LOG_VELOCITY] - p[LOG_LOAD_VELOCITY]) < MAX_LOG_LOAD_RATE_CHANGE:
+    if (
+        not abs(kinks[n, SEGMENT_LOG_VELOCITY] - p[LOG_LOAD_VELOCITY])
+        < MAX_LOG_LOAD_RATE_CHANGE_KEEPING_STEP_SIZE
+    ):
         motion.next_step_length = 0.0
     p[LOAD_VELOCITY], p[LOG_LOAD_VELOCITY] = (
         kinks[n, SEGMENT_VELOCITY],
@@ -273,22 +277,26 @@ def start_next_segment(motion, workspace, last_point, kinks, recording_table):
 
 
 def enter_initial_regime(
-    motion, y, last_point, functions, manifold_values, switch_thresholds, parameters
+    motion, y, last_point, functions, slow_manifold_values, switch_thresholds, parameters
 ):
     """Choose the regime of a point, and set the unknowns of this regime.
 
-    The function uses ``manifold_values`` as memory for the values on the slow manifold.
+    The function uses ``slow_manifold_values`` as memory for the values on the slow manifold.
     """
     motion.starts_at_point, motion.regime = 0, SLOW_REGIME
     set_unknowns_of_regime(motion, y, last_point)
     if motion.has_mass:
-        evaluate_in_place(
-            functions[SLOW_REGIME, FUNCTIONS_PER_REGIME - 1], y, y, parameters, manifold_values
+        evaluate_function_into_array(
+            functions[SLOW_REGIME, FUNCTION_COUNT_PER_REGIME - 1],
+            y,
+            y,
+            parameters,
+            slow_manifold_values,
         )
         if not starts_on_slow_manifold(
             last_point[LOG_SLIP_RATE],
-            manifold_values[0],
-            last_point[SPRING_STRESS] - manifold_values[1],
+            slow_manifold_values[0],
+            last_point[SPRING_STRESS] - slow_manifold_values[1],
             switch_thresholds,
         ):
             motion.regime = FAST_REGIME
@@ -313,7 +321,9 @@ def set_unknowns_of_regime(motion, y, last_point):
         y[1 + motion.states] = 0.0
 
 
-def follow_regime(motion, workspace, last_point, requested_samples, event_table, recording_table):
+def integrate_one_regime(
+    motion, workspace, last_point, requested_samples, event_table, recording_table
+):
     """Integrate one regime, and return a code for the reason of its end."""
     if motion.pending_start:
         motion.time_per_step = 0.0
@@ -322,11 +332,11 @@ def follow_regime(motion, workspace, last_point, requested_samples, event_table,
             motion.dense_output_limit = math.inf
     else:
         copy_values(
-            offset_pointer(workspace.y, workspace.unknown_count),
+            advance_pointer_by_items(workspace.y, workspace.unknown_count),
             workspace.rates,
             workspace.unknown_count,
         )
-    evaluate_in_place(
+    evaluate_function_into_array(
         workspace.fill_point,
         workspace.y,
         workspace.rates,
@@ -335,11 +345,11 @@ def follow_regime(motion, workspace, last_point, requested_samples, event_table,
     )
     while True:
         taken = take_step(motion, workspace)
-        if taken != STEP_TAKEN:
+        if taken != STEP_TAKEN_CODE:
             return taken
         if is_step_recorded(motion, workspace, requested_samples):
-            halve_unresolved_step(motion, workspace)
-        evaluate_in_place(
+            halve_step_until_dense_output_is_accurate(motion, workspace)
+        evaluate_function_into_array(
             workspace.fill_point,
             workspace.y_end,
             workspace.rates_at_end,
@@ -350,7 +360,7 @@ def follow_regime(motion, workspace, last_point, requested_samples, event_table,
             return INVALID_STEP
         if motion.may_terminate and not is_step_end_valid(motion, workspace):
             return TERMINATED
-        leaves, over = truncate_step_at_regime_or_time_end(motion, workspace)
+        leaves, over = truncate_step_at_end_of_regime_or_segment(motion, workspace)
         if motion.pending_start:
             record_regime_start(motion, workspace, recording_table)
             if append_start_events(motion, workspace, last_point, event_table):
@@ -373,7 +383,7 @@ def follow_regime(motion, workspace, last_point, requested_samples, event_table,
         if over:
             append_step_end_event(motion, workspace, event_table, END_CODE)
             return MOTION_ENDED
-        if leaves or has_left_rupture(motion, workspace):
+        if leaves or has_rupture_regime_ended(motion, workspace):
             motion.regime_start_time = time_at_step_end(motion, workspace)
             copy_values(workspace.point_at_end, last_point, FIRST_STATE + motion.states)
             return REGIME_ENDED
@@ -385,7 +395,7 @@ def follow_regime(motion, workspace, last_point, requested_samples, event_table,
         ):
             copy_values(
                 workspace.rates,
-                offset_pointer(workspace.y, workspace.unknown_count),
+                advance_pointer_by_items(workspace.y, workspace.unknown_count),
                 workspace.unknown_count,
             )
             return PAUSED
@@ -403,12 +413,14 @@ def is_step_end_valid(motion, workspace):
     )
     if motion.termination == CONTINUES:
         return True
-    at_begin = margin_to_termination(
+    at_begin = compute_margin_to_termination(
         workspace.point_at_begin[LOG_SLIP_RATE],
         workspace.point_at_begin[NORMAL_STRESS_RATIO],
         velocity,
     )
-    at_end = margin_to_termination(columns[LOG_SLIP_RATE], columns[NORMAL_STRESS_RATIO], velocity)
+    at_end = compute_margin_to_termination(
+        columns[LOG_SLIP_RATE], columns[NORMAL_STRESS_RATIO], velocity
+    )
     if at_begin <= 0.0:
         return False
     truncate_step_at_clock(
@@ -419,7 +431,7 @@ def is_step_end_valid(motion, workspace):
     return True
 
 
-def truncate_step_at_regime_or_time_end(motion, workspace):
+def truncate_step_at_end_of_regime_or_segment(motion, workspace):
     """Truncate the step at the end of the regime or of the loading segment.
 
     Returns
@@ -430,8 +442,8 @@ def truncate_step_at_regime_or_time_end(motion, workspace):
         True if the loading segment ends in this step.
     """
     before, after = (
-        regime_switch_excess(motion, workspace, workspace.point_at_begin),
-        regime_switch_excess(motion, workspace, workspace.point_at_end),
+        compute_excess_over_switch_threshold(motion, workspace, workspace.point_at_begin),
+        compute_excess_over_switch_threshold(motion, workspace, workspace.point_at_end),
     )
     leaves = after >= 0.0 > before
     if leaves:
@@ -462,11 +474,11 @@ def end_step_at_end_time(motion, workspace, clock):
     dense output is much less accurate than the end of the step. The function therefore corrects the
     clock by the remaining time and repeats the step.
     """
-    for _ in range(END_TIME_CORRECTION_COUNT):
+    for _ in range(CORRECTION_COUNT_OF_SEGMENT_END_CLOCK):
         retake_step(motion, workspace, clock)
         late = time_at_step_end(motion, workspace) - motion.end_time
         clock -= late / time_since_regime_start(motion, workspace, workspace.rates_at_end)
-    evaluate_in_place(
+    evaluate_function_into_array(
         workspace.fill_point,
         workspace.y_end,
         workspace.rates_at_end,
@@ -475,9 +487,9 @@ def end_step_at_end_time(motion, workspace, clock):
     )
 
 
-def has_left_rupture(motion, workspace):
+def has_rupture_regime_ended(motion, workspace):
     """Return True if the motion can return to the slow manifold."""
-    if motion.regime == SLOW_REGIME or not may_switch_back_to_slow_manifold(
+    if motion.regime == SLOW_REGIME or not is_slip_slow_enough_for_slow_manifold(
         workspace.point_at_end[LOG_SLIP_RATE], workspace.switch_thresholds
     ):
         return False
@@ -485,7 +497,7 @@ def has_left_rupture(motion, workspace):
     workspace.y_within[0] = columns[SPRING_STRESS]
     for i in range(motion.states):
         workspace.y_within[1 + i] = columns[FIRST_STATE + i]
-    evaluate_in_place(
+    evaluate_function_into_array(
         workspace.fill_balance, workspace.y_within, workspace.y_within, workspace.parameters, below
     )
     missing = columns[SPRING_STRESS] - below[1]

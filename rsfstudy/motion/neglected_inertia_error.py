@@ -35,7 +35,7 @@ from rsfstudy.slider import (
     NEGLIGIBLE_SECOND_ORDER_WEIGHT,
     Numbers,
     Scene,
-    equations_against_displacement,
+    build_equations_against_displacement,
 )
 
 #: Safety factor of the estimate. In random scenes with thresholds three to ten times larger than
@@ -98,7 +98,9 @@ def estimate_neglected_inertia_error(
     jumps = np.cumsum(np.where(arrives, slips, 0.0))
     if not used.size:
         return _ERROR_SAFETY_FACTOR * jumps
-    left = np.maximum.accumulate(_accumulate_residuals(scene, recorded_rows[used], norms[1:][used]))
+    left = np.maximum.accumulate(
+        _bound_log_rate_changes_by_residuals(scene, recorded_rows[used], norms[1:][used])
+    )
     # Other rows get the estimate of the next evaluated row, because residuals may rise steeply.
     numbers = np.arange(len(recorded_rows))
     number = np.minimum(np.searchsorted(used, numbers), used.size - 1)
@@ -106,7 +108,7 @@ def estimate_neglected_inertia_error(
     return _ERROR_SAFETY_FACTOR * (jumps + left[number])
 
 
-def _accumulate_residuals(
+def _bound_log_rate_changes_by_residuals(
     scene: Scene, recorded_rows: np.ndarray, slip_rate_norms: np.ndarray
 ) -> np.ndarray:
     """Compute an upper bound of the change of ln V due to residuals.
@@ -114,7 +116,9 @@ def _accumulate_residuals(
     The bound for each row is the smaller of the integrated residual and the largest residual so
     far.
     """
-    residuals = np.array(list(_iterate_residuals(scene, recorded_rows, slip_rate_norms)))
+    residuals = np.array(
+        list(_iterate_equation_of_motion_residuals(scene, recorded_rows, slip_rate_norms))
+    )
     states = recorded_rows[
         :, FIRST_STATE_COLUMN : FIRST_STATE_COLUMN + scene.parts.law.state_count
     ].sum(axis=1)
@@ -129,7 +133,7 @@ def _accumulate_residuals(
     return found
 
 
-def _iterate_residuals(
+def _iterate_equation_of_motion_residuals(
     scene: Scene, recorded_rows: np.ndarray, slip_rate_norms: np.ndarray
 ) -> Iterator[float]:
     """Yield the residual of the equation of motion, divided by a, at each row.
@@ -158,7 +162,7 @@ def _compute_force_balance_residual(
 
     The row must be on the slow manifold.
     """
-    equations = equations_against_displacement(segment_scene)
+    equations = build_equations_against_displacement(segment_scene)
     state = (
         recorded_row[SHEAR_STRESS_COLUMNS][0] - segment_scene.mu_star,
         *recorded_row[FIRST_STATE_COLUMN : FIRST_STATE_COLUMN + segment_scene.state_count].tolist(),

@@ -18,7 +18,7 @@ from rsfstudy.motion.recording import (
 from rsfstudy.slider import Scene
 
 #: Columns of a recorded motion that define its path length.
-_PATH_LENGTH_COLUMNS = tuple(
+_COLUMNS_DEFINING_PATH_LENGTH = tuple(
     MOTION_VARIABLES.index(name) for name in ("time", "log10_slip_rate", "shear_stress")
 )
 
@@ -102,7 +102,7 @@ def resample_motion_along_path(
         np.empty(point_count),
         np.empty(SAMPLES_PER_STEP + 1),
     )
-    seen = [columns[place] for place in (*_PATH_LENGTH_COLUMNS, SAMPLE_COLUMN)]
+    seen = [columns[place] for place in (*_COLUMNS_DEFINING_PATH_LENGTH, SAMPLE_COLUMN)]
     call_array_function_by_engine(
         resample_along_path, engine, columns, *seen, path, at, room, found
     )

@@ -61,7 +61,7 @@ class Recording:
     regime_names: list[str] = field(default_factory=list)
     sample_times: np.ndarray | None = None
     _row_blocks: list[np.ndarray] = field(default_factory=list)
-    _clipped_block_count: int = 0
+    _block_count_with_clipped_times: int = 0
 
     def index_of_regime(self, regime_name: str) -> int:
         """Return the index of a regime, and add new regimes to the list.
@@ -110,7 +110,7 @@ class Recording:
             rows[:, REGIME_COLUMN] = np.array(numbers)[rows[:, REGIME_COLUMN].astype(int)]
         self._row_blocks.append(rows)
 
-    def clip_times_to(self, max_time: float) -> None:
+    def clip_recorded_times(self, max_time: float) -> None:
         """Limit the recorded times of a chain of segments to its end time.
 
         Parameters
@@ -120,11 +120,11 @@ class Recording:
         """
         if self.sample_times is not None:
             return
-        for rows in self._row_blocks[self._clipped_block_count :]:
+        for rows in self._row_blocks[self._block_count_with_clipped_times :]:
             np.minimum(rows[:, 0], max_time, out=rows[:, 0])
-        if self._clipped_block_count < len(self._row_blocks):
+        if self._block_count_with_clipped_times < len(self._row_blocks):
             self._row_blocks[-1][-1:, 0] = max_time
-        self._clipped_block_count = len(self._row_blocks)
+        self._block_count_with_clipped_times = len(self._row_blocks)
 
     def as_table(self, scene: Scene, end_event: Event | None = None) -> np.ndarray:
         """Return the recorded motion as a table.
@@ -351,16 +351,16 @@ def resample_along_path(  # type: ignore[no-untyped-def]
                 top = i
             elif values[i] < values[bottom]:
                 bottom = i
-        replace_nearest_row_position(
+        move_nearest_row_position_to(
             row_positions, find_extreme_position(values, step_sample_numbers, top, work_array)
         )
-        replace_nearest_row_position(
+        move_nearest_row_position_to(
             row_positions, find_extreme_position(values, step_sample_numbers, bottom, work_array)
         )
     interpolate_rows(columns, row_positions, result)
 
 
-def replace_nearest_row_position(row_positions: Any, row_position: float) -> None:
+def move_nearest_row_position_to(row_positions: Any, row_position: float) -> None:
     """Replace the nearest inner row position by another row position.
 
     Parameters

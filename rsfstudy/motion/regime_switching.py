@@ -63,7 +63,7 @@ class SwitchThresholds(NamedTuple):
 
 
 #: Thresholds of a motion without inertia. The loop does not use their values.
-NO_SWITCH_THRESHOLDS = SwitchThresholds(*[math.nan] * len(SwitchThresholds._fields))
+UNUSED_SWITCH_THRESHOLDS = SwitchThresholds(*[math.nan] * len(SwitchThresholds._fields))
 
 
 @cached_per_scene
@@ -83,7 +83,7 @@ def compute_switch_thresholds(scene: Scene, accuracy: Accuracy) -> SwitchThresho
         Thresholds. All values are NaN if the scene has no inertia.
     """
     if not scene.has_mass:
-        return NO_SWITCH_THRESHOLDS
+        return UNUSED_SWITCH_THRESHOLDS
     softness = scene.stiffness / scene.a
     return SwitchThresholds(
         math.sqrt(accuracy.max_inertia_weight / softness),
@@ -113,7 +113,7 @@ def compute_slip_rate_norm(log_slip_rate: float, switch_thresholds: SwitchThresh
     return switch_thresholds.inertial_time * math.exp(min(log_slip_rate, LARGEST_LOG_SLIP_RATE))
 
 
-def compute_inertia_weight_at_mismatch(
+def compute_inertia_effect_over_limit(
     log_slip_rate: float, inertial_stress: float, switch_thresholds: SwitchThresholds
 ) -> float:
     r"""Compute the effect of inertia relative to its limit.
@@ -165,7 +165,7 @@ def inertia_matters_at(scene: Scene, accuracy: Accuracy, point: MotionPoint) -> 
         return False
     inertial_stress = point.spring_stress - point.frictional_stress
     given = compute_switch_thresholds(scene, accuracy)
-    return compute_inertia_weight_at_mismatch(point.log_slip_rate, inertial_stress, given) >= 1.0
+    return compute_inertia_effect_over_limit(point.log_slip_rate, inertial_stress, given) >= 1.0
 
 
 def slip_during_transition(
@@ -234,7 +234,7 @@ def starts_on_slow_manifold(
     )
     slow = (
         max(
-            compute_inertia_weight_at_mismatch(
+            compute_inertia_effect_over_limit(
                 manifold_log_slip_rate, inertial_stress, switch_thresholds
             ),
             rate,
@@ -248,7 +248,7 @@ def starts_on_slow_manifold(
     )
 
 
-def may_switch_back_to_slow_manifold(
+def is_slip_slow_enough_for_slow_manifold(
     log_slip_rate: float, switch_thresholds: SwitchThresholds
 ) -> bool:
     r"""Return True if the slip rate is small enough for the slow manifold.
@@ -341,7 +341,7 @@ def should_switch_back_to_slow_manifold(
     settled = (
         max(
             norm / switch_thresholds.max_slip_rate_norm,
-            compute_inertia_weight_at_mismatch(
+            compute_inertia_effect_over_limit(
                 manifold_log_slip_rate, inertial_stress, switch_thresholds
             ),
         )
@@ -384,7 +384,7 @@ def find_termination_status(
     return CONTINUES
 
 
-def margin_to_termination(
+def compute_margin_to_termination(
     log_slip_rate: float, normal_stress: float, load_velocity: float
 ) -> float:
     r"""Compute the margin between a motion and its nearest termination limit.
@@ -413,7 +413,7 @@ def margin_to_termination(
     return min(left, log_slip_rate - STOPPED_LOG_SLIP_RATE) if load_velocity == 0.0 else left
 
 
-def termination_error(termination_status: int, normal_stress: float) -> MotionStopped:
+def build_termination_error(termination_status: int, normal_stress: float) -> MotionStopped:
     """Return the exception for a terminated motion.
 
     Parameters

@@ -1,9 +1,9 @@
 """Detection of events within a step, and recording of samples.
 
-``append_events_in_step`` and ``record_step`` are called by ``motion_loop.follow_regime`` after each
-step. An event occurs at a root of its quantity. The root is bracketed by the ends of the step and
-is located with dense output. Samples are recorded at even intervals within each step, or at
-requested times or slips.
+``append_events_in_step`` and ``record_step`` are called by ``motion_loop.integrate_one_regime``
+after each step. An event occurs at a root of its quantity. The root is bracketed by the ends of the
+step and is located with dense output. Samples are recorded at even intervals within each step, or
+at requested times or slips.
 """
 
 from __future__ import annotations
@@ -20,6 +20,7 @@ from rsfstudy.motion.array_layout import (
     EVENT_POINT,
     EVENT_REGIME,
     EVENT_SLIP,
+    EVENT_SPECIFICATION_COLUMNS,
     EVENT_TIME,
     FIRST_STATE,
     FRICTION_COEFFICIENT,
@@ -43,14 +44,13 @@ from rsfstudy.motion.array_layout import (
     SPEC_MAY_DEFER,
     SPEC_QUANTITY,
     SPEC_TERMINAL,
-    SPECIFICATION_COLUMNS,
     SPRING_STRESS,
     START_CODE,
     STATE_VARIABLE,
     STEADY_STATE_DISTANCE,
     STEADY_STATE_OFFSET,
 )
-from rsfstudy.motion.array_operations import offset_pointer
+from rsfstudy.motion.array_operations import advance_pointer_by_items
 from rsfstudy.motion.recording import (
     FIRST_STATE_COLUMN,
     REGIME_COLUMN,
@@ -58,8 +58,8 @@ from rsfstudy.motion.recording import (
     SAMPLES_PER_STEP,
 )
 from rsfstudy.motion.regime_switching import (
-    compute_inertia_weight_at_mismatch,
-    margin_to_termination,
+    compute_inertia_effect_over_limit,
+    compute_margin_to_termination,
 )
 from rsfstudy.motion.root_finding import build_root_finder
 from rsfstudy.motion.step_integration import (
@@ -78,8 +78,8 @@ SWITCH_CONDITION, TIME_CONDITION, TERMINATION_CONDITION = -1.0, -2.0, -3.0
 #: Factor of the level of SETTLED events for the slip rate and the sum of the states. The level
 #: without this factor applies to all unknowns. Both conditions must be met. Otherwise, the decrease
 #: of one initially very large unknown would end the motion although the slip rate still changes.
-FRICTION_SETTLING_LEVEL_FACTOR = 10.0
-#: Results of ``find_jump_side``.
+SETTLED_LEVEL_FACTOR_FOR_RATE_AND_STATES = 10.0
+#: Results of ``find_jump_side_of_event``.
 NO_EVENT, BEFORE_JUMP, AFTER_JUMP = range(3)
 
 
@@ -100,7 +100,9 @@ def evaluate_event_quantity(event_spec, point_columns, parameters):
 
 def get_event_specification(workspace, spec_index):
     """Return the row of an event specification."""
-    return offset_pointer(workspace.event_specs, len(SPECIFICATION_COLUMNS) * spec_index)
+    return advance_pointer_by_items(
+        workspace.event_specs, len(EVENT_SPECIFICATION_COLUMNS) * spec_index
+    )
 
 
 def has_deferrable_event(workspace):
@@ -111,7 +113,7 @@ def has_deferrable_event(workspace):
     return found
 
 
-def regime_switch_excess(motion, workspace, point_columns):
+def compute_excess_over_switch_threshold(motion, workspace, point_columns):
     """Return the excess of the effect of inertia over its limit.
 
     The excess is at least zero if the motion must leave the slow manifold. In ruptures, and for
@@ -121,7 +123,7 @@ def regime_switch_excess(motion, workspace, point_columns):
         return -1.0
     missing = point_columns[SPRING_STRESS] - point_columns[FRICTIONAL_STRESS]
     return (
-        compute_inertia_weight_at_mismatch(
+        compute_inertia_effect_over_limit(
             point_columns[LOG_SLIP_RATE], missing, workspace.switch_thresholds
         )
         - 1.0
@@ -141,7 +143,7 @@ def has_event_occurred(event_spec, quantity_before, quantity_after, clock_direct
     return quantity_before > 0.0 >= quantity_after
 
 
-def evaluate_root_condition(clock, condition_context):
+def evaluate_condition_at_clock(clock, condition_context):
     """Evaluate a condition within the step, for the root finder.
 
     The condition is the index of an event specification, ``SWITCH_CONDITION``, ``TIME_CONDITION``
@@ -157,9 +159,9 @@ def evaluate_root_condition(clock, condition_context):
         )
     evaluate_point_at_clock(motion, workspace, clock)
     if what == SWITCH_CONDITION:
-        return regime_switch_excess(motion, workspace, workspace.point_within)
+        return compute_excess_over_switch_threshold(motion, workspace, workspace.point_within)
     if what == TERMINATION_CONDITION:
-        return margin_to_termination(
+        return compute_margin_to_termination(
             workspace.point_within[LOG_SLIP_RATE],
             workspace.point_within[NORMAL_STRESS_RATIO],
             workspace.parameters[LOAD_VELOCITY],
@@ -169,7 +171,7 @@ def evaluate_root_condition(clock, condition_context):
     )
 
 
-_find_condition_root = build_root_finder(evaluate_root_condition)
+_find_clock_where_condition_is_zero = build_root_finder(evaluate_condition_at_clock)
 
 
 def locate_sign_change(condition, value_at_begin, value_at_end, motion, workspace):
@@ -182,7 +184,7 @@ def locate_sign_change(condition, value_at_begin, value_at_end, motion, workspac
         (1e-15 * width, 1e-15) if condition == TIME_CONDITION else (1e-13 * width, 1e-14)
     )
     given = condition, motion, workspace
-    return _find_condition_root(
+    return _find_clock_where_condition_is_zero(
         motion.clock, motion.end, value_at_begin, value_at_end, finest, relative, given
     )
 
@@ -256,7 +258,7 @@ def append_start_events(motion, workspace, last_point, event_table):
         return False
     for w in range(workspace.event_spec_count):
         spec = get_event_specification(workspace, w)
-        jumps = find_jump_side(spec, last_point, p_before, workspace.point_at_begin, p)
+        jumps = find_jump_side_of_event(spec, last_point, p_before, workspace.point_at_begin, p)
         if jumps != NO_EVENT:
             columns = last_point if jumps == BEFORE_JUMP else workspace.point_at_begin
             append_event_row(motion, event_table, float(w), motion.clock, passed, columns, p)
@@ -265,7 +267,7 @@ def append_start_events(motion, workspace, last_point, event_table):
     return False
 
 
-def find_jump_side(
+def find_jump_side_of_event(
     event_spec: Any,
     point_before: Any,
     parameters_before: Any,
@@ -331,7 +333,7 @@ def locate_events_in_step(motion, workspace):
             if (
                 near
                 and friction
-                < FRICTION_SETTLING_LEVEL_FACTOR
+                < SETTLED_LEVEL_FACTOR_FOR_RATE_AND_STATES
                 * spec[SPEC_LEVEL]
                 * spec[SPEC_MAX_FRICTION_DISTANCE]
             ):

@@ -16,9 +16,9 @@ from rsfstudy.motion.array_layout import (
     LOG_SLIP_RATE,
     NO_STEP_POSSIBLE,
     NORMAL_STRESS_RATIO,
-    STEP_TAKEN,
+    STEP_TAKEN_CODE,
 )
-from rsfstudy.motion.array_operations import copy_values, evaluate_in_place
+from rsfstudy.motion.array_operations import copy_values, evaluate_function_into_array
 from rsfstudy.motion.max_step_length import MAX_STEP_LENGTH, compute_max_step_length
 from rsfstudy.motion.steppers import (
     attempt_step,
@@ -26,13 +26,13 @@ from rsfstudy.motion.steppers import (
     retake_step,
     step_to_segment_end,
 )
-from rsfstudy.motion.workspace import count_evaluations, fill_rates_by_step_clock
+from rsfstudy.motion.workspace import count_evaluations, evaluate_rates_by_step_clock
 from rsfstudy.parts import LOG_LOAD_VELOCITY
 
-#: Constants of ``halve_unresolved_step``: maximum error of the derivative of dense output,
-#: multiplied by the step size, in local tolerances; maximum number of halvings of a step; growth
-#: factor of the step size limit after a resolved step; and spacing of finite differences of dense
-#: output, as a fraction of the step size.
+#: Constants of ``halve_step_until_dense_output_is_accurate``: maximum error of the derivative of
+#: dense output, multiplied by the step size, in local tolerances; maximum number of halvings of a
+#: step; growth factor of the step size limit after a resolved step; and spacing of finite
+#: differences of dense output, as a fraction of the step size.
 MAX_SLOPE_ERROR, MAX_HALVINGS, GROWTH_FACTOR, SLOPE_SPACING = 300.0, 6, 1.3, 5e-3
 
 
@@ -63,8 +63,8 @@ def take_step(motion, workspace):
     Returns
     -------
     int
-        ``STEP_TAKEN``, ``NO_STEP_POSSIBLE``, ``BUDGET_EXCEEDED`` or ``INVALID_STEP``. A step is
-        invalid if its size is zero or if its end is not finite.
+        ``STEP_TAKEN_CODE``, ``NO_STEP_POSSIBLE``, ``BUDGET_EXCEEDED`` or ``INVALID_STEP``. A step
+        is invalid if its size is zero or if its end is not finite.
     """
     longest = MAX_STEP_LENGTH
     if motion.clock_is_path_length:
@@ -78,7 +78,9 @@ def take_step(motion, workspace):
         longest = min(longest, motion.dense_output_limit)
     length = 0.0
     if motion.kinks_ahead > 0:
-        length = step_to_next_kink(motion, workspace, min(longest, motion.next_step_length))
+        length = take_step_to_next_loading_kink(
+            motion, workspace, min(longest, motion.next_step_length)
+        )
     if length == 0.0:
         length = attempt_step(motion, workspace, longest)
     motion.steps += 1
@@ -89,10 +91,10 @@ def take_step(motion, workspace):
         total += workspace.y_end[i]
     if motion.end == motion.clock or not math.isfinite(total):
         return INVALID_STEP
-    return STEP_TAKEN
+    return STEP_TAKEN_CODE
 
 
-def step_to_next_kink(motion, workspace, max_length):
+def take_step_to_next_loading_kink(motion, workspace, max_length):
     """Take a step to the next kink, and return its length.
 
     Return 0 if the kink is farther away than ``max_length``, or if the stepper cannot take this
@@ -103,21 +105,21 @@ def step_to_next_kink(motion, workspace, max_length):
     return step_to_segment_end(motion, workspace, length) if 0.0 < length <= max_length else 0.0
 
 
-def halve_unresolved_step(motion, workspace):
+def halve_step_until_dense_output_is_accurate(motion, workspace):
     """Halve the step until its dense output is accurate.
 
     The event loop calls the function if the step is recorded. If stability limits the step size,
     dense output is much less accurate than the end of the step.
     """
     for _ in range(MAX_HALVINGS):
-        if is_step_resolved(motion, workspace):
+        if is_dense_output_accurate(motion, workspace):
             motion.dense_output_limit *= GROWTH_FACTOR
             return
         retake_step(motion, workspace, motion.clock + 0.5 * (motion.end - motion.clock))
         motion.next_step_length = motion.dense_output_limit = abs(motion.step_length)
 
 
-def is_step_resolved(motion, workspace):
+def is_dense_output_accurate(motion, workspace):
     """Return True if the dense output of the step is accurate.
 
     The function compares the derivatives of dense output with the right-hand side at two points of
@@ -139,7 +141,7 @@ def is_step_resolved(motion, workspace):
                 workspace.dense_slopes[i] += weight / (12.0 * SLOPE_SPACING) * workspace.y_within[i]
         interpolate_unknowns(motion, workspace, clock)
         count_evaluations(motion, 1)
-        fill_rates_by_step_clock(motion, workspace, workspace.y_within, workspace.rates_within)
+        evaluate_rates_by_step_clock(motion, workspace, workspace.y_within, workspace.rates_within)
         for i in range(workspace.unknown_count):
             differ = abs(motion.step_length * workspace.rates_within[i] - workspace.dense_slopes[i])
             size = workspace.scales[i] + max(abs(workspace.y[i]), abs(workspace.y_end[i]))
@@ -153,14 +155,14 @@ def evaluate_point_at_clock(motion, workspace, clock):
     """Fill in ``workspace.point_within`` at a clock within the step."""
     interpolate_unknowns(motion, workspace, clock)
     count_evaluations(motion, 1)
-    evaluate_in_place(
+    evaluate_function_into_array(
         workspace.fill_rates,
         workspace.y_within,
         workspace.y_within,
         workspace.parameters,
         workspace.rates_within,
     )
-    evaluate_in_place(
+    evaluate_function_into_array(
         workspace.fill_point,
         workspace.y_within,
         workspace.rates_within,

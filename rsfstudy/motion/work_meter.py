@@ -13,12 +13,12 @@ from rsfstudy.status import Status
 
 #: Local tolerance for which the maximum step sizes are specified. For other tolerances, the maximum
 #: step size is proportional to the eighth root of the tolerance.
-REFERENCE_TOLERANCE_OF_STEP_LIMIT = 1e-7
+TOLERANCE_FOR_SPECIFIED_MAX_STEP_LENGTHS = 1e-7
 #: Minimum local tolerance. Rounding errors dominate below this limit, and SciPy issues a warning.
 MIN_LOCAL_TOLERANCE = 5e-14
 
 
-def larger_budget_remedy(budget: int) -> str:
+def suggest_raising_budget(budget: int) -> str:
     """Return the end of a message that suggests a larger budget.
 
     Parameters

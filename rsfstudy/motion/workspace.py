@@ -32,19 +32,23 @@ from __future__ import annotations
 from typing import Any, NamedTuple
 
 from rsfstudy._deprecation import renamed_members
-from rsfstudy.motion.array_layout import FIRST_STATE, FUNCTIONS_PER_REGIME, SLOW_REGIME
-from rsfstudy.motion.array_operations import copy_values, evaluate_in_place, offset_pointer
+from rsfstudy.motion.array_layout import FIRST_STATE, FUNCTION_COUNT_PER_REGIME, SLOW_REGIME
+from rsfstudy.motion.array_operations import (
+    advance_pointer_by_items,
+    copy_values,
+    evaluate_function_into_array,
+)
 from rsfstudy.motion.regime_switching import SwitchThresholds
 from rsfstudy.motion.steppers.unrolled_step import (
     DENSE_ROW_COUNT,
     HEADER_SIZE,
     STAGE_COUNT,
-    TOTAL_STAGE_COUNT,
+    STAGE_COUNT_WITH_DENSE_OUTPUT,
 )
 
 Array = Any
 #: Positive number that replaces a zero derivative of time, so that no division by zero occurs.
-MIN_TIME_PER_CLOCK = 1e-300
+REPLACEMENT_OF_ZERO_TIME_DERIVATIVE = 1e-300
 
 
 @renamed_members
@@ -140,7 +144,7 @@ def workspace_size(unknown_count: int, state_count: int, event_spec_count: int) 
     int
         Number of floats.
     """
-    of_unknowns = 1 + DENSE_ROW_COUNT + 1 + TOTAL_STAGE_COUNT + 1 + 1 + 1
+    of_unknowns = 1 + DENSE_ROW_COUNT + 1 + STAGE_COUNT_WITH_DENSE_OUTPUT + 1 + 1 + 1
     return (
         HEADER_SIZE
         + of_unknowns * unknown_count
@@ -150,7 +154,13 @@ def workspace_size(unknown_count: int, state_count: int, event_spec_count: int) 
 
 
 def create_workspace(
-    workspace_block, y, unknown_count, unknown_scales, state_count, functions, shared_members
+    workspace_block,
+    y,
+    unknown_count,
+    unknown_scales,
+    state_count,
+    functions,
+    members_shared_by_regimes,
 ):
     """Create the workspace of a regime within a block of memory.
 
@@ -168,7 +178,7 @@ def create_workspace(
         Number of states.
     functions : sequence
         Row of the function table.
-    shared_members : tuple
+    members_shared_by_regimes : tuple
         Last six fields of the workspace, which both regimes share.
 
     Returns
@@ -176,16 +186,16 @@ def create_workspace(
     Workspace
         Workspace of the regime.
     """
-    new, columns = offset_pointer(workspace_block, HEADER_SIZE), FIRST_STATE + state_count
-    own = offset_pointer(new, unknown_count)
-    dense = offset_pointer(own, unknown_count)
-    stages = offset_pointer(dense, DENSE_ROW_COUNT * unknown_count)
-    within = offset_pointer(stages, TOTAL_STAGE_COUNT * unknown_count)
-    before = offset_pointer(within, 3 * unknown_count)
+    new, columns = advance_pointer_by_items(workspace_block, HEADER_SIZE), FIRST_STATE + state_count
+    own = advance_pointer_by_items(new, unknown_count)
+    dense = advance_pointer_by_items(own, unknown_count)
+    stages = advance_pointer_by_items(dense, DENSE_ROW_COUNT * unknown_count)
+    within = advance_pointer_by_items(stages, STAGE_COUNT_WITH_DENSE_OUTPUT * unknown_count)
+    before = advance_pointer_by_items(within, 3 * unknown_count)
     copy_values(unknown_scales, own, unknown_count)
     step = (
         stages,
-        offset_pointer(stages, STAGE_COUNT * unknown_count),
+        advance_pointer_by_items(stages, STAGE_COUNT * unknown_count),
         stages,
         workspace_block,
         own,
@@ -193,20 +203,22 @@ def create_workspace(
     )
     inside = (
         within,
-        offset_pointer(within, unknown_count),
-        offset_pointer(within, 2 * unknown_count),
+        advance_pointer_by_items(within, unknown_count),
+        advance_pointer_by_items(within, 2 * unknown_count),
     )
     points = (
         before,
-        offset_pointer(before, columns),
-        offset_pointer(before, 2 * columns),
-        offset_pointer(before, 3 * columns),
+        advance_pointer_by_items(before, columns),
+        advance_pointer_by_items(before, 2 * columns),
+        advance_pointer_by_items(before, 3 * columns),
     )
-    equations = functions[0], functions[1], functions[2], functions[FUNCTIONS_PER_REGIME - 1]
-    return Workspace(unknown_count, y, new, *step, *inside, *points, *equations, *shared_members)
+    equations = functions[0], functions[1], functions[2], functions[FUNCTION_COUNT_PER_REGIME - 1]
+    return Workspace(
+        unknown_count, y, new, *step, *inside, *points, *equations, *members_shared_by_regimes
+    )
 
 
-def fill_rates_by_step_clock(motion, workspace, y, result):
+def evaluate_rates_by_step_clock(motion, workspace, y, result):
     """Fill in derivatives with respect to the clock of the step.
 
     Parameters
@@ -221,9 +233,11 @@ def fill_rates_by_step_clock(motion, workspace, y, result):
         Output array of the derivatives. If ``motion.time_per_step`` is positive, the independent
         variable of the step is proportional to time.
     """
-    evaluate_in_place(workspace.fill_rates, y, y, workspace.parameters, result)
+    evaluate_function_into_array(workspace.fill_rates, y, y, workspace.parameters, result)
     if motion.time_per_step > 0.0:
-        slower = motion.time_per_step / max(result[workspace.unknown_count - 1], MIN_TIME_PER_CLOCK)
+        slower = motion.time_per_step / max(
+            result[workspace.unknown_count - 1], REPLACEMENT_OF_ZERO_TIME_DERIVATIVE
+        )
         for i in range(workspace.unknown_count):
             result[i] *= slower
 

@@ -17,13 +17,11 @@ from rsfstudy.plots._style import (
     finalize_layout,
 )
 
-PointsOfCurve = Sequence[tuple[float, float]]
+CurvePoints = Sequence[tuple[float, float]]
 
 
 @renamed_keywords
-def draw_agreement(
-    digits: Mapping[str, PointsOfCurve], label: str, required_digits: float
-) -> Figure:
+def draw_agreement(digits: Mapping[str, CurvePoints], label: str, required_digits: float) -> Figure:
     """Draw the number of digits that agree for each quantity.
 
     Parameters

@@ -29,8 +29,8 @@ from rsfstudy.plots._text import (
     visible_length,
     wrap_text,
 )
-from rsfstudy.study import read_undocumented_quantities
-from rsfstudy.vocabulary import coverage_content_type, find_quantity
+from rsfstudy.study import read_quantities_not_in_vocabulary
+from rsfstudy.vocabulary import find_coverage_content_type, find_quantity
 
 #: Ratio of the largest value to the smallest value above which an axis has a log scale.
 _MIN_RATIO_FOR_LOG_SCALE = 100.0
@@ -41,7 +41,7 @@ _MAX_POINT_NAMES_ALONG_Y, _MAX_POINT_NAMES_ALONG_X = 45, 30
 #: Maximum number of horizontal names along x. If there are more names, the names are vertical.
 _MAX_HORIZONTAL_NAMES_ALONG_X = 12
 #: Phrases that describe the points of some axes.
-_PHRASES_OF_AXIS_POINTS = {
+_POINT_PHRASE_TEMPLATE_BY_AXIS = {
     "law": "{} law",
     "normal_stress": "{} normal stress",
     "load": "load point {}",
@@ -83,7 +83,7 @@ def is_numeric_variable(variable: xr.DataArray) -> bool:
     return variable.dtype.kind in "fiub" and "flag_values" not in variable.attrs
 
 
-def read_flag_words(variable: xr.DataArray) -> dict[float, str]:
+def read_flag_meanings_of_variable(variable: xr.DataArray) -> dict[float, str]:
     """Return the meanings of the flags of a variable.
 
     Parameters
@@ -127,7 +127,7 @@ def measured_variables(dataset: xr.Dataset) -> list[str]:
         for name, found in values.items()
         if set(found.dims) == cells
         and is_numeric_variable(found)
-        and coverage_content_type(name) == "modelResult"
+        and find_coverage_content_type(name) == "modelResult"
         and name not in beside
         and bool(np.isfinite(found).any())
     ]
@@ -219,9 +219,9 @@ def describe_point(cell: xr.Dataset | xr.DataArray, dimension: str) -> str:
     '$b/a$ = 2'
     """
     value = cell[dimension].item()
-    about = find_quantity(dimension, read_undocumented_quantities(cell.coords.to_dataset()))
+    about = find_quantity(dimension, read_quantities_not_in_vocabulary(cell.coords.to_dataset()))
     if isinstance(value, str):
-        return _PHRASES_OF_AXIS_POINTS.get(dimension, "{}").format(to_mathtext(value))
+        return _POINT_PHRASE_TEMPLATE_BY_AXIS.get(dimension, "{}").format(to_mathtext(value))
     if dimension == "stiffness_ratio":
         return format_stiffness_ratio(value)
     if dimension == "inertia":
@@ -370,7 +370,7 @@ def point_colours(dataset: xr.Dataset, dimension: str) -> np.ndarray:
         logarithmically.
     """
     points = dataset[dimension].values.astype(float)
-    return np.asarray(_colour_scale(dataset, dimension).to_rgba(points))
+    return np.asarray(_build_colour_scale(dataset, dimension).to_rgba(points))
 
 
 def add_colour_bar(dataset: xr.Dataset, axes: Axes, dimension: str) -> None:
@@ -387,16 +387,16 @@ def add_colour_bar(dataset: xr.Dataset, axes: Axes, dimension: str) -> None:
     dimension : str
         Name of the dimension.
     """
-    scale = _colour_scale(dataset, dimension)
+    scale = _build_colour_scale(dataset, dimension)
     bar = cast(Figure, axes.figure).colorbar(scale, ax=axes, pad=0.02)
     bar.set_label(
         format_quantity_axis_label(
-            find_quantity(dimension, read_undocumented_quantities(dataset)), 34
+            find_quantity(dimension, read_quantities_not_in_vocabulary(dataset)), 34
         )
     )
 
 
-def _colour_scale(dataset: xr.Dataset, dimension: str) -> ScalarMappable:
+def _build_colour_scale(dataset: xr.Dataset, dimension: str) -> ScalarMappable:
     """Return the colour scale of a numeric dimension."""
     points = dataset[dimension].values.astype(float)
     kind = LogNorm if are_log_spaced(points) else Normalize

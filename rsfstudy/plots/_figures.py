@@ -34,7 +34,7 @@ from rsfstudy.plots._style import (
     enlarge_for_legends,
     figure_size,
     finalize_layout,
-    freeze_tick_style,
+    freeze_tick_label_size,
     merge_common_legends,
 )
 from rsfstudy.plots._style import cycle_marker as cycle_marker
@@ -43,20 +43,20 @@ from rsfstudy.plots._style import style_context as style_context
 from rsfstudy.plots._text import format_number as format_number
 from rsfstudy.plots._text import format_slope as format_slope
 from rsfstudy.plots._text import quantity_symbol, to_mathtext, wrap_text
-from rsfstudy.rig import convert_to_display_units, has_units_unlike_its_study
+from rsfstudy.rig import convert_to_display_units, has_units_unexpected_by_its_figures
 from rsfstudy.status import Status
 from rsfstudy.storage import read_declaration
 from rsfstudy.study import Figure as Declared
-from rsfstudy.study import Panel, Study, load_study, read_undocumented_quantities, study_names
+from rsfstudy.study import Panel, Study, load_study, read_quantities_not_in_vocabulary, study_names
 from rsfstudy.study import failed_cell_mask as failed_cell_mask
 from rsfstudy.vocabulary import FORMULAS_OF_DERIVED_COORDINATES, find_quantity
 
 #: Names of the figures that can display any lattice.
-_NAMES_OF_GENERIC_FIGURES = ("lines", "maps")
+_NAMES_OF_FIGURES_FOR_ANY_LATTICE = ("lines", "maps")
 #: Name of the figure of fits of records.
 _NAME_OF_FITS_FIGURE = "fits"
 #: Names of all figures, including the figures of the named studies.
-FIGURE_NAMES = (*_NAMES_OF_GENERIC_FIGURES, _NAME_OF_FITS_FIGURE, *study_names())
+FIGURE_NAMES = (*_NAMES_OF_FIGURES_FOR_ANY_LATTICE, _NAME_OF_FITS_FIGURE, *study_names())
 
 #: Resolution of figures in notebooks, in dots per inch.
 _SCREEN_DPI = 150
@@ -185,16 +185,16 @@ def draw_figure(
         figure = NotebookFigure(figsize=figure_size(columns, rows, height), layout="constrained")
         drawn = [figure.add_subplot(rows, columns, number + 1) for number in range(len(panels))]
         for axes, panel in zip(drawn, panels, strict=True):
-            freeze_tick_style(axes)
+            freeze_tick_label_size(axes)
             _panel.draw_panel(panel, dataset, axes)
         _panel.finalize_scales_and_legends(panels, drawn)
         for scale in figure.axes:
             if scale not in drawn:
-                freeze_tick_style(scale)
+                freeze_tick_label_size(scale)
         add_panel_letters(drawn)
         merge_common_legends(figure, drawn)
         lacking, overrides = _missing_cells_note(dataset), read_declaration(dataset).overrides
-        said = [_format_overrides_note(dataset, columns)] if overrides else []
+        said = [_format_note_on_overrides(dataset, columns)] if overrides else []
         if said or lacking:
             color = "tab:red" if lacking else "0.4"
             figure.suptitle("\n".join(filter(None, (*said, lacking))), color=color)
@@ -217,9 +217,9 @@ def _missing_cells_note(dataset: xr.Dataset) -> str:
     return f"[{', '.join(parts)}]" * bool(parts)
 
 
-def _format_overrides_note(dataset: xr.Dataset, max_line_characters: int) -> str:
+def _format_note_on_overrides(dataset: xr.Dataset, max_line_characters: int) -> str:
     """Return a note about the values that differ from the declaration."""
-    own = read_undocumented_quantities(dataset)
+    own = read_quantities_not_in_vocabulary(dataset)
     names = {n: quantity_symbol(find_quantity(n, own)) for n in read_declaration(dataset).overrides}
     values = {names[name]: value for name, value in read_declaration(dataset).overrides.items()}
     text = to_mathtext(
@@ -248,12 +248,12 @@ def _choose_figure(
     if (
         user_figure is None
         and study is None
-        and name not in (*_NAMES_OF_GENERIC_FIGURES, _NAME_OF_FITS_FIGURE)
+        and name not in (*_NAMES_OF_FIGURES_FOR_ANY_LATTICE, _NAME_OF_FITS_FIGURE)
     ):
         raise InvalidValue("plot", name, "is unknown", choices=FIGURE_NAMES)
     known = {str(dimension) for dimension in sizes}
     if study is not None and user_figure in (None, study.plot):
-        user_figure, dataset = study.plot, _restore_selected_axes(dataset, study)
+        user_figure, dataset = study.plot, _restore_dimensions_of_selected_axes(dataset, study)
         if isinstance(user_figure, Declared) and not user_figure.allow_extra_dims:
             known = set(study.dimensions)
     elif isinstance(user_figure, Declared):
@@ -262,7 +262,7 @@ def _choose_figure(
     further = sorted(varied - known)
     many = math.prod(sizes[dimension] for dimension in further) > _MAX_POINTS_OF_REPEATED_AXES
     plain = variable is not None or user_figure is None or isinstance(user_figure, str)
-    if plain or many or has_units_unlike_its_study(dataset):
+    if plain or many or has_units_unexpected_by_its_figures(dataset):
         return _generic_figure(dataset, variable), dataset
     drawing = (
         user_figure
@@ -292,7 +292,7 @@ def _expand_panels_of_figure(
             one for panel in figure_declaration.panels for one in _panel.expand_facets(panel, part)
         ]
         found += (
-            [_panel.select_panel_at_extra_dims(panel, where, said) for panel in each]
+            [_panel.restrict_panel_to_point_of_extra_dims(panel, where, said) for panel in each]
             if extra_dimensions
             else each
         )
@@ -303,7 +303,7 @@ def _expand_panels_of_figure(
     return found
 
 
-def _restore_selected_axes(dataset: xr.Dataset, study: Study) -> xr.Dataset:
+def _restore_dimensions_of_selected_axes(dataset: xr.Dataset, study: Study) -> xr.Dataset:
     """Restore the dimensions of axes that were reduced to a single point."""
     gone = [d for d in study.dimensions if d not in dataset.dims and d in dataset.coords]
     if not gone:
@@ -330,7 +330,9 @@ def _generic_figure(dataset: xr.Dataset, variable: str | None = None) -> Declare
     logarithms = [n for n in map(str, dataset.data_vars) if "log10_" in n]
     dataset = dataset.drop_vars([n for n in logarithms if n.replace("log10_", "") in dataset])
     if square := samples.panels(dataset, variable):
-        return Declared(square, samples.count_panels_per_side(square), _SCATTER_PANEL_HEIGHT)
+        return Declared(
+            square, samples.count_panels_per_side_of_scatter_matrix(square), _SCATTER_PANEL_HEIGHT
+        )
     for module in (maps, lines):
         if found := module.panels(dataset, variable):
             return Declared(found)

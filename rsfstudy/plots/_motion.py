@@ -28,7 +28,7 @@ from rsfstudy.plots._style import (
     enlarge_for_legends,
     figure_size,
     finalize_layout,
-    freeze_tick_style,
+    freeze_tick_label_size,
     style_context,
 )
 from rsfstudy.plots._text import to_mathtext, wrap_text
@@ -43,7 +43,7 @@ NATURAL_LOG_OF_10 = math.log(10.0)
 ABSCISSA_VARIABLES = ("load_point_displacement", "slip", "time")
 #: Relative change below which the load point displacement or the slip rate is considered constant.
 #: Smaller changes are due to rounding errors.
-_HELD_LOAD_POINT_RTOL = 1e-6
+_MAX_RELATIVE_CHANGE_OF_HELD_LOAD_POINT = 1e-6
 _FRICTION_LABEL = r"Friction coefficient, $\mu$"
 
 
@@ -107,7 +107,7 @@ def plot_motion(
         lower = figure.add_subplot(grid[1, 0], sharex=upper)
         plane = figure.add_subplot(grid[:, 1])
         for axes in figure.axes:
-            freeze_tick_style(axes)
+            freeze_tick_label_size(axes)
         if "friction_coefficient" in shown:
             upper.plot(shown[against], shown["friction_coefficient"])
             upper.set_ylabel(_FRICTION_LABEL)
@@ -166,7 +166,9 @@ def _choose_abscissa(motion: xr.Dataset) -> str:
     if "load_point_displacement" not in motion:
         return "time"
     pulled, slid = (np.asarray(motion[name]) for name in ("load_point_displacement", "slip"))
-    least = _HELD_LOAD_POINT_RTOL * max(float(np.ptp(slid)), float(np.abs(pulled).max()))
+    least = _MAX_RELATIVE_CHANGE_OF_HELD_LOAD_POINT * max(
+        float(np.ptp(slid)), float(np.abs(pulled).max())
+    )
     return "load_point_displacement" if np.ptp(pulled) > least else "slip"
 
 
@@ -183,7 +185,10 @@ def _draw_slip_rate(displayed_motion: xr.Dataset, axes: Axes, abscissa: str) -> 
     if "slip_rate" in displayed_motion:
         axes.plot(displayed_motion[abscissa], displayed_motion["slip_rate"])
         # A constant slip rate needs explicit limits, because rounding errors would fill the panel.
-        if np.ptp(ends := axes.dataLim.intervaly) < _HELD_LOAD_POINT_RTOL * ends[1]:
+        if (
+            np.ptp(ends := axes.dataLim.intervaly)
+            < _MAX_RELATIVE_CHANGE_OF_HELD_LOAD_POINT * ends[1]
+        ):
             axes.set_ylim(0.5 * ends[0], 2.0 * ends[1])
         set_log_scale(axes, "y")
         axes.set_ylabel(

@@ -33,16 +33,16 @@ from rsfstudy.plots._style import (
     add_legend,
     cycle_marker,
     cycle_style,
-    text_capacity_in_characters,
+    estimate_text_capacity_in_characters,
 )
 from rsfstudy.plots._text import format_quantity_axis_label as labelled
 from rsfstudy.plots._text import format_slope, to_mathtext, wrap_text
 from rsfstudy.status import Status
-from rsfstudy.study import Panel, read_undocumented_quantities
+from rsfstudy.study import Panel, read_quantities_not_in_vocabulary
 from rsfstudy.vocabulary import find_quantity
 
 #: Line styles and marker fill styles for the points of the second axis of ``hue``.
-_DASHES_AND_MARKER_FILLS_OF_SECOND_HUE = (
+_LINE_AND_FILL_STYLES_OF_SECOND_HUE = (
     ("-", "full"),
     ("--", "none"),
     (":", "none"),
@@ -54,8 +54,8 @@ _MIN_POINTS_FOR_COLOUR_SCALE, _MAX_POINTS_WITH_MARKERS = 7, 60
 #: Maximum number of decimal places of a slope.
 _SLOPE_DIGITS = 6
 #: Width of the panel letter and of the y tick labels, in characters.
-_CHARACTERS_LEFT_OF_TITLE = 10
-_MISSING_VALUE_ARRAY = xr.DataArray(np.nan)
+_WIDTH_LEFT_OF_TITLE_IN_CHARACTERS = 10
+_ARRAY_OF_ONE_MISSING_VALUE = xr.DataArray(np.nan)
 
 
 def expand_facets(panel: Panel, dataset: xr.Dataset) -> list[Panel]:
@@ -77,7 +77,7 @@ def expand_facets(panel: Panel, dataset: xr.Dataset) -> list[Panel]:
     if (
         isinstance(panel.y, str)
         and panel.y
-        and not dataset.get(panel.y, _MISSING_VALUE_ARRAY).notnull().any()
+        and not dataset.get(panel.y, _ARRAY_OF_ONE_MISSING_VALUE).notnull().any()
     ):
         return []
     if panel.condition and not panel.condition(dataset):
@@ -105,10 +105,12 @@ def _has_data(panel: Panel, dataset: xr.Dataset) -> bool:
 def _select_data_of_panel(panel: Panel, dataset: xr.Dataset) -> xr.Dataset:
     """Select the part of a dataset that a panel displays."""
     at = {d: place for d, place in panel.isel.items() if d in dataset.dims}
-    return dataset.isel({d: _resolve_point_indices(dataset[d], place) for d, place in at.items()})
+    return dataset.isel(
+        {d: _find_indices_of_selected_points(dataset[d], place) for d, place in at.items()}
+    )
 
 
-def select_panel_at_extra_dims(
+def restrict_panel_to_point_of_extra_dims(
     panel: Panel, point_indices: Mapping[str, int], title_suffix: str
 ) -> Panel:
     """Restrict a panel to one point of additional dimensions.
@@ -131,7 +133,7 @@ def select_panel_at_extra_dims(
 
     def title(part: xr.Dataset) -> str:
         """Return the title of the panel with the description of the point."""
-        return _join_phrases(
+        return _join_and_capitalise_phrases(
             _resolve_text_or_function(panel.title, part, _describe_selected_points(part, own)),
             title_suffix,
         )
@@ -174,15 +176,17 @@ def draw_panel(panel: Panel, dataset: xr.Dataset, axes: Axes) -> None:
             # A margin above the highest point keeps the marker of this point inside the panel.
             top = float(axes.dataLim.ymax)
             axes.set_ylim(top=max(axes.get_ylim()[1], top + 0.05 * (top - limits[0])))
-    across, up = text_capacity_in_characters(axes)
-    if label := _axis_label(panel.x, panel.x_label, part, across - _CHARACTERS_LEFT_OF_TITLE):
+    across, up = estimate_text_capacity_in_characters(axes)
+    if label := _axis_label(
+        panel.x, panel.x_label, part, across - _WIDTH_LEFT_OF_TITLE_IN_CHARACTERS
+    ):
         axes.set_xlabel(label)
     if label := _axis_label(panel.y, panel.y_label, part, up):
         axes.set_ylabel(label)
     title = ", ".join(
         filter(None, [axes.get_title(), _resolve_text_or_function(panel.title, part, places)])
     )
-    axes.set_title(wrap_text(title, across - _CHARACTERS_LEFT_OF_TITLE))
+    axes.set_title(wrap_text(title, across - _WIDTH_LEFT_OF_TITLE_IN_CHARACTERS))
 
 
 def finalize_scales_and_legends(panels: Sequence[Panel], axes_of_panels: Sequence[Axes]) -> None:
@@ -245,16 +249,16 @@ def iterate_curves_and_styles(
         if shades is not None:
             style |= {"color": shades[number], "linestyle": "-"}
         if panel.hue[1:] and panel.hue[1] in several:
-            style |= _second_hue_style(at[1])
+            style |= _choose_style_of_second_hue_point(at[1])
         style["label"] = _format_curve_name(panel, row, named[:1] if len(several) > 1 else named)
         own = panel.style
         yield row, style | dict(own(row) if callable(own) else own)
 
 
-def _second_hue_style(point_number: int) -> dict[str, str]:
+def _choose_style_of_second_hue_point(point_number: int) -> dict[str, str]:
     """Return the line style and marker fill style for the second hue axis."""
-    line, fill = _DASHES_AND_MARKER_FILLS_OF_SECOND_HUE[
-        point_number % len(_DASHES_AND_MARKER_FILLS_OF_SECOND_HUE)
+    line, fill = _LINE_AND_FILL_STYLES_OF_SECOND_HUE[
+        point_number % len(_LINE_AND_FILL_STYLES_OF_SECOND_HUE)
     ]
     return {"linestyle": line, "fillstyle": fill}
 
@@ -271,7 +275,7 @@ def _add_second_hue_legend(panel: Panel, panel_data: xr.Dataset, axes: Axes) -> 
         own = {} if callable(panel.style) else dict(panel.style)
         line = {"linestyle": "none"} if panel.markers_only else {}
         for number in range(panel_data.sizes[second] if not shades else 0):
-            style = {"marker": "o"} | _second_hue_style(number) | own | line
+            style = {"marker": "o"} | _choose_style_of_second_hue_point(number) | own | line
             add_grey_legend_entry(
                 axes, describe_point(panel_data.isel({second: number}), second), style
             )
@@ -299,7 +303,7 @@ def _format_curve_name(
     )
     if name is None or not np.isfinite(curve_data.get(f"{panel.annotation}_stderr", np.nan)):
         return name
-    symbol = find_quantity(panel.annotation, read_undocumented_quantities(curve_data)).symbol
+    symbol = find_quantity(panel.annotation, read_quantities_not_in_vocabulary(curve_data)).symbol
     slope = f"{symbol} = {format_slope(curve_data, panel.annotation, _SLOPE_DIGITS)}".removeprefix(
         " = "
     )
@@ -363,7 +367,7 @@ def _evaluate_name_or_function(name_or_function: Any, curve_data: xr.Dataset) ->
     )
 
 
-def _resolve_point_indices(points: xr.DataArray, index_or_function: Any) -> Any:
+def _find_indices_of_selected_points(points: xr.DataArray, index_or_function: Any) -> Any:
     """Convert a selection of points to indices without duplicates.
 
     If the selection is a function, such as ``min``, the function receives a list of all coordinate
@@ -411,7 +415,7 @@ def _axis_label(
         )
     return (
         labelled(
-            find_quantity(name_or_function, read_undocumented_quantities(panel_data)),
+            find_quantity(name_or_function, read_quantities_not_in_vocabulary(panel_data)),
             max_line_characters,
         )
         if isinstance(name_or_function, str) and name_or_function
@@ -433,7 +437,7 @@ def _resolve_text_or_function(
 
 def _describe_selected_points(panel_data: xr.Dataset, selected_indices: Mapping[str, Any]) -> str:
     """Describe the selected points of a panel for its title."""
-    return _join_phrases(
+    return _join_and_capitalise_phrases(
         *(
             describe_point(panel_data, dimension)
             for dimension in selected_indices
@@ -442,7 +446,7 @@ def _describe_selected_points(panel_data: xr.Dataset, selected_indices: Mapping[
     )
 
 
-def _join_phrases(*phrases: str) -> str:
+def _join_and_capitalise_phrases(*phrases: str) -> str:
     """Join phrases with commas and capitalise the first letter.
 
     Empty phrases are omitted.

@@ -90,7 +90,7 @@ def style_context(user_styles: Any = None) -> Iterator[None]:
             rule = f"a figure cannot be drawn in it: {shorten_text(error).rstrip('.')}"
             remedy = "Draw it without this style to find out if the style is the reason."
             raise InvalidValue(
-                "style", _printable_style(user_styles), rule, remedy=remedy
+                "style", _format_style_for_message(user_styles), rule, remedy=remedy
             ) from error
 
 
@@ -109,11 +109,11 @@ def _to_matplotlib_style(user_style: Any) -> str | dict[str, Any]:
         return _read_style_sheet(Path(user_style))
     rule = f"is neither a style sheet, which ends in {_STYLE_SHEET_SUFFIX}, nor the name of a style"
     raise InvalidValue(
-        "style", _printable_style(user_style), rule, choices=["default", *style.available]
+        "style", _format_style_for_message(user_style), rule, choices=["default", *style.available]
     )
 
 
-def _printable_style(user_style: Any) -> Any:
+def _format_style_for_message(user_style: Any) -> Any:
     """Return a style in a form that is readable in an error message."""
     return str(user_style) if isinstance(user_style, Path) else user_style
 
@@ -273,7 +273,7 @@ def add_panel_letters(panel_axes: Sequence[Axes]) -> None:
             panel.set_title(f"({text}) ", loc="left", fontweight="bold", ha="right")
 
 
-def text_capacity_in_characters(axes: Axes) -> tuple[int, int]:
+def estimate_text_capacity_in_characters(axes: Axes) -> tuple[int, int]:
     """Estimate how many characters fit along the axes of a panel.
 
     The estimate uses the average width of a letter in the current font size.
@@ -321,7 +321,7 @@ def add_legend(axes: Axes, legend_columns: int = 2, title: str | None = None) ->
     shown = _legend_entries(axes)
     if not shown:
         return
-    lines = axes.get_xlabel().count("\n") + _tick_label_lines(axes)
+    lines = axes.get_xlabel().count("\n") + _estimate_tick_label_line_count(axes)
     drop = rcParams["font.size"] * (2.9 + 1.3 * lines)
     figure, (left, right) = cast(Figure, axes.figure), _horizontal_extent_in_figure(axes)
     # A legend that extends below the colour bar would make the layout engine narrow the panel.
@@ -338,7 +338,7 @@ def add_legend(axes: Axes, legend_columns: int = 2, title: str | None = None) ->
     _fit_legend_to_width(made, shown, legend_columns, 0.97 * (right - left) * figure.bbox.width)
 
 
-def _tick_label_lines(axes: Axes) -> float:
+def _estimate_tick_label_line_count(axes: Axes) -> float:
     """Estimate the height of the x tick labels, in lines of text."""
 
     def lines(tick: Text) -> float:
@@ -484,7 +484,7 @@ def enlarge_for_legends(figure: Figure, panel_rows: Sequence[Sequence[Axes]]) ->
         max(map(_legend_height, legends), default=0.0) for legends in (*beside, figure.legends)
     ]
     line = 1.3 * float(rcParams["font.size"]) / 72.0
-    heights += [line * (max(map(_tick_label_lines, row)) - 1.0) for row in panel_rows]
+    heights += [line * (max(map(_estimate_tick_label_line_count, row)) - 1.0) for row in panel_rows]
     figure.set_figheight(figure.get_figheight() + sum(heights))
 
 
@@ -498,7 +498,7 @@ def _legend_height(legend: Legend) -> float:
     return height / figure.dpi + 1.5 * float(rcParams["font.size"]) / 72.0
 
 
-def freeze_tick_style(axes: Axes) -> None:
+def freeze_tick_label_size(axes: Axes) -> None:
     """Set the size of the tick labels to the size in the current style.
 
     Matplotlib may create ticks after the style context has ended. The explicit size ensures that

@@ -29,7 +29,7 @@ _MAX_AUTOCORRELATION_LAGS, _MAX_DRAWN_RECORD_ROWS, _MAX_RECORD_PANELS = 40, 20_0
 #: average of residuals as a fraction of a window.
 _MARGIN_FRACTION_BESIDE_WINDOWS, _RESIDUAL_AVERAGING_FRACTION_OF_WINDOW = 0.15, 0.02
 #: Half width of the confidence band in standard errors.
-_HALF_WIDTH_OF_BAND_IN_STDERRS = 2.0
+_CONFIDENCE_BAND_HALF_WIDTH_IN_STDERRS = 2.0
 _LINE_STYLE_OF_RECORD_ROWS: dict[str, Any] = {
     "color": "0.7",
     "markersize": 1.5,
@@ -114,7 +114,9 @@ def _iterate_fits_with_law(
             yield one, describe_point(one, "law"), number
 
 
-def _select_thinned_row_columns(fit: xr.Dataset, column_names: Sequence[str]) -> list[np.ndarray]:
+def _select_thinned_columns_of_fit(
+    fit: xr.Dataset, column_names: Sequence[str]
+) -> list[np.ndarray]:
     """Return the columns of a fit without missing values.
 
     Long columns are thinned by omitting rows.
@@ -124,7 +126,7 @@ def _select_thinned_row_columns(fit: xr.Dataset, column_names: Sequence[str]) ->
     return list(columns[:, :: max(1, columns.shape[1] // _MAX_DRAWN_RECORD_ROWS)])
 
 
-def _split_row_columns_by_window(
+def _iterate_columns_of_fit_windows(
     fit: xr.Dataset, column_names: Sequence[str]
 ) -> Iterator[list[np.ndarray]]:
     """Iterate over the windows of a fit.
@@ -136,7 +138,7 @@ def _split_row_columns_by_window(
     late = np.diff(fit["record_time"].values[rows]) > 0.0
     for part in np.split(rows, np.flatnonzero((np.diff(rows) > 1) | ~late) + 1):
         if len(part):
-            yield _select_thinned_row_columns(fit.isel(row=part), column_names)
+            yield _select_thinned_columns_of_fit(fit.isel(row=part), column_names)
 
 
 def _draw_record_with_fits(dataset: xr.Dataset, axes: Axes) -> None:
@@ -144,20 +146,20 @@ def _draw_record_with_fits(dataset: xr.Dataset, axes: Axes) -> None:
     windows = []
     for number, (one, name, law) in enumerate(_iterate_fits_with_law(dataset)):
         if not number:
-            record = _select_thinned_row_columns(one, ("record_displacement", "record_friction"))
+            record = _select_thinned_columns_of_fit(one, ("record_displacement", "record_friction"))
             axes.plot(*record, label="record", **_LINE_STYLE_OF_RECORD_ROWS)
         names = "record_displacement", "fitted_friction", "fitted_friction_stderr"
         style = cycle_style(law) | {"marker": "", "label": name, "linewidth": 1.2, "zorder": 3}
-        for x, y, error in _split_row_columns_by_window(one, names):
+        for x, y, error in _iterate_columns_of_fit_windows(one, names):
             if not law:
                 axes.axvspan(x[0], x[-1], color="0.94", lw=0, zorder=0, label="what is fitted")
             windows += [x[0], x[-1]]
             band = {"color": style["color"], "alpha": 0.3, "lw": 0, "zorder": 2}
-            said = f"within {_HALF_WIDTH_OF_BAND_IN_STDERRS:g} standard errors"
+            said = f"within {_CONFIDENCE_BAND_HALF_WIDTH_IN_STDERRS:g} standard errors"
             axes.fill_between(
                 x,
-                y - _HALF_WIDTH_OF_BAND_IN_STDERRS * error,
-                y + _HALF_WIDTH_OF_BAND_IN_STDERRS * error,
+                y - _CONFIDENCE_BAND_HALF_WIDTH_IN_STDERRS * error,
+                y + _CONFIDENCE_BAND_HALF_WIDTH_IN_STDERRS * error,
                 label=said,
                 **band,
             )
@@ -172,7 +174,7 @@ def _draw_residuals(dataset: xr.Dataset, axes: Axes) -> None:
     axes.axhline(0.0, color="0.5", lw=0.8, zorder=2)
     for one, name, law in _iterate_fits_with_law(dataset):
         style = cycle_style(law) | {"label": name, "marker": "", "linewidth": 1.0, "zorder": 3}
-        for x, y in _split_row_columns_by_window(one, ("record_displacement", "residual")):
+        for x, y in _iterate_columns_of_fit_windows(one, ("record_displacement", "residual")):
             if not law:
                 axes.plot(x, y, label=f"each row, {name}", **_LINE_STYLE_OF_RECORD_ROWS)
             count = max(1, round(_RESIDUAL_AVERAGING_FRACTION_OF_WINDOW * len(x)))
@@ -184,7 +186,7 @@ def _draw_autocorrelation(dataset: xr.Dataset, axes: Axes) -> None:
     """Draw the autocorrelation of residuals and of whitened residuals."""
     axes.axhline(0.0, color="0.5", lw=0.8)
     for one, name, law in _iterate_fits_with_law(dataset, only_first_step=True):
-        left, freed = _select_thinned_row_columns(one, ("residual", "innovation"))
+        left, freed = _select_thinned_columns_of_fit(one, ("residual", "innovation"))
         if len(left) <= _MAX_AUTOCORRELATION_LAGS:
             continue
         style = cycle_style(law) | {"marker": ""}

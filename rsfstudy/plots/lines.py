@@ -21,14 +21,14 @@ from rsfstudy.plots._axes import (
     has_numeric_points,
     is_numeric_variable,
     point_colours,
-    read_flag_words,
+    read_flag_meanings_of_variable,
     set_x_axis_of_dimension,
     varying_variables,
 )
 from rsfstudy.plots._style import add_grey_legend_entry, cycle_marker, cycle_style
 from rsfstudy.plots._text import format_quantity_axis_label, to_mathtext
 from rsfstudy.storage import read_declaration
-from rsfstudy.study import Panel, read_undocumented_quantities
+from rsfstudy.study import Panel, read_quantities_not_in_vocabulary
 from rsfstudy.vocabulary import find_quantity
 
 #: Maximum number of panels, maximum number of lines with a legend entry, and maximum number of
@@ -62,7 +62,8 @@ def panels(dataset: xr.Dataset, variable: str | None = None) -> Sequence[Panel]:
     else:
         known = variable in dataset
         drawn = known and (
-            is_numeric_variable(dataset[variable]) or read_flag_words(dataset[variable])
+            is_numeric_variable(dataset[variable])
+            or read_flag_meanings_of_variable(dataset[variable])
         )
         names = [variable] if drawn else []
     named = len(names) == 1 and not read_declaration(dataset).overrides
@@ -81,7 +82,7 @@ def _build_panel(dataset: xr.Dataset, variable_name: str, title: str) -> Panel:
         x=along,
         overlays=[partial(_draw_lines, variable_name, along)],
         y_label=format_quantity_axis_label(
-            find_quantity(variable_name, read_undocumented_quantities(dataset)), 200
+            find_quantity(variable_name, read_quantities_not_in_vocabulary(dataset)), 200
         ),
         title=to_mathtext(title),
     )
@@ -90,7 +91,7 @@ def _build_panel(dataset: xr.Dataset, variable_name: str, title: str) -> Panel:
 def _draw_lines(variable_name: str, x_dimension: str, dataset: xr.Dataset, axes: Axes) -> None:
     """Draw the lines of a variable along a dimension."""
     values = dataset[variable_name]
-    if told := read_flag_words(values):
+    if told := read_flag_meanings_of_variable(values):
         flags, places = np.unique(values.values, return_inverse=True)
         values = values.copy(data=np.reshape(places, values.shape).astype(float))
         axes.set_yticks(range(flags.size), [told[flag] for flag in flags.tolist()])

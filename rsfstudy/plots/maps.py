@@ -28,20 +28,20 @@ from rsfstudy.plots._axes import (
     has_numeric_points,
     is_numeric_variable,
     measured_variables,
-    read_flag_words,
+    read_flag_meanings_of_variable,
 )
 from rsfstudy.plots._text import format_quantity_axis_label, to_mathtext
 from rsfstudy.status import Status
-from rsfstudy.study import Panel, read_undocumented_quantities
+from rsfstudy.study import Panel, read_quantities_not_in_vocabulary
 from rsfstudy.vocabulary import find_quantity
 
 #: Minimum number of points of each axis of a map, and maximum number of maps.
 _MIN_POINTS_PER_MAP_AXIS, _MAX_MAPS = 3, 12
 #: Hatches of cells without a value, in the order of their status codes.
-_HATCHES = ("////", "\\\\\\\\", "....", "xxxx", "||||", "----", "++++", "oooo")
+_HATCH_PATTERNS_OF_STATUSES = ("////", "\\\\\\\\", "....", "xxxx", "||||", "----", "++++", "oooo")
 #: Minimum distance of a contour label from the frame and from other contours, as a fraction of the
 #: panel size.
-_CONTOUR_LABEL_CLEARANCE = 0.06
+_MIN_DISTANCE_AROUND_CONTOUR_LABEL = 0.06
 #: Minimum extent of a contour with a label, as a fraction of the panel size.
 _MIN_LENGTH_OF_LABELLED_CONTOUR = 0.2
 #: Minimum number of points of each axis for contours.
@@ -70,23 +70,25 @@ def panels(dataset: xr.Dataset, variable: str | None = None) -> Sequence[Panel]:
     if not names or names[0] not in dataset:
         return []
     values = dataset[names[0]]
-    if not (is_numeric_variable(values) or read_flag_words(values)):
+    if not (is_numeric_variable(values) or read_flag_meanings_of_variable(values)):
         return []
     plane, cells = _choose_map_dimensions(dataset, values), dataset["status"].dims
     if plane is None or not set(values.dims) <= set(cells):
         return []
     others = [str(d) for d in values.dims if d not in plane]
-    about = find_quantity(names[0], read_undocumented_quantities(dataset))
+    about = find_quantity(names[0], read_quantities_not_in_vocabulary(dataset))
     places = list(np.ndindex(*(values.sizes[d] for d in others)))[:_MAX_MAPS]
     panel = partial(
         Panel,
         x=plane[1],
         overlays=[partial(draw_map, names[0], plane, _colour_scale(values))],
         y_label=format_quantity_axis_label(
-            find_quantity(plane[0], read_undocumented_quantities(dataset)), 200
+            find_quantity(plane[0], read_quantities_not_in_vocabulary(dataset)), 200
         ),
         title=None if others else to_mathtext(dataset.attrs.get("title", "")),
-        legend_title=format_quantity_axis_label(about, 60) if read_flag_words(values) else None,
+        legend_title=format_quantity_axis_label(about, 60)
+        if read_flag_meanings_of_variable(values)
+        else None,
     )
     return [panel(isel=dict(zip(others, at, strict=True))) for at in places]
 
@@ -140,7 +142,7 @@ def draw_map(
         axes.grid(False)
         known = np.ma.masked_invalid(values.values)
         drawn = axes.pcolormesh(*at, known, rasterized=True, norm=found[0])
-        if meanings := read_flag_words(dataset[variable_name]):
+        if meanings := read_flag_meanings_of_variable(dataset[variable_name]):
             for flag in found[1]:
                 colour = drawn.to_rgba(np.array(flag))
                 axes.add_collection(PolyCollection([], facecolor=colour, label=meanings[flag]))
@@ -148,7 +150,7 @@ def draw_map(
             bar = cast(Figure, axes.figure).colorbar(drawn, ax=axes, pad=0.02)
             bar.set_label(
                 format_quantity_axis_label(
-                    find_quantity(variable_name, read_undocumented_quantities(dataset)), 34
+                    find_quantity(variable_name, read_quantities_not_in_vocabulary(dataset)), 34
                 )
             )
             draw_contours(axes, values, found[1])
@@ -158,7 +160,9 @@ def draw_map(
     )
     if set(status.dims) == set(map_dimensions):
         unknown = ~np.isfinite(values.values)
-        _hatch_statuses(axes, at, status.transpose(*map_dimensions).values, unknown)
+        _hatch_cells_without_value_by_status(
+            axes, at, status.transpose(*map_dimensions).values, unknown
+        )
 
 
 def _colour_scale(map_values: xr.DataArray) -> tuple[Normalize, Sequence[float]] | None:
@@ -170,7 +174,7 @@ def _colour_scale(map_values: xr.DataArray) -> tuple[Normalize, Sequence[float]]
     values = map_values.values.astype(float)
     if not np.isfinite(values).any():
         return None
-    if read_flag_words(map_values):
+    if read_flag_meanings_of_variable(map_values):
         flags = np.unique(values[np.isfinite(values)])
         return BoundaryNorm(_cell_edges(flags), 256), flags.tolist()
     low, high = float(np.nanmin(values)), float(np.nanmax(values))
@@ -244,7 +248,7 @@ def _label_positions(axes: Axes, contour_set: QuadContourSet) -> list[tuple[floa
         apart = cKDTree(np.concatenate(others)).query(line)[0] if others else np.ones(len(line))
         room = np.minimum(apart, np.minimum(line, 1.0 - line).min(axis=1))
         if (
-            room.max() > _CONTOUR_LABEL_CLEARANCE
+            room.max() > _MIN_DISTANCE_AROUND_CONTOUR_LABEL
             and np.ptp(line, axis=0).max() > _MIN_LENGTH_OF_LABELLED_CONTOUR
         ):
             x, y = panel.inverted().transform(line[room.argmax()]).tolist()
@@ -252,7 +256,7 @@ def _label_positions(axes: Axes, contour_set: QuadContourSet) -> list[tuple[floa
     return places
 
 
-def _hatch_statuses(
+def _hatch_cells_without_value_by_status(
     axes: Axes,
     cell_edges: tuple[np.ndarray, np.ndarray],
     status: np.ndarray,
@@ -273,7 +277,9 @@ def _hatch_statuses(
     missing_mask : ndarray of bool, shape (ny, nx)
         True for the cells to be hatched.
     """
-    for hatch, code in zip(_HATCHES, np.unique(status[missing_mask]), strict=False):
+    for hatch, code in zip(
+        _HATCH_PATTERNS_OF_STATUSES, np.unique(status[missing_mask]), strict=False
+    ):
         rows = [
             _outline_of_cell_run(cell_edges, *run)
             for run in _find_horizontal_cell_runs(missing_mask & (status == code))

@@ -25,7 +25,7 @@ from rsfstudy.plots._axes import (
 from rsfstudy.plots._style import cycle_style
 from rsfstudy.plots._text import format_units, quantity_symbol, wrap_text
 from rsfstudy.storage import build_axis_from_stored, read_declaration
-from rsfstudy.study import DrawFunction, Panel, read_undocumented_quantities
+from rsfstudy.study import DrawFunction, Panel, read_quantities_not_in_vocabulary
 from rsfstudy.vocabulary import find_quantity
 
 #: Maximum number of quantities in the scatter matrix, including the measured variable, and maximum
@@ -72,7 +72,7 @@ def panels(dataset: xr.Dataset, variable: str | None = None) -> Sequence[Panel]:
     return [_build_panel(dataset, along, x, y) for y in names for x in names]
 
 
-def count_panels_per_side(panels: Sequence[Panel]) -> int:
+def count_panels_per_side_of_scatter_matrix(panels: Sequence[Panel]) -> int:
     """Return the number of rows and columns of a scatter matrix.
 
     Parameters
@@ -139,19 +139,19 @@ def _format_short_axis_label(dataset: xr.Dataset, variable_name: str) -> str:
     labels is written next to the first line of the label.
     """
     about = find_quantity(
-        variable_name.removesuffix("_error"), read_undocumented_quantities(dataset)
+        variable_name.removesuffix("_error"), read_quantities_not_in_vocabulary(dataset)
     )
     units = "" if about.units in ("", "1") or about.scale else f" ({format_units(about.units)})"
     text = wrap_text(f"{quantity_symbol(about)}{units}", _MAX_LABEL_LINE_CHARACTERS)
     return f"error of\n{text}" if variable_name.endswith("_error") else text
 
 
-def _limit_ticks(is_x_limited: int, _dataset: xr.Dataset, axes: Axes) -> None:
+def _limit_ticks(max_x_tick_count: int, _dataset: xr.Dataset, axes: Axes) -> None:
     """Limit the number of ticks, so that the tick labels do not overlap.
 
     The tick labels of error estimates are long, so fewer ticks are used along x.
     """
-    axes.xaxis.set_major_locator(MaxNLocator(is_x_limited))
+    axes.xaxis.set_major_locator(MaxNLocator(max_x_tick_count))
     axes.yaxis.set_major_locator(MaxNLocator(_MAX_TICKS))
 
 

@@ -14,20 +14,20 @@ from rsfstudy._lazy_exports import lazy_exports
 if TYPE_CHECKING:
     from rsfstudy.referee.answer_comparison import AnswerComparison
     from rsfstudy.referee.problem_files import write_problems
-    from rsfstudy.referee.verification import compare_file, summarise_comparisons
+    from rsfstudy.referee.verification import compare_file_with_known_answer, summarise_comparisons
 else:
     __getattr__, __dir__ = lazy_exports(
         __name__,
         {
             "referee.answer_comparison": ("AnswerComparison",),
             "referee.problem_files": ("write_problems",),
-            "referee.verification": ("compare_file", "summarise_comparisons"),
+            "referee.verification": ("compare_file_with_known_answer", "summarise_comparisons"),
         },
     )
 
 __all__ = [
     "AnswerComparison",
-    "compare_file",
+    "compare_file_with_known_answer",
     "summarise_comparisons",
     "write_problems",
 ]

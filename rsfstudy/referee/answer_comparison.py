@@ -18,7 +18,7 @@ from rsfstudy.motion import COMPILED, SCIPY, Accuracy, is_engine_installed
 from rsfstudy.referee import reference_answers
 from rsfstudy.referee.external_answers import ReportedQuantity
 from rsfstudy.referee.problem_files import BenchmarkProblem
-from rsfstudy.referee.reference_answers import AnswerTable
+from rsfstudy.referee.reference_answers import AnswerColumnByQuantity
 from rsfstudy.rig import read_table
 
 #: Default number of digits that is required to pass.
@@ -29,7 +29,7 @@ _MIN_EXPLAINED_DIGITS, _MIN_DIGITS_GAINED = 3.0, 1.5
 #: Maximum difference of rounded values in units of the last decimal place. The code may contribute
 #: one unit, the rounding in the file half a unit, and the rounding of the known answer a small
 #: margin.
-_MAX_LAST_PLACE_DIFFERENCE = 1.51
+_MAX_DIFFERENCE_IN_LAST_PLACE_UNITS = 1.51
 #: Quantities with differences relative to the largest value of the column, because they start at
 #: zero.
 _QUANTITIES_STARTING_AT_ZERO = ("slip", "pore_pressure")
@@ -40,7 +40,7 @@ _RADIATION_DAMPING_CONVENTIONS = {
     "left out": 0.0,
 }
 #: Common conversion factors of units, powers of ten, angles and logarithms.
-_USUAL_CONVERSION_FACTORS = {
+_COMMON_CONVERSION_FACTOR_BY_NAME = {
     "2": 2.0, "0.5": 0.5, "pi": math.pi, "1/pi": 1.0 / math.pi, "2 pi": 2.0 * math.pi,
     "1/(2 pi)": 0.5 / math.pi, "ln 10": math.log(10.0), "1/ln 10": 1.0 / math.log(10.0),
     **{f"{unit:g}": unit for unit in (60.0, 3600.0, 86400.0)},
@@ -94,7 +94,7 @@ class AnswerComparison:
         Agreement of each quantity.
     required_digits : float
         Number of digits that is required to pass.
-    explanation : str, default: ""
+    explanation_of_disagreement : str, default: ""
         Convention that explains the difference. The string is empty if the answer passes or if no
         explanation was found.
     """
@@ -102,7 +102,7 @@ class AnswerComparison:
     problem: BenchmarkProblem
     quantity_agreements: tuple[QuantityAgreement, ...]
     required_digits: float
-    explanation: str = ""
+    explanation_of_disagreement: str = ""
 
     @property
     def agreeing_digits(self) -> float:
@@ -153,7 +153,7 @@ def _format_answer_row(problem: BenchmarkProblem, row: int) -> str:
 
 def known_answer(
     problem: BenchmarkProblem, answer_path: Path | None
-) -> tuple[BenchmarkProblem, AnswerTable]:
+) -> tuple[BenchmarkProblem, AnswerColumnByQuantity]:
     """Return a problem and its known answer.
 
     Parameters
@@ -193,7 +193,7 @@ def known_answer(
 
 def compare_answers(
     problem: BenchmarkProblem,
-    answer: AnswerTable,
+    answer: AnswerColumnByQuantity,
     reported: Mapping[str, ReportedQuantity],
     required_digits: float,
 ) -> AnswerComparison:
@@ -240,10 +240,12 @@ def compare_answers(
     )
     if found.has_required_digits:
         return found
-    best, words = max(_iterate_possible_explanations(problem, values, answer), default=(0.0, ""))
+    best, words = max(
+        _iterate_explanations_of_disagreement(problem, values, answer), default=(0.0, "")
+    )
     better = best >= max(_MIN_EXPLAINED_DIGITS, found.agreeing_digits + _MIN_DIGITS_GAINED)
     explanation = f"{words}. With that undone, {round_digits_down(best):.1f} digits agree"
-    return replace(found, explanation=explanation if better else "")
+    return replace(found, explanation_of_disagreement=explanation if better else "")
 
 
 def round_digits_down(digits: float) -> float:
@@ -266,8 +268,8 @@ def round_digits_down(digits: float) -> float:
 
 def _compute_quantity_agreements(
     problem: BenchmarkProblem,
-    reported: AnswerTable,
-    answer: AnswerTable,
+    reported: AnswerColumnByQuantity,
+    answer: AnswerColumnByQuantity,
     required_digits: float,
     last_place_units: Mapping[str, float] | None = None,
 ) -> tuple[QuantityAgreement, ...]:
@@ -285,7 +287,8 @@ def _compute_quantity_agreements(
                 int(few[0]) if len(few) else None,
                 bool(
                     (
-                        np.abs(reported[name] - answer[name]) <= _MAX_LAST_PLACE_DIFFERENCE * place
+                        np.abs(reported[name] - answer[name])
+                        <= _MAX_DIFFERENCE_IN_LAST_PLACE_UNITS * place
                     ).all()
                 ),
                 apart,
@@ -313,21 +316,21 @@ def _relative_differences(
     return np.asarray(np.maximum(np.abs(reported - reference) - rounded, 0.0) / scale)
 
 
-def _iterate_possible_explanations(
-    problem: BenchmarkProblem, reported: AnswerTable, answer: AnswerTable
+def _iterate_explanations_of_disagreement(
+    problem: BenchmarkProblem, reported: AnswerColumnByQuantity, answer: AnswerColumnByQuantity
 ) -> Iterator[tuple[float, str]]:
     """Iterate over conventions that may explain a difference.
 
     Each item contains the number of digits that agree under the convention, and a description.
     """
-    for words, table in _iterate_reinterpreted_answers(problem, reported, answer):
+    for words, table in _iterate_answers_in_other_conventions(problem, reported, answer):
         yield (
             min(
                 a.agreeing_digits for a in _compute_quantity_agreements(problem, table, answer, 0.0)
             ),
             words,
         )
-    for words, other in _iterate_reformulated_problems(problem):
+    for words, other in _iterate_problems_in_other_conventions(problem):
         try:
             table = reference_answers.compute_answer(
                 other, Accuracy(_EXPLANATION_RTOL, reference_answers.ANSWER_EVALUATION_BUDGET)
@@ -343,9 +346,9 @@ def _iterate_possible_explanations(
         )
 
 
-def _iterate_reinterpreted_answers(
-    problem: BenchmarkProblem, reported: AnswerTable, answer: AnswerTable
-) -> Iterator[tuple[str, AnswerTable]]:
+def _iterate_answers_in_other_conventions(
+    problem: BenchmarkProblem, reported: AnswerColumnByQuantity, answer: AnswerColumnByQuantity
+) -> Iterator[tuple[str, AnswerColumnByQuantity]]:
     """Iterate over answers that are converted from other conventions.
 
     Each item contains a description of the convention, and the converted columns.
@@ -366,7 +369,9 @@ def _iterate_reinterpreted_answers(
         factor = float(np.median(reported[name] / np.where(answer[name], answer[name], np.nan)))
         # An arbitrary factor or an arbitrary shift would explain any single value.
         several = len(answer[name]) > 1
-        usual = _match_usual_factor(factor, _FACTOR_RTOL if several else _SINGLE_VALUE_FACTOR_RTOL)
+        usual = _find_common_conversion_factor(
+            factor, _FACTOR_RTOL if several else _SINGLE_VALUE_FACTOR_RTOL
+        )
         if usual is not None:
             yield f"{name} {usual[0]}", reported | {name: reported[name] / usual[1]}
         elif several and math.isfinite(factor) and factor:
@@ -380,7 +385,7 @@ def _iterate_reinterpreted_answers(
             yield words, reported | {name: reported[name] - apart}
 
 
-def _match_usual_factor(factor: float, tolerance: float) -> tuple[str, float] | None:
+def _find_common_conversion_factor(factor: float, tolerance: float) -> tuple[str, float] | None:
     """Return the common conversion factor that equals a given factor.
 
     The relative difference of the two factors must not exceed the tolerance.
@@ -392,7 +397,7 @@ def _match_usual_factor(factor: float, tolerance: float) -> tuple[str, float] | 
     """
     if math.isclose(factor, -1.0, rel_tol=tolerance):
         return "has the opposite sign", -1.0
-    for words, usual in _USUAL_CONVERSION_FACTORS.items():
+    for words, usual in _COMMON_CONVERSION_FACTOR_BY_NAME.items():
         if math.isclose(abs(factor), usual, rel_tol=tolerance):
             sign = "-" if factor < 0.0 else ""
             return f"is {sign}{words} times the known answer", math.copysign(usual, factor)
@@ -405,7 +410,7 @@ def _format_factor(factor: float) -> str:
     return text if text != "1" else f"(1 {'-' if beyond < 0.0 else '+'} {abs(beyond):.2g})"
 
 
-def _iterate_reformulated_problems(
+def _iterate_problems_in_other_conventions(
     problem: BenchmarkProblem,
 ) -> Iterator[tuple[str, BenchmarkProblem]]:
     """Iterate over problems with other conventions.

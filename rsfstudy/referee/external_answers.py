@@ -20,15 +20,15 @@ from rsfstudy.referee.problem_files import BenchmarkProblem
 from rsfstudy.rig import Column, convert_to_si, read_table
 
 #: Quantities that a file may contain instead of a requested quantity, and their units.
-_SUBSTITUTE_QUANTITY_AND_UNITS = {
+_SUBSTITUTE_AND_UNITS_BY_QUANTITY = {
     "slip_rate": ("log10_slip_rate", "1"),
     "friction": ("shear_stress", "Pa"),
 }
-_UNITS_BY_SUBSTITUTE_QUANTITY = dict(_SUBSTITUTE_QUANTITY_AND_UNITS.values())
+_UNITS_BY_SUBSTITUTE_QUANTITY = dict(_SUBSTITUTE_AND_UNITS_BY_QUANTITY.values())
 #: Tolerance of times, relative to the last time. The times in files are rounded to some decimals.
-_ANSWER_TIME_RTOL = 1e-9
+_RTOL_FOR_MATCHING_ANSWER_TIMES = 1e-9
 #: Largest allowed value in SI units. Larger values would cause an overflow in ratios.
-_MAX_REPORTED_VALUE = 1e100
+_MAX_ACCEPTED_ANSWER_VALUE_IN_SI = 1e100
 
 
 class ReportedQuantity(NamedTuple):
@@ -97,7 +97,7 @@ def read_external_answer(
         for key, column in table.items()
         if key in asked
     }
-    for name, (other, _units) in _SUBSTITUTE_QUANTITY_AND_UNITS.items():
+    for name, (other, _units) in _SUBSTITUTE_AND_UNITS_BY_QUANTITY.items():
         # With radiation damping, the slip rate is required to convert shear stress to friction.
         waits = name == "friction" and problem.radiation_damping and "slip_rate" not in found
         if name in problem.quantity_units and name not in found and other in found and not waits:
@@ -159,9 +159,9 @@ def _convert_column_to_si(
     except InvalidValue as error:
         raise error.with_location(column.path) from error
     most = (
-        math.log10(_MAX_REPORTED_VALUE)
+        math.log10(_MAX_ACCEPTED_ANSWER_VALUE_IN_SI)
         if quantity_name == "log10_slip_rate"
-        else _MAX_REPORTED_VALUE / factor
+        else _MAX_ACCEPTED_ANSWER_VALUE_IN_SI / factor
     )
     column.check_values(
         quantity_name, ~(np.abs(column.values) <= most), f"must be a number, of {most:g} at most"
@@ -188,7 +188,10 @@ def _check_index_values(
     InvalidValue
         If a value differs, for example because the file contains other times.
     """
-    wrong = np.abs(values - expected_values) > _ANSWER_TIME_RTOL * np.abs(expected_values).max()
+    wrong = (
+        np.abs(values - expected_values)
+        > _RTOL_FOR_MATCHING_ANSWER_TIMES * np.abs(expected_values).max()
+    )
     wanted = f"{expected_values[np.argmax(wrong)]:g} {problem.quantity_units[problem.index_column]}"
     column._replace(values=values).check_values(
         problem.index_column, wrong, f"must be {wanted}: nothing is interpolated"

@@ -50,7 +50,7 @@ UNITS_OF_SERIES_QUANTITIES = {
     "slip": "m", "normal_stress": "Pa", "pore_pressure": "Pa",
 }  # fmt: skip
 UNITS_OF_PEAK_QUANTITIES = {"event": "1", "time": "s", "slip_rate": "m/s"}
-UNITS_OF_NUMBER_QUANTITIES = {
+SI_UNITS_BY_SCALAR_QUANTITY = {
     "critical_stiffness": "Pa/m", "growth_rate": "1/s", "angular_frequency": "1/s",
     "critical_velocity": "m/s", "critical_displacement": "m", "recurrence_interval": "s",
     "static_stress_drop": "Pa", "dynamic_stress_drop": "Pa", "peak_slip_rate": "m/s",
@@ -59,7 +59,7 @@ UNITS_OF_NUMBER_QUANTITIES = {
 QUANTITY_UNITS_BY_REPORT_KIND = {
     "series": UNITS_OF_SERIES_QUANTITIES,
     "peaks": UNITS_OF_PEAK_QUANTITIES,
-    "numbers": UNITS_OF_NUMBER_QUANTITIES,
+    "numbers": SI_UNITS_BY_SCALAR_QUANTITY,
 }
 #: Fields of the rig by the names of the problem parameters. The first dictionary contains only the
 #: required parameters.
@@ -80,7 +80,7 @@ _UNITS_BY_PARAMETER = {
     "V_unstable": "m/s",
 }  # fmt: skip
 #: Laws with the state variable b ln(theta/theta_*), so that theta follows from the state variable.
-_LAWS_WITH_THETA = (
+_NAMES_OF_LAWS_WITH_THETA_AS_STATE = (
     "slip", "slowness", "family", "perrin_rice_zheng", "composite", "two_slip_states",
     "two_slowness_states",
 )  # fmt: skip
@@ -88,7 +88,7 @@ _LAWS_WITH_THETA = (
 
 #: Pattern of the type errors of msgspec, and descriptions of the types for error messages.
 _TYPE_ERROR_PATTERN = re.compile(r"Expected `(\w+)`, got `(\w+)`(?: - at `\$(.*)`)?")
-_DESCRIPTION_BY_TYPE_NAME = {
+_READABLE_NAME_BY_TYPE_NAME = {
     "array": "a list", "object": "a table", "str": "a text", "int": "a whole number",
     "float": "a number", "bool": "true or false", "null": "nothing", "date": "a date",
 }  # fmt: skip
@@ -177,8 +177,10 @@ class BenchmarkProblem:
         if self.report == "peaks" and not 1 <= self.count <= _MAX_PEAKS:
             rule = f"must lie between 1 and {_MAX_PEAKS:,}: it is the number of peaks to report"
             raise InvalidValue("count", self.count, rule)
-        if self.law not in _LAWS_WITH_THETA:
-            raise InvalidValue("law", self.law, "is unknown", choices=_LAWS_WITH_THETA)
+        if self.law not in _NAMES_OF_LAWS_WITH_THETA_AS_STATE:
+            raise InvalidValue(
+                "law", self.law, "is unknown", choices=_NAMES_OF_LAWS_WITH_THETA_AS_STATE
+            )
         two = ("b_2", "D_c_2") if self.law.startswith("two") else ()
         for name in ("a", "b", *two, *_REQUIRED_RIG_FIELD_BY_PARAMETER):
             if name not in self.parameters:
@@ -452,7 +454,9 @@ def _check_declared_type(name: str, value: Any, expected_type: Any) -> None:
         found = _TYPE_ERROR_PATTERN.search(str(error))
         if found is None:
             raise InvalidValue(name, value, str(error)) from error
-        wanted, actual = (_DESCRIPTION_BY_TYPE_NAME.get(kind, kind) for kind in found.groups()[:2])
+        wanted, actual = (
+            _READABLE_NAME_BY_TYPE_NAME.get(kind, kind) for kind in found.groups()[:2]
+        )
         place = f"{name}{found[3] or ''}"
         raise InvalidValue(place, value, f"must be {wanted}, not {actual}") from error
 

@@ -25,12 +25,12 @@ from rsfstudy.referee.problem_files import BenchmarkProblem
 from rsfstudy.slider import critical_stiffness, linear_growth_rates
 from rsfstudy.status import Status
 
-AnswerTable = dict[str, np.ndarray]
+AnswerColumnByQuantity = dict[str, np.ndarray]
 #: Maximum number of evaluations of the right-hand side per answer.
 ANSWER_EVALUATION_BUDGET = 5_000_000
 
 
-def compute_answer(problem: BenchmarkProblem, accuracy: Accuracy) -> AnswerTable:
+def compute_answer(problem: BenchmarkProblem, accuracy: Accuracy) -> AnswerColumnByQuantity:
     """Compute the answer to a benchmark problem.
 
     Parameters
@@ -53,8 +53,8 @@ def compute_answer(problem: BenchmarkProblem, accuracy: Accuracy) -> AnswerTable
     """
     found = {
         "series": _compute_series_answer,
-        "peaks": _compute_peaks_answer,
-        "numbers": _compute_numbers_answer,
+        "peaks": _compute_times_and_rates_of_peaks,
+        "numbers": _compute_requested_scalar_quantities,
     }[problem.report]
     try:
         told = found(problem, accuracy)
@@ -80,7 +80,7 @@ def compute_normal_stress(problem: BenchmarkProblem) -> np.ndarray:
     return compute_answer(asked, Accuracy(1e-11, ANSWER_EVALUATION_BUDGET))["normal_stress"]
 
 
-def _compute_series_answer(problem: BenchmarkProblem, accuracy: Accuracy) -> AnswerTable:
+def _compute_series_answer(problem: BenchmarkProblem, accuracy: Accuracy) -> AnswerColumnByQuantity:
     r"""Compute the values of a series at the times of the problem.
 
     The motion provides the state variables :math:`\Theta`, which are converted to :math:`\theta =
@@ -123,7 +123,9 @@ def _compute_series_answer(problem: BenchmarkProblem, accuracy: Accuracy) -> Ans
     }
 
 
-def _compute_peaks_answer(problem: BenchmarkProblem, accuracy: Accuracy) -> AnswerTable:
+def _compute_times_and_rates_of_peaks(
+    problem: BenchmarkProblem, accuracy: Accuracy
+) -> AnswerColumnByQuantity:
     """Compute the times and values of the maxima of slip rate."""
     rig, meter = problem.rig, WorkMeter(accuracy.budget, engine=accuracy.engine)
     watched = integrate_events(
@@ -142,10 +144,12 @@ def _compute_peaks_answer(problem: BenchmarkProblem, accuracy: Accuracy) -> Answ
     }
 
 
-def _compute_numbers_answer(problem: BenchmarkProblem, accuracy: Accuracy) -> AnswerTable:
+def _compute_requested_scalar_quantities(
+    problem: BenchmarkProblem, accuracy: Accuracy
+) -> AnswerColumnByQuantity:
     """Compute the requested numbers."""
     told: dict[str, float] = {}
-    for names, find in _NUMBER_FUNCTION_BY_QUANTITIES.items():
+    for names, find in _COMPUTE_FUNCTION_BY_SCALAR_QUANTITIES.items():
         if {*names} & {*problem.quantities}:
             told |= zip(names, find(problem, accuracy), strict=True)
     return {name: np.array([value]) for name, value in told.items()}
@@ -198,7 +202,7 @@ def _compute_limit_cycle_numbers(
     return found["recurrence_interval"] / rig.dimensionless("1 s"), *drops, *rates
 
 
-_NUMBER_FUNCTION_BY_QUANTITIES: Mapping[
+_COMPUTE_FUNCTION_BY_SCALAR_QUANTITIES: Mapping[
     tuple[str, ...], Callable[[BenchmarkProblem, Accuracy], tuple[float, ...]]
 ] = {
     ("critical_stiffness", "growth_rate", "angular_frequency"): _compute_stability_numbers,

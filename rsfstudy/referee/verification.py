@@ -12,7 +12,7 @@ from rsfstudy.referee.external_answers import read_external_answer
 from rsfstudy.referee.problem_files import read_problem, shipped_problem_files
 
 
-def compare_file(
+def compare_file_with_known_answer(
     file: Path, stated_problem: str, columns: Mapping[str, str] | None, required_digits: float
 ) -> AnswerComparison:
     """Compare a file of another code with the known answer to its problem.
@@ -55,12 +55,12 @@ def compare_file(
     return compare_answers(*known_answer(posed, path), told, required_digits)
 
 
-def summarise_comparisons(found: Sequence[AnswerComparison]) -> str:
+def summarise_comparisons(comparisons: Sequence[AnswerComparison]) -> str:
     """Summarise the comparisons of several files in one line.
 
     Parameters
     ----------
-    found : sequence of AnswerComparison
+    comparisons : sequence of AnswerComparison
         Comparisons of the files.
 
     Returns
@@ -70,10 +70,10 @@ def summarise_comparisons(found: Sequence[AnswerComparison]) -> str:
     """
     passed = {
         one.problem.title: math.floor(one.agreeing_digits)
-        for one in found
+        for one in comparisons
         if one.has_required_digits
     }
-    own = all(one.problem.number == 0 for one in found)
+    own = all(one.problem.number == 0 for one in comparisons)
     of = "one's own" if own else f"{len(shipped_problem_files())}"
     text = f"{len(passed)} problem{'s' * (len(passed) != 1)} of {of}"
     if not passed:

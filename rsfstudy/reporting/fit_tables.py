@@ -26,7 +26,7 @@ from rsfstudy.status import STATUS_LABELS, Status
 from rsfstudy.storage import read_declaration
 
 #: Names of parameters in laboratories, if they differ from the names in rsfstudy.
-_PARAMETER_NAMES_IN_LABORATORIES = {
+_LABORATORY_NAME_BY_PARAMETER_NAME = {
     "slip_distance": "Dc",
     "slip_distance_2": "Dc2",
     "mu_star": "mu_0",
@@ -44,7 +44,7 @@ _MAX_PRINTED_RELATIVE_ERROR = 1e4
 #: Difference of AIC above which the comparison of two laws is decisive.
 _DECISIVE_AIC_DIFFERENCE = 10.0
 #: Mark of invalid standard errors.
-_INVALID_ERROR_MARK = "*"
+_MARK_OF_INVALID_STDERRS = "*"
 
 
 def is_fit(dataset: xr.Dataset) -> bool:
@@ -63,7 +63,7 @@ def is_fit(dataset: xr.Dataset) -> bool:
     return "rows_fitted" in dataset
 
 
-def split_fits(dataset: xr.Dataset) -> list[xr.Dataset]:
+def split_into_single_fits(dataset: xr.Dataset) -> list[xr.Dataset]:
     """Split a dataset into its fits.
 
     If the fits have several windows, only the fits of the longest window are returned.
@@ -127,7 +127,7 @@ def parameter_headings(fit: xr.Dataset) -> dict[str, str]:
     names, found = [*map(str, fit["parameter"].values), "a_minus_b"], {}
     for short in dict.fromkeys(("a", "b", "b1", "b2", "a_minus_b", *PARAMETERS)):
         for name in (n for n in names if split_window_number(n)[0] == short):
-            found[name] = _PARAMETER_NAMES_IN_LABORATORIES.get(short, short) + name.removeprefix(
+            found[name] = _LABORATORY_NAME_BY_PARAMETER_NAME.get(short, short) + name.removeprefix(
                 short
             )
     return found
@@ -159,7 +159,7 @@ def fit_table(dataset: xr.Dataset) -> pd.DataFrame:
         If the dataset contains no fits.
     """
     rows = []
-    for one in split_fits(dataset):
+    for one in split_into_single_fits(dataset):
         row: dict[str, Any] = dict(record_and_step_of_fit(one))
         for name, short in parameter_headings(one).items():
             row[short] = one[name].item()
@@ -229,7 +229,7 @@ def all_fits_are_valid(dataset: xr.Dataset) -> bool:
     """
     return all(
         status_label_of_fit(one) in _STATUS_LABELS_OF_FITS_WITH_VALUES
-        for one in split_fits(dataset)
+        for one in split_into_single_fits(dataset)
     )
 
 
@@ -249,7 +249,7 @@ def summarise_fits(dataset: xr.Dataset) -> Iterator[TextTable | str]:
         row per fit.
     """
     places: dict[str, list[xr.Dataset]] = {}
-    for one in split_fits(dataset):
+    for one in split_into_single_fits(dataset):
         where = ", ".join(f"{n} {value}" for n, value in record_and_step_of_fit(one).items())
         places.setdefault(where, []).append(one)
     measure: Any = read_declaration(dataset).measure
@@ -373,7 +373,7 @@ def format_with_stderr(fit: xr.Dataset, parameter_name: str) -> str:
         fit[parameter_name].item(), fit[f"{parameter_name}_stderr"].item()
     )
     is_marked = " +- " in text and status_label_of_fit(fit) == Status.ERRORS_NOT_VALID.label
-    return text + _INVALID_ERROR_MARK * is_marked
+    return text + _MARK_OF_INVALID_STDERRS * is_marked
 
 
 def _format_rounded_to_error(value: float, error: float) -> str:
@@ -405,7 +405,8 @@ def _iterate_fit_remarks(fit: xr.Dataset) -> Iterator[str]:
     """
     law, message = fit["law"].item(), str(fit["message"].item())
     if status_label_of_fit(fit) == Status.ERRORS_NOT_VALID.label:
-        yield f"{law}: standard errors marked by {_INVALID_ERROR_MARK} are not valid: {message}"
+        mark = _MARK_OF_INVALID_STDERRS
+        yield f"{law}: standard errors marked by {mark} are not valid: {message}"
     elif message:
         yield f"{law}: {status_label_of_fit(fit).replace('_', ' ')}: {message}"
     short = parameter_headings(fit)

@@ -1,6 +1,7 @@
 """Summaries of datasets for commands, reports and notebooks.
 
-The main function is ``build_summary_pieces``. A summary consists of tables, mappings and sentences.
+The main function is ``build_summary_tables_and_sentences``. A summary consists of tables, mappings
+and sentences.
 """
 
 from __future__ import annotations
@@ -23,10 +24,10 @@ from rsfstudy.reporting.tables import (
 from rsfstudy.slider import Scene
 from rsfstudy.storage import is_of_single_scene, read_json_attribute, read_scene_fields
 
-TableMappingOrSentence = TextTable | Mapping[str, str] | str
+SummaryTableOrSentence = TextTable | Mapping[str, str] | str
 
 
-def build_summary_pieces(dataset: xr.Dataset) -> Iterator[TableMappingOrSentence]:
+def build_summary_tables_and_sentences(dataset: xr.Dataset) -> Iterator[SummaryTableOrSentence]:
     """Yield the summary of a dataset.
 
     Parameters
@@ -45,7 +46,10 @@ def build_summary_pieces(dataset: xr.Dataset) -> Iterator[TableMappingOrSentence
     elif not is_of_single_scene(dataset):
         yield tables.build_primary_output_table(dataset)
         yield from tables.reduction_tables(dataset)
-        yield {f"no {name}": why for name, why in tables.find_refusal_reasons(dataset).items()}
+        yield {
+            f"no {name}": why
+            for name, why in tables.find_refusal_reasons_of_reductions(dataset).items()
+        }
         yield from filter(None, [tables.note_on_norms_near_load_velocity(dataset)])
     elif is_motion(dataset):
         yield summarise_motion(dataset)
@@ -55,12 +59,12 @@ def build_summary_pieces(dataset: xr.Dataset) -> Iterator[TableMappingOrSentence
         except InvalidValue as error:  # The scene has a user-defined part.
             yield f"neither its stability nor its events: {error}"
     else:
-        yield tables.build_scene_answer_table(dataset)
+        yield tables.build_single_scene_result_table(dataset)
 
 
-def motion_pieces(
+def build_motion_tables_and_sentences(
     motion: xr.Dataset, scene: Scene, catalogue: xr.Dataset
-) -> list[TableMappingOrSentence]:
+) -> list[SummaryTableOrSentence]:
     """Return the summary of a motion.
 
     Parameters

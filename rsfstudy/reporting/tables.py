@@ -25,8 +25,8 @@ from rsfstudy.formatting import (
 from rsfstudy.quantities import units_or_scale_of_variable
 from rsfstudy.rig import (
     DIMENSIONLESS_PREFIX,
+    convert_to_dimensional_name,
     convert_to_display_units,
-    drop_ratio_from_name,
     in_display_units,
 )
 from rsfstudy.status import STATUS_LABELS, Status
@@ -38,7 +38,7 @@ from rsfstudy.vocabulary import find_quantity
 #: that is not thinned, and maximum number of failed cells in a table.
 MAX_CELLS_SHOWN, _MAX_CELLS_SHOWN_WITHOUT_THINNING, _MAX_FAILURES = 24, 36, 20
 #: Number of fields per point of a numbered axis above which fewer cells are shown.
-_MAX_POINT_FIELDS_WITHOUT_THINNING = 4
+_MAX_FIELDS_PER_POINT_WITHOUT_THINNING = 4
 #: Maximum number of significant digits of a float.
 _MAX_DIGITS = 15
 #: Headings and formats of the columns of a slope table, by the suffix of the variable name.
@@ -49,7 +49,7 @@ _COLUMNS_OF_SLOPE_TABLE = {
     "error": ("numerical error", ".2g"),
 }
 #: Name of a variable and function that formats a value, by the column heading.
-VariableAndFormatByHeading = dict[str, tuple[str, Callable[[Any], str]]]
+VariableAndFormatterByHeading = dict[str, tuple[str, Callable[[Any], str]]]
 
 
 @dataclass(frozen=True)
@@ -64,14 +64,14 @@ class TextTable:
         Caption of the table.
     wrappable_columns : collection of str, optional
         Headings of the columns whose texts may be wrapped between words.
-    colours : sequence of str, optional
+    row_colours : sequence of str, optional
         Colour of the last cell of each row.
     """
 
     rows: Sequence[Mapping[str, str]]
     caption: str = ""
     wrappable_columns: Collection[str] = ()
-    colours: Sequence[str] = ()
+    row_colours: Sequence[str] = ()
 
 
 def format_number_or_dash(value: float, format_specification: str = ".8g") -> str:
@@ -114,7 +114,7 @@ def format_rounded_to_error(value: float, error: float) -> str:
     return format(value, f".{min(digits, _MAX_DIGITS)}g")
 
 
-def build_scene_answer_table(dataset: xr.Dataset) -> TextTable:
+def build_single_scene_result_table(dataset: xr.Dataset) -> TextTable:
     """Build a table of the scalar variables of a dataset of one scene.
 
     Parameters
@@ -279,7 +279,7 @@ def describe_study_origin(dataset: xr.Dataset) -> dict[str, str]:
 
 
 def build_rows_along_dimensions(
-    dataset: xr.Dataset, dimensions: Iterable[Hashable], columns: VariableAndFormatByHeading
+    dataset: xr.Dataset, dimensions: Iterable[Hashable], columns: VariableAndFormatterByHeading
 ) -> list[dict[str, str]]:
     """Build one row for each point of some dimensions.
 
@@ -325,10 +325,10 @@ def build_primary_output_table(dataset: xr.Dataset) -> TextTable:
     if name is None:
         return TextTable([])
     dataset = convert_to_display_units(dataset)
-    name = name if name in dataset else drop_ratio_from_name(name)
+    name = name if name in dataset else convert_to_dimensional_name(name)
     dims = dataset["status"].dims
-    drawn = [n for n in _fields_along_numbered_axes(dataset) if n in dataset.coords]
-    columns = VariableAndFormatByHeading(
+    drawn = [n for n in _find_fields_along_numbered_axes(dataset) if n in dataset.coords]
+    columns = VariableAndFormatterByHeading(
         {format_axis_name(dataset[n]): (n, format_value) for n in drawn}
     )
     columns[name] = name, format_number_or_dash
@@ -337,7 +337,7 @@ def build_primary_output_table(dataset: xr.Dataset) -> TextTable:
             f"{name}_error",
             partial(format_number_or_dash, format_specification=".1e"),
         )
-    size, fewer = dataset["status"].size, 1 + len(drawn) // _MAX_POINT_FIELDS_WITHOUT_THINNING
+    size, fewer = dataset["status"].size, 1 + len(drawn) // _MAX_FIELDS_PER_POINT_WITHOUT_THINNING
     most = size if size <= _MAX_CELLS_SHOWN_WITHOUT_THINNING // fewer else MAX_CELLS_SHOWN // fewer
     at = select_thinned_points({str(d): dataset.sizes[d] for d in dims}, most)
     few = dataset[[*(n for n, _form in columns.values()), "status"]].isel(at).load()
@@ -353,7 +353,7 @@ def build_primary_output_table(dataset: xr.Dataset) -> TextTable:
     return TextTable(build_rows_along_dimensions(few, dims, columns), caption)
 
 
-def _fields_along_numbered_axes(dataset: xr.Dataset) -> list[str]:
+def _find_fields_along_numbered_axes(dataset: xr.Dataset) -> list[str]:
     """Return the fields that vary along numbered axes, such as samples."""
     axes = [axis["values"] for axis in read_declaration(dataset).axes]
     columns = [
@@ -362,7 +362,7 @@ def _fields_along_numbered_axes(dataset: xr.Dataset) -> list[str]:
     return [name for column in columns for name in column]
 
 
-def summarise_study_in_lines(dataset: xr.Dataset) -> list[str]:
+def summarise_study_as_text_lines(dataset: xr.Dataset) -> list[str]:
     """Summarise the results of a study in lines of text.
 
     Parameters
@@ -377,7 +377,7 @@ def summarise_study_in_lines(dataset: xr.Dataset) -> list[str]:
     """
     lines, converted = [], convert_to_display_units(dataset)
     if (name := find_primary_output(dataset)) is not None:
-        values = converted[name if name in converted else drop_ratio_from_name(name)]
+        values = converted[name if name in converted else convert_to_dimensional_name(name)]
         told, units = np.unique(values.values[np.isfinite(values.values)]), format_units(values)
         ends = " to ".join(map(format_value, dict.fromkeys((*told[:1], *told[-1:]))))
         text = f"{ends}{f' {units}' * (units != '1')}" if ends else "no number"
@@ -405,7 +405,7 @@ def reduction_tables(dataset: xr.Dataset) -> Iterator[TextTable]:
     converted = convert_to_display_units(dataset)
     for slope in _names_of_slope_reductions(converted):
         yield _slope_table(converted, slope)
-    columns: VariableAndFormatByHeading = {
+    columns: VariableAndFormatterByHeading = {
         "cheapest": ("cheapest_integrator", str),
         "its work": ("cheapest_work", "{:,.0f}".format),
         "work of the default": ("cheapest_default_work", "{:,.0f}".format),
@@ -419,7 +419,7 @@ def reduction_tables(dataset: xr.Dataset) -> Iterator[TextTable]:
         )
 
 
-def reduction_pieces(dataset: xr.Dataset) -> Iterator[TextTable | str]:
+def build_reduction_tables_and_sentences(dataset: xr.Dataset) -> Iterator[TextTable | str]:
     """Yield the tables of reductions, and the reasons for missing reductions.
 
     Parameters
@@ -437,7 +437,7 @@ def reduction_pieces(dataset: xr.Dataset) -> Iterator[TextTable | str]:
         yield f"no {name}: {why}"
 
 
-def find_refusal_reasons(dataset: xr.Dataset) -> dict[str, str]:
+def find_refusal_reasons_of_reductions(dataset: xr.Dataset) -> dict[str, str]:
     """Find the reasons why reductions were not computed from their cells.
 
     Parameters
@@ -460,7 +460,7 @@ def find_refusal_reasons(dataset: xr.Dataset) -> dict[str, str]:
     return found
 
 
-def incomplete_notes(results: xr.Dataset) -> list[str]:
+def format_notes_on_incomplete_results(results: xr.Dataset) -> list[str]:
     """Describe failed cells and reductions that could not be computed.
 
     Parameters
@@ -473,7 +473,9 @@ def incomplete_notes(results: xr.Dataset) -> list[str]:
     list of str
         Notes, or an empty list if the results are complete.
     """
-    told = [f"no {name}: {why}" for name, why in find_refusal_reasons(results).items()]
+    told = [
+        f"no {name}: {why}" for name, why in find_refusal_reasons_of_reductions(results).items()
+    ]
     if failed := count_failures(results):
         each = ", ".join(f"{label} {number}" for label, number in failed.items())
         first = f"{sum(failed.values())} of {results['status'].size} cells failed: {each}"
@@ -494,7 +496,7 @@ def missing_result_reasons(dataset: xr.Dataset) -> dict[str, str]:
     dict of str to str
         Reasons by the name of the reduction.
     """
-    found, there = find_refusal_reasons(dataset), tuple(map(str, dataset.data_vars))
+    found, there = find_refusal_reasons_of_reductions(dataset), tuple(map(str, dataset.data_vars))
     for stated_as in read_declaration(dataset).reductions:
         about: Mapping[str, Any] = {**stated_as}
         if not any(name.startswith(about["name"]) for name in there):
@@ -539,7 +541,7 @@ def _slope_table(dataset: xr.Dataset, reduction_name: str) -> TextTable:
         dataset[reduction_name].attrs.get("comment", reduction_name),
     )
     units = format_units(dataset[reduction_name])
-    columns: VariableAndFormatByHeading = {
+    columns: VariableAndFormatterByHeading = {
         f"{reduction_name} ({units})" if units != "1" else reduction_name: (
             reduction_name,
             format_value,
@@ -583,7 +585,7 @@ def claims_table(verdicts: pd.DataFrame) -> TextTable | str:
     return TextTable(
         [format_verdict_row(row) for row in rows],
         wrappable_columns={"claim", "tolerance, and why"},
-        colours=colours,
+        row_colours=colours,
     )
 
 
@@ -715,7 +717,7 @@ def format_recompute_command(
     return shlex.join(words)
 
 
-def count_pending(dataset: xr.Dataset) -> int:
+def count_pending_cells(dataset: xr.Dataset) -> int:
     """Count the cells that have not been computed.
 
     Parameters

@@ -13,8 +13,8 @@ from rsfstudy._lazy_exports import lazy_exports
 
 if TYPE_CHECKING:
     from rsfstudy.responses._recorded_motion import (
+        compute_settled_friction_flag,
         estimate_errors_at_instants,
-        flag_of_settled_friction,
     )
     from rsfstudy.responses.healing import Healing
     from rsfstudy.responses.linear_stability import LinearStability
@@ -27,7 +27,7 @@ else:
         {
             "responses._recorded_motion": (
                 "estimate_errors_at_instants",
-                "flag_of_settled_friction",
+                "compute_settled_friction_flag",
             ),
             "responses.healing": ("Healing",),
             "responses.linear_stability": ("LinearStability",),
@@ -44,5 +44,5 @@ __all__ = [
     "StepResponse",
     "VelocityStep",
     "estimate_errors_at_instants",
-    "flag_of_settled_friction",
+    "compute_settled_friction_flag",
 ]

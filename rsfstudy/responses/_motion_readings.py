@@ -6,7 +6,7 @@ import math
 
 from rsfstudy.motion import Event
 from rsfstudy.slider import (
-    LOG_RATE_PER_PATH_LENGTH,
+    LOG_SLIP_RATE_PER_PATH_LENGTH,
     RUPTURE_REGIME,
     MotionPoint,
     Scene,
@@ -14,7 +14,7 @@ from rsfstudy.slider import (
 )
 
 #: Smallest square of a direction cosine of the path in a rupture, where ln V changes at once.
-MIN_SQUARED_PATH_ANGLE_COSINE = 1e-12
+MIN_SQUARED_DIRECTION_COSINE_OF_PATH = 1e-12
 
 
 def distance_from_steady_sliding(scene: Scene, point: MotionPoint, load_velocity: float) -> float:
@@ -67,16 +67,19 @@ def growth_rate_along_path(scene: Scene, event: Event, load_velocity: float) -> 
         return growth
     norm = scene.inertial_time * (math.exp(event.point.log_slip_rate) + load_velocity)
     slant = growth / (
-        LOG_RATE_PER_PATH_LENGTH
+        LOG_SLIP_RATE_PER_PATH_LENGTH
         * math.sqrt(
-            max(1.0 - (growth / LOG_RATE_PER_PATH_LENGTH) ** 2, MIN_SQUARED_PATH_ANGLE_COSINE)
+            max(
+                1.0 - (growth / LOG_SLIP_RATE_PER_PATH_LENGTH) ** 2,
+                MIN_SQUARED_DIRECTION_COSINE_OF_PATH,
+            )
         )
         * norm
     )
-    return LOG_RATE_PER_PATH_LENGTH * slant * displacement_per_path_length(slant)
+    return LOG_SLIP_RATE_PER_PATH_LENGTH * slant * displacement_per_path_length(slant)
 
 
-def friction_quantity_for_events(scene: Scene) -> tuple[str, float]:
+def choose_friction_quantity_for_events(scene: Scene) -> tuple[str, float]:
     """Return the quantity at whose extrema and levels friction events are located.
 
     If normal stress is constant and the law is not regularised, events of the friction coefficient

@@ -30,7 +30,7 @@ ERROR_FLOOR_OVER_RTOL = 0.01
 #: Part of the same, times a, by which the friction coefficient of two runs may agree by chance at
 #: an instant: of 7,071 numbers of random holds 22 err by up to 22 times their estimates without it,
 #: and four by up to 1.7 times with it (study coverage).
-_FRICTION_ERROR_FLOOR_AT_INSTANT = 0.1
+_FRICTION_ERROR_FLOOR_OVER_A_AND_RTOL = 0.1
 
 
 class RecordedMotion(NamedTuple):
@@ -198,7 +198,7 @@ def estimate_error_at_instant(
     friction_derivative: float,
     scene: Scene,
     accuracy: Accuracy,
-    neglected_error: float = 0.0,
+    neglected_inertia_error: float = 0.0,
 ) -> float:
     r"""Estimate the error of a result that is read at a single instant.
 
@@ -219,7 +219,7 @@ def estimate_error_at_instant(
         Scene of the motion.
     accuracy : Accuracy
         Accuracy of the first run.
-    neglected_error : float, default: 0.0
+    neglected_inertia_error : float, default: 0.0
         Error of ln V that both runs share, because both runs neglect the same part of inertia.
 
     Returns
@@ -237,7 +237,9 @@ def estimate_error_at_instant(
 
     because friction changes by :math:`a` if :math:`\ln V` changes by 1.
     """
-    friction = (_FRICTION_ERROR_FLOOR_AT_INSTANT * accuracy.rtol + neglected_error) * scene.a
+    friction = (
+        _FRICTION_ERROR_FLOOR_OVER_A_AND_RTOL * accuracy.rtol + neglected_inertia_error
+    ) * scene.a
     chance = ERROR_FLOOR_OVER_RTOL * accuracy.rtol
     return estimate_error(value, refined_value, chance) + friction * abs(friction_derivative)
 
@@ -248,7 +250,7 @@ def estimate_errors_at_instants(
     friction_derivatives: Mapping[str, float],
     scene: Scene,
     accuracy: Accuracy,
-    neglected_errors: Mapping[str, float] | None = None,
+    neglected_inertia_errors: Mapping[str, float] | None = None,
 ) -> dict[str, float]:
     """Estimate the errors of several results that are read at single instants.
 
@@ -266,7 +268,7 @@ def estimate_errors_at_instants(
         Scene of the motion.
     accuracy : Accuracy
         Accuracy of the first run.
-    neglected_errors : mapping of str to float, optional
+    neglected_inertia_errors : mapping of str to float, optional
         Errors of ln V by name of the result. By default, all errors are zero.
 
     Returns
@@ -274,7 +276,7 @@ def estimate_errors_at_instants(
     dict of str to float
         Errors by name, as ``<name>_error``.
     """
-    shared = neglected_errors or dict.fromkeys(values, 0.0)
+    shared = neglected_inertia_errors or dict.fromkeys(values, 0.0)
     return {
         f"{name}_error": estimate_error_at_instant(
             value, refined_values[name], friction_derivatives[name], scene, accuracy, shared[name]
@@ -283,7 +285,7 @@ def estimate_errors_at_instants(
     }
 
 
-def flag_of_settled_friction(scene: Scene, *, is_flat: bool) -> float:
+def compute_settled_friction_flag(scene: Scene, *, is_flat: bool) -> float:
     """Return 1 if friction has settled at the end of a record, and 0 if not.
 
     Friction has settled if it is nearly constant and if small perturbations of steady sliding do

@@ -14,7 +14,7 @@ from rsfstudy.errors import InvalidValue
 from rsfstudy.measure_base import (
     Outcome,
     RecordingMeasure,
-    outputs_along_phase,
+    create_outputs_along_phase,
     steady_sliding_is_linearly_stable,
 )
 from rsfstudy.motion import (
@@ -33,8 +33,8 @@ from rsfstudy.motion import (
 from rsfstudy.parts import Segment
 from rsfstudy.quantities import Output
 from rsfstudy.responses._motion_readings import (
+    choose_friction_quantity_for_events,
     distance_from_steady_sliding,
-    friction_quantity_for_events,
     growth_rate_along_path,
 )
 from rsfstudy.responses._recorded_motion import (
@@ -48,13 +48,13 @@ from rsfstudy.status import Status
 
 #: Largest distance from steady sliding, in ln V or in the state divided by b, at which the motion
 #: before a hold is treated as steady.
-_MAX_DISTANCE_OF_STEADY_START = 1e-3
+_MAX_STEADY_STATE_DISTANCE_BEFORE_HOLD = 1e-3
 #: Largest height of a peak, relative to the local tolerance, that is attributed to numerical errors
 #: near steady sliding. In 7,000 random motions with rtol from 1e-2 to 1e-6, the largest such height
 #: is 1.9.
 _FRICTION_NOISE_OVER_LOCAL_TOLERANCE = 3.0
 #: Fraction of the largest distance from steady sliding below which no further peak is expected.
-_SETTLED_FRACTION_OF_MAX_DISTANCE = 1e-6
+_SETTLING_TOLERANCE_OVER_MAX_DISTANCE = 1e-6
 
 _PEAK_DISPLACEMENT_MEANING = "load point displacement from reloading to the peak of friction"
 _HEALING_MEANING = "healing: peak friction on reloading less friction before the hold"
@@ -65,7 +65,7 @@ _OUTPUTS = (
     Output(
         "peak_displacement", r"$\delta_0/D_c$", "1", _PEAK_DISPLACEMENT_MEANING, "D_c", error=True
     ),
-    *outputs_along_phase(
+    *create_outputs_along_phase(
         "time", "load_point_displacement", "slip", "friction_coefficient", "log10_slip_rate"
     ),
 )
@@ -185,7 +185,10 @@ class Healing(RecordingMeasure):
         hold = _find_first_hold_segment(scene)
         first = _record_hold_and_reloading(scene, hold, accuracy, meter)
         said = _describe_unsteady_start_of_hold(
-            scene, hold, first.start_event, max(_MAX_DISTANCE_OF_STEADY_START, accuracy.rtol)
+            scene,
+            hold,
+            first.start_event,
+            max(_MAX_STEADY_STATE_DISTANCE_BEFORE_HOLD, accuracy.rtol),
         )
         peakless = Outcome(
             Status.NOT_APPLICABLE,
@@ -202,7 +205,7 @@ class Healing(RecordingMeasure):
             hold,
             accuracy.refined(),
             meter,
-            self._record_end_time(scene, hold, first.peak_event),
+            self._compute_end_time_of_record(scene, hold, first.peak_event),
         )
         if again.peak_event is None:
             return peakless
@@ -234,10 +237,14 @@ class Healing(RecordingMeasure):
         ):
             return peakless
         return Outcome(
-            Status.OK, {**values, **errors, **self._recorded_output_values(scene, again)}, said
+            Status.OK,
+            {**values, **errors, **self._compute_outputs_along_record(scene, again)},
+            said,
         )
 
-    def _record_end_time(self, scene: Scene, hold_index: int, peak_event: Event) -> float:
+    def _compute_end_time_of_record(
+        self, scene: Scene, hold_index: int, peak_event: Event
+    ) -> float:
         """Return the time at which the record ends, in units of D_c/V_*."""
         history = scene.parts.loading.segments
         goes_on = self.record / history[hold_index + 1].load_velocity
@@ -245,7 +252,7 @@ class Healing(RecordingMeasure):
             peak_event.time + goes_on, math.fsum(s.duration for s in history[: hold_index + 2])
         )
 
-    def _recorded_output_values(
+    def _compute_outputs_along_record(
         self, scene: Scene, record: RecordedMotion
     ) -> dict[str, np.ndarray]:
         """Return the quantities along the record, beginning with the hold."""
@@ -306,8 +313,10 @@ def _record_hold_and_reloading(
     continue after the peak.
     """
     peak, settled = (
-        maximum(friction_quantity_for_events(scene)[0]),
-        approach_to_steady_state(_SETTLED_FRACTION_OF_MAX_DISTANCE, terminal=end_time == math.inf),
+        maximum(choose_friction_quantity_for_events(scene)[0]),
+        approach_to_steady_state(
+            _SETTLING_TOLERANCE_OVER_MAX_DISTANCE, terminal=end_time == math.inf
+        ),
     )
     asked = peak, settled
     return record_motion_of_segment(

@@ -22,11 +22,11 @@ from rsfstudy.slider import (
     Scene,
     SteadySliding,
     all_critical_stiffnesses,
+    build_equations_against_displacement,
+    build_equations_against_inertial_time,
     critical_stiffness,
     critical_stiffness_closed_form,
     effective_normal_stress_at,
-    equations_against_displacement,
-    equations_against_inertial_time,
     steady_friction_minus_reference,
     steady_sliding,
 )
@@ -38,10 +38,10 @@ _RELATIVE_DIFFERENCE_STEP = 1e-4
 #: Slip rate norm above which growth rates are computed from the full equations. Below this norm,
 #: inertia is smaller than the rounding errors of the full equations, and the slow manifold, which
 #: is of second order in the mass, is accurate enough.
-_MIN_NORM_FOR_FULL_EQUATIONS = 1e-3
+_MIN_SLIP_RATE_NORM_FOR_FULL_EQUATIONS = 1e-3
 #: Relative increase of the critical stiffness by inertia above which steady sliding is treated as
 #: unstable at any stiffness.
-_MAX_STIFFNESS_RISE_BY_INERTIA = 1e6
+_MAX_CRITICAL_STIFFNESS_RISE_BY_INERTIA = 1e6
 
 _OUTPUTS = (
     Output("critical_stiffness", error=True),
@@ -165,7 +165,7 @@ class LinearStability(Measure):
         at_reference = scene.critical_stiffness
         relative = critical / at_reference if at_reference else math.inf
         rise = critical / massless - 1.0 if massless else math.inf
-        if rise > _MAX_STIFFNESS_RISE_BY_INERTIA:
+        if rise > _MAX_CRITICAL_STIFFNESS_RISE_BY_INERTIA:
             norm = scene.dynamics.slip_rate_norm(scene, load)
             return Outcome(
                 Status.UNSTABLE_AT_ANY_STIFFNESS,
@@ -214,17 +214,17 @@ def _find_stiffness_at_zero_growth(
     """
     with_mass = (
         scene.dynamics.slip_rate_norm(scene, steady_state.log_slip_rate)
-        > _MIN_NORM_FOR_FULL_EQUATIONS
+        > _MIN_SLIP_RATE_NORM_FOR_FULL_EQUATIONS
     )
 
     def growth_at(stiffness: float) -> float:
         changed = scene.with_(stiffness=stiffness)
         if with_mass:
-            equations = equations_against_inertial_time(changed)
+            equations = build_equations_against_inertial_time(changed)
             stress = steady_state.spring_stress
             state = (stress, steady_state.log_slip_rate, stress, *steady_state.states[1:])
         else:
-            equations = equations_against_displacement(changed)
+            equations = build_equations_against_displacement(changed)
             state = (steady_state.spring_stress, *steady_state.states)
         work_meter.charge(equations.regime, 2 * len(state))
         return max_growth_rate(compute_jacobian(equations, state))

@@ -14,8 +14,8 @@ from rsfstudy.errors import InvalidValue
 from rsfstudy.measure_base import (
     Outcome,
     RecordingMeasure,
-    check_loading_lets_motion_settle,
-    outputs_along_phase,
+    check_loading_changes_stress_only_in_steps,
+    create_outputs_along_phase,
     steady_sliding_is_linearly_stable,
 )
 from rsfstudy.motion import (
@@ -40,7 +40,7 @@ from rsfstudy.status import Status
 LN10 = math.log(10.0)
 
 #: Fraction of the largest distance from steady sliding below which an oscillation has ended.
-_SETTLED_FRACTION_OF_MAX_DISTANCE = 1e-3
+_SETTLING_TOLERANCE_OVER_MAX_DISTANCE = 1e-3
 
 _OUTPUTS = (
     Output("max_log10_slip_rate", error=True),
@@ -50,7 +50,7 @@ _OUTPUTS = (
         "oscillations repeat",
     ),
     Output("peak_log10_slip_rate", dims=("peak",)),
-    *outputs_along_phase(*MOTION_VARIABLES),
+    *create_outputs_along_phase(*MOTION_VARIABLES),
 )
 
 
@@ -168,7 +168,7 @@ class StepResponse(RecordingMeasure):
         Outcome
             Status, results and message.
         """
-        check_loading_lets_motion_settle(scene)
+        check_loading_changes_stress_only_in_steps(scene)
         if scene.log_load_velocity == -math.inf:
             return Outcome(Status.NO_STEADY_STATE, message="the load point is held")
         if not scene.is_perturbed:
@@ -199,7 +199,10 @@ class StepResponse(RecordingMeasure):
         peaks: list[float] = []
         recording, asked = (
             Recording(),
-            (maximum("log_slip_rate"), approach_to_steady_state(_SETTLED_FRACTION_OF_MAX_DISTANCE)),
+            (
+                maximum("log_slip_rate"),
+                approach_to_steady_state(_SETTLING_TOLERANCE_OVER_MAX_DISTANCE),
+            ),
         )
         for event in integrate_events(
             scene, accuracy, work_meter, asked, with_time=True, recording=recording
@@ -222,7 +225,7 @@ def _slip_rate_peaks_at_start(scene: Scene, event: Event) -> bool:
     not integrated, the start of the motion is a maximum.
     """
     return (
-        _inertia_delays_initial_rise(scene)
+        _does_inertia_delay_initial_slip_rate_rise(scene)
         and event.kind is EventKind.START
         and event.point.log_slip_rate_derivative <= 0.0
     )
@@ -233,10 +236,10 @@ def _error_of_neglected_initial_rise(scene: Scene, accuracy: Accuracy) -> float:
 
     The error is zero unless inertia delays the rise.
     """
-    slip = accuracy.max_remaining_slip if _inertia_delays_initial_rise(scene) else 0.0
+    slip = accuracy.max_remaining_slip if _does_inertia_delay_initial_slip_rate_rise(scene) else 0.0
     return (1.0 + scene.stiffness / scene.a) * slip / LN10
 
 
-def _inertia_delays_initial_rise(scene: Scene) -> bool:
+def _does_inertia_delay_initial_slip_rate_rise(scene: Scene) -> bool:
     """Return True if inertia delays an initial rise of slip rate."""
     return scene.has_mass and (scene.starts_unsteady or scene.spring_stress_step > 0.0)

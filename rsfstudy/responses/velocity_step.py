@@ -14,8 +14,8 @@ from rsfstudy.errors import InvalidValue
 from rsfstudy.measure_base import (
     Outcome,
     RecordingMeasure,
-    check_loading_lets_motion_settle,
-    outputs_along_phase,
+    check_loading_changes_stress_only_in_steps,
+    create_outputs_along_phase,
 )
 from rsfstudy.motion import (
     MOTION_VARIABLES,
@@ -35,13 +35,13 @@ from rsfstudy.motion import (
 from rsfstudy.parts import Segment
 from rsfstudy.quantities import Output
 from rsfstudy.responses._motion_readings import (
+    choose_friction_quantity_for_events,
     distance_from_steady_sliding,
-    friction_quantity_for_events,
 )
 from rsfstudy.responses._recorded_motion import (
     RecordedMotion,
+    compute_settled_friction_flag,
     estimate_errors_at_instants,
-    flag_of_settled_friction,
     path_relative_to_start,
     record_motion_of_segment,
 )
@@ -80,13 +80,13 @@ _OUTPUTS = (
         "closed_form_departure",
         long_name="largest departure of friction, from the peak on, from that of a stiff slider",
     ),
-    *outputs_along_phase(
+    *create_outputs_along_phase(
         "load_point_displacement", "slip", "friction_coefficient", "log10_slip_rate"
     ),
 )
 
 
-class _EvaluatedStep(NamedTuple):
+class _EvaluatedVelocityStep(NamedTuple):
     """The velocity step that the measure evaluates.
 
     Velocities are in units of V_*, and times are in units of D_c/V_*.
@@ -215,12 +215,12 @@ class VelocityStep(RecordingMeasure):
         mapping of str to float
             Scales by name of the result.
         """
-        slopes = self._friction_derivatives(
+        slopes = self._compute_output_derivatives_by_friction(
             self._find_evaluated_step(scene).log_velocity_ratio, values
         )
         return {name: abs(values[name]) + scene.a * abs(slopes[name]) for name in slopes}
 
-    def _friction_derivatives(
+    def _compute_output_derivatives_by_friction(
         self, log_velocity_ratio: float, values: Mapping[str, Any]
     ) -> dict[str, float]:
         """Return the derivatives of the results with respect to friction.
@@ -261,22 +261,22 @@ class VelocityStep(RecordingMeasure):
         Outcome
             Status, results and message.
         """
-        check_loading_lets_motion_settle(scene)
+        check_loading_changes_stress_only_in_steps(scene)
         step = self._find_evaluated_step(scene)
         records = [
             self._record_response(scene, step, a, meter) for a in (accuracy, accuracy.refined())
         ]
         (record, values), (_again, again) = records
-        slopes = self._friction_derivatives(step.log_velocity_ratio, values)
+        slopes = self._compute_output_derivatives_by_friction(step.log_velocity_ratio, values)
         neglected = dict.fromkeys(slopes, record.neglected_error_until(record.last_event.time))
         errors = estimate_errors_at_instants(values, again, slopes, scene, accuracy, neglected)
-        found = {**values, **errors, **self._recorded_output_values(scene, step, record)}
+        found = {**values, **errors, **self._compute_outputs_along_record(scene, step, record)}
         if not abs(values["apparent_b"]) > errors["apparent_b_error"]:
             text = "friction has no extremum after the step, or does not evolve from there"
             return Outcome(Status.NOT_APPLICABLE, found, text)
         return Outcome(Status.OK, found)
 
-    def _find_evaluated_step(self, scene: Scene) -> _EvaluatedStep:
+    def _find_evaluated_step(self, scene: Scene) -> _EvaluatedVelocityStep:
         """Return the step that the measure evaluates.
 
         Raises
@@ -297,19 +297,19 @@ class VelocityStep(RecordingMeasure):
             raise MotionStopped(Status.NOT_APPLICABLE, text)
         start_time = math.fsum(segment.duration for segment in earlier)
         duration = min(own.duration, self.record / own.load_velocity)
-        return _EvaluatedStep(before.load_velocity, own.load_velocity, start_time, duration)
+        return _EvaluatedVelocityStep(before.load_velocity, own.load_velocity, start_time, duration)
 
     def _record_response(
         self,
         scene: Scene,
-        evaluated_step: _EvaluatedStep,
+        evaluated_step: _EvaluatedVelocityStep,
         accuracy: Accuracy,
         work_meter: WorkMeter,
     ) -> tuple[RecordedMotion, dict[str, float]]:
         """Record the motion, and return the record and the results."""
         extreme = maximum if evaluated_step.log_velocity_ratio > 0.0 else minimum
         number, end = self.step_number - 1, evaluated_step.start_time + evaluated_step.duration
-        turn = extreme(friction_quantity_for_events(scene)[0])
+        turn = extreme(choose_friction_quantity_for_events(scene)[0])
         record = record_motion_of_segment(
             scene, accuracy, work_meter, [turn], number, number, end_time=end
         )
@@ -319,7 +319,7 @@ class VelocityStep(RecordingMeasure):
 
     def _read_step_results(
         self,
-        evaluated_step: _EvaluatedStep,
+        evaluated_step: _EvaluatedVelocityStep,
         recorded_motion: RecordedMotion,
         decay_event: Event | None,
     ) -> dict[str, float]:
@@ -366,7 +366,7 @@ class VelocityStep(RecordingMeasure):
         if peak is None or not peak.time < recorded_motion.last_event.time:
             return None
         after, top = (e.point.apparent_friction for e in (recorded_motion.last_event, peak))
-        of, above = friction_quantity_for_events(scene)
+        of, above = choose_friction_quantity_for_events(scene)
         level = after + (top - after) / math.e - above
         # If a state strengthens friction, the evolution may have the sign of the direct effect.
         watch = fall(of, level, terminal=True) if top > after else rise(of, level, terminal=True)
@@ -377,8 +377,8 @@ class VelocityStep(RecordingMeasure):
         )
         return next((event for event in events if event.specification == watch), None)
 
-    def _recorded_output_values(
-        self, scene: Scene, evaluated_step: _EvaluatedStep, recorded_motion: RecordedMotion
+    def _compute_outputs_along_record(
+        self, scene: Scene, evaluated_step: _EvaluatedVelocityStep, recorded_motion: RecordedMotion
     ) -> dict[str, float | np.ndarray]:
         """Return the record, ``settled`` and the closed-form departure."""
         rows, friction = (
@@ -397,7 +397,7 @@ class VelocityStep(RecordingMeasure):
         stepped = scene.segment_scene(self.step_number - 1)
         is_flat = bool(np.ptp(last) < _SETTLING_TOLERANCE * abs(direct))
         return {
-            "settled": flag_of_settled_friction(stepped, is_flat=is_flat),
+            "settled": compute_settled_friction_flag(stepped, is_flat=is_flat),
             "closed_form_departure": _max_departure_from_closed_form(
                 scene, evaluated_step, recorded_motion
             ),
@@ -407,7 +407,7 @@ class VelocityStep(RecordingMeasure):
 
 
 def _max_departure_from_closed_form(
-    scene: Scene, evaluated_step: _EvaluatedStep, recorded_motion: RecordedMotion
+    scene: Scene, evaluated_step: _EvaluatedVelocityStep, recorded_motion: RecordedMotion
 ) -> float:
     """Compute the largest difference from the friction of a rigid slider.
 
@@ -445,7 +445,7 @@ def _max_departure_from_closed_form(
 
 
 def _closed_form_applies(
-    scene: Scene, evaluated_step: _EvaluatedStep, recorded_motion: RecordedMotion
+    scene: Scene, evaluated_step: _EvaluatedVelocityStep, recorded_motion: RecordedMotion
 ) -> bool:
     """Return True if the closed form of a rigid slider applies.
 

@@ -21,12 +21,12 @@ if TYPE_CHECKING:
     from rsfstudy.rig.dataset_scales import (
         DIMENSIONLESS_PREFIX,
         DISPLAY_BASE_UNITS,
-        SCALES_ATTRIBUTE,
+        NAME_OF_SCALES_ATTRIBUTE,
         convert_dataset_units,
+        convert_to_dimensional_name,
         convert_to_display_units,
-        drop_ratio_from_name,
         find_scale_of_variable,
-        has_units_unlike_its_study,
+        has_units_unexpected_by_its_figures,
         read_si_scales,
         slip_rate_from_log,
     )
@@ -35,11 +35,20 @@ if TYPE_CHECKING:
         RATIO_FIELD_BY_DIMENSIONAL_NAME,
         RIG_QUANTITIES,
         in_display_units,
-        is_friction_stiffness,
+        is_stiffness_over_normal_stress,
     )
-    from rsfstudy.rig.rig_scenes import LatticeScenesOnRig, put_on_rig, replace_rig_quantity
+    from rsfstudy.rig.rig_scenes import (
+        LatticeScenesOnRig,
+        convert_scene_and_axes_to_rig,
+        replace_rig_quantity,
+    )
     from rsfstudy.rig.table_files import Column, read_table
-    from rsfstudy.rig.units import convert_to_si, expand_range, parse_number, unit_factor
+    from rsfstudy.rig.units import (
+        compute_conversion_factor,
+        convert_to_si,
+        expand_range,
+        parse_number,
+    )
 else:
     __getattr__, __dir__ = lazy_exports(
         __name__,
@@ -48,18 +57,22 @@ else:
                 "RATIO_FIELD_BY_DIMENSIONAL_NAME",
                 "RIG_QUANTITIES",
                 "in_display_units",
-                "is_friction_stiffness",
+                "is_stiffness_over_normal_stress",
             ),
             "rig.rig": ("Rig",),
-            "rig.rig_scenes": ("LatticeScenesOnRig", "put_on_rig", "replace_rig_quantity"),
+            "rig.rig_scenes": (
+                "LatticeScenesOnRig",
+                "convert_scene_and_axes_to_rig",
+                "replace_rig_quantity",
+            ),
             "rig.dataset_scales": (
                 "DIMENSIONLESS_PREFIX",
                 "DISPLAY_BASE_UNITS",
-                "SCALES_ATTRIBUTE",
+                "NAME_OF_SCALES_ATTRIBUTE",
                 "convert_to_display_units",
                 "convert_dataset_units",
-                "drop_ratio_from_name",
-                "has_units_unlike_its_study",
+                "convert_to_dimensional_name",
+                "has_units_unexpected_by_its_figures",
                 "read_si_scales",
                 "slip_rate_from_log",
                 "find_scale_of_variable",
@@ -71,7 +84,12 @@ else:
                 "convert_values_to_units",
                 "make_axis_with_units",
             ),
-            "rig.units": ("convert_to_si", "expand_range", "parse_number", "unit_factor"),
+            "rig.units": (
+                "convert_to_si",
+                "expand_range",
+                "parse_number",
+                "compute_conversion_factor",
+            ),
         },
     )
 
@@ -83,25 +101,25 @@ __all__ = [
     "RIG_QUANTITIES",
     "Rig",
     "LatticeScenesOnRig",
-    "SCALES_ATTRIBUTE",
+    "NAME_OF_SCALES_ATTRIBUTE",
     "axis_name_and_units",
     "convert_axis_to_stated_units",
     "convert_to_display_units",
     "convert_to_si",
     "convert_dataset_units",
     "convert_values_to_units",
-    "drop_ratio_from_name",
+    "convert_to_dimensional_name",
     "expand_range",
-    "has_units_unlike_its_study",
+    "has_units_unexpected_by_its_figures",
     "in_display_units",
-    "is_friction_stiffness",
+    "is_stiffness_over_normal_stress",
     "make_axis_with_units",
     "parse_number",
-    "put_on_rig",
+    "convert_scene_and_axes_to_rig",
     "read_si_scales",
     "read_table",
     "slip_rate_from_log",
-    "unit_factor",
+    "compute_conversion_factor",
     "find_scale_of_variable",
     "replace_rig_quantity",
 ]

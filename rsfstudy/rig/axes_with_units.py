@@ -20,13 +20,13 @@ from rsfstudy.rig.rig_quantities import (
     RIG_QUANTITIES,
     SI_UNIT_BY_SCALE,
     find_si_units_of_field,
-    is_friction_stiffness,
+    is_stiffness_over_normal_stress,
 )
 from rsfstudy.rig.units import (
+    compute_conversion_factor,
     convert_to_si_as_fraction,
     expand_range,
     split_number_and_units,
-    unit_factor,
 )
 
 
@@ -167,7 +167,7 @@ def convert_values_to_units(quantity_name: str, values: Sequence[Any], units: st
     scale, found = factor_to_si(quantity_name, units), []
     kind = (
         "1/m"
-        if quantity_name == "stiffness" and is_friction_stiffness(f"1 {units}")
+        if quantity_name == "stiffness" and is_stiffness_over_normal_stress(f"1 {units}")
         else _axis_si_units(quantity_name, "1")
     )
     for value in values:
@@ -271,9 +271,9 @@ def factor_to_si(quantity_name: str, units: str) -> Fraction:
     InvalidValue
         If the quantity has no units, or if the units are unknown or incompatible.
     """
-    if quantity_name == "stiffness" and is_friction_stiffness(f"1 {units}"):
-        return unit_factor(quantity_name, units, "1/m")
+    if quantity_name == "stiffness" and is_stiffness_over_normal_stress(f"1 {units}"):
+        return compute_conversion_factor(quantity_name, units, "1/m")
     si = _axis_si_units(quantity_name, f"1 {units}")
     if si is None:
         raise InvalidValue(quantity_name, units, "is no quantity of a rig, nor in units of one")
-    return unit_factor(quantity_name, units, si)
+    return compute_conversion_factor(quantity_name, units, si)

@@ -18,11 +18,11 @@ import xarray as xr
 from rsfstudy.errors import DataError, InvalidValue
 from rsfstudy.netcdf_encoding import copy_with_cf_encoding
 from rsfstudy.quantities import format_unit_quotient, split_unit_quotient
-from rsfstudy.rig.units import unit_factor
+from rsfstudy.rig.units import compute_conversion_factor
 
 #: Names of velocity ratios and normal stress ratios after conversion to units. The name
 #: ``normal_stress`` is not available, because scenes have a field of this name.
-_DIMENSIONAL_NAMES_OF_RATIOS = {
+_DIMENSIONAL_NAME_BY_RATIO_NAME = {
     "velocity_ratio": "velocity",
     "normal_stress_ratio": "effective_normal_stress",
 }
@@ -36,11 +36,11 @@ DIMENSIONLESS_PREFIX = "dimensionless_"
 #: Units of a rig in tables and figures.
 DISPLAY_BASE_UNITS = {"stress": "MPa", "length": "um", "time": "s"}
 #: Name of the dataset attribute that lists the scales after a conversion.
-SCALES_ATTRIBUTE = "scales"
+NAME_OF_SCALES_ATTRIBUTE = "scales"
 
 
 #: Tolerance for the comparison of two scales, which allows for rounding errors and printed digits.
-_REFERENCE_RATE_RTOL = 1e-9
+_RTOL_OF_EQUAL_REFERENCE_RATES = 1e-9
 
 
 class UnitScale(NamedTuple):
@@ -113,13 +113,15 @@ def _resolve_scale_of_dataset(
             raise InvalidValue(argument_name, None, "is not in the dataset", remedy=remedy)
         return stated_value
     variable = dataset[coordinate_name].variable.to_base_variable()
-    held = variable * float(unit_factor(coordinate_name, variable.attrs.get("units", units), units))
+    held = variable * float(
+        compute_conversion_factor(coordinate_name, variable.attrs.get("units", units), units)
+    )
     known = np.unique(held.values[np.isfinite(held.values)])
     # If the scale does not vary, it also applies to cells in which the scale is NaN.
     if known.size == 1:
         held = xr.Variable((), known[0])
     if stated_value is not None and not np.allclose(
-        held, stated_value, rtol=_REFERENCE_RATE_RTOL, atol=0.0
+        held, stated_value, rtol=_RTOL_OF_EQUAL_REFERENCE_RATES, atol=0.0
     ):
         rule = f"contradicts that of the dataset, {_format_number_or_range(held)} {units}"
         remedy = "Each cell is converted by its own: state another to the scenes."
@@ -172,13 +174,13 @@ def convert_dataset_units(
         "V_*": f"{length} {time}-1", "sigma_*/D_c": f"{stress} {length}-1",
     }  # fmt: skip
     size = {
-        n: float(unit_factor("units", units[n], si_scales[n].units))
+        n: float(compute_conversion_factor("units", units[n], si_scales[n].units))
         for n in ("sigma_*", "D_c", "D_c/V_*")
     }
     size["V_*"] = size["D_c"] / size["D_c/V_*"]
     size["sigma_*/D_c"] = size["sigma_*"] / size["D_c"]
     size["V_*/D_c"] = 1.0 / size["D_c/V_*"]
-    return apply_scales_to_dataset(
+    return convert_dataset_by_unit_scales(
         dataset, {n: UnitScale(s.factor / size[n], units[n]) for n, s in si_scales.items()}
     )
 
@@ -281,12 +283,12 @@ def convert_to_display_units(dataset: xr.Dataset) -> xr.Dataset:
     xarray.Dataset
         Results in units. A dataset without a rig is returned unchanged.
     """
-    if "sigma_star" not in dataset.variables or SCALES_ATTRIBUTE in dataset.attrs:
+    if "sigma_star" not in dataset.variables or NAME_OF_SCALES_ATTRIBUTE in dataset.attrs:
         return dataset
     return convert_dataset_units(dataset, read_si_scales(dataset), **DISPLAY_BASE_UNITS)
 
 
-def has_units_unlike_its_study(dataset: xr.Dataset) -> bool:
+def has_units_unexpected_by_its_figures(dataset: xr.Dataset) -> bool:
     """Return True if results have units that study figures do not expect.
 
     Parameters
@@ -300,14 +302,14 @@ def has_units_unlike_its_study(dataset: xr.Dataset) -> bool:
         True if the results were converted to units other than MPa, um and s, or if the results have
         units but no rig.
     """
-    told = dataset.attrs.get(SCALES_ATTRIBUTE, "")
+    told = dataset.attrs.get(NAME_OF_SCALES_ATTRIBUTE, "")
     as_shown = "sigma_star" in dataset.variables and all(
         f" {u}," in told for u in DISPLAY_BASE_UNITS.values()
     )
     return bool(told) and not as_shown
 
 
-def apply_scales_to_dataset(
+def convert_dataset_by_unit_scales(
     dataset: xr.Dataset, scales_by_name: Mapping[str, UnitScale]
 ) -> xr.Dataset:
     """Multiply all variables of a dataset by their scales.
@@ -340,7 +342,7 @@ def apply_scales_to_dataset(
     beside = [
         n
         for n in map(str, dataset.coords)
-        if drop_ratio_from_name(n) != n and drop_ratio_from_name(n) in dataset
+        if convert_to_dimensional_name(n) != n and convert_to_dimensional_name(n) in dataset
     ]
     dataset = dataset.drop_vars(beside)
     result = dataset.copy()
@@ -372,7 +374,7 @@ def apply_scales_to_dataset(
         result[name] = one.dims, one.values, words
     for name in logarithms:
         result = result.assign(slip_rate_from_log(dataset, name, *scales_by_name["V_*"]))
-    new = {str(name): drop_ratio_from_name(str(name)) for name in sizes}
+    new = {str(name): convert_to_dimensional_name(str(name)) for name in sizes}
     result = result.rename({old: name for old, name in new.items() if name != old})
     for variable in result.variables.values():
         named = str(variable.attrs.get("ancillary_variables", "")).split()
@@ -381,10 +383,10 @@ def apply_scales_to_dataset(
     told = ", ".join(
         f"{n} = {_format_number_or_range(s.factor)} {s.units}" for n, s in scales_by_name.items()
     )
-    return copy_with_cf_encoding(result.assign_attrs({SCALES_ATTRIBUTE: told}))
+    return copy_with_cf_encoding(result.assign_attrs({NAME_OF_SCALES_ATTRIBUTE: told}))
 
 
-def drop_ratio_from_name(variable_name: str) -> str:
+def convert_to_dimensional_name(variable_name: str) -> str:
     """Return the name of a variable after conversion to units.
 
     Parameters
@@ -398,7 +400,7 @@ def drop_ratio_from_name(variable_name: str) -> str:
         Name without ``ratio`` and without the prefix ``dimensionless_``.
     """
     variable_name = variable_name.removeprefix(DIMENSIONLESS_PREFIX)
-    for ratio, quantity in _DIMENSIONAL_NAMES_OF_RATIOS.items():
+    for ratio, quantity in _DIMENSIONAL_NAME_BY_RATIO_NAME.items():
         variable_name = variable_name.replace(ratio, quantity)
     return variable_name
 

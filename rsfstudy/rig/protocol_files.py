@@ -19,7 +19,7 @@ from rsfstudy.rig.rig import SLIDER_UNITS_OF_SEGMENT_FIELDS, Rig
 from rsfstudy.rig.table_files import Column, read_table, select_columns_of_arrays
 from rsfstudy.slider import (
     MIN_SEGMENT_DURATION,
-    SEGMENT_KEYS,
+    SEGMENT_MAPPING_KEYS,
     Protocol,
     SampledHistory,
     build_sampled_history,
@@ -110,7 +110,7 @@ def history(
     >>> round(rsfstudy.Scene(loading=loading).load_velocity, 9)
     2.0
     """
-    found = _read_columns(record, columns, rig)
+    found = _read_columns_of_record(record, columns, rig)
     for key in found:
         if key not in _SLIDER_UNITS_OF_RECORD_COLUMNS:
             raise InvalidValue("column", key, "is unknown", choices=_SLIDER_UNITS_OF_RECORD_COLUMNS)
@@ -146,7 +146,7 @@ def history(
     )
 
 
-def _read_columns(
+def _read_columns_of_record(
     record: Any, columns: Mapping[str, Any] | None, rig: Rig | None
 ) -> dict[str, Column]:
     """Read the columns of a record of any type."""
@@ -262,8 +262,8 @@ def read_protocol(path: str | Path, rig: Rig | None = None, name: str = "protoco
     """
     columns = read_table(path)
     for key in columns:
-        if key not in SEGMENT_KEYS:
-            raise InvalidValue("column", key, "is unknown", choices=SEGMENT_KEYS)
+        if key not in SEGMENT_MAPPING_KEYS:
+            raise InvalidValue("column", key, "is unknown", choices=SEGMENT_MAPPING_KEYS)
     units = {key: column.units for key, column in columns.items()}
     of_slider = all(SLIDER_UNITS_OF_SEGMENT_FIELDS[key] == of for key, of in units.items())
     if not of_slider and rig is None:

@@ -16,7 +16,7 @@ import pandas as pd
 from rsfstudy.error_boundary import check_regular_file, error_boundary
 from rsfstudy.errors import DataError, InvalidValue
 from rsfstudy.fitting import RECORD_COLUMNS, Record
-from rsfstudy.rig.rig_quantities import is_friction_stiffness
+from rsfstudy.rig.rig_quantities import is_stiffness_over_normal_stress
 from rsfstudy.rig.table_files import (
     HEADING_PATTERN,
     Column,
@@ -26,7 +26,7 @@ from rsfstudy.rig.table_files import (
     read_table,
     select_columns_of_arrays,
 )
-from rsfstudy.rig.units import convert_to_si, unit_factor
+from rsfstudy.rig.units import compute_conversion_factor, convert_to_si
 
 #: SI units of the columns of a record, and factors from SI units to the units of `Record`.
 _UNITS_AND_FACTORS_OF_RECORD_COLUMNS = {
@@ -51,7 +51,7 @@ _PATTERNS_OF_USUAL_HEADINGS = {
 #: Layout of xlook files: size of the file header, size of each column header, and number of column
 #: headers. The data follow the headers.
 _XLOOK_HEADER_BYTES, _XLOOK_COLUMN_HEADER_BYTES, _XLOOK_MAX_COLUMNS = 36, 84, 32
-_XLOOK_DATA_START = _XLOOK_HEADER_BYTES + _XLOOK_COLUMN_HEADER_BYTES * _XLOOK_MAX_COLUMNS
+_XLOOK_DATA_START_BYTE = _XLOOK_HEADER_BYTES + _XLOOK_COLUMN_HEADER_BYTES * _XLOOK_MAX_COLUMNS
 
 
 @error_boundary
@@ -141,7 +141,7 @@ def read_record(
     for key, column in found.items():
         _check_column_name(key)
         column.check_values(key, ~np.isfinite(column.values), "must be a finite number")
-        values[key] = column.values * _unit_factor_of_column(key, column.units)
+        values[key] = column.values * _find_factor_to_record_units(key, column.units)
     return _build_record(values, normal_stress, stiffness, name or _record_name_from_source(source))
 
 
@@ -159,7 +159,7 @@ def _record_name_from_source(source: Any) -> str:
     return text if text.isidentifier() else f"record_{text}"
 
 
-def _unit_factor_of_column(column_name: str, units: str) -> float:
+def _find_factor_to_record_units(column_name: str, units: str) -> float:
     """Compute the factor that converts a column to the units of `Record`.
 
     Columns without units are in s, um and MPa.
@@ -169,7 +169,7 @@ def _unit_factor_of_column(column_name: str, units: str) -> float:
         return {"Pa": 1e6}.get(si, 1.0)
     if si == "1" and units in ("1", "-"):
         return 1.0
-    return float(unit_factor(column_name, units, si)) * ours
+    return float(compute_conversion_factor(column_name, units, si)) * ours
 
 
 def _compute_load_point_displacement(
@@ -187,7 +187,7 @@ def _compute_load_point_displacement(
         raise InvalidValue("slip", "given without displacement", rule, remedy=remedy)
     friction, stress = record_values["friction"], record_values.get("normal_stress")
     is_number = isinstance(stiffness, int | float)
-    over_stress = is_number or is_friction_stiffness(stiffness)
+    over_stress = is_number or is_stiffness_over_normal_stress(stiffness)
     if is_number:
         per_um = float(stiffness)
     else:
@@ -232,7 +232,7 @@ def _read_text_columns(path: Path, columns: Mapping[str, Any] | None) -> Mapping
     """Read the selected or recognised columns of a text file."""
 
     def select(headings: list[str], place: str) -> dict[str, ColumnSpec]:
-        told = _complete_column_selection(columns or {}, headings, place)
+        told = _add_required_columns_by_usual_headings(columns or {}, headings, place)
         return {key: _parse_column_selection(key, of, headings) for key, of in told.items()}
 
     return read_table(path, select)
@@ -244,13 +244,13 @@ def _read_array_columns(source: Any, columns: Mapping[str, Any] | None) -> Mappi
     check_heading_lengths(headings, "record")
     if columns is None and not any("(" in key or "[" in key for key in headings):
         return select_columns_of_arrays(source, {key: (key,) for key in headings})
-    told = _complete_column_selection(columns or {}, headings, "record")
+    told = _add_required_columns_by_usual_headings(columns or {}, headings, "record")
     return select_columns_of_arrays(
         source, {key: _parse_column_selection(key, of, headings) for key, of in told.items()}
     )
 
 
-def _complete_column_selection(
+def _add_required_columns_by_usual_headings(
     selected_columns: Mapping[str, Any], headings: list[str], file_description: str
 ) -> dict[str, Any]:
     """Add required columns with common headings to the selected columns."""
@@ -260,7 +260,7 @@ def _complete_column_selection(
     wanted = dict(selected_columns)
     for key in _PATTERNS_OF_USUAL_HEADINGS:
         if key in lacking and not (key == "shear_stress" and "friction" in wanted):
-            wanted |= _find_usual_heading(key, headings, file_description)
+            wanted |= _find_column_with_usual_heading(key, headings, file_description)
     if "displacement" in wanted and "slip" not in selected_columns:
         wanted.pop("slip", None)
     if "time" not in wanted or not {"displacement", "slip"} & set(wanted):
@@ -275,7 +275,7 @@ def _complete_column_selection(
     return wanted
 
 
-def _find_usual_heading(
+def _find_column_with_usual_heading(
     column_name: str, headings: list[str], file_description: str
 ) -> dict[str, str]:
     """Find the column with a common heading for a quantity.
@@ -309,7 +309,7 @@ def _find_usual_heading(
 def _has_compatible_units(column_name: str, units: str) -> bool:
     """Return True if the units are compatible with a column."""
     try:
-        return _unit_factor_of_column(column_name, units) > 0.0
+        return _find_factor_to_record_units(column_name, units) > 0.0
     except InvalidValue:
         return False
 
@@ -337,7 +337,7 @@ def _is_binary(path: Path) -> bool:
     """Return True if the beginning of a file contains a null byte."""
     try:
         with path.open("rb") as file:
-            return b"\0" in file.read(_XLOOK_DATA_START)
+            return b"\0" in file.read(_XLOOK_DATA_START_BYTE)
     except OSError as error:
         raise DataError(f"{path}: cannot be read: {error.strerror}") from error
 
@@ -350,12 +350,12 @@ def _read_xlook_columns(path: Path, columns: Mapping[str, Any] | None) -> Mappin
     intervals, which the function sums.
     """
     data = path.read_bytes()
-    if len(data) < _XLOOK_DATA_START:
+    if len(data) < _XLOOK_DATA_START_BYTE:
         raise DataError(f"{path}: ends within the headers of an xlook file")
     used = int.from_bytes(data[24:28], "big")
     if not 0 < used <= _XLOOK_MAX_COLUMNS:
         raise DataError(f"{path}: states {used} columns, which no xlook file has")
-    headings, begin, found = [], _XLOOK_DATA_START, {}
+    headings, begin, found = [], _XLOOK_DATA_START_BYTE, {}
     for number in range(used):
         header = data[
             _XLOOK_HEADER_BYTES + _XLOOK_COLUMN_HEADER_BYTES * number : _XLOOK_HEADER_BYTES

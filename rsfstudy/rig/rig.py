@@ -40,7 +40,7 @@ from rsfstudy.rig.rig_quantities import (
     find_si_units_of_field,
 )
 from rsfstudy.rig.units import convert_to_si
-from rsfstudy.slider import Protocol, Scene, protocol, with_scene_field_signature
+from rsfstudy.slider import Protocol, Scene, add_scene_fields_to_signature, protocol
 
 __getattr__ = renamed_names(__name__)
 
@@ -186,7 +186,7 @@ class Rig(HtmlTableMixin):
             / self.scales[scale].factor
         )
 
-    @with_scene_field_signature(*RATIO_FIELD_BY_DIMENSIONAL_NAME)
+    @add_scene_fields_to_signature(*RATIO_FIELD_BY_DIMENSIONAL_NAME)
     def scene(self, **fields: Any) -> Scene:
         """Create a scene of this rig.
 
@@ -213,7 +213,7 @@ class Rig(HtmlTableMixin):
         """
         if find_si_units_of_field("instability_norm", norm := fields.get("instability_norm")):
             scene = self.scene(**{n: v for n, v in fields.items() if n != "instability_norm"})
-            return scene.with_(instability_norm=compute_instability_norm(self, norm, scene))
+            return scene.with_(instability_norm=convert_to_instability_norm(self, norm, scene))
         for name in RATIO_FIELD_BY_DIMENSIONAL_NAME.keys() & fields.keys():
             if RATIO_FIELD_BY_DIMENSIONAL_NAME[name] in fields:
                 raise InvalidValue(
@@ -376,7 +376,7 @@ class Rig(HtmlTableMixin):
             raise error.with_location(f"segment {segment_number}") from error
 
 
-def compute_instability_norm(rig: Rig, norm_or_slip_rate: Any, scene: Scene) -> float:
+def convert_to_instability_norm(rig: Rig, norm_or_slip_rate: Any, scene: Scene) -> float:
     r"""Compute the norm of instability for a scene of a rig.
 
     Parameters

@@ -10,8 +10,8 @@ import numpy as np
 
 from rsfstudy.error_boundary import user_stacklevel
 from rsfstudy.errors import InvalidValue, RsfStudyWarning
-from rsfstudy.rig.units import convert_to_si, multiply_exactly, unit_factor
-from rsfstudy.slider import FIELD_QUANTITIES
+from rsfstudy.rig.units import compute_conversion_factor, convert_to_si, multiply_by_exact_fraction
+from rsfstudy.slider import SCENE_FIELD_QUANTITIES
 
 
 class RigQuantity(NamedTuple):
@@ -21,7 +21,7 @@ class RigQuantity(NamedTuple):
     ----------
     si_units : str
         SI units.
-    min_usual, max_usual : float
+    min_usual_value, max_usual_value : float
         Range of common values in SI units. Values outside this range cause a warning.
     symbol : str
         Symbol in LaTeX.
@@ -30,8 +30,8 @@ class RigQuantity(NamedTuple):
     """
 
     si_units: str
-    min_usual: float
-    max_usual: float
+    min_usual_value: float
+    max_usual_value: float
     symbol: str
     meaning: str
 
@@ -62,7 +62,7 @@ SI_UNIT_BY_SCALE = {
 #: Display units by SI units.
 DISPLAY_UNIT_BY_SI_UNIT = {"Pa": "MPa", "m": "um", "m/s": "um/s", "Pa/m": "MPa/um"}
 #: Descriptions of scene fields by name.
-SCENE_QUANTITY_BY_FIELD_NAME = {about.name: about for about in FIELD_QUANTITIES}
+SCENE_QUANTITY_BY_FIELD_NAME = {about.name: about for about in SCENE_FIELD_QUANTITIES}
 #: Names of velocity ratios of a scene by the names of the corresponding velocities.
 RATIO_FIELD_BY_DIMENSIONAL_NAME = {
     name.removesuffix("_ratio"): name
@@ -136,12 +136,12 @@ def convert_rig_value_to_si(
     try:
         return convert_to_si(quantity_name, value, units)
     except InvalidValue:
-        if units == "Pa/m" and normal_stress is not None and is_friction_stiffness(value):
+        if units == "Pa/m" and normal_stress is not None and is_stiffness_over_normal_stress(value):
             return convert_to_si(quantity_name, value, "1/m") * normal_stress
         raise
 
 
-def is_friction_stiffness(stiffness: Any) -> bool:
+def is_stiffness_over_normal_stress(stiffness: Any) -> bool:
     """Return True if a stiffness is friction divided by displacement.
 
     Parameters
@@ -193,7 +193,7 @@ def check_rig_quantities_are_consistent(rig_values: Mapping[str, Any]) -> None:
 
 
 def in_display_units(
-    rig: Mapping[str, float], without: Collection[str] = ()
+    rig: Mapping[str, float], excluded_axis_names: Collection[str] = ()
 ) -> dict[str, tuple[float, str]]:
     """Convert the quantities of a rig to display units.
 
@@ -201,7 +201,7 @@ def in_display_units(
     ----------
     rig : mapping of str to float
         Quantities of the rig in SI units.
-    without : collection of str, optional
+    excluded_axis_names : collection of str, optional
         Names of quantities to omit, because axes vary these quantities.
 
     Returns
@@ -210,11 +210,16 @@ def in_display_units(
         Value and units of each quantity.
     """
     units = {
-        n: RIG_QUANTITIES[n].si_units for n in rig if AXIS_NAME_BY_RIG_NAME.get(n, n) not in without
+        n: RIG_QUANTITIES[n].si_units
+        for n in rig
+        if AXIS_NAME_BY_RIG_NAME.get(n, n) not in excluded_axis_names
     }
     shown = {n: DISPLAY_UNIT_BY_SI_UNIT.get(si, si) for n, si in units.items()}
     return {
-        n: (multiply_exactly(rig[n], 1 / unit_factor(n, shown[n], si)), shown[n])
+        n: (
+            multiply_by_exact_fraction(rig[n], 1 / compute_conversion_factor(n, shown[n], si)),
+            shown[n],
+        )
         for n, si in units.items()
     }
 

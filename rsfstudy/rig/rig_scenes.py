@@ -16,7 +16,7 @@ from rsfstudy.axes import Axis, AxisRow, classify_rows_by_fields
 from rsfstudy.errors import InvalidValue
 from rsfstudy.rig.axes_with_units import factor_to_si, make_axis_with_units
 from rsfstudy.rig.dataset_scales import DIMENSIONLESS_PREFIX, build_scales_of_rig
-from rsfstudy.rig.rig import Rig, compute_instability_norm
+from rsfstudy.rig.rig import Rig, convert_to_instability_norm
 from rsfstudy.rig.rig_quantities import (
     AXIS_NAME_BY_RIG_NAME,
     DISPLAY_UNIT_BY_SI_UNIT,
@@ -29,9 +29,9 @@ from rsfstudy.rig.rig_quantities import (
     convert_rig_value_and_warn_if_unusual,
     derive_scene_fields_from_rig,
     is_dimensionless_field_with_scale,
-    is_friction_stiffness,
+    is_stiffness_over_normal_stress,
 )
-from rsfstudy.rig.units import multiply_exactly
+from rsfstudy.rig.units import multiply_by_exact_fraction
 from rsfstudy.slider import Scene
 
 
@@ -105,10 +105,10 @@ class LatticeScenesOnRig:
         found, units = dict(self.rig.as_dict()), self.units
         for name in RIG_NAME_BY_AXIS_NAME:
             if name in units and axis_row.get(name) is not None:
-                found[RIG_NAME_BY_AXIS_NAME[name]] = multiply_exactly(
+                found[RIG_NAME_BY_AXIS_NAME[name]] = multiply_by_exact_fraction(
                     axis_row[name], factor_to_si(name, units[name])
                 )
-        in_friction = is_friction_stiffness(f"1 {units.get('stiffness', '')}")
+        in_friction = is_stiffness_over_normal_stress(f"1 {units.get('stiffness', '')}")
         if axis_row.get("stiffness") is not None and in_friction:
             found["stiffness"] = found["stiffness"] * found["normal_stress"]
         check_rig_quantities_are_consistent(found)
@@ -130,7 +130,9 @@ class LatticeScenesOnRig:
         units, rig = self.units, self.compute_rig_quantities(axis_row)
         here, found = scale_factors_of_rig(rig), {}
         if set(RIG_NAME_BY_AXIS_NAME) & set(units) & set(axis_row):
-            found = self._base_fields_constant_in_si(here) | derive_scene_fields_from_rig(rig)
+            found = self._compute_base_fields_constant_in_si(here) | derive_scene_fields_from_rig(
+                rig
+            )
             if "period" in self.rig.as_dict() and not self.base_scene.has_mass:
                 # The base scene ignores the inertia of the rig.
                 found.pop("inertia", None)
@@ -140,11 +142,11 @@ class LatticeScenesOnRig:
                 found[name] = value
             elif name not in RIG_NAME_BY_AXIS_NAME:
                 scale = SCENE_QUANTITY_BY_FIELD_NAME[field].scale
-                in_si = multiply_exactly(value, factor_to_si(name, units[name]))
+                in_si = multiply_by_exact_fraction(value, factor_to_si(name, units[name]))
                 found[field] = in_si / (here[scale] if scale else 1.0)
         return found
 
-    def _base_fields_constant_in_si(
+    def _compute_base_fields_constant_in_si(
         self, scale_factors_of_cell: Mapping[str, Any]
     ) -> dict[str, Any]:
         """Return fields of the base scene with fixed values in SI units."""
@@ -178,11 +180,13 @@ class LatticeScenesOnRig:
         # An axis with one point gets a second point to find out if the values depend on the axis.
         alone = {axis.dimension for axis in self.axes if len(axis) == 1 and axis.is_single_field}
         along = [
-            _add_second_axis_point(a) if a.dimension in alone else a for a in self.axes if a.units
+            _add_second_point_to_axis(a) if a.dimension in alone else a
+            for a in self.axes
+            if a.units
         ]
         shape = tuple(len(axis) for axis in along)
         found: dict[str, np.ndarray] = {}
-        for rows in group_rows_by_fields_set(along):
+        for rows in group_axis_rows_by_field_names(along):
             numbers: dict[str, Any] = {}
             for place, axis in enumerate(along):
                 shaped = [-1 if p == place else 1 for p in range(len(along))]
@@ -220,7 +224,7 @@ def _is_close_within_rounding(other_value: Any, value: Any) -> bool:
     return isinstance(other_value, float) and math.isclose(other_value, value, rel_tol=1e-9)
 
 
-def put_on_rig(
+def convert_scene_and_axes_to_rig(
     rig: Rig, base: Scene, axes: Sequence[Axis]
 ) -> tuple[Scene, list[Axis], dict[str, float]]:
     """Convert a dimensionless scene and its axes to units of a rig.
@@ -257,7 +261,7 @@ def put_on_rig(
             for n, scale in scales.items()
         }
         sizes = {
-            n: multiply_exactly(sizes_of[s], 1 / factor_to_si(n, units[n]))
+            n: multiply_by_exact_fraction(sizes_of[s], 1 / factor_to_si(n, units[n]))
             for n, s in scales.items()
         }
         every |= sizes
@@ -298,7 +302,7 @@ def replace_rig_quantity(
     """
     if quantity_name == "instability_norm":
         return rig, base_scene.with_(
-            instability_norm=compute_instability_norm(rig, value, base_scene)
+            instability_norm=convert_to_instability_norm(rig, value, base_scene)
         )
     axis = make_axis_with_units(quantity_name, [value])
     changed = base_scene.with_(
@@ -329,7 +333,7 @@ def scale_factors_of_rig(rig_values: Mapping[str, Any]) -> dict[str, Any]:
     return {name: scale.factor for name, scale in build_scales_of_rig(rig_values).items()}
 
 
-def _add_second_axis_point(axis: Axis) -> Axis:
+def _add_second_point_to_axis(axis: Axis) -> Axis:
     """Add a second point to an axis that has one point."""
     (row,) = axis.rows
     near = {
@@ -352,7 +356,7 @@ def _drop_constant_dimensions(
     return tuple(kept), values
 
 
-def group_rows_by_fields_set(axes: Sequence[Axis]) -> Iterator[tuple[np.ndarray, ...]]:
+def group_axis_rows_by_field_names(axes: Sequence[Axis]) -> Iterator[tuple[np.ndarray, ...]]:
     """Iterate over groups of axis rows that set the same fields.
 
     Parameters

@@ -19,17 +19,17 @@ import numpy as np
 from rsfstudy._deprecation import renamed_members, renamed_names
 from rsfstudy.error_boundary import check_regular_file, error_boundary
 from rsfstudy.errors import DataError, InvalidValue
-from rsfstudy.quantities import parse_heading
+from rsfstudy.quantities import split_heading_into_name_and_units
 from rsfstudy.rig.units import parse_number
 
 __getattr__ = renamed_names(__name__)
 
 #: Characters of tables that `numpy.loadtxt` can parse.
-_PLAIN_TABLE_CHARACTERS = frozenset("0123456789+-.eE \t\r\n")
+_CHARACTERS_OF_PLAIN_NUMERIC_TABLES = frozenset("0123456789+-.eE \t\r\n")
 _EXAMPLE_OF_TABLE_HEADER = "velocity (um/s), distance (um), a (1)"
 _NUMBER_PATTERN = r"\s*((?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*"
 #: Heading followed by a scale and an offset.
-_SCALED_COLUMN_PATTERN = re.compile(
+_HEADING_WITH_SCALE_AND_OFFSET_PATTERN = re.compile(
     rf"(.*\S)\s*\*\s*(-?){_NUMBER_PATTERN}(?:([-+]){_NUMBER_PATTERN})?"
 )
 #: Heading with optional units in brackets.
@@ -60,7 +60,7 @@ class ColumnSpec(NamedTuple):
 
 
 #: Function of the headings and their location in the file, which returns the selected columns.
-ColumnChooser = Callable[[list[str], str], dict[str, ColumnSpec]]
+ColumnChoosingFunction = Callable[[list[str], str], dict[str, ColumnSpec]]
 
 
 def check_heading_length(heading: str) -> None:
@@ -105,7 +105,7 @@ def check_heading_lengths(headings: Iterable[str], file_description: str) -> Non
             raise error.with_location(f"{file_description}, column {column}") from error
 
 
-def _parse_listed_column_spec(column_choice: Any) -> ColumnSpec:
+def _parse_column_spec_given_as_list(column_choice: Any) -> ColumnSpec:
     """Parse a selection that lists heading, units, scale and offset."""
     rule = "must be a heading, or a list of a heading, its units, a scale and an offset"
     remedy = "Write ('Time (s)', 's', 0.001), for example."
@@ -150,9 +150,13 @@ def parse_column_spec(column_choice: Any, headings: Collection[str]) -> ColumnSp
         If the selection has another type, or if the heading is too long.
     """
     if not isinstance(column_choice, str):
-        return _parse_listed_column_spec(column_choice)
+        return _parse_column_spec_given_as_list(column_choice)
     check_heading_length(column_choice)
-    raw = None if column_choice in headings else _SCALED_COLUMN_PATTERN.fullmatch(column_choice)
+    raw = (
+        None
+        if column_choice in headings
+        else _HEADING_WITH_SCALE_AND_OFFSET_PATTERN.fullmatch(column_choice)
+    )
     scale, offset = 1.0, 0.0
     if raw:
         column_choice, scale = raw[1], float(raw[2] + raw[3])
@@ -286,7 +290,7 @@ def _to_floats_and_units(column_name: str, values: Any) -> tuple[np.ndarray, str
 
 @error_boundary
 def read_table(
-    path: str | Path, columns: Mapping[str, Any] | ColumnChooser | None = None
+    path: str | Path, columns: Mapping[str, Any] | ColumnChoosingFunction | None = None
 ) -> dict[str, Column]:
     r"""Read columns of a CSV file or of a text file.
 
@@ -337,7 +341,7 @@ def read_table(
         read = csv.reader(io.StringIO(text), delimiter=between, skipinitialspace=between == " ")
         line, header = next(((n, row) for n, row in enumerate(read, start=1) if any(row)), (1, []))
         headings = [name.strip() for name in header]
-        values, lines = _read_plain_table(text, between, line, len(header))
+        values, lines = _read_plain_numeric_table(text, between, line, len(header))
         if values is None:
             rows = [(n, row) for n, row in enumerate(read, start=line + 1) if any(row)]
     except (OSError, UnicodeError, csv.Error) as error:
@@ -373,7 +377,10 @@ def read_table(
         place = places[heading]
         column = Column(np.empty(0), units, place + 1, lines, str(path))
         below = (
-            [_parse_field(name, row[place], column, n) for n, (_line, row) in enumerate(rows)]
+            [
+                _parse_number_in_table_field(name, row[place], column, n)
+                for n, (_line, row) in enumerate(rows)
+            ]
             if values is None
             else values[:, place]
         )
@@ -381,7 +388,7 @@ def read_table(
     return found
 
 
-def _read_plain_table(
+def _read_plain_numeric_table(
     text: str, delimiter: str, header_line_count: int, column_count: int
 ) -> tuple[np.ndarray | None, np.ndarray]:
     """Read a table that contains only finite numbers and its delimiters.
@@ -394,7 +401,7 @@ def _read_plain_table(
     if (
         delimiter == " "
         or not body.strip()
-        or not set(body) <= _PLAIN_TABLE_CHARACTERS | {delimiter}
+        or not set(body) <= _CHARACTERS_OF_PLAIN_NUMERIC_TABLES | {delimiter}
     ):
         return None, lines
     try:
@@ -418,7 +425,7 @@ def _choose_all_columns_of_header(
     """Select all columns of a header with names and units."""
     found: dict[str, ColumnSpec] = {}
     for n, heading in enumerate(headings, start=1):
-        stated = parse_heading(heading)
+        stated = split_heading_into_name_and_units(heading)
         if stated is None:
             remedy = f"Write the header as in {_EXAMPLE_OF_TABLE_HEADER}."
             rule = "names no column with its units"
@@ -434,7 +441,7 @@ def _choose_all_columns_of_header(
     return found
 
 
-def _parse_field(column_name: str, text: str, column: Column, row: int) -> float:
+def _parse_number_in_table_field(column_name: str, text: str, column: Column, row: int) -> float:
     if not text.strip():
         return math.nan
     found = parse_number(text)

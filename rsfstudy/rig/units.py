@@ -29,7 +29,7 @@ _STRESS_EXPONENTS, _FORCE_EXPONENTS, _LENGTH_EXPONENTS, _TIME_EXPONENTS = (
     (0, 1, 0),
     (0, 0, 1),
 )
-_SIZES_OF_KNOWN_UNITS: Mapping[str, tuple[str | int, tuple[int, int, int]]] = {
+_SI_FACTOR_AND_EXPONENTS_BY_UNIT: Mapping[str, tuple[str | int, tuple[int, int, int]]] = {
     "kg": (1, (1, 0, 0)),
     **{
         f"{p}Pa": (x, _STRESS_EXPONENTS)
@@ -50,7 +50,7 @@ _SIZES_OF_KNOWN_UNITS: Mapping[str, tuple[str | int, tuple[int, int, int]]] = {
     "year": (31557600, _TIME_EXPONENTS),
 }
 _KNOWN_UNITS: Mapping[str, SiFactorAndExponents] = {
-    name: (Fraction(size), of) for name, (size, of) in _SIZES_OF_KNOWN_UNITS.items()
+    name: (Fraction(size), of) for name, (size, of) in _SI_FACTOR_AND_EXPONENTS_BY_UNIT.items()
 }
 _NUMBER_PATTERN = re.compile(
     r"[-+]?(?:[0-9]+(?:\.[0-9]*)?|\.[0-9]+)(?:[eE][-+]?[0-9]+)?|nan|[-+]?inf"
@@ -72,7 +72,7 @@ _LOG_RANGE_SYNTAX_REMEDY = (
 )
 _MAX_POINTS_OF_RANGE = 1_000_000
 #: Maximum length of a quantity. The patterns above need quadratic time for longer strings.
-_MAX_QUANTITY_LENGTH = 200
+_MAX_QUANTITY_TEXT_LENGTH = 200
 _PINT_INSTALL_ADVICE = "Install pint (pip install 'rsfstudy[units]')"
 
 
@@ -222,7 +222,7 @@ def convert_to_si_as_fraction(quantity_name: str, value: Any, units: str) -> Fra
     return Fraction(found)
 
 
-def unit_factor(quantity_name: str, stated_units: str, target_units: str) -> Fraction:
+def compute_conversion_factor(quantity_name: str, stated_units: str, target_units: str) -> Fraction:
     """Compute the conversion factor between two units.
 
     Parameters
@@ -247,7 +247,7 @@ def unit_factor(quantity_name: str, stated_units: str, target_units: str) -> Fra
     return convert_to_si_as_fraction(quantity_name, f"1 {stated_units}", target_units)
 
 
-def multiply_exactly(values: Any, factor: Fraction) -> Any:
+def multiply_by_exact_fraction(values: Any, factor: Fraction) -> Any:
     """Multiply numbers by a conversion factor with a single rounding.
 
     The function uses the decimal digits of each number, so that a number in a file and the same
@@ -268,9 +268,9 @@ def multiply_exactly(values: Any, factor: Fraction) -> Any:
     # Arrays of coordinates often repeat their values, so each value is multiplied once.
     if isinstance(values, np.ndarray):
         each, places = np.unique(values, return_inverse=True)
-        return np.array([multiply_exactly(x, factor) for x in each.tolist()])[places].reshape(
-            values.shape
-        )
+        return np.array([multiply_by_exact_fraction(x, factor) for x in each.tolist()])[
+            places
+        ].reshape(values.shape)
     return (
         _to_float(_fraction_of_shortest_digits(values) * factor)
         if math.isfinite(values)
@@ -295,8 +295,8 @@ def _parse_quantity(quantity_name: str, text: str, units: str) -> Fraction | flo
 
     A number that is not finite is returned unchanged.
     """
-    if len(text) > _MAX_QUANTITY_LENGTH:
-        rule = f"is no quantity, because it has more than {_MAX_QUANTITY_LENGTH} characters"
+    if len(text) > _MAX_QUANTITY_TEXT_LENGTH:
+        rule = f"is no quantity, because it has more than {_MAX_QUANTITY_TEXT_LENGTH} characters"
         remedy = f"Write a number and its units, as in '2.5 {units.removesuffix('1')}'."
         raise InvalidValue(quantity_name, text, rule, remedy=remedy)
     match = _NUMBER_PATTERN.match(text.strip())

@@ -69,12 +69,12 @@ if TYPE_CHECKING:
     from rsfstudy.slider.equations import (
         RUPTURE_REGIME,
         Equations,
+        build_equations_against_displacement,
+        build_equations_against_inertial_time,
         build_friction_relation,
         build_state_evolution_function,
         compute_steady_states,
         effective_normal_stress_at,
-        equations_against_displacement,
-        equations_against_inertial_time,
         equations_at_imposed_slip_rate,
         equations_between_ruptures,
         equations_in_rupture,
@@ -88,14 +88,15 @@ if TYPE_CHECKING:
     from rsfstudy.slider.motion_point import MotionPoint
     from rsfstudy.slider.parameter_layout import LARGEST_LOG_SLIP_RATE
     from rsfstudy.slider.part_registry import (
-        FIELD_NAMES,
-        FIELD_QUANTITIES,
-        FIELD_TYPES,
         FIELDS_OMITTED_IF_NONE,
         PART_SELECTING_FIELDS,
+        SCENE_FIELD_NAMES,
+        SCENE_FIELD_QUANTITIES,
+        SCENE_FIELD_TYPES,
         SLOT_NAMES,
         SLOTS,
         UserPart,
+        add_scene_fields_to_signature,
         normalise_field_value,
         quantities_with_values,
         register_user_parts,
@@ -103,7 +104,6 @@ if TYPE_CHECKING:
         scene_field_defaults,
         scene_field_quantities,
         scene_field_types,
-        with_scene_field_signature,
     )
     from rsfstudy.slider.parts import Function, Numbers, field_names
     from rsfstudy.slider.sampled_loading import (
@@ -112,16 +112,16 @@ if TYPE_CHECKING:
         build_sampled_history,
         build_sampled_history_from_table,
     )
-    from rsfstudy.slider.scene import ENDLESS_SEGMENT_TABLE, Scene
+    from rsfstudy.slider.scene import SINGLE_ENDLESS_SEGMENT_TABLE, Scene
     from rsfstudy.slider.scene_assembly import find_inapplicable_fields, replace_field_values
     from rsfstudy.slider.scene_caching import cached_attribute, cached_per_scene
     from rsfstudy.slider.scene_functions import (
-        LOG_RATE_PER_PATH_LENGTH,
+        LOG_SLIP_RATE_PER_PATH_LENGTH,
         STOPPED_LOG_SLIP_RATE,
         displacement_per_path_length,
     )
     from rsfstudy.slider.scene_view import SceneView
-    from rsfstudy.slider.slider_parameters import STIFFNESS_FIELDS, SliderParameters
+    from rsfstudy.slider.slider_parameters import ALTERNATIVE_STIFFNESS_FIELDS, SliderParameters
     from rsfstudy.slider.stability import (
         all_critical_stiffnesses,
         critical_stiffness,
@@ -136,7 +136,7 @@ if TYPE_CHECKING:
         steady_friction_minus_reference,
         steady_sliding,
     )
-    from rsfstudy.slider.user_loadings import SEGMENT_KEYS, Protocol, UserLoading, protocol
+    from rsfstudy.slider.user_loadings import SEGMENT_MAPPING_KEYS, Protocol, UserLoading, protocol
 else:
     __getattr__, __dir__ = lazy_exports(
         __name__,
@@ -154,8 +154,8 @@ else:
                 "RUPTURE_REGIME",
                 "compute_steady_states",
                 "equations_between_ruptures",
-                "equations_against_displacement",
-                "equations_against_inertial_time",
+                "build_equations_against_displacement",
+                "build_equations_against_inertial_time",
                 "equations_in_rupture",
                 "equations_at_imposed_slip_rate",
                 "equations_without_mass",
@@ -171,11 +171,11 @@ else:
             "slider.parameter_layout": ("LARGEST_LOG_SLIP_RATE",),
             "slider.parts": ("Function", "Numbers", "field_names"),
             "slider.motion_point": ("MotionPoint",),
-            "slider.user_loadings": ("Protocol", "SEGMENT_KEYS", "UserLoading", "protocol"),
+            "slider.user_loadings": ("Protocol", "SEGMENT_MAPPING_KEYS", "UserLoading", "protocol"),
             "slider.part_registry": (
-                "FIELD_NAMES",
-                "FIELD_QUANTITIES",
-                "FIELD_TYPES",
+                "SCENE_FIELD_NAMES",
+                "SCENE_FIELD_QUANTITIES",
+                "SCENE_FIELD_TYPES",
                 "FIELDS_OMITTED_IF_NONE",
                 "PART_SELECTING_FIELDS",
                 "SLOTS",
@@ -188,7 +188,7 @@ else:
                 "quantities_with_values",
                 "register_user_parts",
                 "scene_field_quantities",
-                "with_scene_field_signature",
+                "add_scene_fields_to_signature",
             ),
             "slider.sampled_loading": (
                 "STRESS_RATE_COLUMN",
@@ -196,14 +196,14 @@ else:
                 "build_sampled_history",
                 "build_sampled_history_from_table",
             ),
-            "slider.scene": ("ENDLESS_SEGMENT_TABLE", "Scene"),
+            "slider.scene": ("SINGLE_ENDLESS_SEGMENT_TABLE", "Scene"),
             "slider.scene_functions": (
-                "LOG_RATE_PER_PATH_LENGTH",
+                "LOG_SLIP_RATE_PER_PATH_LENGTH",
                 "STOPPED_LOG_SLIP_RATE",
                 "displacement_per_path_length",
             ),
             "slider.scene_view": ("SceneView",),
-            "slider.slider_parameters": ("STIFFNESS_FIELDS", "SliderParameters"),
+            "slider.slider_parameters": ("ALTERNATIVE_STIFFNESS_FIELDS", "SliderParameters"),
             "slider.stability": (
                 "critical_stiffness",
                 "all_critical_stiffnesses",
@@ -224,11 +224,11 @@ else:
 __all__ = [
     "BUILT_IN_PARTS",
     "CLOSED_FORMS",
-    "ENDLESS_SEGMENT_TABLE",
+    "SINGLE_ENDLESS_SEGMENT_TABLE",
     "Equations",
-    "FIELD_NAMES",
-    "FIELD_QUANTITIES",
-    "FIELD_TYPES",
+    "SCENE_FIELD_NAMES",
+    "SCENE_FIELD_QUANTITIES",
+    "SCENE_FIELD_TYPES",
     "FrictionFunctions",
     "Function",
     "LARGEST_LOG_SLIP_RATE",
@@ -236,15 +236,15 @@ __all__ = [
     "NEGLIGIBLE_SECOND_ORDER_WEIGHT",
     "Numbers",
     "FIELDS_OMITTED_IF_NONE",
-    "LOG_RATE_PER_PATH_LENGTH",
+    "LOG_SLIP_RATE_PER_PATH_LENGTH",
     "MotionPoint",
     "Protocol",
     "RUPTURE_REGIME",
-    "SEGMENT_KEYS",
+    "SEGMENT_MAPPING_KEYS",
     "PART_SELECTING_FIELDS",
     "SLOTS",
     "SLOT_NAMES",
-    "STIFFNESS_FIELDS",
+    "ALTERNATIVE_STIFFNESS_FIELDS",
     "STOPPED_LOG_SLIP_RATE",
     "STRESS_RATE_COLUMN",
     "SampledHistory",
@@ -263,8 +263,8 @@ __all__ = [
     "all_critical_stiffnesses",
     "effective_friction",
     "equations_between_ruptures",
-    "equations_against_displacement",
-    "equations_against_inertial_time",
+    "build_equations_against_displacement",
+    "build_equations_against_inertial_time",
     "equations_in_rupture",
     "equations_at_imposed_slip_rate",
     "equations_without_mass",
@@ -293,5 +293,5 @@ __all__ = [
     "frictional_stress_after_jump",
     "frictional_stress_for_friction",
     "hint_for_unknown_field",
-    "with_scene_field_signature",
+    "add_scene_fields_to_signature",
 ]

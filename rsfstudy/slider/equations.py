@@ -14,7 +14,11 @@ from rsfstudy.slider.dynamics.quasi_static import QuasiStatic
 from rsfstudy.slider.motion_point import MotionPoint
 from rsfstudy.slider.parts import Function, Numbers
 from rsfstudy.slider.scene_caching import cached_per_scene
-from rsfstudy.slider.scene_functions import RegimeFunctions, SceneFunctions, build_scene_functions
+from rsfstudy.slider.scene_functions import (
+    MotionRegimeFunctions,
+    SceneFunctions,
+    build_scene_functions,
+)
 from rsfstudy.slider.scene_view import SceneView
 
 #: Names of two regimes: the equations with inertia, and the equations of a rigid slider.
@@ -167,7 +171,7 @@ def _build_slow_equations(
 
 
 def _append_time_if_requested(
-    regime_functions: RegimeFunctions,
+    regime_functions: MotionRegimeFunctions,
     unknown_names: tuple[str, ...],
     unknown_scales: Numbers,
     *,
@@ -214,7 +218,7 @@ def equations_in_rupture(scene: SceneView, *, with_time: bool = False) -> Equati
     TypeError
         If the scene has no inertia.
     """
-    a, form, others = scene.a, _require_rupture_functions(scene), _state_names(scene)[1:]
+    a, form, others = scene.a, _get_required_rupture_functions(scene), _state_names(scene)[1:]
     unknowns = ("spring_stress", "log_slip_rate", "friction", *others)
     scales, p = (a, 1.0, a, *[a] * len(others)), scene.parameter_values
     unknowns, scales, rate = _append_time_if_requested(form, unknowns, scales, with_time=with_time)
@@ -223,14 +227,14 @@ def equations_in_rupture(scene: SceneView, *, with_time: bool = False) -> Equati
     )
 
 
-def _require_rupture_functions(scene: SceneView) -> RegimeFunctions:
+def _get_required_rupture_functions(scene: SceneView) -> MotionRegimeFunctions:
     full = scene.equation_functions.functions_in_rupture
     if full is None:
         raise TypeError(f"{scene.dynamics.name} has no equations of ruptures")
     return full
 
 
-def equations_against_displacement(scene: SceneView) -> Equations:
+def build_equations_against_displacement(scene: SceneView) -> Equations:
     """Return the equations between ruptures with displacement as variable.
 
     The displacement is slip plus load point displacement. Close to steady sliding, the rates are
@@ -253,7 +257,7 @@ def equations_against_displacement(scene: SceneView) -> Equations:
     )
 
 
-def equations_against_inertial_time(scene: SceneView) -> Equations:
+def build_equations_against_inertial_time(scene: SceneView) -> Equations:
     r"""Return the equations of a scene with inertia as functions of time.
 
     Parameters
@@ -272,7 +276,7 @@ def equations_against_inertial_time(scene: SceneView) -> Equations:
         If the scene has no inertia.
     """
     return equations_in_rupture(scene)._replace(
-        rate_function=_require_rupture_functions(scene).rates_against_clock
+        rate_function=_get_required_rupture_functions(scene).rates_against_clock
     )
 
 

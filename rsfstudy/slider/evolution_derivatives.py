@@ -22,7 +22,7 @@ _STATE_SCALE_OVER_B, _MIN_STATE_CHANGE = 0.05, 1e-9
 #: convergence, and relative rounding error of a finite difference.
 _MAX_HALVINGS, _CONVERGENCE_TOLERANCE, _ROUNDING_ERROR = 9, 1e-12, 8.0 * 2.0**-52
 
-Matrix = list[list[float]]
+NestedListMatrix = list[list[float]]
 
 
 class StateEvolutionDerivatives(NamedTuple):
@@ -40,10 +40,10 @@ class StateEvolutionDerivatives(NamedTuple):
 
     with_respect_to_log_slip_rate: list[float]
     with_respect_to_state_shift: list[float]
-    with_respect_to_states: Matrix
+    with_respect_to_states: NestedListMatrix
     relative_error: float
 
-    def with_relative_change(self, relative_change: float) -> StateEvolutionDerivatives:
+    def with_perturbed_derivatives(self, relative_change: float) -> StateEvolutionDerivatives:
         r"""Return a copy with a relative change of all derivatives.
 
         Parameters

@@ -30,57 +30,57 @@ def _rig_quantity_hint(symbol: str, name: str) -> str:
     )
 
 
-def _map_each_name_to(space_separated_names: str, value: str) -> dict[str, str]:
+def _map_names_to_same_value(space_separated_names: str, value: str) -> dict[str, str]:
     return dict.fromkeys(space_separated_names.split(), value)
 
 
 #: Hints for field names that scenes do not have.
 _HINT_BY_WRONG_FIELD_NAME: Mapping[str, str] = {
-    **_map_each_name_to("k K kappa spring_constant", f"Write {_STIFFNESS_HINT}."),
-    **_map_each_name_to("b B", "Write b_over_a, which is b/a."),
-    **_map_each_name_to("a_minus_b b_minus_a ab", "Write b_over_a, which is b/a, beside a."),
-    **_map_each_name_to("A", "Write a."),
-    **_map_each_name_to(
+    **_map_names_to_same_value("k K kappa spring_constant", f"Write {_STIFFNESS_HINT}."),
+    **_map_names_to_same_value("b B", "Write b_over_a, which is b/a."),
+    **_map_names_to_same_value("a_minus_b b_minus_a ab", "Write b_over_a, which is b/a, beside a."),
+    **_map_names_to_same_value("A", "Write a."),
+    **_map_names_to_same_value(
         "Dc dc D_c d_c DC L dcrit slip_distance", _rig_quantity_hint("D_c", "slip_distance")
     ),
-    **_map_each_name_to("mu mu0 mu_0 mu_ref f0 f_0", "Write mu_star."),
-    **_map_each_name_to(
+    **_map_names_to_same_value("mu mu0 mu_0 mu_ref f0 f_0", "Write mu_star."),
+    **_map_names_to_same_value(
         "sigma sigma_n sigman sigma0 sigma_star sn", _rig_quantity_hint("sigma_*", "normal_stress")
     ),
-    **_map_each_name_to(
+    **_map_names_to_same_value(
         "V0 V_0 v0 v_0 V v Vl vl vlp Vlp velocity load_velocity", _LOAD_VELOCITY_HINT
     ),
-    **_map_each_name_to(
+    **_map_names_to_same_value(
         "V_star v_star vstar Vref vref V_ref v_ref reference_velocity",
         _rig_quantity_hint("V_*", "reference_velocity"),
     ),
-    **_map_each_name_to("G shear_modulus", _rig_quantity_hint("G", "shear_modulus")),
-    **_map_each_name_to("rho density", _rig_quantity_hint("rho", "density")),
-    **_map_each_name_to(
+    **_map_names_to_same_value("G shear_modulus", _rig_quantity_hint("G", "shear_modulus")),
+    **_map_names_to_same_value("rho density", _rig_quantity_hint("rho", "density")),
+    **_map_names_to_same_value(
         "kc k_c kcr k_cr k_ratio k_over_kc k_kc", "Write stiffness_ratio, which is k/k_cr."
     ),
-    **_map_each_name_to(
+    **_map_names_to_same_value(
         "tau tau0 tau_0", "Write initial_stress, over sigma_*, above that of steady sliding."
     ),
-    **_map_each_name_to(
+    **_map_names_to_same_value(
         "theta theta0 theta_0", "Write initial_state, which is b ln(theta/theta_*)."
     ),
-    **_map_each_name_to("m M mass", _INERTIA_HINT),
-    **_map_each_name_to("eta damping", "Write radiation_damping: eta V_*/sigma_*."),
-    **_map_each_name_to("T", "Write period, in s."),
-    **_map_each_name_to("evolution evolution_law state_law friction_law", "Write law."),
-    **_map_each_name_to("duration t_end tmax", _DURATION_HINT),
+    **_map_names_to_same_value("m M mass", _INERTIA_HINT),
+    **_map_names_to_same_value("eta damping", "Write radiation_damping: eta V_*/sigma_*."),
+    **_map_names_to_same_value("T", "Write period, in s."),
+    **_map_names_to_same_value("evolution evolution_law state_law friction_law", "Write law."),
+    **_map_names_to_same_value("duration t_end tmax", _DURATION_HINT),
 }
 #: Names of laws by their synonyms.
 _LAW_NAME_BY_ALIAS: Mapping[str, str] = {
-    **_map_each_name_to(
+    **_map_names_to_same_value(
         "aging ageing dieterich dieterich_ruina dr aging_law ageing_law", "slowness"
     ),
-    **_map_each_name_to("slowness_law", "slowness"),
-    **_map_each_name_to("ruina ruina_dieterich rr slip_law", "slip"),
-    **_map_each_name_to("prz perrin", "perrin_rice_zheng"),
-    **_map_each_name_to("kato_tullis kato", "composite"),
-    **_map_each_name_to("okubo cutoff", "cut_off"),
+    **_map_names_to_same_value("slowness_law", "slowness"),
+    **_map_names_to_same_value("ruina ruina_dieterich rr slip_law", "slip"),
+    **_map_names_to_same_value("prz perrin", "perrin_rice_zheng"),
+    **_map_names_to_same_value("kato_tullis kato", "composite"),
+    **_map_names_to_same_value("okubo cutoff", "cut_off"),
 }
 
 
@@ -147,7 +147,7 @@ def hint_for_unknown_choice(slot_name: str, value: Any, choices: Iterable[str]) 
     return f"Write {slot_name}={plain!r}." if plain in choices else ""
 
 
-def hint_for_value_without_field_name(
+def hint_for_positional_argument(
     value: Any, choices_by_slot_name: Mapping[str, Iterable[str]]
 ) -> str:
     """Return a hint for a positional argument of a scene.

@@ -366,7 +366,7 @@ def sum_state_effects(first_effect: Function, second_effect: Function) -> Functi
     return combined_effect
 
 
-def make_slip_reversible(forward_relation: Function) -> Function:
+def extend_relation_to_reversed_slip(forward_relation: Function) -> Function:
     r"""Return the friction relation of a fault that may slip backwards.
 
     Parameters
@@ -535,7 +535,7 @@ class FrictionTerms(NamedTuple):
         Number of states of the law.
     evolutions, steady_states : callable
         Evolution and steady states of the law.
-    state_effects : tuple of callable
+    stress_effects_on_state : tuple of callable
         Functions that compute the decrease of the state variable due to stress. The normal stress
         condition, the law and the shear stress can each contribute a function.
     allows_reversed_slip : bool
@@ -560,7 +560,7 @@ class FrictionTerms(NamedTuple):
     law_state_count: int
     evolutions: Function
     steady_states: Function
-    state_effects: tuple[Function, ...]
+    stress_effects_on_state: tuple[Function, ...]
     allows_reversed_slip: bool
     normal_stress: Function | None
     auxiliary_unknown_count: int
@@ -586,8 +586,8 @@ def build_friction_functions(friction_terms: FrictionTerms) -> FrictionFunctions
         Functions of friction. The result is cached.
     """
     effect = (
-        reduce(sum_state_effects, friction_terms.state_effects)
-        if friction_terms.state_effects
+        reduce(sum_state_effects, friction_terms.stress_effects_on_state)
+        if friction_terms.stress_effects_on_state
         else zero_state_effect
     )
     pressure, outside = (
@@ -600,7 +600,9 @@ def build_friction_functions(friction_terms: FrictionTerms) -> FrictionFunctions
         build_effective_normal_stress_function(total, outside),
     )
     changes = (
-        pressure or total is not zero_normal_stress_excess or len(friction_terms.state_effects) > 0
+        pressure
+        or total is not zero_normal_stress_excess
+        or len(friction_terms.stress_effects_on_state) > 0
     )
     strength = (
         build_strength_function(effective, effect)
@@ -608,7 +610,7 @@ def build_friction_functions(friction_terms: FrictionTerms) -> FrictionFunctions
         else friction_relation_at_constant_normal_stress
     )
     if friction_terms.allows_reversed_slip:
-        strength = make_slip_reversible(strength)
+        strength = extend_relation_to_reversed_slip(strength)
     evolutions, steady_states = friction_terms.evolutions, friction_terms.steady_states
     if (
         friction_terms.auxiliary_rates is not None

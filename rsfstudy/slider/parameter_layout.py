@@ -60,7 +60,7 @@ LARGEST_LOG_SLOWNESS = 680.0
 SMALLEST_NORMAL_STRESS_EXCESS, LARGEST_NORMAL_STRESS_EXCESS = 1e-12 - 1.0, 1e12
 
 
-class _HasParameterValues(Protocol):
+class _ParameterValueSource(Protocol):
     """Part, or combination of parts, with parameters for the equations."""
 
     @property
@@ -116,7 +116,7 @@ def pack_friction_parameter_values(scene: SceneView) -> Numbers:
 
 
 def _part_parameters_padded_with_nan(
-    part: _HasParameterValues, scene: SceneView, length: int
+    part: _ParameterValueSource, scene: SceneView, length: int
 ) -> Numbers:
     """Return the parameters of a part, padded with NaN.
 

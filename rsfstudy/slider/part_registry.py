@@ -20,11 +20,11 @@ from rsfstudy.quantities import Quantity, is_variable_name
 from rsfstudy.slider import dynamics, fluid, laws, loading, normal_stress
 from rsfstudy.slider.field_name_hints import canonical_law_name
 from rsfstudy.slider.needed_quantities import check_names_of_needed_quantities
-from rsfstudy.slider.parts import Part, field_names, field_quantities, is_boolean_field
+from rsfstudy.slider.parts import Part, field_names, is_boolean_field, part_field_quantities
 from rsfstudy.slider.slider_parameters import SliderParameters
 from rsfstudy.slider.user_loadings import UserLoading
 
-F = TypeVar("F", bound=Callable[..., Any])
+DecoratedFunction = TypeVar("DecoratedFunction", bound=Callable[..., Any])
 #: User-defined part: the class of a part, or a loading object such as a protocol.
 UserPart = type[Part] | UserLoading
 
@@ -62,7 +62,7 @@ class Slot:
         return Quantity(self.name, "", "", self.long_name)
 
     @cached_property
-    def parts_by_selecting_field(self) -> Mapping[str, type[Part]]:
+    def part_class_by_selecting_field(self) -> Mapping[str, type[Part]]:
         """Mapping from field names to the parts that the fields select."""
         return {part.selected_by: part for part in self.built_in_parts.values() if part.selected_by}
 
@@ -87,7 +87,9 @@ SLOTS: tuple[Slot, ...] = (
     Slot("loading", loading.Loading, loading.BUILT_IN_PARTS, "step", "what the load point does"),
 )
 #: Slots whose part is selected by name. In the other slots, the values of fields select the part.
-SLOTS_CHOSEN_BY_NAME = tuple(slot for slot in SLOTS if not slot.parts_by_selecting_field)
+SLOTS_WITH_PART_CHOSEN_BY_NAME = tuple(
+    slot for slot in SLOTS if not slot.part_class_by_selecting_field
+)
 _ALL_PART_CLASSES: tuple[type[Part], ...] = (
     SliderParameters,
     *(part for slot in SLOTS for part in slot.built_in_parts.values()),
@@ -97,12 +99,14 @@ PART_CLASS_BY_FIELD_NAME: Mapping[str, type[Part]] = {
     name: part for part in reversed(_ALL_PART_CLASSES) for name in field_names(part)
 }
 #: Quantities that describe the fields of a scene.
-FIELD_QUANTITIES: tuple[Quantity, ...] = (
-    *(slot.field_quantity for slot in SLOTS_CHOSEN_BY_NAME),
-    *(about for part in _ALL_PART_CLASSES for about in field_quantities(part)),
+SCENE_FIELD_QUANTITIES: tuple[Quantity, ...] = (
+    *(slot.field_quantity for slot in SLOTS_WITH_PART_CHOSEN_BY_NAME),
+    *(about for part in _ALL_PART_CLASSES for about in part_field_quantities(part)),
 )
 #: Names of the fields of a scene.
-FIELD_NAMES: tuple[str, ...] = tuple(dict.fromkeys(about.name for about in FIELD_QUANTITIES))
+SCENE_FIELD_NAMES: tuple[str, ...] = tuple(
+    dict.fromkeys(about.name for about in SCENE_FIELD_QUANTITIES)
+)
 #: Names of the fields that are included among the values of a scene only if the user sets them.
 FIELDS_OMITTED_IF_NONE: frozenset[str] = frozenset(
     name
@@ -113,7 +117,7 @@ FIELDS_OMITTED_IF_NONE: frozenset[str] = frozenset(
 SLOT_NAMES: frozenset[str] = frozenset(slot.name for slot in SLOTS)
 #: Names of the fields whose values select a part.
 PART_SELECTING_FIELDS: tuple[str, ...] = tuple(
-    name for slot in SLOTS for name in slot.parts_by_selecting_field
+    name for slot in SLOTS for name in slot.part_class_by_selecting_field
 )
 
 
@@ -126,17 +130,21 @@ def scene_field_defaults() -> dict[str, Any]:
         Default values by field name. The default of a slot is None if other fields select the part.
     """
     choices = {
-        slot.name: slot.default_part_name if slot in SLOTS_CHOSEN_BY_NAME else None
+        slot.name: slot.default_part_name if slot in SLOTS_WITH_PART_CHOSEN_BY_NAME else None
         for slot in SLOTS
     }
     fields = {
         name: part.__dataclass_fields__[name].default
         for name, part in PART_CLASS_BY_FIELD_NAME.items()
     }
-    return {name: {**choices, **fields}[name] for name in dict.fromkeys((*FIELD_NAMES, *choices))}
+    return {
+        name: {**choices, **fields}[name] for name in dict.fromkeys((*SCENE_FIELD_NAMES, *choices))
+    }
 
 
-def with_scene_field_signature(*extra_field_names: str) -> Callable[[F], F]:
+def add_scene_fields_to_signature(
+    *extra_field_names: str,
+) -> Callable[[DecoratedFunction], DecoratedFunction]:
     """Return a decorator that adds the fields of scenes to a signature.
 
     The signature is used for code completion in editors. The decorated function takes the fields as
@@ -153,7 +161,7 @@ def with_scene_field_signature(*extra_field_names: str) -> Callable[[F], F]:
         Decorator.
     """
 
-    def decorate(function: F) -> F:
+    def decorate(function: DecoratedFunction) -> DecoratedFunction:
         stated = signature(function)
         *first, last = stated.parameters.values()
         names = (*scene_field_defaults(), *extra_field_names)
@@ -226,7 +234,7 @@ def check_and_register_part(slot: Slot, part: Any) -> UserPart:
         If the part cannot fill the slot.
     """
     found: UserPart = part
-    if part in slot.built_in_parts.values() and slot in SLOTS_CHOSEN_BY_NAME:
+    if part in slot.built_in_parts.values() and slot in SLOTS_WITH_PART_CHOSEN_BY_NAME:
         return found
     if isinstance(part, UserLoading) and slot.base_class is loading.Loading:
         _check_part_name(slot, part)
@@ -248,7 +256,7 @@ def _check_user_part(slot: Slot, part: Any) -> None:
         raise InvalidValue(slot.name, part, "must be a frozen dataclass", remedy=remedy)
     _check_part_name(slot, part)
     _check_part_fields(slot, part)
-    _check_excluded_unknowns(slot, part)
+    _check_unknowns_excluded_from_distance(slot, part)
     check_names_of_needed_quantities(slot.name, part)
     for name in part.required_functions():
         function = getattr_static(part, name, None)
@@ -257,7 +265,7 @@ def _check_user_part(slot: Slot, part: Any) -> None:
             raise InvalidValue(slot.name, part, rule, remedy=remedy)
 
 
-def _check_excluded_unknowns(slot: Slot, part: type[Part]) -> None:
+def _check_unknowns_excluded_from_distance(slot: Slot, part: type[Part]) -> None:
     """Raise ``InvalidValue`` if ``excluded_from_distance`` is invalid.
 
     Each name must be the name of an unknown of the part.
@@ -280,18 +288,19 @@ def _check_part_name(slot: Slot, part: UserPart) -> None:
     for other in SLOTS:
         if name in other.built_in_parts:
             rule = f"takes the name of a part of rsfstudy, {name!r}"
-        elif name in other.user_parts and _definition_origin(
+        elif name in other.user_parts and _module_and_qualified_name(
             other.user_parts[name]
-        ) != _definition_origin(part):
+        ) != _module_and_qualified_name(part):
             rule = (
-                f"takes the name {name!r} of {'.'.join(_definition_origin(other.user_parts[name]))}"
+                f"takes the name {name!r} of "
+                f"{'.'.join(_module_and_qualified_name(other.user_parts[name]))}"
             )
     if rule:
-        remedy = f'Write name = "..." in {_definition_origin(part)[1]}.'
+        remedy = f'Write name = "..." in {_module_and_qualified_name(part)[1]}.'
         raise InvalidValue(slot.name, part, rule, remedy=remedy)
 
 
-def _definition_origin(part: UserPart) -> tuple[str, str]:
+def _module_and_qualified_name(part: UserPart) -> tuple[str, str]:
     """Return the module and the qualified name of the definition of a part.
 
     The result is the same if a notebook cell with the definition is run again.
@@ -419,9 +428,9 @@ def scene_field_quantities(user_parts: Iterable[UserPart]) -> dict[str, Quantity
     InvalidValue
         If two parts have different fields with the same name.
     """
-    found = {about.name: about for about in FIELD_QUANTITIES}
+    found = {about.name: about for about in SCENE_FIELD_QUANTITIES}
     for kind in map(class_of_part, user_parts):
-        for about in (find_slot_of_part_class(kind).field_quantity, *field_quantities(kind)):
+        for about in (find_slot_of_part_class(kind).field_quantity, *part_field_quantities(kind)):
             if found.setdefault(about.name, about) != about:
                 rule = "is the name of something else, of another part"
                 raise InvalidValue(f"field of {kind.name}", about.name, rule)
@@ -458,7 +467,7 @@ def scene_field_types(user_parts: Iterable[UserPart]) -> Mapping[str, Any]:
 
 
 #: Types of the fields of scenes without user-defined parts.
-FIELD_TYPES = scene_field_types(())
+SCENE_FIELD_TYPES = scene_field_types(())
 
 
 def quantities_with_values(

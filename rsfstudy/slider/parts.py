@@ -233,7 +233,7 @@ def number(
     scale : str, optional
         Scale of a dimensionless field, for example ``"sigma_*"``.
     rule : str, optional
-        Condition that values must satisfy, a key of ``VALUE_RULES``.
+        Condition that values must satisfy, a key of ``CONDITION_BY_VALUE_RULE``.
     remedy : str, optional
         Last sentence of the error message if a value violates the rule.
     omit_if_none : bool, default: False
@@ -261,8 +261,8 @@ def number(
     >>> PowerLaw().power
     2.0
     """
-    if rule not in VALUE_RULES:
-        raise InvalidValue("rule", rule, "is unknown", choices=VALUE_RULES)
+    if rule not in CONDITION_BY_VALUE_RULE:
+        raise InvalidValue("rule", rule, "is unknown", choices=CONDITION_BY_VALUE_RULE)
     about = {"symbol": symbol, "units": units, "long_name": long_name, "scale": scale}
     metadata = {"about": about, "rule": rule, "remedy": remedy, "omit_if_none": omit_if_none}
     return field(default=default, metadata=metadata)
@@ -298,7 +298,7 @@ def flag(default: bool, long_name: str) -> Any:
 
 
 #: Conditions of numeric fields, by the text of the rule.
-VALUE_RULES: Mapping[str, Callable[[float], bool]] = {
+CONDITION_BY_VALUE_RULE: Mapping[str, Callable[[float], bool]] = {
     "": lambda value: True,
     POSITIVE: lambda value: value > 0.0,
     NON_NEGATIVE: lambda value: value >= 0.0,
@@ -383,7 +383,7 @@ def collect_parameter_values(part: Part, scene: SceneView) -> Numbers:
     return (*part.parameter_values(scene), *others)
 
 
-def field_quantities(part_class: type[Part]) -> list[Quantity]:
+def part_field_quantities(part_class: type[Part]) -> list[Quantity]:
     """Return the quantities that describe the fields of a part.
 
     Parameters
@@ -407,7 +407,7 @@ def _field_validation_rule(
     """Return the default, rule, remedy and condition of a field."""
     stated = part_class.__dataclass_fields__[field_name]
     rule = stated.metadata["rule"]
-    return stated.default, rule, stated.metadata["remedy"], VALUE_RULES.get(rule)
+    return stated.default, rule, stated.metadata["remedy"], CONDITION_BY_VALUE_RULE.get(rule)
 
 
 def validate_field_value(part_class: type[Part], field_name: str, value: Any) -> Any:
@@ -454,7 +454,7 @@ def validate_field_value(part_class: type[Part], field_name: str, value: Any) ->
         raise InvalidValue(field_name, value, "must be a number") from error
     if not math.isfinite(plain):
         raise InvalidValue(field_name, plain, "must be finite")
-    if not VALUE_RULES[rule](plain):
+    if not CONDITION_BY_VALUE_RULE[rule](plain):
         raise InvalidValue(field_name, plain, rule, remedy=remedy)
     return plain
 

@@ -88,8 +88,8 @@ class SampledHistory(UserLoading):
     of_pressure: bool = False  # type: ignore[misc]
     first_reversal: tuple[str, float, str] | None = field(default=None, compare=False, repr=False)
 
-    auxiliary_rates = staticmethod(ramp.auxiliary_rates)
-    auxiliary_steady_states = staticmethod(ramp.auxiliary_steady_states)
+    auxiliary_rates = staticmethod(ramp.pending_normal_stress_rates)
+    auxiliary_steady_states = staticmethod(ramp.zero_pending_normal_stress)
 
     @property
     def unknowns(self) -> tuple[Quantity, ...]:  # type: ignore[override]
@@ -204,7 +204,7 @@ class SampledHistory(UserLoading):
 def build_sampled_history(
     time: np.ndarray,
     velocity: np.ndarray,
-    stress_fall: np.ndarray | None,
+    normal_stress_fall: np.ndarray | None,
     name: str,
     *,
     of_pressure: bool = False,
@@ -219,7 +219,7 @@ def build_sampled_history(
     velocity : ndarray
         Load point velocity between each sample and the next sample, in :math:`V_*`. The last
         velocity has no end.
-    stress_fall : ndarray or None
+    normal_stress_fall : ndarray or None
         Decrease of normal stress from :math:`\sigma_*` at the samples, in :math:`\sigma_*`. After
         the last sample, normal stress remains constant.
     name : str
@@ -243,11 +243,11 @@ def build_sampled_history(
         raise InvalidValue("name", name, "must be a Python identifier: it names the history")
     columns = np.zeros((len(time), STRESS_RATE_COLUMN + 1))
     columns[:, TIME_COLUMN], columns[:, VELOCITY_COLUMN] = time - time[0], velocity
-    if stress_fall is not None:
-        columns[:, STRESS_FALL_COLUMN] = stress_fall
-        columns[:-1, STRESS_RATE_COLUMN] = -np.diff(stress_fall) / np.diff(time)
+    if normal_stress_fall is not None:
+        columns[:, STRESS_FALL_COLUMN] = normal_stress_fall
+        columns[:-1, STRESS_RATE_COLUMN] = -np.diff(normal_stress_fall) / np.diff(time)
     history = build_sampled_history_from_table(
-        columns, stress_fall is not None, name, of_pressure=of_pressure
+        columns, normal_stress_fall is not None, name, of_pressure=of_pressure
     )
     return replace(history, first_reversal=first_reversal)
 

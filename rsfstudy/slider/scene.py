@@ -41,7 +41,7 @@ from rsfstudy.slider.state_functions import check_steady_states
 #: do not affect friction.
 _CRITICAL_STIFFNESS_CACHE_SIZE = 4096
 #: Segment table of loadings that consist of a single segment without an end.
-ENDLESS_SEGMENT_TABLE = np.array([[0.0, math.inf, *[math.nan] * 4]])
+SINGLE_ENDLESS_SEGMENT_TABLE = np.array([[0.0, math.inf, *[math.nan] * 4]])
 
 
 @guard_methods
@@ -310,7 +310,7 @@ class Scene(SceneBase):
         table, an array of shape (segments, 6). The columns are defined in ``parameter_layout``.
         """
         if len(self._segments) == 1:
-            return ((self, ENDLESS_SEGMENT_TABLE),)
+            return ((self, SINGLE_ENDLESS_SEGMENT_TABLE),)
         table, breaks = map(
             np.array, (self.parts.loading.segment_table, self.parts.loading.jump_mask)
         )

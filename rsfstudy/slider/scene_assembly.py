@@ -17,9 +17,9 @@ from rsfstudy.errors import InvalidValue
 from rsfstudy.quantities import HtmlTableMixin, Quantity
 from rsfstudy.slider import dynamics, fluid, laws, loading, normal_stress
 from rsfstudy.slider.field_name_hints import (
+    hint_for_positional_argument,
     hint_for_unknown_choice,
     hint_for_unknown_field,
-    hint_for_value_without_field_name,
 )
 from rsfstudy.slider.part_registry import (
     FIELDS_OMITTED_IF_NONE,
@@ -27,20 +27,20 @@ from rsfstudy.slider.part_registry import (
     PART_SELECTING_FIELDS,
     SLOT_NAMES,
     SLOTS,
-    SLOTS_CHOSEN_BY_NAME,
+    SLOTS_WITH_PART_CHOSEN_BY_NAME,
     Slot,
     UserPart,
+    add_scene_fields_to_signature,
     check_and_register_part,
     class_of_part,
     normalise_field_value,
     quantities_with_values,
     scene_field_quantities,
-    with_scene_field_signature,
 )
 from rsfstudy.slider.parts import Part, field_names, validate_field_value
 from rsfstudy.slider.scene_caching import cached_attribute
 from rsfstudy.slider.slider_parameters import (
-    STIFFNESS_FIELDS,
+    ALTERNATIVE_STIFFNESS_FIELDS,
     SliderParameters,
     with_stiffness_default,
 )
@@ -128,8 +128,11 @@ def replace_field_values(
     for place, values in _group_values_by_part_index(
         changed_field_values, build_field_index(tuple(map(type, scene_parts[1:])))
     ).items():
-        if any(name in values for name in STIFFNESS_FIELDS):
-            values = {**dict.fromkeys(STIFFNESS_FIELDS), **with_stiffness_default(values)}
+        if any(name in values for name in ALTERNATIVE_STIFFNESS_FIELDS):
+            values = {
+                **dict.fromkeys(ALTERNATIVE_STIFFNESS_FIELDS),
+                **with_stiffness_default(values),
+            }
         made[place] = replace(made[place], **values)
     return SceneParts._make(made)
 
@@ -171,7 +174,7 @@ def _select_part(slot: Slot, field_values: Mapping[str, Any]) -> UserPart:
         return check_and_register_part(slot, value)
     if isinstance(value, str) and value in slot.user_parts and value not in slot.built_in_parts:
         return slot.user_parts[value]
-    if not slot.parts_by_selecting_field:
+    if not slot.part_class_by_selecting_field:
         name = normalise_field_value(slot.name, field_values.get(slot.name, slot.default_part_name))
         if not isinstance(name, str) or name not in slot.built_in_parts:
             choices = (*slot.built_in_parts, *slot.user_parts)
@@ -179,10 +182,10 @@ def _select_part(slot: Slot, field_values: Mapping[str, Any]) -> UserPart:
             raise InvalidValue(slot.name, name, "is unknown", choices=choices, remedy=remedy)
         return slot.built_in_parts[name]
     if value is not None:
-        others = ", ".join(slot.parts_by_selecting_field) or "the other fields"
+        others = ", ".join(slot.part_class_by_selecting_field) or "the other fields"
         remedy = f"Those of rsfstudy are called for by {others}."
         raise InvalidValue(slot.name, value, "is unknown", choices=slot.user_parts, remedy=remedy)
-    for caller, part in slot.parts_by_selecting_field.items():
+    for caller, part in slot.part_class_by_selecting_field.items():
         value = field_values.get(caller)
         if value is not None and validate_field_value(part, caller, value):
             return part
@@ -205,11 +208,11 @@ class FieldIndex(NamedTuple):
     inapplicable_fields : frozenset of str
         Names of these fields that have no meaning, whatever their value. Fields that would select
         another part are not included.
-    slots_given_by_name : tuple of str
+    names_of_slots_chosen_by_name : tuple of str
         Names of the slots whose parts are selected by name.
     all_field_names : tuple of str
         Names of all fields, including the fields of user-defined parts.
-    plain_value_fields : frozenset of str
+    fields_not_selecting_a_part : frozenset of str
         Names of the fields that do not select a part.
     """
 
@@ -218,9 +221,9 @@ class FieldIndex(NamedTuple):
     rejecting_part_class_by_field: Mapping[str, type[Part]]
     values_of_inactive_fields: Mapping[str, Any]
     inapplicable_fields: frozenset[str]
-    slots_given_by_name: tuple[str, ...]
+    names_of_slots_chosen_by_name: tuple[str, ...]
     all_field_names: tuple[str, ...]
-    plain_value_fields: frozenset[str]
+    fields_not_selecting_a_part: frozenset[str]
 
 
 @cache
@@ -260,7 +263,9 @@ def build_field_index(part_classes: tuple[type[Part], ...]) -> FieldIndex:
                 idle[name] = other.__dataclass_fields__[name].default if calls else None
                 if not calls or slot.name in owned:
                     foreign.add(name)
-    named = tuple(slot.name for slot in SLOTS if slot in SLOTS_CHOSEN_BY_NAME or slot.name in owned)
+    named = tuple(
+        slot.name for slot in SLOTS if slot in SLOTS_WITH_PART_CHOSEN_BY_NAME or slot.name in owned
+    )
     fields = tuple(scene_field_quantities(owned.values()))
     plain = frozenset(fields) - {*SLOT_NAMES, *PART_SELECTING_FIELDS}
     return FieldIndex(kinds, places, refusing, idle, frozenset(foreign), named, fields, plain)
@@ -365,7 +370,7 @@ class SceneBase(HtmlTableMixin):
         layout = self.field_index
         if name in layout.part_index_by_field:
             return getattr(self.parts[layout.part_index_by_field[name]], name)
-        if name in layout.slots_given_by_name:
+        if name in layout.names_of_slots_chosen_by_name:
             return getattr(self.parts, name).name
         if name in layout.values_of_inactive_fields:
             return layout.values_of_inactive_fields[name]
@@ -402,7 +407,7 @@ class SceneBase(HtmlTableMixin):
             Values by field name.
         """
         values = dict(self.field_index.values_of_inactive_fields)
-        for name in self.field_index.slots_given_by_name:
+        for name in self.field_index.names_of_slots_chosen_by_name:
             values[name] = getattr(self.parts, name).name
         for part in self.parts:
             values |= vars(part)
@@ -424,7 +429,7 @@ class SceneBase(HtmlTableMixin):
         """
         history = (
             self.parts.loading.describe()
-            if "loading" in self.field_index.slots_given_by_name
+            if "loading" in self.field_index.names_of_slots_chosen_by_name
             else {}
         )
         return self.as_dict() | history
@@ -444,7 +449,7 @@ class SceneBase(HtmlTableMixin):
         """
         return quantities_with_values(self.as_dict(), self.user_parts)
 
-    @with_scene_field_signature()
+    @add_scene_fields_to_signature()
     def with_(self, **changes: Any) -> Self:
         """Return a copy of the scene with new values of some fields.
 
@@ -467,15 +472,15 @@ class SceneBase(HtmlTableMixin):
             If a value is invalid in the new scene.
         """
         if all(
-            n in self.field_index.plain_value_fields and value is not None
+            n in self.field_index.fields_not_selecting_a_part and value is not None
             for n, value in changes.items()
         ):
             return type(self)(replace_field_values(self.parts, changes))
         theirs = find_user_parts(self.parts)
         kept = {**self.as_dict(), **theirs}
         dropped = find_inapplicable_fields({**kept, **changes}, theirs.values())
-        if any(changes.get(name) is not None for name in STIFFNESS_FIELDS):
-            dropped |= {*STIFFNESS_FIELDS}
+        if any(changes.get(name) is not None for name in ALTERNATIVE_STIFFNESS_FIELDS):
+            dropped |= {*ALTERNATIVE_STIFFNESS_FIELDS}
         return type(self)(**{name: kept[name] for name in kept if name not in dropped} | changes)
 
 
@@ -508,7 +513,7 @@ def value_without_field_name_error(value: Any) -> InvalidValue:
     InvalidValue
         Error whose message suggests the name of the field.
     """
-    remedy = hint_for_value_without_field_name(
-        value, {slot.name: slot.built_in_parts for slot in SLOTS_CHOSEN_BY_NAME}
+    remedy = hint_for_positional_argument(
+        value, {slot.name: slot.built_in_parts for slot in SLOTS_WITH_PART_CHOSEN_BY_NAME}
     )
     return InvalidValue("Scene", value, "is given without a name", remedy=remedy)

@@ -6,8 +6,8 @@ from collections.abc import Callable
 from functools import cached_property, wraps
 from typing import TYPE_CHECKING, Any, Concatenate, ParamSpec, TypeVar
 
-P = ParamSpec("P")
-T = TypeVar("T")
+ParametersAfterScene = ParamSpec("ParametersAfterScene")
+FunctionResult = TypeVar("FunctionResult")
 
 if TYPE_CHECKING:
     cached_attribute = cached_property
@@ -29,8 +29,8 @@ else:
 
 
 def cached_per_scene(
-    function: Callable[Concatenate[Any, P], T],
-) -> Callable[Concatenate[Any, P], T]:
+    function: Callable[Concatenate[Any, ParametersAfterScene], FunctionResult],
+) -> Callable[Concatenate[Any, ParametersAfterScene], FunctionResult]:
     """Cache the results of a function in the scene that it is called with.
 
     Parameters
@@ -46,7 +46,9 @@ def cached_per_scene(
     """
 
     @wraps(function)
-    def wrapper(scene: Any, /, *stated: P.args, **named: P.kwargs) -> T:
+    def wrapper(
+        scene: Any, /, *stated: ParametersAfterScene.args, **named: ParametersAfterScene.kwargs
+    ) -> FunctionResult:
         made, key = scene.cache, (function, *stated, *named.values())
         # The key is used only once for a lookup, because hashing a key can be slow.
         found = made.get(key)

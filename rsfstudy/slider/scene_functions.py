@@ -62,10 +62,10 @@ STOPPED_LOG_SLIP_RATE = -290.0 * math.log(10.0)
 #: Largest difference between ln V_0 and ln V that the rates resolve. At lower slip rates the
 #: contact is stationary, because the remaining slip changes the state by a relative amount below
 #: exp(-100).
-STATIONARY_CONTACT_LOG_VELOCITY_RATIO = 100.0
+MAX_LOG_LOAD_OVER_SLIP_VELOCITY = 100.0
 
 #: Change of ln V that is as long as one unit of displacement (D_c) or inertial time along the path.
-LOG_RATE_PER_PATH_LENGTH = 6.0
+LOG_SLIP_RATE_PER_PATH_LENGTH = 6.0
 #: Largest slope whose square is computed. Adding 1 to the square of a larger slope has no effect in
 #: double precision.
 MAX_FINITE_PATH_SLOPE = 1e9
@@ -102,7 +102,7 @@ def velocity_ratios(log_slip_rate: float, p: Numbers) -> VelocityRatios:
     the slip fraction has a limit, but without the lower limit of the log rate the first factor
     would overflow and the second factor would underflow.
     """
-    least = p[LOG_LOAD_VELOCITY] - STATIONARY_CONTACT_LOG_VELOCITY_RATIO
+    least = p[LOG_LOAD_VELOCITY] - MAX_LOG_LOAD_OVER_SLIP_VELOCITY
     x = least if log_slip_rate < least else log_slip_rate
     slower = math.exp(p[LOG_LOAD_VELOCITY] - x)
     return x, slower, 1.0 / (1.0 + slower)
@@ -235,14 +235,14 @@ def build_rate_functions_between_ruptures(
     def rates_along_path(state: Numbers, p: Numbers) -> Numbers:
         loading, changes, _ratios = displacement_rate_function(state, p)
         along = displacement_per_path_length(
-            (loading - state_sum(changes)) / (LOG_RATE_PER_PATH_LENGTH * p[A])
+            (loading - state_sum(changes)) / (LOG_SLIP_RATE_PER_PATH_LENGTH * p[A])
         )
         return (along * loading, *times(changes, along))
 
     def rates_along_path_with_time(state: Numbers, p: Numbers) -> Numbers:
         loading, changes, ratios = displacement_rate_function(state, p)
         along = displacement_per_path_length(
-            (loading - state_sum(changes)) / (LOG_RATE_PER_PATH_LENGTH * p[A])
+            (loading - state_sum(changes)) / (LOG_SLIP_RATE_PER_PATH_LENGTH * p[A])
         )
         return (along * loading, *times(changes, along), along * time_per_displacement(ratios, p))
 
@@ -275,17 +275,17 @@ def build_rate_functions_in_rupture(
 
     def rates_along_path(state: Numbers, p: Numbers) -> Numbers:
         by = rupture_rate_function(state, p)
-        return times(by, displacement_per_path_length(by[1] / LOG_RATE_PER_PATH_LENGTH))
+        return times(by, displacement_per_path_length(by[1] / LOG_SLIP_RATE_PER_PATH_LENGTH))
 
     def rates_along_path_with_time(state: Numbers, p: Numbers) -> Numbers:
         by = rupture_rate_function(state[:end], p)
-        along = displacement_per_path_length(by[1] / LOG_RATE_PER_PATH_LENGTH)
+        along = displacement_per_path_length(by[1] / LOG_SLIP_RATE_PER_PATH_LENGTH)
         return (*times(by, along), along)
 
     return rupture_rate_function, rates_along_path, rates_along_path_with_time
 
 
-def build_rigid_rate_function(friction_functions: FrictionFunctions) -> Function:
+def build_rate_function_of_rigid_slider(friction_functions: FrictionFunctions) -> Function:
     r"""Return the rate function of a rigid slider.
 
     Parameters
@@ -319,7 +319,7 @@ def build_rigid_rate_function(friction_functions: FrictionFunctions) -> Function
 # ---- points --------------------------------------------------------------------------------------
 
 
-def build_point_assembling_function(friction_functions: FrictionFunctions) -> Function:
+def build_motion_point_assembling_function(friction_functions: FrictionFunctions) -> Function:
     r"""Return a function that computes all quantities of a point.
 
     Parameters
@@ -473,7 +473,7 @@ def build_point_function_in_rupture(
     return point
 
 
-def build_rigid_point_function(
+def build_point_function_of_rigid_slider(
     friction_functions: FrictionFunctions, assemble_point: Function
 ) -> Function:
     """Return a function that computes points of a rigid slider.
@@ -505,7 +505,7 @@ def build_rigid_point_function(
 # ---- all of it -----------------------------------------------------------------------------------
 
 
-class RegimeFunctions(NamedTuple):
+class MotionRegimeFunctions(NamedTuple):
     """Rates and points of a scene in one regime.
 
     Parameters
@@ -550,8 +550,8 @@ class SceneFunctions(NamedTuple):
 
     friction_functions: FrictionFunctions
     force_balance_function: Function
-    functions_between_ruptures: RegimeFunctions
-    functions_in_rupture: RegimeFunctions | None
+    functions_between_ruptures: MotionRegimeFunctions
+    functions_in_rupture: MotionRegimeFunctions | None
     rigid_rate_function: Function
     rigid_point_function: Function
 
@@ -585,13 +585,19 @@ def assemble_scene_functions(
     against = build_displacement_rate_function(
         made, balance, allows_reversed_slip=friction_terms.allows_reversed_slip
     )
-    point_at = build_point_assembling_function(made)
+    point_at = build_motion_point_assembling_function(made)
     point = build_point_function_between_ruptures(made, balance, growth, point_at)
-    slow, full = RegimeFunctions(*build_rate_functions_between_ruptures(made, against), point), None
+    slow, full = (
+        MotionRegimeFunctions(*build_rate_functions_between_ruptures(made, against), point),
+        None,
+    )
     if rupture_rate_function_builder is not None:
         rates = build_rate_functions_in_rupture(made, rupture_rate_function_builder(made))
-        full = RegimeFunctions(*rates, build_point_function_in_rupture(made, point_at))
-    of_rigid = build_rigid_rate_function(made), build_rigid_point_function(made, point_at)
+        full = MotionRegimeFunctions(*rates, build_point_function_in_rupture(made, point_at))
+    of_rigid = (
+        build_rate_function_of_rigid_slider(made),
+        build_point_function_of_rigid_slider(made, point_at),
+    )
     return SceneFunctions(made, balance, slow, full, *of_rigid)
 
 
@@ -636,7 +642,7 @@ def build_scene_functions(scene: SceneView, dynamics: Dynamics | None = None) ->
         law_state_count=law.state_count,
         evolutions=law.evolutions or wrap_single_state_evolution(law.evolution),
         steady_states=law.steady_states or default_steady_state,
-        state_effects=tuple(effect for effect in effects if effect is not None),
+        stress_effects_on_state=tuple(effect for effect in effects if effect is not None),
         allows_reversed_slip=law.regularised,
         normal_stress=stress.normal_stress,
         auxiliary_unknown_count=len(source.unknowns),

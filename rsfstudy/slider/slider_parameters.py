@@ -91,7 +91,7 @@ class SliderParameters(Part):
 
 
 #: Names of the two alternative fields for the stiffness.
-STIFFNESS_FIELDS = ("stiffness_ratio", "stiffness")
+ALTERNATIVE_STIFFNESS_FIELDS = ("stiffness_ratio", "stiffness")
 
 
 def with_stiffness_default(field_values: dict[str, Any]) -> dict[str, Any]:
@@ -112,7 +112,7 @@ def with_stiffness_default(field_values: dict[str, Any]) -> dict[str, Any]:
     InvalidValue
         If both the stiffness and the stiffness ratio are given.
     """
-    given = [name for name in STIFFNESS_FIELDS if name in field_values]
+    given = [name for name in ALTERNATIVE_STIFFNESS_FIELDS if name in field_values]
     if len(given) == 2:
         rule = (
             f"give stiffness or stiffness_ratio (here {field_values['stiffness_ratio']:g}), not "

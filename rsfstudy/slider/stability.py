@@ -47,7 +47,7 @@ import numpy as np
 
 from rsfstudy.slider.equations import build_friction_relation
 from rsfstudy.slider.evolution_derivatives import (
-    Matrix,
+    NestedListMatrix,
     StateEvolutionDerivatives,
     compute_state_evolution_derivatives,
 )
@@ -225,11 +225,11 @@ def _compute_growth_rates(
         0.0 < abs(polynomial[-1]) < _SMALL_MASS_RATIO * abs(polynomial[-2])
         and linearised_balance.slip_rate_norm > 0.0
     )
-    roots = _find_roots_if_one_is_distant(polynomial) if light else np.roots(polynomial[::-1])
+    roots = _find_roots_with_one_distant_root(polynomial) if light else np.roots(polynomial[::-1])
     return np.asarray(roots[np.argsort(-roots.real)])
 
 
-def _find_roots_if_one_is_distant(polynomial: PolynomialCoefficients) -> np.ndarray:
+def _find_roots_with_one_distant_root(polynomial: PolynomialCoefficients) -> np.ndarray:
     """Find the roots of a polynomial with one root of large magnitude.
 
     A small mass makes one root about 1e20 times larger. If all roots were computed together, the
@@ -288,10 +288,10 @@ def linear_friction_response(
         evolution_derivatives or compute_state_evolution_derivatives(scene, steady_state)
     )
     by_state = [list(row) for row in by_state]
-    weights, shifting = _state_weights_in_log_slip_rate(scene, steady_state)
+    weights, shifting = _log_slip_rate_change_by_each_state(scene, steady_state)
     for row, of_shift in zip(by_state, by_shift, strict=True):
         row[-1] += of_shift * shifting
-    denominator, adjugate = compute_matrix_resolvent(by_state)
+    denominator, adjugate = compute_resolvent_polynomials(by_state)
     above = [scene.a * x for x in denominator]
     below = [slope * x for x in denominator]
     for power, matrix in enumerate(adjugate):
@@ -301,7 +301,7 @@ def linear_friction_response(
     return above, below
 
 
-def _state_weights_in_log_slip_rate(
+def _log_slip_rate_change_by_each_state(
     scene: SceneView, steady_state: SteadySliding
 ) -> tuple[list[float], float]:
     """Return the weight of each state in the friction relation.
@@ -322,7 +322,9 @@ def _dot_product(first: Sequence[float], second: Sequence[float]) -> float:
     return sum(map(mul, first, second))
 
 
-def compute_matrix_resolvent(matrix: Matrix) -> tuple[PolynomialCoefficients, list[Matrix]]:
+def compute_resolvent_polynomials(
+    matrix: NestedListMatrix,
+) -> tuple[PolynomialCoefficients, list[NestedListMatrix]]:
     """Compute the resolvent of a matrix by the Faddeev-LeVerrier algorithm.
 
     The resolvent :math:`(p - M)^{-1}` is the adjugate matrix of :math:`p - M`, divided by the
@@ -435,7 +437,7 @@ def largest_linear_growth_rate(scene: SceneView, log_slip_rate: float) -> Growth
     error = slopes.relative_error
 
     def perturbed_growth_rates(part: float) -> np.ndarray:
-        changed = slopes.with_relative_change(part)
+        changed = slopes.with_perturbed_derivatives(part)
         return _compute_growth_rates(
             _linearise_force_balance(scene, steady, changed), scene.stiffness
         )
@@ -500,7 +502,7 @@ def spring_response_to_normal_stress(
     )
     gained, shifted = by_pressure(steady.frictional_stress, psis, p)
     _by_rate, by_shift, by_state, _error = compute_state_evolution_derivatives(still, steady)
-    denominator, adjugate = compute_matrix_resolvent(by_state)
+    denominator, adjugate = compute_resolvent_polynomials(by_state)
     forced = [gained * x for x in denominator]
     for power, matrix in enumerate(adjugate):
         forced[power] -= shifted * math.fsum(_dot_product(row, by_shift) for row in matrix)

@@ -138,7 +138,7 @@ def build_sum_function(term_count: int) -> Function:
     callable
         Function ``(numbers) -> float``.
     """
-    return _evaluate_lambda_source("numbers", _sum_source_text("numbers", term_count))
+    return _build_function_from_expression("numbers", _tuple_sum_expression("numbers", term_count))
 
 
 @cache
@@ -156,7 +156,7 @@ def build_tuple_scaling_function(component_count: int) -> Function:
         Function ``(numbers, by) -> tuple`` that multiplies each element by ``by``.
     """
     each = (f"by * numbers[{i}], " for i in range(component_count))
-    return _evaluate_lambda_source("numbers, by", f"({''.join(each)})")
+    return _build_function_from_expression("numbers, by", f"({''.join(each)})")
 
 
 @cache
@@ -175,15 +175,15 @@ def build_state_step_function(state_count: int) -> Function:
         state.
     """
     each = (f"psis[{i}] + by * changes[{i}], " for i in range(state_count))
-    return _evaluate_lambda_source("psis, changes, by", f"({''.join(each)})")
+    return _build_function_from_expression("psis, changes, by", f"({''.join(each)})")
 
 
-def _sum_source_text(tuple_name: str, term_count: int) -> str:
+def _tuple_sum_expression(tuple_name: str, term_count: int) -> str:
     """Return the source code of a sum of the first elements of a tuple."""
     return " + ".join(f"{tuple_name}[{i}]" for i in range(term_count))
 
 
-def _evaluate_lambda_source(argument_names: str, expression: str) -> Function:
+def _build_function_from_expression(argument_names: str, expression: str) -> Function:
     """Create a function from the source code of its arguments and value.
 
     The code has no loop, because the compiler cannot iterate over tuples.
@@ -212,8 +212,8 @@ def build_state_contribution_function(
         due to changes of the states.
     """
     if pressure_derivatives is None:
-        return _evaluate_lambda_source(
-            "changes, g, psis, p", _sum_source_text("changes", law_state_count)
+        return _build_function_from_expression(
+            "changes, g, psis, p", _tuple_sum_expression("changes", law_state_count)
         )
     state_sum = build_sum_function(law_state_count)
 
@@ -293,13 +293,17 @@ def check_steady_states(scene: SceneView) -> None:
 
 
 def _evolution_jacobian(
-    evolutions: Function, log_slip_rate: float, states: Numbers, state_scale: float, p: Numbers
+    evolutions: Function,
+    log_slip_rate: float,
+    states: Numbers,
+    finite_difference_scale: float,
+    p: Numbers,
 ) -> list[list[float]]:
     """Compute the Jacobian matrix of the evolution by central differences.
 
-    The step is 1e-4 times ``state_scale``.
+    The step is 1e-4 times ``finite_difference_scale``.
     """
-    step, rows = 1e-4 * state_scale, list[list[float]]()
+    step, rows = 1e-4 * finite_difference_scale, list[list[float]]()
     for n, psi in enumerate(states):
         ahead, behind = (
             evolutions(log_slip_rate, (*states[:n], psi + off, *states[n + 1 :]), 0.0, 1.0, p)

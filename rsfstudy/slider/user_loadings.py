@@ -24,7 +24,7 @@ from rsfstudy.slider.parameter_layout import SEGMENT_VELOCITY
 from rsfstudy.slider.scene_view import SceneView
 
 #: Keys of a mapping that describes a segment.
-SEGMENT_KEYS = ("velocity", "duration", "distance", "step", "normal_stress")
+SEGMENT_MAPPING_KEYS = ("velocity", "duration", "distance", "step", "normal_stress")
 
 
 @guard_methods
@@ -197,8 +197,8 @@ def _parse_segment(declared_segment: Any, previous_normal_stress: float, locatio
             remedy = 'Write {"velocity": 10, "duration": 2}.'
             raise InvalidValue("segment", declared_segment, "is no segment", remedy=remedy)
         for key in declared_segment:
-            if key not in SEGMENT_KEYS:
-                raise InvalidValue("segment", key, "is unknown", choices=SEGMENT_KEYS)
+            if key not in SEGMENT_MAPPING_KEYS:
+                raise InvalidValue("segment", key, "is unknown", choices=SEGMENT_MAPPING_KEYS)
         if "normal_stress" in declared_segment:
             previous_normal_stress = (
                 _read_positive_number(

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
         CellColumns,
         CellJournal,
         CellTimings,
-        OutputPacking,
+        OutputPacker,
         StoredCellRow,
         find_fingerprint_differences,
         read_timings,
@@ -27,7 +27,11 @@ if TYPE_CHECKING:
         compare_same_lattice,
         find_cell_number,
     )
-    from rsfstudy.storage.dataset_files import clean_attributes, read_dataset, write_dataset
+    from rsfstudy.storage.dataset_files import (
+        convert_attributes_for_netcdf,
+        read_dataset,
+        write_dataset,
+    )
     from rsfstudy.storage.dataset_scenes import scene_of_dataset
     from rsfstudy.storage.lattice_datasets import assemble_dataset
     from rsfstudy.storage.rebuild_from_file import (
@@ -38,7 +42,7 @@ if TYPE_CHECKING:
     from rsfstudy.storage.schema import (
         build_axis_from_stored,
         build_scene_from_stored,
-        check_is_of_study,
+        check_contains_study_results,
         is_of_single_scene,
         read_declaration,
         read_json_attribute,
@@ -66,7 +70,7 @@ else:
                 "StoredCellRow",
                 "CellTimings",
                 "CellJournal",
-                "OutputPacking",
+                "OutputPacker",
                 "find_fingerprint_differences",
                 "read_timings",
             ),
@@ -79,14 +83,18 @@ else:
             "storage.schema": (
                 "build_axis_from_stored",
                 "build_scene_from_stored",
-                "check_is_of_study",
+                "check_contains_study_results",
                 "is_of_single_scene",
                 "read_declaration",
                 "read_json_attribute",
                 "read_provenance",
                 "read_scene_fields",
             ),
-            "storage.dataset_files": ("clean_attributes", "read_dataset", "write_dataset"),
+            "storage.dataset_files": (
+                "convert_attributes_for_netcdf",
+                "read_dataset",
+                "write_dataset",
+            ),
             "storage.zarr_store": (
                 "check_store_does_not_exist",
                 "check_zarr_installed",
@@ -101,14 +109,14 @@ __all__ = [
     "CellTimings",
     "Comparison",
     "CellJournal",
-    "OutputPacking",
+    "OutputPacker",
     "assemble_dataset",
     "build_axis_from_stored",
     "build_scene_from_stored",
-    "check_is_of_study",
+    "check_contains_study_results",
     "check_store_does_not_exist",
     "check_zarr_installed",
-    "clean_attributes",
+    "convert_attributes_for_netcdf",
     "compare_results",
     "compare_same_lattice",
     "find_cell_number",

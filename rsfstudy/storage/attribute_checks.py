@@ -44,10 +44,10 @@ def check_variable_attributes(dataset: xr.Dataset) -> None:
         for key, most in _MAX_CHARACTERS_OF_TEXT_ATTRIBUTES.items():
             if key in values.attrs:
                 _check_text_attribute(f"{shorten_text(name)}.{key}", values.attrs[key], most)
-        _check_flags(str(name), values.attrs)
+        _check_flag_values_and_meanings(str(name), values.attrs)
 
 
-def check_motion_variables(dataset: xr.Dataset) -> None:
+def check_motion_variables_are_numeric(dataset: xr.Dataset) -> None:
     """Check that the variables along a motion are numeric.
 
     The variables along a motion have the same dimensions as the variable ``slip``.
@@ -85,7 +85,7 @@ def _check_text_attribute(attribute_path: str, value: object, max_characters: in
         )
 
 
-def _check_flags(variable_name: str, attributes: Mapping[Any, Any]) -> None:
+def _check_flag_values_and_meanings(variable_name: str, attributes: Mapping[Any, Any]) -> None:
     """Check that flag values are numbers, and that each has a meaning."""
     if not {"flag_values", "flag_meanings"} & set(attributes):
         return

@@ -42,7 +42,7 @@ CREATE TABLE IF NOT EXISTS cells (
 """
 #: Query for database objects that do not belong to a journal. A trigger, for example, would run
 #: whenever the journal is written.
-_FOREIGN_OBJECTS_QUERY = """
+_FOREIGN_DATABASE_OBJECTS_QUERY = """
 SELECT type || ' ' || name FROM sqlite_master
 WHERE type NOT IN ('table', 'index') OR tbl_name NOT IN ('fingerprint', 'cells')
 """
@@ -52,7 +52,7 @@ _LOCK_TIMEOUT = 5.0
 _UNUSABLE_JOURNAL_REMEDY = "Choose another --output, or start over with --fresh."
 
 
-class OutputPacking:
+class OutputPacker:
     """Layout of the outputs of a measure in a row of float64 numbers.
 
     Parameters
@@ -139,7 +139,7 @@ class CellColumns:
     wall_times : ndarray of float, shape (n,)
         Wall times in s. The wall time of a pending cell is NaN.
     packed_outputs : ndarray of float, shape (n, m)
-        Outputs of each cell, in the layout of ``OutputPacking``.
+        Outputs of each cell, in the layout of ``OutputPacker``.
     """
 
     statuses: np.ndarray
@@ -201,11 +201,11 @@ class CellJournal:
         self,
         path: Path | None,
         fingerprint: Mapping[str, Any],
-        packing: OutputPacking,
+        output_packer: OutputPacker,
         *,
         fresh: bool = False,
     ) -> None:
-        self._path, self._packing = path or Path("memory"), packing
+        self._path, self._output_packer = path or Path("memory"), output_packer
         ours = {**fingerprint, "journal": _FORMAT_VERSION}
         wanted = json.dumps(ours, sort_keys=True)
         try:
@@ -217,7 +217,7 @@ class CellJournal:
         except (OSError, sqlite3.Error) as error:
             raise self._build_unusable_journal_error(error) from error
         try:
-            theirs = self._read_stored_fingerprint(wanted)
+            theirs = self._read_or_store_fingerprint(wanted)
             if theirs != wanted:
                 self._accept_journal_with_smaller_budget(theirs, ours)
         except sqlite3.Error as error:
@@ -234,7 +234,7 @@ class CellJournal:
             return DataError(rule)
         return DataError(f"cannot use {self._path}: {error}. {_UNUSABLE_JOURNAL_REMEDY}")
 
-    def _read_stored_fingerprint(self, run_fingerprint: str) -> Any:
+    def _read_or_store_fingerprint(self, run_fingerprint: str) -> Any:
         """Return the fingerprint stored in the journal.
 
         If the journal is new, the method stores ``run_fingerprint`` and returns
@@ -242,7 +242,7 @@ class CellJournal:
         """
         with self._db:
             self._db.executescript(_CREATE_TABLES)
-            others = self._db.execute(_FOREIGN_OBJECTS_QUERY).fetchall()
+            others = self._db.execute(_FOREIGN_DATABASE_OBJECTS_QUERY).fetchall()
             if others:
                 found = shorten_text(others[0][0])
                 raise DataError(
@@ -356,7 +356,9 @@ class CellJournal:
         DataError
             If the journal cannot be read, or if a row does not match its checksum.
         """
-        columns = CellColumns.build_pending_cells(len(cell_keys), self._packing.packed_number_count)
+        columns = CellColumns.build_pending_cells(
+            len(cell_keys), self._output_packer.packed_number_count
+        )
         what = "key, status, message, work, seconds, numbers, checksum"
         for places, rows in self._query_rows_of_cells(cell_keys, what):
             try:

@@ -28,7 +28,7 @@ from rsfstudy.vocabulary import TIMING_VARIABLES
 
 _AGREEMENT_COLUMNS = ["variable", "values", "identical", "largest_difference", "beyond_errors"]
 #: Entries of a fingerprint that the declaration contains too.
-_FINGERPRINT_KEYS_ALSO_DECLARED = {"study", "measure", "rtol", "budget", "methods", "engine"}
+_FINGERPRINT_KEYS_ALSO_IN_DECLARATION = {"study", "measure", "rtol", "budget", "methods", "engine"}
 
 FirstAndSecondValue = tuple[Any, Any]
 
@@ -75,14 +75,14 @@ def compare_same_lattice(first: xr.Dataset, second: xr.Dataset) -> pd.DataFrame:
     )
 
 
-def _compare_motions(theirs: xr.Dataset, ours: xr.Dataset) -> pd.DataFrame:
+def _compare_motions(first: xr.Dataset, second: xr.Dataset) -> pd.DataFrame:
     """Compare two motions of one scene."""
     rows = [
-        _variable_agreement(n, theirs, ours)
-        for n, values in theirs.variables.items()
+        _variable_agreement(n, first, second)
+        for n, values in first.variables.items()
         if values.dims
     ]
-    made = ({"source": str(d.attrs.get("source", "unknown"))} for d in (theirs, ours))
+    made = ({"source": str(d.attrs.get("source", "unknown"))} for d in (first, second))
     return _agreement_table(rows, *made)
 
 
@@ -212,7 +212,9 @@ def compare_results(first: xr.Dataset, second: xr.Dataset) -> Comparison:
         _add_axes_of_other_dataset(one, other) for one, other in ((first, second), (second, first))
     ]
     dims = [str(d) for d in both[0]["status"].dims]
-    labelled = [dataset.assign_coords(_alignment_labels(dataset)) for dataset in both]
+    labelled = [
+        dataset.assign_coords(_round_coordinates_for_alignment(dataset)) for dataset in both
+    ]
     left_out = _uncompared_variables(labelled)
     kept = [dataset.drop_vars(left_out, errors="ignore") for dataset in labelled]
     shared = [one.transpose(*dims, ...) for one in xr.align(*kept, join="inner")]
@@ -258,7 +260,7 @@ def _add_axes_of_other_dataset(dataset: xr.Dataset, other: xr.Dataset) -> xr.Dat
     return dataset
 
 
-def _alignment_labels(dataset: xr.Dataset) -> dict[str, Any]:
+def _round_coordinates_for_alignment(dataset: xr.Dataset) -> dict[str, Any]:
     """Round the coordinates to 12 digits, so that two datasets can be aligned.
 
     A coordinate is not rounded if two of its points would become equal.
@@ -359,7 +361,9 @@ def _read_versions_and_machine(dataset: xr.Dataset) -> dict[str, Any]:
     """Read the versions, code digests and machine of a dataset."""
     about: Mapping[str, Any] = read_provenance(dataset)
     decided = {
-        n: v for n, v in about["fingerprint"].items() if n not in _FINGERPRINT_KEYS_ALSO_DECLARED
+        n: v
+        for n, v in about["fingerprint"].items()
+        if n not in _FINGERPRINT_KEYS_ALSO_IN_DECLARATION
     }
     others = {n: v for n, v in about.items() if isinstance(v, str)}
     for name in ("time", "command", "declared_in"):

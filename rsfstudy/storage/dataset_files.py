@@ -27,7 +27,10 @@ from rsfstudy.errors import DataError, RsfStudyError, RsfStudyWarning, shorten_t
 from rsfstudy.netcdf_encoding import copy_with_cf_encoding, encoding_without_fill_values
 from rsfstudy.path_checks import check_path
 from rsfstudy.storage import content_digest, schema
-from rsfstudy.storage.attribute_checks import check_motion_variables, check_variable_attributes
+from rsfstudy.storage.attribute_checks import (
+    check_motion_variables_are_numeric,
+    check_variable_attributes,
+)
 from rsfstudy.storage.schema import FILE_LAYOUT_VERSION
 
 #: Options for opening a Zarr store lazily. Only version 3 of the Zarr format is supported.
@@ -70,7 +73,9 @@ def write_dataset(dataset: xr.Dataset, path: Path) -> xr.Dataset:
     DataError
         If the file cannot be written, or if the data that were read back differ from the dataset.
     """
-    clean = clean_attributes(dataset.assign_attrs({"layout": FILE_LAYOUT_VERSION, **dataset.attrs}))
+    clean = convert_attributes_for_netcdf(
+        dataset.assign_attrs({"layout": FILE_LAYOUT_VERSION, **dataset.attrs})
+    )
     clean.attrs.pop(content_digest.DIGEST_ATTRIBUTE, None)
     digest = {content_digest.DIGEST_ATTRIBUTE: content_digest.compute_content_digest(clean)}
     stored = clean.assign_attrs(digest)
@@ -248,7 +253,7 @@ def read_dataset(path: Path) -> xr.Dataset:
     try:
         check_variable_attributes(dataset)
         if schema.is_of_single_scene(dataset):
-            check_motion_variables(dataset)
+            check_motion_variables_are_numeric(dataset)
             return dataset  # Users save motions with xarray, which writes no digest.
         schema.check_results(dataset)
     except DataError as error:
@@ -288,7 +293,7 @@ def _check_zarr_codecs(path: Path) -> None:
                 )
 
 
-def clean_attributes(dataset: xr.Dataset) -> xr.Dataset:
+def convert_attributes_for_netcdf(dataset: xr.Dataset) -> xr.Dataset:
     """Convert attributes to types that a NetCDF file preserves.
 
     Parameters
@@ -304,13 +309,13 @@ def clean_attributes(dataset: xr.Dataset) -> xr.Dataset:
         become scalars. Attributes that are None are removed.
     """
     clean = dataset.copy()
-    clean.attrs = _clean_attribute_mapping(dataset.attrs)
+    clean.attrs = _convert_attribute_mapping_for_netcdf(dataset.attrs)
     for name in clean.variables:
-        clean[name].attrs = _clean_attribute_mapping(dataset[name].attrs)
+        clean[name].attrs = _convert_attribute_mapping_for_netcdf(dataset[name].attrs)
     return clean
 
 
-def _clean_attribute_mapping(attributes: Mapping[Any, Any]) -> dict[str, Any]:
+def _convert_attribute_mapping_for_netcdf(attributes: Mapping[Any, Any]) -> dict[str, Any]:
     """Convert the attributes of a dataset or variable, without None."""
     return {
         str(name): _to_netcdf_value(value)

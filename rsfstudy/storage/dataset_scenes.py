@@ -45,11 +45,11 @@ def scene_of_dataset(dataset: xr.Dataset, study: Study | None) -> Scene:
         not registered.
     """
     if study is not None:
-        return study.scene(selected_cell_number(dataset, study))
-    return read_described_scene(dataset)
+        return study.scene(find_selected_cell_number(dataset, study))
+    return read_scene_from_attributes(dataset)
 
 
-def selected_cell_number(dataset: xr.Dataset, study: Study) -> int:
+def find_selected_cell_number(dataset: xr.Dataset, study: Study) -> int:
     """Find the number of the selected cell.
 
     Parameters
@@ -84,7 +84,7 @@ def selected_cell_number(dataset: xr.Dataset, study: Study) -> int:
     return int(np.ravel_multi_index(places, study.shape))
 
 
-def read_described_scene(dataset: xr.Dataset) -> Scene:
+def read_scene_from_attributes(dataset: xr.Dataset) -> Scene:
     """Build the scene from the attributes of a dataset.
 
     Parameters

@@ -19,12 +19,12 @@ from rsfstudy.quantities import Quantity
 from rsfstudy.rig import DIMENSIONLESS_PREFIX
 from rsfstudy.status import Status
 from rsfstudy.storage import stored_loadings
-from rsfstudy.storage.cell_journal import CellColumns, OutputPacking
+from rsfstudy.storage.cell_journal import CellColumns, OutputPacker
 from rsfstudy.storage.schema import FILE_LAYOUT_VERSION
 from rsfstudy.study import Study
 from rsfstudy.vocabulary import (
     FORMULAS_OF_DERIVED_COORDINATES,
-    coverage_content_type,
+    find_coverage_content_type,
     find_quantity,
 )
 
@@ -95,7 +95,7 @@ def build_lattice_variables(
     dict of str to tuple
         Dimensions, values and attributes of each variable.
     """
-    layout, dims, own = OutputPacking(study.measure), study.dimensions, study.quantities
+    layout, dims, own = OutputPacker(study.measure), study.dimensions, study.quantities
     described = {}
     for name, inner in study.measure.variables.items():
         values = cell_columns.packed_outputs[:, layout.slices[name]].reshape(
@@ -116,7 +116,7 @@ def build_lattice_variables(
         comment="; ".join(f"{s.label}: {s.meaning}" for s in Status),
     )
     for name, (_dims, _values, about) in described.items():
-        about["coverage_content_type"] = coverage_content_type(name)
+        about["coverage_content_type"] = find_coverage_content_type(name)
     for name in study.measure.variables:
         companions = [n for n in (f"{name}_error", "status") if n in described and n != name]
         described[name][2]["ancillary_variables"] = " ".join(companions)

@@ -34,9 +34,9 @@ from rsfstudy.storage.schema import (
     invalid_part_error,
 )
 from rsfstudy.study import Study, load_study, study_names
-from rsfstudy.vocabulary import coverage_content_type
+from rsfstudy.vocabulary import find_coverage_content_type
 
-_NAME_STUDY_FILE_REMEDY = "Name the file that declares it: --study FILE (study=)."
+_MISSING_STUDY_FILE_REMEDY = "Name the file that declares it: --study FILE (study=)."
 
 
 def rebuild_study(results: xr.Dataset, study_file: str | Path | None = None) -> Study:
@@ -69,7 +69,7 @@ def rebuild_study(results: xr.Dataset, study_file: str | Path | None = None) -> 
     if (
         study_file is None
         and declared.name in study_names()
-        and schema.find_user_part_not_stored(declared)
+        and schema.find_user_part_missing_from_file(declared)
     ):
         study_file = declared.name
     for axis in declared.axes:
@@ -79,12 +79,15 @@ def rebuild_study(results: xr.Dataset, study_file: str | Path | None = None) -> 
             rule = f"has {declared_points} points in the declaration, and {points} in the file"
             raise invalid_part_error(axis["dimension"], rule)
     held = stored_loadings.read_loadings(results)
-    if study_file is None and has_user_code(results):
+    if study_file is None and depends_on_user_code(results):
         rule = "is a user's own, and code is never taken from a results file"
-        remedy, named_in = _NAME_STUDY_FILE_REMEDY, schema.read_provenance(results)["declared_in"]
+        remedy, named_in = (
+            _MISSING_STUDY_FILE_REMEDY,
+            schema.read_provenance(results)["declared_in"],
+        )
         if named_in:
             remedy += f" It was {shorten_text(named_in)}."
-        name, value = schema.find_user_part_not_stored(declared, held) or (
+        name, value = schema.find_user_part_missing_from_file(declared, held) or (
             "measure",
             declared.measure["name"],
         )
@@ -121,14 +124,14 @@ def study_of_dataset(results: xr.Dataset) -> Study:
         If the declaration is invalid.
     """
     declared, about = schema.read_declaration(results), schema.read_provenance(results)
-    if has_user_code(results):
+    if depends_on_user_code(results):
         rule = "has code of a user's own, and code is never taken from a dataset"
         remedy = f"Import the study from the file that declares it. {about['declared_in']}"
         raise InvalidValue("study", declared.name, rule, remedy=remedy.strip())
     return study_from_declaration(declared, stored_loadings.read_loadings(results))
 
 
-def has_user_code(results: xr.Dataset) -> bool:
+def depends_on_user_code(results: xr.Dataset) -> bool:
     """Return True if user-defined code affected the results.
 
     User-defined loadings are data rather than code, because the results contain their samples or
@@ -150,7 +153,8 @@ def has_user_code(results: xr.Dataset) -> bool:
     held = stored_loadings.read_loadings(results)
     return (
         not held
-        or schema.find_user_part_not_stored(schema.read_declaration(results), held) is not None
+        or schema.find_user_part_missing_from_file(schema.read_declaration(results), held)
+        is not None
     )
 
 
@@ -262,7 +266,7 @@ def rebuild_measure(plain_measure: StoredMeasure, path_in_file: str) -> Measure:
         If a field is missing, unknown or invalid.
     """
     values: dict[str, Any] = dict(plain_measure)
-    kind = _find_declared_class("measure", Measure, measures, values.pop("name"))
+    kind = _find_class_by_declared_name("measure", Measure, measures, values.pop("name"))
     given = dict(kind.fields_from_description(values, path_in_file))
     if isinstance(values.get("measure"), Mapping):
         given["measure"] = rebuild_measure(values.pop("measure"), f"{path_in_file}.measure")
@@ -275,12 +279,12 @@ def _rebuild_reduction(plain_reduction: StoredReduction, path_in_file: str) -> R
     values: dict[str, Any] = dict(plain_reduction)
     if values["kind"] == "spread":  # Older files use this name.
         values |= {"kind": "range", "over": values.pop("on", "")}
-    kind = _find_declared_class("reduction", Reduction, reductions, values.pop("kind"))
+    kind = _find_class_by_declared_name("reduction", Reduction, reductions, values.pop("kind"))
     made: Reduction = build_dataclass_from_plain_data(values, kind, path_in_file)
     return made
 
 
-def _find_declared_class(
+def _find_class_by_declared_name(
     declaration_key: str, base_class: Any, exporting_package: ModuleType, declared_name: str
 ) -> Any:
     """Find a class of rsfstudy by its name in declarations.
@@ -297,7 +301,7 @@ def _find_declared_class(
     if declared_name not in kinds:
         rule = "is not part of rsfstudy"
         raise InvalidValue(
-            declaration_key, declared_name, rule, choices=kinds, remedy=_NAME_STUDY_FILE_REMEDY
+            declaration_key, declared_name, rule, choices=kinds, remedy=_MISSING_STUDY_FILE_REMEDY
         )
     return kinds[declared_name]
 
@@ -335,7 +339,7 @@ def find_primary_output(dataset: xr.Dataset) -> str | None:
         for name, values in dataset.data_vars.items()
         if set(values.dims) == cells
         and values.dtype.kind == "f"
-        and coverage_content_type(str(name)) == "modelResult"
+        and find_coverage_content_type(str(name)) == "modelResult"
     ]
     try:
         described = schema.read_declaration(dataset).measure

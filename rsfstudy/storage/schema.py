@@ -240,7 +240,7 @@ class StoredProvenance(TypedDict):
 #: NumPy dtype kinds that are allowed in variables, and their description.
 _ALLOWED_DTYPE_KINDS = ("iufbOUT", "numbers or texts")
 #: Default values for scenes in older files, which were written before pore fluids were supported.
-_SCENE_DEFAULTS_OF_OLDER_FILES: Mapping[str, Any] = {
+_SCENE_DEFAULTS_FOR_OLDER_FILES: Mapping[str, Any] = {
     **{name: None for part in BUILT_IN_PARTS.values() for name in field_names(part)},
     "fluid": "drained",
 }
@@ -314,7 +314,7 @@ def is_of_single_scene(dataset: xr.Dataset) -> bool:
     return "scene" in dataset.attrs and "declaration" not in dataset.attrs
 
 
-def check_is_of_study(dataset: xr.Dataset, file_description: str) -> None:
+def check_contains_study_results(dataset: xr.Dataset, file_description: str) -> None:
     """Check that a dataset contains the results of a study.
 
     Parameters
@@ -426,7 +426,7 @@ def build_scene_from_stored(
     kinds = scene_field_types(parts)
     values = {
         **dict.fromkeys(FIELDS_OMITTED_IF_NONE),
-        **_SCENE_DEFAULTS_OF_OLDER_FILES,
+        **_SCENE_DEFAULTS_FOR_OLDER_FILES,
         **stored_scene,
     }
     _check_mapping_keys(values, kinds, path_in_file)
@@ -440,7 +440,7 @@ def build_scene_from_stored(
         raise invalid_part_error(f"{path_in_file}.{error.name}", f"is refused ({error})") from error
 
 
-def find_user_part_not_stored(
+def find_user_part_missing_from_file(
     declaration: StoredDeclaration, stored_loadings: Collection[str] = ()
 ) -> tuple[str, str] | None:
     """Find a user-defined part that the results file does not contain.

@@ -20,7 +20,7 @@ import xarray as xr
 
 from rsfstudy.errors import DataError, InvalidValue
 from rsfstudy.status import Status
-from rsfstudy.storage.cell_journal import CellColumns, OutputPacking
+from rsfstudy.storage.cell_journal import CellColumns, OutputPacker
 from rsfstudy.storage.dataset_files import ZARR_OPEN_OPTIONS, open_zarr_store, write_store_digest
 from rsfstudy.storage.lattice_datasets import (
     build_lattice_coordinates,
@@ -31,7 +31,7 @@ from rsfstudy.study import Study
 
 #: Maximum number of values in a slab (32 MB of float64). A slab consists of complete rows along the
 #: first axis, and has at least one row.
-_NUMBERS_PER_SLAB = 4_000_000
+_MAX_VALUES_PER_SLAB = 4_000_000
 #: Options for writing a slab. The metadata are consolidated once, together with the reductions.
 _ZARR_WRITE_OPTIONS: Mapping[str, Any] = {"consolidated": False, "zarr_format": 3}
 
@@ -139,13 +139,13 @@ def _convert_strings_to_object_dtype(dataset: xr.Dataset) -> xr.Dataset:
 def _write_lattice(study: Study, read_cells: ReadCellsFunction, path: Path) -> int:
     """Write the variables of the lattice, and count the finished cells."""
     width, first, finished = (
-        OutputPacking(study.measure).packed_number_count,
+        OutputPacker(study.measure).packed_number_count,
         study.dimensions[0],
         0,
     )
     length, *within = study.shape
     row = math.prod(within)  # number of cells
-    rows = min(length, max(1, _NUMBERS_PER_SLAB // (width * row)))
+    rows = min(length, max(1, _MAX_VALUES_PER_SLAB // (width * row)))
     coords = _convert_strings_to_object_dtype(xr.Dataset(coords=build_lattice_coordinates(study)))
     # The fill values are the values of pending cells, so a lost chunk is read as pending cells.
     pending = build_lattice_variables(

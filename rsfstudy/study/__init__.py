@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from rsfstudy.study.claims import NOT_APPLICABLE_VERDICT, VERDICTS, Claim, build_verdict_table
     from rsfstudy.study.figure_declarations import DrawFunction, Figure, Panel, name_of_figure
     from rsfstudy.study.lattice_cell import Cell, CellChanges
-    from rsfstudy.study.reductions.base import failed_cell_mask, read_undocumented_quantities
+    from rsfstudy.study.reductions.base import failed_cell_mask, read_quantities_not_in_vocabulary
     from rsfstudy.study.studies_on_rig import convert_study_to_rig_units
     from rsfstudy.study.study import Study
     from rsfstudy.study.study_index import STUDIES_PACKAGE, study_names, study_titles
@@ -30,7 +30,7 @@ else:
             "study.lattice_cell": ("Cell", "CellChanges"),
             "study.claims": ("Claim", "NOT_APPLICABLE_VERDICT", "VERDICTS", "build_verdict_table"),
             "study.figure_declarations": ("DrawFunction", "Figure", "Panel", "name_of_figure"),
-            "study.reductions.base": ("failed_cell_mask", "read_undocumented_quantities"),
+            "study.reductions.base": ("failed_cell_mask", "read_quantities_not_in_vocabulary"),
             "study.studies_on_rig": ("convert_study_to_rig_units",),
             "study.study": ("Study",),
             "study.study_index": ("STUDIES_PACKAGE", "study_names", "study_titles"),
@@ -56,7 +56,7 @@ __all__ = [
     "format_verdict_row",
     "failed_cell_mask",
     "load_study",
-    "read_undocumented_quantities",
+    "read_quantities_not_in_vocabulary",
     "study_names",
     "study_titles",
     "convert_study_to_rig_units",

@@ -99,8 +99,12 @@ def replace_field_values(axis: Axis, field_name: str, values: Sequence[Any]) -> 
                 continue
             new = existing.get(_point_key(changed), "")
             if not new:
-                new = _label_after_override(
-                    label, field_name, row[field_name], value, value_is_unique=len(others) == 1
+                new = _relabel_overridden_point(
+                    label,
+                    field_name,
+                    row[field_name],
+                    value,
+                    value_identifies_point=len(others) == 1,
                 )
                 while new in points or new in axis.labels:
                     new = f"{label}, {new}"
@@ -113,14 +117,14 @@ def _point_key(row: AxisRow) -> frozenset[tuple[str, Any]]:
     return frozenset(row.items())
 
 
-def _label_after_override(
-    label: str, field_name: str, old_value: Any, new_value: Any, *, value_is_unique: bool
+def _relabel_overridden_point(
+    label: str, field_name: str, old_value: Any, new_value: Any, *, value_identifies_point: bool
 ) -> str:
     """Return the label of a point after the value of one field has changed.
 
     If the label contains the old value, as in ``"imposed, alpha = 0.25"``, the old value is
-    replaced. Otherwise, if the new value identifies the point (``value_is_unique``), the label
-    becomes ``"alpha = 0.3"``. In all other cases ``"alpha = 0.3"`` is appended to the label.
+    replaced. Otherwise, if the new value identifies the point (``value_identifies_point``), the
+    label becomes ``"alpha = 0.3"``. In all other cases ``"alpha = 0.3"`` is appended to the label.
     """
     text = f"{field_name} = {_format_with_all_digits(new_value)}"
     old_text = re.escape(_format_with_all_digits(old_value))
@@ -128,7 +132,7 @@ def _label_after_override(
     replaced, count = re.subn(stated, lambda _found: text, label)
     if count:
         return replaced
-    return text if value_is_unique else f"{label}, {text}"
+    return text if value_identifies_point else f"{label}, {text}"
 
 
 def _format_with_all_digits(value: Any) -> str:

@@ -19,7 +19,7 @@ import xarray as xr
 from rsfstudy._deprecation import renamed_members
 from rsfstudy.error_boundary import guard_methods
 from rsfstudy.errors import InvalidValue
-from rsfstudy.rig import SCALES_ATTRIBUTE
+from rsfstudy.rig import NAME_OF_SCALES_ATTRIBUTE
 from rsfstudy.status import Status
 from rsfstudy.study.verdict_table import VerdictTable
 
@@ -280,7 +280,7 @@ def build_verdict_table(
     along = {str(name) for name in dataset.coords if dataset[name].ndim > 0}
     moved_base = [
         name for name in study_overrides if name not in along
-    ] or SCALES_ATTRIBUTE in dataset.attrs
+    ] or NAME_OF_SCALES_ATTRIBUTE in dataset.attrs
     rows = []
     for claim in claims:
         ours, verdict = claim.verdict(dataset)

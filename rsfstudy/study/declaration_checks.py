@@ -19,7 +19,7 @@ from rsfstudy.motion import Accuracy
 from rsfstudy.quantities import is_variable_name
 from rsfstudy.rig import RATIO_FIELD_BY_DIMENSIONAL_NAME, LatticeScenesOnRig, Rig
 from rsfstudy.slider import (
-    FIELD_NAMES,
+    SCENE_FIELD_NAMES,
     SLOT_NAMES,
     Scene,
     UserPart,
@@ -93,15 +93,15 @@ def check_name_clashes(
         if reduction.of not in known:
             raise InvalidValue("reduction of", reduction.of, "is not measured", choices=known)
         known.append(reduction.name)
-    taken = {*known, *measure.inner_coordinates, *(RESERVED_NAMES - set(FIELD_NAMES))}
+    taken = {*known, *measure.inner_coordinates, *(RESERVED_NAMES - set(SCENE_FIELD_NAMES))}
     for axis in axes:
-        check_fields_not_solved_for(measure, axis.fields)
+        check_fields_not_solved_by_measure(measure, axis.fields)
         for name in (axis.dimension, *axis.fields):
             if name in taken:
                 raise InvalidValue("axis", name, "is the name of something measured")
 
 
-def check_fields_not_solved_for(measure: Measure, field_names: Sequence[str]) -> None:
+def check_fields_not_solved_by_measure(measure: Measure, field_names: Sequence[str]) -> None:
     """Raise InvalidValue if the measure solves for one of the fields.
 
     Parameters
@@ -143,7 +143,7 @@ def check_user_fields(
     """
     taken = {*measure.variables, *measure.inner_coordinates}
     taken |= {*RESERVED_NAMES, *QUANTITY_BY_NAME, *(reduction.name for reduction in reductions)}
-    for name in user_field_names[len(FIELD_NAMES) :]:
+    for name in user_field_names[len(SCENE_FIELD_NAMES) :]:
         if name in taken - SLOT_NAMES:
             rule, remedy = "is the name of something else", "Rename the field of your part."
             raise InvalidValue("field", name, rule, remedy=remedy)
@@ -153,7 +153,7 @@ def check_axis_fields(
     measure: Measure,
     axes: Sequence[Axis],
     scene_field_names: Sequence[str],
-    rig_scenes: LatticeScenesOnRig | None,
+    scenes_on_rig: LatticeScenesOnRig | None,
 ) -> None:
     """Raise InvalidValue if an axis has unknown fields or unexpected units.
 
@@ -165,7 +165,7 @@ def check_axis_fields(
         Axes of the study.
     scene_field_names : sequence of str
         Names of all scene fields.
-    rig_scenes : LatticeScenesOnRig or None
+    scenes_on_rig : LatticeScenesOnRig or None
         Converter of axis values with units. None in a study without a rig.
 
     Raises
@@ -174,13 +174,13 @@ def check_axis_fields(
         If an axis varies an unknown field, if a zipped axis has the name of a field, or if an axis
         has units and the study has no rig.
     """
-    in_units = rig_scenes.units if rig_scenes else {}
+    in_units = scenes_on_rig.units if scenes_on_rig else {}
     known = dict.fromkeys((*scene_field_names, *measure.plain_fields, *in_units))
     for axis in axes:
         if not axis.is_single_field and axis.dimension in (*scene_field_names, *axis.fields):
             rule = "is a field: a zipped axis needs a name of its own"
             raise InvalidValue("axis", axis.dimension, rule)
-        if axis.units and rig_scenes is None:
+        if axis.units and scenes_on_rig is None:
             remedy = "Give the study its rig: Study(rig=rig)."
             raise InvalidValue("axis", axis.dimension, "is in units of a rig", remedy=remedy)
         for name in axis.fields:
@@ -192,7 +192,7 @@ def check_axis_fields(
                 raise unknown_name_error("field", name, rule, known)
 
 
-def check_outputs_do_not_vary(
+def check_outputs_are_same_in_all_cells(
     measure: Measure, measure_field_changes: Iterable[Mapping[str, Any]]
 ) -> None:
     """Raise InvalidValue if an axis changes the set of results.

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import Any
 
-from rsfstudy.rig import Rig, put_on_rig
+from rsfstudy.rig import Rig, convert_scene_and_axes_to_rig
 from rsfstudy.study.study import Study
 
 
@@ -27,15 +27,15 @@ def convert_study_to_rig_units(study: Study, rig: Rig) -> Study:
     Study
         Study with the rig.
     """
-    base, axes, every = put_on_rig(rig, study.base, study.axes)
+    base, axes, every = convert_scene_and_axes_to_rig(rig, study.base, study.axes)
     reductions = [
-        _convert_reduction_range(each, every.get(getattr(each, "on", "")))
+        _convert_reduction_range_to_rig_units(each, every.get(getattr(each, "on", "")))
         for each in study.reductions
     ]
     return replace(study, rig=rig, base=base, axes=axes, reductions=reductions)
 
 
-def _convert_reduction_range(reduction: Any, scale: float | None) -> Any:
+def _convert_reduction_range_to_rig_units(reduction: Any, scale: float | None) -> Any:
     """Convert the range of a reduction to units.
 
     A reduction without a range is returned unchanged.

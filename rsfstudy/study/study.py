@@ -36,9 +36,9 @@ from rsfstudy.rig import (
 )
 from rsfstudy.rig import make_axis_with_units as axis_in_units
 from rsfstudy.slider import (
+    ALTERNATIVE_STIFFNESS_FIELDS,
     PART_SELECTING_FIELDS,
     SLOT_NAMES,
-    STIFFNESS_FIELDS,
     Scene,
     UserPart,
     find_inapplicable_fields,
@@ -58,13 +58,13 @@ from rsfstudy.study.user_parts import find_named_user_parts, user_field_quantiti
 #: bytes, and the names of files have suffixes.
 _MAX_NAME_BYTES = 200
 #: Fields that select a part of the slider.
-_FIELDS_THAT_SELECT_PARTS = frozenset({*SLOT_NAMES, *PART_SELECTING_FIELDS})
+_SLOT_AND_PART_SELECTING_FIELDS = frozenset({*SLOT_NAMES, *PART_SELECTING_FIELDS})
 #: Pairs of equivalent fields. A slip rate can be given as a velocity or as a ratio, and the spring
 #: as a stiffness or as a ratio to the critical stiffness.
-_EQUIVALENT_FIELD = {
+_EQUIVALENT_FIELD_BY_FIELD_NAME = {
     **RATIO_FIELD_BY_DIMENSIONAL_NAME,
     **{ratio: name for name, ratio in RATIO_FIELD_BY_DIMENSIONAL_NAME.items()},
-    **dict(zip(STIFFNESS_FIELDS, STIFFNESS_FIELDS[::-1], strict=True)),
+    **dict(zip(ALTERNATIVE_STIFFNESS_FIELDS, ALTERNATIVE_STIFFNESS_FIELDS[::-1], strict=True)),
 }
 
 
@@ -179,7 +179,7 @@ class Study:
         )
         varied = [axis.rows for axis in self.axes if not set(axis.fields) <= self.scene_field_names]
         changes = (self.split_rows(rows)[1] for rows in itertools.product(*varied))
-        declaration_checks.check_outputs_do_not_vary(self.measure, changes)
+        declaration_checks.check_outputs_are_same_in_all_cells(self.measure, changes)
         declaration_checks.check_axes_are_distinct(self.axes)
         for name, value in self.describe().items():
             try:
@@ -436,7 +436,7 @@ class Study:
         return self.base.as_dict()
 
     @cached_property
-    def _fields_without_meaning(self) -> frozenset[str]:
+    def _inapplicable_base_fields(self) -> frozenset[str]:
         """Fields that have no meaning for the parts of the base scene.
 
         The set applies to cells in which no axis selects a part.
@@ -450,11 +450,11 @@ class Study:
         """Compute the changes of a cell at one row of each axis."""
         given, of_measure = self.split_rows(axis_rows)
         of_scene = self.scene_fields_of_row(given)
-        if _FIELDS_THAT_SELECT_PARTS.isdisjoint(of_scene) and _FIELDS_THAT_SELECT_PARTS.isdisjoint(
-            given
-        ):
+        if _SLOT_AND_PART_SELECTING_FIELDS.isdisjoint(
+            of_scene
+        ) and _SLOT_AND_PART_SELECTING_FIELDS.isdisjoint(given):
             kept = {
-                n: value for n, value in of_scene.items() if n not in self._fields_without_meaning
+                n: value for n, value in of_scene.items() if n not in self._inapplicable_base_fields
             }
             return CellChanges(kept, of_measure)
         # If a row selects a part and also sets a field without a meaning for this part, the field
@@ -462,7 +462,7 @@ class Study:
         stated = {
             name
             for row in axis_rows
-            if not _FIELDS_THAT_SELECT_PARTS.isdisjoint(row)
+            if not _SLOT_AND_PART_SELECTING_FIELDS.isdisjoint(row)
             for name in row
         }
         parts = self.user_parts
@@ -555,7 +555,7 @@ class Study:
         ):
             rule = "is neither an axis nor a field of the scene or of the measure"
             raise declaration_checks.unknown_name_error("override", field_name, rule, known)
-        declaration_checks.check_fields_not_solved_for(self.measure, [field_name])
+        declaration_checks.check_fields_not_solved_by_measure(self.measure, [field_name])
         if is_sequence_of_axis_values(value):
             return replace(self, axes=(self._make_axis(field_name, values), *self.axes))
         if self.rig is not None and of_rig:
@@ -587,12 +587,18 @@ class Study:
                 field_name,
                 convert_values_to_units(field_name, values, units) if units else values,
             )
-        if _EQUIVALENT_FIELD.get(field_name) not in axis.fields:
+        if _EQUIVALENT_FIELD_BY_FIELD_NAME.get(field_name) not in axis.fields:
             return None
         if axis.labels is not None:
-            rule = f"states what {_EQUIVALENT_FIELD[field_name]} does along {axis.dimension}"
+            rule = (
+                f"states what {_EQUIVALENT_FIELD_BY_FIELD_NAME[field_name]} does along "
+                f"{axis.dimension}"
+            )
             raise InvalidValue(
-                field_name, values, rule, remedy=f"Give {_EQUIVALENT_FIELD[field_name]}."
+                field_name,
+                values,
+                rule,
+                remedy=f"Give {_EQUIVALENT_FIELD_BY_FIELD_NAME[field_name]}.",
             )
         return self._make_axis(field_name, values)
 

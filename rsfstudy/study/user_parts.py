@@ -6,7 +6,7 @@ from collections.abc import Iterable, Iterator, Mapping
 from typing import Any
 
 from rsfstudy.quantities import Quantity
-from rsfstudy.slider import FIELD_NAMES, SLOTS, UserPart, scene_field_quantities
+from rsfstudy.slider import SCENE_FIELD_NAMES, SLOTS, UserPart, scene_field_quantities
 
 
 def find_named_user_parts(
@@ -47,5 +47,7 @@ def user_field_quantities(parts: Iterable[UserPart]) -> Iterator[Quantity]:
         Quantities of the fields that are not fields of every scene.
     """
     return (
-        about for name, about in scene_field_quantities(parts).items() if name not in FIELD_NAMES
+        about
+        for name, about in scene_field_quantities(parts).items()
+        if name not in SCENE_FIELD_NAMES
     )

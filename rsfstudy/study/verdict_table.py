@@ -10,7 +10,7 @@ import pandas as pd
 from rsfstudy.errors import escape_control_characters
 from rsfstudy.quantities import html_table
 
-_SIGNS_OF_CLAIM_RELATIONS = {"equals": "", "below": "< ", "above": "> "}
+_SIGN_BY_CLAIM_RELATION = {"equals": "", "below": "< ", "above": "> "}
 #: Widths of a line and of the column with the identifiers on a terminal, in characters.
 _TERMINAL_LINE_WIDTH, _CLAIM_ID_WIDTH = 100, 12
 #: Columns that must be present in a table that is printed on a terminal.
@@ -39,7 +39,7 @@ def format_published_value(verdict_row: dict[Any, Any]) -> str:
     str
         Published value. The value of an inequality is preceded by ``<`` or ``>``.
     """
-    return f"{_SIGNS_OF_CLAIM_RELATIONS[verdict_row['relation']]}{verdict_row['published']:.6g}"
+    return f"{_SIGN_BY_CLAIM_RELATION[verdict_row['relation']]}{verdict_row['published']:.6g}"
 
 
 def _format_row_for_terminal(verdict_row: dict[Any, Any]) -> dict[str, str]:

@@ -206,7 +206,7 @@ def scene_fields() -> str:
     str
         Table in Markdown.
     """
-    abouts = {about.name: about for about in part_registry.FIELD_QUANTITIES}
+    abouts = {about.name: about for about in part_registry.SCENE_FIELD_QUANTITIES}
     defaults = part_registry.scene_field_defaults()
     rows = (
         (
@@ -218,7 +218,7 @@ def scene_fields() -> str:
             strip_markup(about.long_name),
             _parts_with(name),
         )
-        for name, about in ((name, abouts[name]) for name in part_registry.FIELD_NAMES)
+        for name, about in ((name, abouts[name]) for name in part_registry.SCENE_FIELD_NAMES)
     )
     return markdown_table(("field", "symbol", "unit", "default", "rule", "meaning", "of"), rows)
 
@@ -284,7 +284,9 @@ def _slot(slot: part_registry.Slot) -> str:
     )  # fmt: skip
     made = markdown_table(("choice", "what it is", "equation", "its fields", "example"), rows)
     called = (
-        "" if not slot.parts_by_selecting_field else " A field of the choice, stated, calls for it."
+        ""
+        if not slot.part_class_by_selecting_field
+        else " A field of the choice, stated, calls for it."
     )
     return f"### {slot.name}\n\n{slot.long_name.capitalize()}.{called}\n\n{made}"
 
@@ -548,7 +550,7 @@ def vocabulary() -> str:
             strip_markup(about.long_name),
         )
         for about in QUANTITY_BY_NAME.values()
-        if about.name not in part_registry.FIELD_NAMES
+        if about.name not in part_registry.SCENE_FIELD_NAMES
     )
     return markdown_table(("name", "symbol", "unit", "meaning"), rows)
 

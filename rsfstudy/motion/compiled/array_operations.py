@@ -67,7 +67,7 @@ def _pointer_moved_by(_context: Any, pointer: Any, item_count: Any) -> Any:
     return _NUMBA_FLOAT_POINTER_TYPE(_NUMBA_FLOAT_POINTER_TYPE, types.int64), code
 
 
-def evaluate_in_place(function, y, rates, parameters, result):
+def evaluate_function_into_array(function, y, rates, parameters, result):
     """Call a function that fills an array.
 
     Parameters
@@ -98,7 +98,7 @@ def array_as_pointer(array):
     return _array_data_pointer(array)
 
 
-def offset_pointer(pointer, item_count):
+def advance_pointer_by_items(pointer, item_count):
     """Move a pointer by a number of items.
 
     Parameters
@@ -173,10 +173,10 @@ def interpolate_rows(columns, row_positions, result):
 
 
 #: Compiled replacements of Python functions.
-COMPILED_REPLACEMENT_BY_FUNCTION: Mapping[Any, Any] = {
-    array_operations.evaluate_in_place: evaluate_in_place,
+COMPILED_REPLACEMENT_BY_PYTHON_FUNCTION: Mapping[Any, Any] = {
+    array_operations.evaluate_function_into_array: evaluate_function_into_array,
     array_operations.array_as_pointer: array_as_pointer,
-    array_operations.offset_pointer: offset_pointer,
+    array_operations.advance_pointer_by_items: advance_pointer_by_items,
     array_operations.copy_values: copy_values,
     recording.interpolate_rows: interpolate_rows,
     steppers.begin_regime: order_eight.begin_regime,

@@ -16,12 +16,12 @@ from rsfstudy.errors import InvalidValue
 from rsfstudy.parts import Part
 from rsfstudy.slider import Function
 
-_EQUATIONS_TEXT = "the equations"
+_EQUATIONS_PHRASE_FOR_ERROR_MESSAGES = "the equations"
 _NUMBA_ERROR_LOCATION_PATTERN = re.compile(r'\n+File "(?P<file>.+?)", line (?P<line>\d+)')
 
 
 def check_function_never_raises(
-    function: Function, checked_functions: set[Function] | None = None
+    function: Function, already_checked_functions: set[Function] | None = None
 ) -> None:
     """Raise InvalidValue if a function contains a raise statement.
 
@@ -32,7 +32,7 @@ def check_function_never_raises(
     ----------
     function : callable
         Function to check.
-    checked_functions : set of callable, optional
+    already_checked_functions : set of callable, optional
         Functions that were already checked. The function adds new items.
 
     Raises
@@ -40,16 +40,18 @@ def check_function_never_raises(
     InvalidValue
         If one of the functions contains a raise statement.
     """
-    checked_functions = set() if checked_functions is None else checked_functions
-    if function in checked_functions:
+    already_checked_functions = (
+        set() if already_checked_functions is None else already_checked_functions
+    )
+    if function in already_checked_functions:
         return
-    checked_functions.add(function)
+    already_checked_functions.add(function)
     for instruction in dis.get_instructions(function):
         if instruction.opname == "RAISE_VARARGS":
             code = function.__code__
             where = f"{function.__name__}, {code.co_filename}, line {code.co_firstlineno}"
             rule = (
-                f"cannot compile {_describe_parts_defined_in(code.co_filename)} ({where}): it "
+                f"cannot compile {_describe_parts_defined_in_file(code.co_filename)} ({where}): it "
                 "raises an error"
             )
             remedy = "Return math.nan instead, which ends the motion; or use the engine scipy."
@@ -57,7 +59,7 @@ def check_function_never_raises(
     named = (function.__globals__.get(name) for name in function.__code__.co_names)
     for reached in (*named, *(cell.cell_contents for cell in function.__closure__ or ())):
         if isinstance(reached, FunctionType):
-            check_function_never_raises(reached, checked_functions)
+            check_function_never_raises(reached, already_checked_functions)
 
 
 def compilation_error(error: Exception) -> InvalidValue:
@@ -73,14 +75,16 @@ def compilation_error(error: Exception) -> InvalidValue:
     InvalidValue
         Error for the user.
     """
-    text, what, where = str(error), _EQUATIONS_TEXT, ""
+    text, what, where = str(error), _EQUATIONS_PHRASE_FOR_ERROR_MESSAGES, ""
     places = list(_NUMBA_ERROR_LOCATION_PATTERN.finditer(text))
     of_parts = [
-        place for place in places if _describe_parts_defined_in(place["file"]) != _EQUATIONS_TEXT
+        place
+        for place in places
+        if _describe_parts_defined_in_file(place["file"]) != _EQUATIONS_PHRASE_FOR_ERROR_MESSAGES
     ]
     for place in (of_parts or places)[:1]:
         what, where = (
-            _describe_parts_defined_in(place["file"]),
+            _describe_parts_defined_in_file(place["file"]),
             f" ({place['file']}, line {place['line']})",
         )
         text = text[: place.start()]
@@ -90,20 +94,20 @@ def compilation_error(error: Exception) -> InvalidValue:
     return InvalidValue("engine", "compiled", rule, remedy=remedy)
 
 
-def _describe_parts_defined_in(source_file: str) -> str:
+def _describe_parts_defined_in_file(source_file: str) -> str:
     """Describe the parts that a source file defines, for error messages."""
     names = [
         part.name
-        for part in _iterate_part_classes()
+        for part in _iterate_named_part_subclasses()
         if _source_file_of_part(part) == _resolve_path(source_file)
     ]
-    return f"the part {' or '.join(names)}" if names else _EQUATIONS_TEXT
+    return f"the part {' or '.join(names)}" if names else _EQUATIONS_PHRASE_FOR_ERROR_MESSAGES
 
 
-def _iterate_part_classes(base_class: type[Part] = Part) -> Iterator[type[Part]]:
+def _iterate_named_part_subclasses(base_class: type[Part] = Part) -> Iterator[type[Part]]:
     """Yield all part classes of this process, the latest definition first."""
     for part in reversed(base_class.__subclasses__()):
-        yield from _iterate_part_classes(part)
+        yield from _iterate_named_part_subclasses(part)
         if "name" in vars(part):
             yield part
 

@@ -1,8 +1,8 @@
 """Compilation of functions with Numba, and a cache of the results on disk.
 
 ``compile_function`` and ``compile_cfunc_addresses`` are the main functions. They copy a function
-and all functions that it calls, replace some of them (``COMPILED_REPLACEMENT_BY_FUNCTION``), and
-compile the copy.
+and all functions that it calls, replace some of them (``COMPILED_REPLACEMENT_BY_PYTHON_FUNCTION``),
+and compile the copy.
 
 Each result is stored in a folder named by a digest of the functions, the compiler and the
 processor. The folder is written under a temporary name, renamed when it is complete, and never
@@ -37,12 +37,12 @@ from numba.core.caching import FunctionCache
 from numba.core.ccallback import CFunc
 from numba.core.sigutils import normalize_signature
 
-from rsfstudy.motion.compiled.array_operations import COMPILED_REPLACEMENT_BY_FUNCTION
+from rsfstudy.motion.compiled.array_operations import COMPILED_REPLACEMENT_BY_PYTHON_FUNCTION
 from rsfstudy.motion.engines import compilation_log
 
 _CACHE_ENTRY_FILE_NAME = "motion.py"
 #: Modules whose content is identified by their version or by the version of Python.
-_MODULES_IDENTIFIED_BY_VERSION = {*sys.stdlib_module_names, "numpy", "numba"}
+_PACKAGES_IDENTIFIED_BY_VERSION_ONLY = {*sys.stdlib_module_names, "numpy", "numba"}
 #: The fast-math flags permit reciprocals instead of divisions, and fused multiply-add operations.
 #: The compiler can then compute reciprocals of the parameters once per step.
 _COMPILER_OPTIONS: Mapping[str, Any] = {
@@ -149,7 +149,7 @@ class _ContentDigest:
             value = _compiled_replacement_of(global_values.get(name))
             if not isinstance(value, types.ModuleType):
                 self.add_value(value)
-            elif value.__name__.partition(".")[0] not in _MODULES_IDENTIFIED_BY_VERSION:
+            elif value.__name__.partition(".")[0] not in _PACKAGES_IDENTIFIED_BY_VERSION_ONLY:
                 # Numba treats the attributes of a module as constants.
                 self.add_value([getattr(value, read, None) for read in code.co_names])
 
@@ -233,7 +233,7 @@ def _compile_cfunc(function: Any, *, use_cache: bool) -> Any:
     return compiled
 
 
-def _load_or_compile(entry_name: str, compile_at_path: Callable[[str], Any]) -> Any:
+def _load_or_compile(entry_name: str, compile_with_cache_path: Callable[[str], Any]) -> Any:
     """Load functions from their cache folder, or compile them.
 
     A damaged cache folder is replaced.
@@ -242,18 +242,18 @@ def _load_or_compile(entry_name: str, compile_at_path: Callable[[str], Any]) -> 
     if folder is not None:
         if folder.exists():
             with contextlib.suppress(Exception):  # A damaged cache can raise any exception.
-                return compile_at_path(str(folder / _CACHE_ENTRY_FILE_NAME))
+                return compile_with_cache_path(str(folder / _CACHE_ENTRY_FILE_NAME))
         shutil.rmtree(folder, ignore_errors=True)
     began = time.perf_counter()
-    with compilation_log.context_while_compiling():
+    with compilation_log.create_context_while_compiling():
         try:
             return (
-                compile_at_path("")
+                compile_with_cache_path("")
                 if folder is None
-                else _compile_in_temporary_folder(folder, compile_at_path)
+                else _compile_in_temporary_folder(folder, compile_with_cache_path)
             )
         except OSError:  # The cache folder cannot be written.
-            return compile_at_path("")
+            return compile_with_cache_path("")
         finally:
             compilation_log.compiled_program_count += 1
             compilation_log.total_compilation_seconds += time.perf_counter() - began
@@ -297,14 +297,16 @@ def _is_private_folder(folder: Path) -> bool:
     return owners == {os.geteuid()} and not found.st_mode & (stat.S_IWGRP | stat.S_IWOTH)
 
 
-def _compile_in_temporary_folder(folder: Path, compile_at_path: Callable[[str], Any]) -> Any:
+def _compile_in_temporary_folder(
+    folder: Path, compile_with_cache_path: Callable[[str], Any]
+) -> Any:
     """Compile in a temporary folder, and rename the complete folder."""
     aside = Path(tempfile.mkdtemp(prefix=f"{folder.name}.", dir=folder.parent))
     try:
         entry = aside / _CACHE_ENTRY_FILE_NAME
         entry.write_text("# Stands for a function that rsfstudy has compiled.\n")
         os.utime(entry, (0, 0))  # The cache of Numba depends on the modification time.
-        ready = compile_at_path(str(entry))
+        ready = compile_with_cache_path(str(entry))
         with contextlib.suppress(OSError):  # Another process may have renamed its folder earlier.
             os.rename(aside, folder)
         return ready
@@ -312,12 +314,12 @@ def _compile_in_temporary_folder(folder: Path, compile_at_path: Callable[[str], 
         shutil.rmtree(aside, ignore_errors=True)
 
 
-def _copy_with_compiled_globals(function: Any, entry_path: str = "") -> Any:
+def _copy_with_compiled_globals(function: Any, cache_entry_path: str = "") -> Any:
     """Copy a function, with compiled functions in place of its callees.
 
     The qualified name of the copy contains a digest of its content. A linker treats functions with
     equal names as the same function, and the numbers that Numba adds to names differ between
-    processes. If ``entry_path`` is given, it becomes the source file of the copy.
+    processes. If ``cache_entry_path`` is given, it becomes the source file of the copy.
     """
     named = {
         name: function.__globals__.get(name) for name in _global_names_read_by(function.__code__)
@@ -329,7 +331,11 @@ def _copy_with_compiled_globals(function: Any, entry_path: str = "") -> Any:
         types.CellType(_jit_compile_callee(value) if _is_function(value) else value)
         for value in (cell.cell_contents for cell in function.__closure__ or ())
     )
-    code = function.__code__.replace(co_filename=entry_path) if entry_path else function.__code__
+    code = (
+        function.__code__.replace(co_filename=cache_entry_path)
+        if cache_entry_path
+        else function.__code__
+    )
     copy = types.FunctionType(
         code, {**function.__globals__, **reached}, function.__name__, None, cells or None
     )
@@ -356,7 +362,9 @@ def _is_function(value: Any) -> bool:
 
 def _compiled_replacement_of(value: Any) -> Any:
     """Return the compiled replacement of a function, or the value itself."""
-    return COMPILED_REPLACEMENT_BY_FUNCTION.get(value, value) if _is_function(value) else value
+    return (
+        COMPILED_REPLACEMENT_BY_PYTHON_FUNCTION.get(value, value) if _is_function(value) else value
+    )
 
 
 def _jit_compile_callee(function: Any) -> Any:

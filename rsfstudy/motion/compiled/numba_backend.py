@@ -38,7 +38,7 @@ from rsfstudy.slider import (
 
 _ARRAY_TYPE, _TABLE_TYPE = types.float64[::1], types.float64[:, ::1]
 _SWITCH_THRESHOLDS_TYPE = types.UniTuple(types.float64, len(SwitchThresholds._fields))
-_LOOP_CONSTANTS_TYPE = types.Tuple(
+_NUMBA_TYPE_OF_LOOP_CONSTANTS = types.Tuple(
     (_ARRAY_TYPE, types.int64[:, ::1], _SWITCH_THRESHOLDS_TYPE, _ARRAY_TYPE, _ARRAY_TYPE)
 )
 
@@ -106,7 +106,7 @@ class NumbaMotionState:
     initial : bytes
         Initial values of the fields.
     called_with : tuple of float
-        Values of the fields in ``array_layout.CALL_ARGUMENT_FIELDS``.
+        Values of the fields in ``array_layout.MOTION_STATE_FIELDS_SET_BY_CALLER``.
 
     Attributes
     ----------
@@ -190,7 +190,7 @@ def _build_function_table(
 
     Both rows contain the force balance function of the slow manifold.
     """
-    rows = np.zeros((2, array_layout.FUNCTIONS_PER_REGIME), dtype=np.int64)
+    rows = np.zeros((2, array_layout.FUNCTION_COUNT_PER_REGIME), dtype=np.int64)
     (
         rows[array_layout.SLOW_REGIME, : len(slow_regime_addresses)],
         rows[array_layout.FAST_REGIME, : len(fast_regime_addresses)],
@@ -211,7 +211,7 @@ def get_compiled_loop() -> Any:
     memory = types.Array(numba.from_dtype(array_layout.MOTION_STATE_DTYPE), 1, "C")
     tables = _ARRAY_TYPE, _TABLE_TYPE, _ARRAY_TYPE, _TABLE_TYPE, _TABLE_TYPE, types.int64
     signature = types.int64(
-        memory, _ARRAY_TYPE, _ARRAY_TYPE, _ARRAY_TYPE, _LOOP_CONSTANTS_TYPE, *tables
+        memory, _ARRAY_TYPE, _ARRAY_TYPE, _ARRAY_TYPE, _NUMBA_TYPE_OF_LOOP_CONSTANTS, *tables
     )
     return compile_function(advance_motion, signature)
 

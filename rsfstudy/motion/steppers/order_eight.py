@@ -11,7 +11,7 @@ import math
 
 from scipy.integrate import DOP853
 
-from rsfstudy.motion.array_operations import evaluate_in_place, offset_pointer
+from rsfstudy.motion.array_operations import advance_pointer_by_items, evaluate_function_into_array
 from rsfstudy.motion.max_step_length import MAX_STEP_LENGTH
 from rsfstudy.motion.steppers import BUDGET_SPENT, NO_STEP, Stepper
 from rsfstudy.motion.steppers.unrolled_step import (
@@ -20,10 +20,10 @@ from rsfstudy.motion.steppers.unrolled_step import (
     EXTRA_STAGE_COUNT,
     LENGTH_INDEX,
     STAGE_COUNT,
+    STAGE_COUNT_WITH_DENSE_OUTPUT,
     TOLERANCE_INDEX,
-    TOTAL_STAGE_COUNT,
 )
-from rsfstudy.motion.workspace import count_evaluations, fill_rates_by_step_clock
+from rsfstudy.motion.workspace import count_evaluations, evaluate_rates_by_step_clock
 
 #: Weights of the additional stages of dense output, and of all stages in its coefficients.
 _EXTRA_WEIGHTS, _DENSE_WEIGHTS = (tuple(x.ravel().tolist()) for x in (DOP853.A_EXTRA, DOP853.D))
@@ -43,7 +43,7 @@ def begin_regime(motion, workspace):
     See ``Stepper.begin_regime``.
     """
     motion.clock = 0.0
-    evaluate_in_place(
+    evaluate_function_into_array(
         workspace.fill_rates, workspace.y, workspace.y, workspace.parameters, workspace.rates
     )
     count_evaluations(motion, 1)
@@ -69,7 +69,7 @@ def attempt_step(motion, workspace, max_length):
         motion.end = motion.clock + length * motion.direction
         motion.step_length = motion.end - motion.clock
         length = abs(motion.step_length)
-        take_step_ignoring_error(motion, workspace)
+        take_step_without_error_test(motion, workspace)
         if motion.evaluations_slow + motion.evaluations_fast > motion.budget:
             return BUDGET_SPENT
         error = workspace.order_eight_step_block[ERROR_INDEX]
@@ -81,10 +81,10 @@ def attempt_step(motion, workspace, max_length):
     return NO_STEP
 
 
-def take_step_ignoring_error(motion, workspace):
+def take_step_without_error_test(motion, workspace):
     """Take one step of size ``motion.step_length`` without an error test."""
     workspace.order_eight_step_block[LENGTH_INDEX] = motion.step_length
-    evaluate_in_place(
+    evaluate_function_into_array(
         workspace.attempt_step,
         workspace.y,
         workspace.stage_rates,
@@ -135,7 +135,9 @@ def take_step_with_time_as_clock(motion, workspace):
             for j in range(s):
                 together += _RUNGE_KUTTA_STAGE_WEIGHTS[s][j] * stages[j * count + i]
             new[i] = y[i] + length * together
-        fill_rates_by_step_clock(motion, workspace, new, offset_pointer(stages, s * count))
+        evaluate_rates_by_step_clock(
+            motion, workspace, new, advance_pointer_by_items(stages, s * count)
+        )
     fifth = third = 0.0
     for i in range(count):
         of_fifth = of_third = 0.0
@@ -156,7 +158,7 @@ def retake_step(motion, workspace, clock):
     """
     motion.end, motion.step_length, motion.is_dense = clock, clock - motion.clock, 0
     motion.time_per_step = 0.0
-    take_step_ignoring_error(motion, workspace)
+    take_step_without_error_test(motion, workspace)
 
 
 def interpolate_unknowns(motion, workspace, clock):
@@ -249,7 +251,7 @@ def select_initial_step_length(workspace, clock_direction, tolerance):
     trial = 1e-6 if d0 < 1e-5 or d1 < 1e-5 else 0.01 * d0 / d1
     for i in range(count):
         workspace.y_end[i] = y[i] + trial * clock_direction * first[i]
-    evaluate_in_place(
+    evaluate_function_into_array(
         workspace.fill_rates, workspace.y_end, y, workspace.parameters, workspace.y_within
     )
     d2 = 0.0
@@ -289,10 +291,12 @@ def prepare_dense_output(motion, workspace, step_length):
         for i in range(count):
             together = 0.0
             for j in range(STAGE_COUNT + 1 + s):
-                together += _EXTRA_WEIGHTS[s * TOTAL_STAGE_COUNT + j] * stages[j * count + i]
+                together += (
+                    _EXTRA_WEIGHTS[s * STAGE_COUNT_WITH_DENSE_OUTPUT + j] * stages[j * count + i]
+                )
             workspace.y_within[i] = y[i] + step_length * together
-        rates = offset_pointer(stages, (STAGE_COUNT + 1 + s) * count)
-        fill_rates_by_step_clock(motion, workspace, workspace.y_within, rates)
+        rates = advance_pointer_by_items(stages, (STAGE_COUNT + 1 + s) * count)
+        evaluate_rates_by_step_clock(motion, workspace, workspace.y_within, rates)
     for i in range(count):
         change = workspace.y_end[i] - y[i]
         first, last = stages[i], stages[STAGE_COUNT * count + i]
@@ -301,8 +305,10 @@ def prepare_dense_output(motion, workspace, step_length):
         rows[2 * count + i] = 2.0 * change - step_length * (last + first)
         for r in range(DENSE_ROW_COUNT - 3):
             together = 0.0
-            for j in range(TOTAL_STAGE_COUNT):
-                together += _DENSE_WEIGHTS[r * TOTAL_STAGE_COUNT + j] * stages[j * count + i]
+            for j in range(STAGE_COUNT_WITH_DENSE_OUTPUT):
+                together += (
+                    _DENSE_WEIGHTS[r * STAGE_COUNT_WITH_DENSE_OUTPUT + j] * stages[j * count + i]
+                )
             rows[(3 + r) * count + i] = step_length * together
 
 

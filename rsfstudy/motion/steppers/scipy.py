@@ -36,7 +36,7 @@ class _BudgetExceeded(Exception):
     """Raised within a step if the evaluation budget is exceeded."""
 
 
-def _build_float_interpolant(dense_output: Any) -> Callable[[float], Iterable[float]]:
+def _build_interpolant_of_unknowns(dense_output: Any) -> Callable[[float], Iterable[float]]:
     """Build a function that interpolates the unknowns within a step.
 
     For DOP853, the function repeats the operations of SciPy with floats. SciPy's array operations
@@ -90,7 +90,7 @@ class SciPyStepper(Stepper):
         begin, known = np.array(workspace.y[: workspace.unknown_count]), motion.next_step_length
         first = {"first_step": known} if known else {}
         self._solver = self._create_solver(motion, workspace, ends, begin, **first)
-        workspace.rates[: workspace.unknown_count] = self._current_solver_rates()
+        workspace.rates[: workspace.unknown_count] = self._get_current_solver_rates()
 
     def attempt_step(self, motion: Any, workspace: Any, max_length: float) -> float:
         """Take one step with the solver.
@@ -143,7 +143,7 @@ class SciPyStepper(Stepper):
             order_eight.interpolate_unknowns(motion, workspace, clock)  # type: ignore[no-untyped-call]
             return
         if self._interpolant is None:
-            self._interpolant = _build_float_interpolant(self._solver.dense_output())
+            self._interpolant = _build_interpolant_of_unknowns(self._solver.dense_output())
         for i, unknown in enumerate(self._interpolant(clock)):
             workspace.y_within[i] = unknown
 
@@ -169,7 +169,9 @@ class SciPyStepper(Stepper):
             within.append(solver.dense_output())
         motion.end, motion.step_length = clock, clock - motion.clock
         self._interpolant = (
-            OdeSolution(clocks, within) if len(within) > 1 else _build_float_interpolant(within[0])
+            OdeSolution(clocks, within)
+            if len(within) > 1
+            else _build_interpolant_of_unknowns(within[0])
         )
         self._store_step_end(workspace)
 
@@ -231,7 +233,7 @@ class SciPyStepper(Stepper):
             motion.jacobians += int(solver.njev - known)
         return True
 
-    def _current_solver_rates(self) -> np.ndarray:
+    def _get_current_solver_rates(self) -> np.ndarray:
         """Return the derivatives at the current point of the solver.
 
         Most solvers have already computed them.
@@ -244,4 +246,4 @@ class SciPyStepper(Stepper):
     def _store_step_end(self, workspace: Any) -> None:
         """Copy the end of the step to the workspace."""
         workspace.y_end[: workspace.unknown_count] = self._solver.y
-        workspace.rates_at_end[: workspace.unknown_count] = self._current_solver_rates()
+        workspace.rates_at_end[: workspace.unknown_count] = self._get_current_solver_rates()

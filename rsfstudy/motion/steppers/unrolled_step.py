@@ -25,10 +25,10 @@ from scipy.integrate import DOP853
 #: Number of stages of a step, of additional stages for dense output, and of rows of dense output
 #: coefficients.
 STAGE_COUNT, EXTRA_STAGE_COUNT, DENSE_ROW_COUNT = 12, 3, 7
-TOTAL_STAGE_COUNT = STAGE_COUNT + 1 + EXTRA_STAGE_COUNT
+STAGE_COUNT_WITH_DENSE_OUTPUT = STAGE_COUNT + 1 + EXTRA_STAGE_COUNT
 #: Weights of the derivatives in each weighted sum: the stages, of which the last is the end of the
 #: step, and the error estimates of order five and three.
-_RATE_WEIGHTS_BY_SUM_NAME: Mapping[str, np.ndarray] = {
+_DERIVATIVE_WEIGHTS_BY_SUM_NAME: Mapping[str, np.ndarray] = {
     **{f"stage_{s}": DOP853.A[s, :s] for s in range(1, STAGE_COUNT)},
     f"stage_{STAGE_COUNT}": DOP853.B,
     "error_of_fifth": DOP853.E5,
@@ -114,7 +114,7 @@ def _compile_weighted_sum_functions() -> dict[str, Any]:
         name: _compile_function_source(
             name, _sum_argument_source(name), [f"return {_weighted_sum_source(name)}"], {}
         )
-        for name in _RATE_WEIGHTS_BY_SUM_NAME
+        for name in _DERIVATIVE_WEIGHTS_BY_SUM_NAME
     }
 
 
@@ -126,13 +126,13 @@ def _sum_call_source(sum_name: str, unknown_index: int) -> str:
 
 def _sum_argument_source(sum_name: str) -> str:
     """Return the source of the arguments of a weighted sum."""
-    return ", ".join(f"k{s}" for s in np.flatnonzero(_RATE_WEIGHTS_BY_SUM_NAME[sum_name]))
+    return ", ".join(f"k{s}" for s in np.flatnonzero(_DERIVATIVE_WEIGHTS_BY_SUM_NAME[sum_name]))
 
 
 def _weighted_sum_source(sum_name: str) -> str:
     """Return the source of the body of a weighted sum."""
     return " + ".join(
-        f"{float(x)!r} * k{s}" for s, x in enumerate(_RATE_WEIGHTS_BY_SUM_NAME[sum_name]) if x
+        f"{float(x)!r} * k{s}" for s, x in enumerate(_DERIVATIVE_WEIGHTS_BY_SUM_NAME[sum_name]) if x
     )
 
 

@@ -292,19 +292,21 @@ def build_rupture_rate_function(friction_functions: FrictionFunctions) -> Functi
             log_norm = math.copysign(LARGEST_LOG_SLIP_RATE, log_norm)
         norm = math.exp(log_norm)
         value, slope, shift, _shift_slope = strength(g, others, p)
-        faster = clamp_rupture_rate((spring_stress - g) / (stiffness * norm))
+        faster = limit_rate_per_inertial_time((spring_stress - g) / (stiffness * norm))
         changes = evolutions(x, states_at(value, x, others, p), shift, norm, p)
         return (
-            clamp_rupture_rate(stiffness * (p[LOAD_VELOCITY] * p[DYNAMICS] - norm)),
+            limit_rate_per_inertial_time(stiffness * (p[LOAD_VELOCITY] * p[DYNAMICS] - norm)),
             faster,
-            clamp_rupture_rate((a * faster + contribution(changes, g, others, p)) / slope),
+            limit_rate_per_inertial_time(
+                (a * faster + contribution(changes, g, others, p)) / slope
+            ),
             *changes[1:],
         )
 
     return rates
 
 
-def clamp_rupture_rate(rate: float) -> float:
+def limit_rate_per_inertial_time(rate: float) -> float:
     """Limit a rate to ``MAX_RATE_PER_INERTIAL_TIME`` in magnitude.
 
     Parameters

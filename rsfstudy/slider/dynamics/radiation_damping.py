@@ -15,7 +15,7 @@ from rsfstudy.slider.parts import NON_NEGATIVE, Function, Numbers, number
 from rsfstudy.slider.scene_view import SceneView
 
 _MAX_ITERATIONS = 200
-_ROOT_STEP_TOLERANCE = 1e-15
+_RTOL_OF_ROOT_ITERATION_STEPS = 1e-15
 #: Relative tolerance of the strength for convergence. Small Newton steps are not sufficient,
 #: because slopes are very steep at the lower limit of normal stress, which only trial steps reach.
 _STRESS_BALANCE_TOLERANCE = 1e-6
@@ -101,13 +101,13 @@ def build_slip_rate_functions(friction_functions: FrictionFunctions) -> tuple[Fu
                 high = x
             change = missing / (a + slope * damping * math.exp(x))
             balanced = abs(missing) <= _STRESS_BALANCE_TOLERANCE * (1.0 + abs(psi) + a * abs(x))
-            if balanced and abs(change) <= _ROOT_STEP_TOLERANCE * (1.0 + abs(x)):
+            if balanced and abs(change) <= _RTOL_OF_ROOT_ITERATION_STEPS * (1.0 + abs(x)):
                 return x, g, shift
             # If normal stress is almost zero, slopes are very steep, and Newton steps shrink
             # slowly.
-            slow = abs(change) > 0.5 * abs(before) or abs(change) <= _ROOT_STEP_TOLERANCE * (
-                1.0 + abs(x)
-            )
+            slow = abs(change) > 0.5 * abs(before) or abs(
+                change
+            ) <= _RTOL_OF_ROOT_ITERATION_STEPS * (1.0 + abs(x))
             before = change
             if slow or not low < x + change <= high:
                 before = math.inf

@@ -17,8 +17,8 @@ from rsfstudy.slider.parts import NON_NEGATIVE, POSITIVE, Numbers, number
 from rsfstudy.slider.scene_view import SceneView
 
 
-def auxiliary_rates(
-    log_slip_rate: float, states: Numbers, slip_fraction: float, p: Numbers
+def porosity_and_pressure_rates(
+    log_slip_rate: float, states: Numbers, slip_per_independent_variable: float, p: Numbers
 ) -> Numbers:
     r"""Compute the rates of porosity and pore pressure.
 
@@ -28,10 +28,10 @@ def auxiliary_rates(
         Natural logarithm of the slip rate, :math:`\ln(V/V_*)`.
     states : tuple of float
         Porosity :math:`(\varphi - \varphi_0)/(\beta \sigma_*)` and pore pressure :math:`P`.
-    slip_fraction : float
+    slip_per_independent_variable : float
         Factor of the result, equal to the slip per unit of the independent variable. When slip
-        stops, the changes per unit slip are infinite, but their product with ``slip_fraction``
-        remains finite.
+        stops, the changes per unit slip are infinite, but their product with
+        ``slip_per_independent_variable`` remains finite.
     p : tuple of float
         Parameters of the scene. The function reads the dilatancy :math:`\epsilon/(\beta \sigma_*)`
         from ``p[FLUID]`` and the drainage :math:`c^* D_c/V_*` from ``p[FLUID + 1]``.
@@ -40,7 +40,7 @@ def auxiliary_rates(
     -------
     tuple of float
         Changes of porosity and pore pressure per unit slip in :math:`D_c`, multiplied by
-        ``slip_fraction``.
+        ``slip_per_independent_variable``.
 
     Notes
     -----
@@ -57,12 +57,12 @@ def auxiliary_rates(
     Segall and Rice (1995), J. Geophys. Res. 100, 22155-22171.
     """
     porosity, pressure = states
-    opening = slip_fraction * (p[FLUID] * log_slip_rate - porosity)
-    time = slip_fraction * math.exp(min(-log_slip_rate, LARGEST_LOG_SLOWNESS))
+    opening = slip_per_independent_variable * (p[FLUID] * log_slip_rate - porosity)
+    time = slip_per_independent_variable * math.exp(min(-log_slip_rate, LARGEST_LOG_SLOWNESS))
     return opening, -p[FLUID + 1] * time * pressure - opening
 
 
-def auxiliary_steady_states(log_slip_rate: float, p: Numbers) -> Numbers:
+def steady_porosity_and_pressure(log_slip_rate: float, p: Numbers) -> Numbers:
     r"""Compute porosity and pore pressure in steady sliding.
 
     Parameters
@@ -143,8 +143,8 @@ class DilatantFluid(Fluid):
             "sigma_*",
         ),
     )
-    auxiliary_rates = staticmethod(auxiliary_rates)
-    auxiliary_steady_states = staticmethod(auxiliary_steady_states)
+    auxiliary_rates = staticmethod(porosity_and_pressure_rates)
+    auxiliary_steady_states = staticmethod(steady_porosity_and_pressure)
 
     def check(self, scene: SceneView) -> None:
         """Check that the stiffness ratio of the scene is defined.

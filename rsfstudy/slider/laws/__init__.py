@@ -34,7 +34,7 @@ from rsfstudy.slider.scene_view import SceneView
 
 #: Upper limit of exponents in evolution laws. Larger exponents occur only in trial steps that the
 #: integrator rejects, because the equations of motion stop at slip rates of 10^-290 V_*.
-LARGEST_EXPONENT = 700.0
+LARGEST_EVOLUTION_EXPONENT = 700.0
 
 
 def fast_expm1(exponent: float) -> float:

@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-from rsfstudy.slider.laws import LARGEST_EXPONENT, Law, declare_cutoff_velocity_field
+from rsfstudy.slider.laws import LARGEST_EVOLUTION_EXPONENT, Law, declare_cutoff_velocity_field
 from rsfstudy.slider.parameter_layout import LAW
 from rsfstudy.slider.parts import Numbers
 from rsfstudy.slider.scene_view import SceneView
@@ -19,7 +19,7 @@ from rsfstudy.slider.scene_view import SceneView
 HALLEY_ITERATION_COUNT = 4
 
 
-def evolution(log_slip_rate: float, state: float, p: Numbers) -> float:
+def state_evolution_per_slip(log_slip_rate: float, state: float, p: Numbers) -> float:
     r"""Compute the state evolution per unit slip at constant normal stress.
 
     Parameters
@@ -117,7 +117,7 @@ def healing_factor(log_slip_rate: float, log_cutoff_velocity: float) -> float:
 
 
 def clamp_exponent(exponent: float) -> float:
-    """Limit an exponent to ``LARGEST_EXPONENT``.
+    """Limit an exponent to ``LARGEST_EVOLUTION_EXPONENT``.
 
     Larger exponents occur only in trial steps of the integrator.
 
@@ -131,7 +131,7 @@ def clamp_exponent(exponent: float) -> float:
     float
         Smaller value of the exponent and the limit.
     """
-    return min(exponent, LARGEST_EXPONENT)
+    return min(exponent, LARGEST_EVOLUTION_EXPONENT)
 
 
 def lambert_w(value: float) -> float:
@@ -169,7 +169,7 @@ class CompositeLaw(Law):
     cutoff_velocity_ratio: float = declare_cutoff_velocity_field()
 
     name = "composite"
-    evolution = staticmethod(evolution)
+    evolution = staticmethod(state_evolution_per_slip)
     steady_states = staticmethod(steady_states)
 
     @property

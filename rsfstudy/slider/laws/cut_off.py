@@ -9,13 +9,18 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-from rsfstudy.slider.laws import LARGEST_EXPONENT, Law, declare_cutoff_velocity_field, fast_expm1
+from rsfstudy.slider.laws import (
+    LARGEST_EVOLUTION_EXPONENT,
+    Law,
+    declare_cutoff_velocity_field,
+    fast_expm1,
+)
 from rsfstudy.slider.parameter_layout import LAW
 from rsfstudy.slider.parts import Numbers
 from rsfstudy.slider.scene_view import SceneView
 
 
-def evolution(log_slip_rate: float, state: float, p: Numbers) -> float:
+def state_evolution_per_slip(log_slip_rate: float, state: float, p: Numbers) -> float:
     r"""Compute the state evolution per unit slip at constant normal stress.
 
     Parameters
@@ -56,7 +61,7 @@ def evolution(log_slip_rate: float, state: float, p: Numbers) -> float:
     """
     b = p[LAW]
     behind = steady_state_over_b(log_slip_rate, p[LAW + 1], p[LAW + 2]) - state / b
-    return b * fast_expm1(min(behind, LARGEST_EXPONENT))
+    return b * fast_expm1(min(behind, LARGEST_EVOLUTION_EXPONENT))
 
 
 def steady_states(log_slip_rate: float, state_shift: float, p: Numbers) -> Numbers:
@@ -88,7 +93,7 @@ def steady_states(log_slip_rate: float, state_shift: float, p: Numbers) -> Numbe
 
 
 def steady_state_over_b(
-    log_slip_rate: float, cutoff_fraction: float, reference_fraction: float
+    log_slip_rate: float, cutoff_velocity_fraction: float, reference_velocity_fraction: float
 ) -> float:
     r"""Compute the state variable in steady sliding, divided by b.
 
@@ -96,9 +101,9 @@ def steady_state_over_b(
     ----------
     log_slip_rate : float
         Natural logarithm of the slip rate, :math:`\ln(V/V_*)`.
-    cutoff_fraction : float
+    cutoff_velocity_fraction : float
         Fraction :math:`V_c/(V_c + V_*)`.
-    reference_fraction : float
+    reference_velocity_fraction : float
         Fraction :math:`V_*/(V_c + V_*)`.
 
     Returns
@@ -110,13 +115,15 @@ def steady_state_over_b(
     -----
     The function uses two equivalent formulas, one for slip rates below :math:`V_*` and one for
     higher slip rates. Each formula avoids the cancellation of digits in its range. Exponents are
-    limited to ``LARGEST_EXPONENT`` to avoid overflow.
+    limited to ``LARGEST_EVOLUTION_EXPONENT`` to avoid overflow.
     """
     if log_slip_rate < 0.0:
-        exponent = min(-log_slip_rate, LARGEST_EXPONENT)
-        return math.log1p(cutoff_fraction * math.expm1(exponent)) - log_slip_rate - exponent
-    exponent = min(log_slip_rate, LARGEST_EXPONENT)
-    return math.log1p(reference_fraction * math.expm1(exponent)) - exponent
+        exponent = min(-log_slip_rate, LARGEST_EVOLUTION_EXPONENT)
+        return (
+            math.log1p(cutoff_velocity_fraction * math.expm1(exponent)) - log_slip_rate - exponent
+        )
+    exponent = min(log_slip_rate, LARGEST_EVOLUTION_EXPONENT)
+    return math.log1p(reference_velocity_fraction * math.expm1(exponent)) - exponent
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -133,7 +140,7 @@ class CutOffLaw(Law):
     cutoff_velocity_ratio: float = declare_cutoff_velocity_field()
 
     name = "cut_off"
-    evolution = staticmethod(evolution)
+    evolution = staticmethod(state_evolution_per_slip)
     steady_states = staticmethod(steady_states)
     has_logarithmic_state = False  # The state is a logarithm of 1 + theta V_c/D_c.
 
@@ -151,7 +158,7 @@ class CutOffLaw(Law):
 
         See the base class. The fractions are :math:`V_c/(V_c + V_*)` and :math:`V_*/(V_c + V_*)`.
         """
-        return (*super().parameter_values(scene), *self._cutoff_and_reference_fractions())
+        return (*super().parameter_values(scene), *self._cutoff_and_reference_velocity_fractions())
 
     def relaxation(self, log_slip_rate: float, slip: float) -> float:
         r"""Compute the relaxation of stress at constant slip rate.
@@ -176,10 +183,12 @@ class CutOffLaw(Law):
 
             \ln\left[1 + \left(\frac{1 + V_c/V_*}{1 + V_c/V} - 1\right) e^{-\delta/D_c}\right].
         """
-        ahead = -steady_state_over_b(log_slip_rate, *self._cutoff_and_reference_fractions())
+        ahead = -steady_state_over_b(
+            log_slip_rate, *self._cutoff_and_reference_velocity_fractions()
+        )
         return math.log(-math.expm1(-slip) + math.exp(ahead - slip))
 
-    def _cutoff_and_reference_fractions(self) -> Numbers:
+    def _cutoff_and_reference_velocity_fractions(self) -> Numbers:
         return 1.0 / (1.0 + 1.0 / self.cutoff_velocity_ratio), 1.0 / (
             1.0 + self.cutoff_velocity_ratio
         )

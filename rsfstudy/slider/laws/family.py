@@ -5,13 +5,13 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-from rsfstudy.slider.laws import LARGEST_EXPONENT, Law, fast_expm1
+from rsfstudy.slider.laws import LARGEST_EVOLUTION_EXPONENT, Law, fast_expm1
 from rsfstudy.slider.parameter_layout import LAW
 from rsfstudy.slider.parts import Numbers, number
 from rsfstudy.slider.scene_view import SceneView
 
 
-def evolution(log_slip_rate: float, state: float, p: Numbers) -> float:
+def state_evolution_per_slip(log_slip_rate: float, state: float, p: Numbers) -> float:
     r"""Compute the state evolution per unit slip at constant normal stress.
 
     Parameters
@@ -49,11 +49,15 @@ def evolution(log_slip_rate: float, state: float, p: Numbers) -> float:
     b, exponent = p[LAW], p[LAW + 1]
     if exponent == 0.0:
         return -(state + b * log_slip_rate)
-    return b * fast_expm1(min(-exponent * (state / b + log_slip_rate), LARGEST_EXPONENT)) / exponent
+    return (
+        b
+        * fast_expm1(min(-exponent * (state / b + log_slip_rate), LARGEST_EVOLUTION_EXPONENT))
+        / exponent
+    )
 
 
 @dataclass(frozen=True, kw_only=True)
-class LawFamily(Law):
+class SlipToSlownessLaw(Law):
     r"""Family of laws between the slip law and the slowness law.
 
     Parameters
@@ -71,7 +75,7 @@ class LawFamily(Law):
     )
 
     name = "family"
-    evolution = staticmethod(evolution)
+    evolution = staticmethod(state_evolution_per_slip)
     scale_free = True
     has_closed_orbits = True  # The derivative dh/du = -(1 + eps h) is linear in h.
 

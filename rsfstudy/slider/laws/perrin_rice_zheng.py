@@ -8,7 +8,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-from rsfstudy.slider.laws import LARGEST_EXPONENT, Law
+from rsfstudy.slider.laws import LARGEST_EVOLUTION_EXPONENT, Law
 from rsfstudy.slider.parameter_layout import LAW
 from rsfstudy.slider.parts import Numbers
 
@@ -18,7 +18,7 @@ from rsfstudy.slider.parts import Numbers
 MAX_STEADY_STATE_OFFSET_OVER_B = 300.0
 
 
-def evolution(log_slip_rate: float, state: float, p: Numbers) -> float:
+def state_evolution_per_slip(log_slip_rate: float, state: float, p: Numbers) -> float:
     r"""Compute the state evolution per unit slip at constant normal stress.
 
     Parameters
@@ -56,11 +56,14 @@ def evolution(log_slip_rate: float, state: float, p: Numbers) -> float:
     """
     b = p[LAW]
     return -b * math.sinh(
-        max(-LARGEST_EXPONENT, min(state / b + log_slip_rate, MAX_STEADY_STATE_OFFSET_OVER_B))
+        max(
+            -LARGEST_EVOLUTION_EXPONENT,
+            min(state / b + log_slip_rate, MAX_STEADY_STATE_OFFSET_OVER_B),
+        )
     )
 
 
-def relaxation(log_slip_rate: float, slip: float) -> float:
+def stress_relaxation_after_velocity_step(log_slip_rate: float, slip: float) -> float:
     r"""Compute the relaxation of stress at constant slip rate.
 
     Parameters
@@ -96,6 +99,6 @@ class PerrinRiceZhengLaw(Law):
     """Evolution law of Perrin, Rice and Zheng."""
 
     name = "perrin_rice_zheng"
-    evolution = staticmethod(evolution)
-    relaxation = staticmethod(relaxation)
+    evolution = staticmethod(state_evolution_per_slip)
+    relaxation = staticmethod(stress_relaxation_after_velocity_step)
     scale_free = True

@@ -13,7 +13,7 @@ from rsfstudy.slider.parameter_layout import LAW
 from rsfstudy.slider.parts import Numbers
 
 
-def evolution(log_slip_rate: float, state: float, p: Numbers) -> float:
+def state_evolution_per_slip(log_slip_rate: float, state: float, p: Numbers) -> float:
     r"""Compute the state evolution per unit slip at constant normal stress.
 
     Parameters
@@ -46,7 +46,7 @@ def evolution(log_slip_rate: float, state: float, p: Numbers) -> float:
     return -(state + p[LAW] * log_slip_rate)
 
 
-def relaxation(log_slip_rate: float, slip: float) -> float:
+def stress_relaxation_after_velocity_step(log_slip_rate: float, slip: float) -> float:
     r"""Compute the relaxation of stress at constant slip rate.
 
     Parameters
@@ -81,7 +81,7 @@ class SlipLaw(Law):
     """Slip law, in which the state variable evolves only with slip."""
 
     name = "slip"
-    evolution = staticmethod(evolution)
-    relaxation = staticmethod(relaxation)
+    evolution = staticmethod(state_evolution_per_slip)
+    relaxation = staticmethod(stress_relaxation_after_velocity_step)
     scale_free = True
     has_closed_orbits = True  # See Gu et al. (1984).

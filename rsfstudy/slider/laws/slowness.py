@@ -8,12 +8,12 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-from rsfstudy.slider.laws import LARGEST_EXPONENT, Law, fast_expm1
+from rsfstudy.slider.laws import LARGEST_EVOLUTION_EXPONENT, Law, fast_expm1
 from rsfstudy.slider.parameter_layout import LAW
 from rsfstudy.slider.parts import Numbers
 
 
-def evolution(log_slip_rate: float, state: float, p: Numbers) -> float:
+def state_evolution_per_slip(log_slip_rate: float, state: float, p: Numbers) -> float:
     r"""Compute the state evolution per unit slip at constant normal stress.
 
     Parameters
@@ -54,10 +54,12 @@ def evolution(log_slip_rate: float, state: float, p: Numbers) -> float:
     """
     b = p[LAW]
     exponent = -(state / b + log_slip_rate)
-    return b * fast_expm1(LARGEST_EXPONENT if exponent > LARGEST_EXPONENT else exponent)
+    return b * fast_expm1(
+        LARGEST_EVOLUTION_EXPONENT if exponent > LARGEST_EVOLUTION_EXPONENT else exponent
+    )
 
 
-def relaxation(log_slip_rate: float, slip: float) -> float:
+def stress_relaxation_after_velocity_step(log_slip_rate: float, slip: float) -> float:
     r"""Compute the relaxation of stress at constant slip rate.
 
     Parameters
@@ -92,7 +94,7 @@ class SlownessLaw(Law):
     """Slowness (ageing) law, in which contacts also heal at rest."""
 
     name = "slowness"
-    evolution = staticmethod(evolution)
-    relaxation = staticmethod(relaxation)
+    evolution = staticmethod(state_evolution_per_slip)
+    relaxation = staticmethod(stress_relaxation_after_velocity_step)
     scale_free = True
     has_closed_orbits = True  # See Ranjith and Rice (1999).

@@ -16,7 +16,11 @@ from rsfstudy.slider.parts import Numbers
 
 
 def evolutions(
-    log_slip_rate: float, states: Numbers, state_shift: float, slip_fraction: float, p: Numbers
+    log_slip_rate: float,
+    states: Numbers,
+    state_shift: float,
+    slip_per_independent_variable: float,
+    p: Numbers,
 ) -> Numbers:
     r"""Compute the evolution of both states at constant normal stress.
 
@@ -28,7 +32,7 @@ def evolutions(
         States :math:`\Psi_1` and :math:`\Psi_2`, which exclude the effect of stress.
     state_shift : float
         Decrease of the sum of the states due to stress.
-    slip_fraction : float
+    slip_per_independent_variable : float
         Factor of the result, equal to the slip per unit of the independent variable.
     p : tuple of float
         Parameters of the scene. The parameters of the law start at ``p[LAW]``.
@@ -36,7 +40,7 @@ def evolutions(
     Returns
     -------
     tuple of float
-        Rates :math:`D_c \, d\Theta_i/d\delta`, multiplied by ``slip_fraction``.
+        Rates :math:`D_c \, d\Theta_i/d\delta`, multiplied by ``slip_per_independent_variable``.
 
     Notes
     -----
@@ -48,7 +52,9 @@ def evolutions(
     """
     first = states[0] - p[FIRST_SHARE] * state_shift + p[FIRST_B] * log_slip_rate
     second = states[1] - p[SECOND_SHARE] * state_shift + p[SECOND_B] * log_slip_rate
-    return -slip_fraction * first, -slip_fraction * p[LENGTH_QUOTIENT] * second
+    return -slip_per_independent_variable * first, -slip_per_independent_variable * p[
+        LENGTH_QUOTIENT
+    ] * second
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from rsfstudy.errors import InvalidValue
-from rsfstudy.slider.laws import LARGEST_EXPONENT, fast_expm1
+from rsfstudy.slider.laws import LARGEST_EVOLUTION_EXPONENT, fast_expm1
 from rsfstudy.slider.laws._two_states import (
     FIRST_B,
     FIRST_SHARE,
@@ -19,7 +19,11 @@ from rsfstudy.slider.scene_view import SceneView
 
 
 def evolutions(
-    log_slip_rate: float, states: Numbers, state_shift: float, slip_fraction: float, p: Numbers
+    log_slip_rate: float,
+    states: Numbers,
+    state_shift: float,
+    slip_per_independent_variable: float,
+    p: Numbers,
 ) -> Numbers:
     r"""Compute the evolution of both states at constant normal stress.
 
@@ -31,7 +35,7 @@ def evolutions(
         States :math:`\Psi_1` and :math:`\Psi_2`, which exclude the effect of stress.
     state_shift : float
         Decrease of the sum of the states due to stress.
-    slip_fraction : float
+    slip_per_independent_variable : float
         Factor of the result, equal to the slip per unit of the independent variable.
     p : tuple of float
         Parameters of the scene. The parameters of the law start at ``p[LAW]``.
@@ -39,7 +43,7 @@ def evolutions(
     Returns
     -------
     tuple of float
-        Rates :math:`D_c \, d\Theta_i/d\delta`, multiplied by ``slip_fraction``.
+        Rates :math:`D_c \, d\Theta_i/d\delta`, multiplied by ``slip_per_independent_variable``.
 
     Notes
     -----
@@ -61,11 +65,13 @@ def evolutions(
     first = (states[0] - p[FIRST_SHARE] * state_shift) / p[FIRST_B] + log_slip_rate
     second = (states[1] - p[SECOND_SHARE] * state_shift) / p[SECOND_B] + log_slip_rate
     return (
-        slip_fraction * p[FIRST_B] * fast_expm1(min(-first, LARGEST_EXPONENT)),
-        slip_fraction
+        slip_per_independent_variable
+        * p[FIRST_B]
+        * fast_expm1(min(-first, LARGEST_EVOLUTION_EXPONENT)),
+        slip_per_independent_variable
         * p[LENGTH_QUOTIENT]
         * p[SECOND_B]
-        * fast_expm1(min(-second, LARGEST_EXPONENT)),
+        * fast_expm1(min(-second, LARGEST_EVOLUTION_EXPONENT)),
     )
 
 

@@ -20,8 +20,8 @@ from rsfstudy.slider.parts import NON_NEGATIVE, POSITIVE, Numbers, number
 from rsfstudy.slider.scene_view import SceneView
 
 
-def auxiliary_rates(
-    log_slip_rate: float, states: Numbers, slip_fraction: float, p: Numbers
+def harmonic_oscillation_rates(
+    log_slip_rate: float, states: Numbers, slip_per_independent_variable: float, p: Numbers
 ) -> Numbers:
     r"""Compute the rates of the two unknowns of a harmonic oscillation.
 
@@ -31,7 +31,7 @@ def auxiliary_rates(
         Natural logarithm of the slip rate, :math:`\ln(V/V_*)`.
     states : tuple of float
         Unknowns :math:`y` and :math:`P`.
-    slip_fraction : float
+    slip_per_independent_variable : float
         Factor of the result, equal to the slip per unit of the independent variable.
     p : tuple of float
         Parameters of the scene. The function reads :math:`\omega D_c/V_*` from ``p[LOADING]`` and
@@ -41,7 +41,7 @@ def auxiliary_rates(
     -------
     tuple of float
         Changes of :math:`y` and :math:`P` per unit slip in :math:`D_c`, multiplied by
-        ``slip_fraction``.
+        ``slip_per_independent_variable``.
 
     Notes
     -----
@@ -57,13 +57,17 @@ def auxiliary_rates(
     each rate. The term vanishes for the exact solution.
     """
     ahead, relief = states
-    turn = p[LOADING] * slip_fraction * math.exp(min(-log_slip_rate, LARGEST_LOG_SLOWNESS))
+    turn = (
+        p[LOADING]
+        * slip_per_independent_variable
+        * math.exp(min(-log_slip_rate, LARGEST_LOG_SLOWNESS))
+    )
     over, relative = ahead / p[LOADING + 1], relief / p[LOADING + 1]
     missing = 0.5 * (1.0 - over * over - relative * relative)
     return turn * (relief + missing * ahead), turn * (missing * relief - ahead)
 
 
-def auxiliary_steady_states(log_slip_rate: float, p: Numbers) -> Numbers:
+def zero_oscillation_in_steady_sliding(log_slip_rate: float, p: Numbers) -> Numbers:
     r"""Return the unknowns of the oscillation in steady sliding.
 
     Parameters
@@ -136,8 +140,8 @@ class OscillationBase(LoadingWithFinalLoadVelocity):
     )
 
     of_pressure = False
-    auxiliary_rates = staticmethod(auxiliary_rates)
-    auxiliary_steady_states = staticmethod(auxiliary_steady_states)
+    auxiliary_rates = staticmethod(harmonic_oscillation_rates)
+    auxiliary_steady_states = staticmethod(zero_oscillation_in_steady_sliding)
 
     def check(self, scene: SceneView) -> None:
         """Check that the scene has inertia if the oscillation is fast.

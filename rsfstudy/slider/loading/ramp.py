@@ -19,8 +19,8 @@ from rsfstudy.slider.parts import POSITIVE, Numbers, number
 from rsfstudy.slider.scene_view import SceneView
 
 
-def auxiliary_rates(
-    log_slip_rate: float, states: Numbers, slip_fraction: float, p: Numbers
+def pending_normal_stress_rates(
+    log_slip_rate: float, states: Numbers, slip_per_independent_variable: float, p: Numbers
 ) -> Numbers:
     r"""Compute the rate of the unknown of a ramp.
 
@@ -30,7 +30,7 @@ def auxiliary_rates(
         Natural logarithm of the slip rate, :math:`\ln(V/V_*)`.
     states : tuple of float
         Unknown :math:`P`, the remaining change of normal stress.
-    slip_fraction : float
+    slip_per_independent_variable : float
         Factor of the result, equal to the slip per unit of the independent variable.
     p : tuple of float
         Parameters of the scene. The function reads the rate of imposed normal stress, in
@@ -39,7 +39,8 @@ def auxiliary_rates(
     Returns
     -------
     tuple of float
-        Change of :math:`P` per unit slip in :math:`D_c`, multiplied by ``slip_fraction``.
+        Change of :math:`P` per unit slip in :math:`D_c`, multiplied by
+        ``slip_per_independent_variable``.
 
     Notes
     -----
@@ -49,10 +50,14 @@ def auxiliary_rates(
 
         \frac{dP}{dt} = -\frac{\Delta\sigma}{t_r}.
     """
-    return (-p[LOADING] * slip_fraction * math.exp(min(-log_slip_rate, LARGEST_LOG_SLOWNESS)),)
+    return (
+        -p[LOADING]
+        * slip_per_independent_variable
+        * math.exp(min(-log_slip_rate, LARGEST_LOG_SLOWNESS)),
+    )
 
 
-def auxiliary_steady_states(log_slip_rate: float, p: Numbers) -> Numbers:
+def zero_pending_normal_stress(log_slip_rate: float, p: Numbers) -> Numbers:
     r"""Return the unknown of the ramp in steady sliding.
 
     Parameters
@@ -121,8 +126,8 @@ class NormalStressRamp(LoadingWithFinalLoadVelocity):
         Quantity("ramp_left", "$P$", "1", "imposed normal stress that is yet to come", "sigma_*"),
     )
     of_pressure = False
-    auxiliary_rates = staticmethod(auxiliary_rates)
-    auxiliary_steady_states = staticmethod(auxiliary_steady_states)
+    auxiliary_rates = staticmethod(pending_normal_stress_rates)
+    auxiliary_steady_states = staticmethod(zero_pending_normal_stress)
 
     @property
     def segments(self) -> tuple[Segment, ...]:

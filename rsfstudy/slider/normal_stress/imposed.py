@@ -13,7 +13,7 @@ from rsfstudy.slider.parts import Numbers
 from rsfstudy.slider.scene_view import SceneView
 
 
-def normal_stress(frictional_stress: float, p: Numbers) -> tuple[float, float]:
+def imposed_normal_stress_excess(frictional_stress: float, p: Numbers) -> tuple[float, float]:
     r"""Compute the imposed normal stress.
 
     Parameters
@@ -58,7 +58,7 @@ class ImposedNormalStress(NormalStressWithStateEffect):
         "while normal stress does not follow shear stress",
         "set normal_stress='variable'",
     )
-    normal_stress = staticmethod(normal_stress)
+    normal_stress = staticmethod(imposed_normal_stress_excess)
     depends_on_shear_stress = False
 
     @property

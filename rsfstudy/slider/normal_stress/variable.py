@@ -20,7 +20,7 @@ from rsfstudy.slider.parts import POSITIVE, Numbers, number
 from rsfstudy.slider.scene_view import SceneView
 
 
-def normal_stress(frictional_stress: float, p: Numbers) -> tuple[float, float]:
+def shear_coupled_normal_stress_excess(frictional_stress: float, p: Numbers) -> tuple[float, float]:
     r"""Compute the normal stress under an inclined driving stress.
 
     Parameters
@@ -89,7 +89,7 @@ class VariableNormalStress(NormalStressWithStateEffect):
     )
 
     name = "variable"
-    normal_stress = staticmethod(normal_stress)
+    normal_stress = staticmethod(shear_coupled_normal_stress_excess)
 
     @property
     def cot_phi(self) -> float:

@@ -17,12 +17,12 @@ from scipy.optimize import brentq
 #: Minimum number of samples.
 MIN_SAMPLES_OF_CURVE = 4
 #: Number of intervals on either side of the bracket in which the curve is examined.
-_EXAMINED_INTERVALS_PER_SIDE = 3
+_EXAMINED_INTERVALS_BESIDE_BRACKET = 3
 #: Changes of slope below this fraction of the largest slope are regarded as rounding errors.
-_MAX_ROUNDING_OF_SLOPE_CHANGES = 1e-9
+_MAX_ROUNDING_ERROR_OF_SLOPE_CHANGES = 1e-9
 #: Minimum changes of slope that indicate an oscillation, relative to the largest change of slope
 #: and to the smallest slope nearby.
-_MIN_SLOPE_CHANGE_OF_OSCILLATION = 0.1
+_MIN_RELATIVE_OSCILLATION_SLOPE_CHANGE = 0.1
 
 
 class CrossingStatus(IntEnum):
@@ -88,18 +88,18 @@ def find_crossing(x: np.ndarray, y: np.ndarray, level: float) -> Crossing:
     oscillation. The bounds then enclose at least the whole interval.
     """
     if x.size < MIN_SAMPLES_OF_CURVE:
-        return _build_missing_crossing(CrossingStatus.TOO_FEW_POINTS)
+        return _build_result_without_crossing(CrossingStatus.TOO_FEW_POINTS)
     places = find_all_crossings(x, y, level)
     if len(places) != 1:
-        return _build_missing_crossing(
+        return _build_result_without_crossing(
             CrossingStatus.NOT_UNIQUE if places else CrossingStatus.OUT_OF_REACH
         )
     place, widths = places[0], np.diff(x)
     slopes = np.diff(y) / widths
     bracket = int(np.clip(np.searchsorted(x, place) - 1, 0, slopes.size - 1))
     near = range(
-        max(bracket - _EXAMINED_INTERVALS_PER_SIDE, 0),
-        min(bracket + _EXAMINED_INTERVALS_PER_SIDE + 1, slopes.size),
+        max(bracket - _EXAMINED_INTERVALS_BESIDE_BRACKET, 0),
+        min(bracket + _EXAMINED_INTERVALS_BESIDE_BRACKET + 1, slopes.size),
     )
     turns, alternates = _estimate_slope_changes(slopes, near)
     bounds, far = [place], False
@@ -107,7 +107,7 @@ def find_crossing(x: np.ndarray, y: np.ndarray, level: float) -> Crossing:
         span = _crossing_bounds(slopes[n], turns[n], widths[n], level - y[n])
         if span:
             bounds += [x[n] + end for end in span]
-            far |= abs(n - bracket) >= _EXAMINED_INTERVALS_PER_SIDE
+            far |= abs(n - bracket) >= _EXAMINED_INTERVALS_BESIDE_BRACKET
     if alternates:
         bounds += [x[bracket], x[bracket + 1]]
     if bracket in (0, slopes.size - 1):
@@ -145,7 +145,7 @@ def find_all_crossings(x: np.ndarray, y: np.ndarray, level: float) -> list[float
     return places
 
 
-def _build_missing_crossing(crossing_status: CrossingStatus) -> Crossing:
+def _build_result_without_crossing(crossing_status: CrossingStatus) -> Crossing:
     """Return a crossing without a position."""
     return Crossing(math.nan, math.nan, math.nan, crossing_status)
 
@@ -177,13 +177,13 @@ def _estimate_slope_changes(
         turns[n] = 2.0 * float(beside.mean())  # At an end, only one change is known.
     within = bends[interval_numbers.start : interval_numbers.stop - 1]
     if not _count_sign_reversals(
-        within, _MAX_ROUNDING_OF_SLOPE_CHANGES * float(np.abs(slopes).max())
+        within, _MAX_ROUNDING_ERROR_OF_SLOPE_CHANGES * float(np.abs(slopes).max())
     ):
         return turns, False
     largest = 2.0 * max(turns.values())
     # Small changes on either side of a kink, and noise, do not indicate an oscillation.
-    noticeable = _MIN_SLOPE_CHANGE_OF_OSCILLATION * float(np.abs(within).max())
-    steady = largest < 2.0 * _MIN_SLOPE_CHANGE_OF_OSCILLATION * float(
+    noticeable = _MIN_RELATIVE_OSCILLATION_SLOPE_CHANGE * float(np.abs(within).max())
+    steady = largest < 2.0 * _MIN_RELATIVE_OSCILLATION_SLOPE_CHANGE * float(
         np.abs(slopes[interval_numbers.start : interval_numbers.stop]).min()
     )
     return dict.fromkeys(interval_numbers, largest), not steady and _count_sign_reversals(
@@ -198,29 +198,29 @@ def _count_sign_reversals(slope_changes: np.ndarray, min_slope_change: float) ->
 
 
 def _crossing_bounds(
-    slope: float, slope_change: float, interval_width: float, level_above_first_sample: float
+    slope: float, slope_change: float, interval_width: float, level_minus_first_value: float
 ) -> tuple[float, float] | None:
     """Return the bounds of a crossing in an interval.
 
-    Positions are relative to the first sample, and ``level_above_first_sample`` is the level minus
+    Positions are relative to the first sample, and ``level_minus_first_value`` is the level minus
     the value of the first sample. The result is None if the level cannot be reached.
     """
     if slope < 0.0:
-        slope, level_above_first_sample = -slope, -level_above_first_sample
+        slope, level_minus_first_value = -slope, -level_minus_first_value
     if (
-        level_above_first_sample > slope * interval_width
+        level_minus_first_value > slope * interval_width
     ):  # The curve is mirrored, so that the level is below the first sample.
         mirrored = _crossing_bounds(
-            slope, slope_change, interval_width, slope * interval_width - level_above_first_sample
+            slope, slope_change, interval_width, slope * interval_width - level_minus_first_value
         )
         return (
             None
             if mirrored is None
             else (interval_width - mirrored[1], interval_width - mirrored[0])
         )
-    if level_above_first_sample < 0.0:
+    if level_minus_first_value < 0.0:
         excess = slope_change - slope
-        root = excess**2 + 4.0 * slope_change / interval_width * level_above_first_sample
+        root = excess**2 + 4.0 * slope_change / interval_width * level_minus_first_value
         if excess <= 0.0 or root < 0.0:
             return None
         middle, half = (
@@ -230,12 +230,12 @@ def _crossing_bounds(
         return middle - half, middle + half
     rises, falls = slope + slope_change, slope - slope_change
     steeper = math.sqrt(
-        max(rises**2 - 4.0 * slope_change / interval_width * level_above_first_sample, 0.0)
+        max(rises**2 - 4.0 * slope_change / interval_width * level_minus_first_value, 0.0)
     )
-    flatter = math.sqrt(falls**2 + 4.0 * slope_change / interval_width * level_above_first_sample)
-    first = 2.0 * level_above_first_sample / (rises + steeper) if rises else 0.0
+    flatter = math.sqrt(falls**2 + 4.0 * slope_change / interval_width * level_minus_first_value)
+    first = 2.0 * level_minus_first_value / (rises + steeper) if rises else 0.0
     last = (
-        2.0 * level_above_first_sample / (falls + flatter)
+        2.0 * level_minus_first_value / (falls + flatter)
         if falls > 0.0
         else interval_width * (flatter - falls) / (2 * slope_change)
     )
@@ -245,7 +245,7 @@ def _crossing_bounds(
 def _crossing_bounds_at_end(
     slopes: np.ndarray,
     interval_widths: np.ndarray,
-    level_above_inner_sample: float,
+    level_minus_inner_value: float,
     is_first_interval: bool,
 ) -> tuple[float, float]:
     """Return the bounds of a crossing in the first or last interval.
@@ -257,10 +257,10 @@ def _crossing_bounds_at_end(
     slope, following = (slopes[0], slopes[1]) if is_first_interval else (slopes[-1], slopes[-2])
     width = float(interval_widths[0] if is_first_interval else interval_widths[-1])
     if slope < 0.0:
-        slope, following, level_above_inner_sample = -slope, -following, -level_above_inner_sample
+        slope, following, level_minus_inner_value = -slope, -following, -level_minus_inner_value
     bend, climb = (
         abs(following - slope),
-        level_above_inner_sample if is_first_interval else slope * width - level_above_inner_sample,
+        level_minus_inner_value if is_first_interval else slope * width - level_minus_inner_value,
     )
     first = max((climb - bend * width) / (slope - bend), 0.0) if slope > bend else 0.0
     last = min((climb + bend * width) / (slope + bend), width)

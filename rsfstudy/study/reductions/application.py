@@ -15,10 +15,10 @@ from rsfstudy.errors import InvalidValue
 from rsfstudy.status import Status
 from rsfstudy.study.reductions.base import (
     Reduction,
+    add_propagated_errors,
     failed_cell_mask,
     mask_failures,
     mask_unusable_values,
-    with_propagated_errors,
     worst_status_along_other_dims,
 )
 from rsfstudy.study.reductions.boundaries import Boundary, Inverse
@@ -38,7 +38,7 @@ from rsfstudy.study.reductions.statistics import (
     StandardDeviation,
     StatusShares,
 )
-from rsfstudy.vocabulary import coverage_content_type, find_quantity
+from rsfstudy.vocabulary import find_coverage_content_type, find_quantity
 
 __all__ = [
     "Boundary",
@@ -65,7 +65,7 @@ __all__ = [
 _SUFFIXES_OF_QUALITY_VARIABLES = ("error", "stderr", "misfit", "points", "status")
 
 
-def _reduced_variable_names(dataset: xr.Dataset) -> list[str]:
+def _reducible_variable_names(dataset: xr.Dataset) -> list[str]:
     """Return the names of all data variables."""
     return list(map(str, dataset.data_vars))
 
@@ -121,7 +121,7 @@ def apply_reductions(
     for reduction in reductions:
         if reduction.of not in dataset:
             raise InvalidValue(
-                "of", reduction.of, "is not measured", choices=_reduced_variable_names(dataset)
+                "of", reduction.of, "is not measured", choices=_reducible_variable_names(dataset)
             )
         leaves_out = despite and not reduction.uses_failed_cells
         support = mask_failures(dataset) if leaves_out else dataset
@@ -135,7 +135,7 @@ def apply_reductions(
             remedy = "Write return self.results('how it was found', {'': values})."
             what = f"result of {reduction.kind}"
             raise InvalidValue(what, type(found).__name__, rule, remedy=remedy)
-        made = with_propagated_errors(reduction, support, found)
+        made = add_propagated_errors(reduction, support, found)
         stated = {q.name: q for q in reduction.quantities}
         quantities = describe_reduction_results(reduction, dataset, made)
         for name, values in made.data_vars.items():
@@ -149,7 +149,7 @@ def apply_reductions(
                 values.attrs.setdefault("refused", "cells it draws on failed or are missing")
             said = {key: values.attrs[key] for key in ("comment", "refused") if key in values.attrs}
             about = find_quantity(str(name), quantities).attributes
-            about |= {"coverage_content_type": coverage_content_type(str(name)), **said}
+            about |= {"coverage_content_type": find_coverage_content_type(str(name)), **said}
             if str(name) in stated and stated[str(name)].symbol:
                 about["symbol"] = stated[str(name)].symbol
             if beside := [

@@ -30,7 +30,7 @@ DerivativesByVariable = Sequence[tuple[xr.DataArray, Mapping[str, Any]]]
 
 #: For each suffix of a result name, the fields of the reduction that name the variables from which
 #: the units of the result are derived.
-UnitFieldsBySuffix = Mapping[str, Sequence[str]]
+UnitFieldsByResultSuffix = Mapping[str, Sequence[str]]
 
 #: Value of the attribute ``comment`` of propagated errors.
 PROPAGATED_ERROR_COMMENT = (
@@ -99,7 +99,7 @@ class Reduction(CheckedKeywords):
     #: name of the result. For ``("of",)``, the result has the units of the variable that the field
     #: ``of`` names. For ``("of", "on")``, the result has the units of the first variable divided by
     #: the units of the second variable. All other results are dimensionless.
-    unit_fields: ClassVar[UnitFieldsBySuffix] = {}
+    unit_fields: ClassVar[UnitFieldsByResultSuffix] = {}
     #: True if the reduction also uses failed cells. All other reductions reject failed cells.
     uses_failed_cells: ClassVar[bool] = False
 
@@ -394,7 +394,7 @@ def select_coordinate_range(
     return dataset.isel({dimension_of_coordinate(dataset, coordinate_name): np.flatnonzero(inside)})
 
 
-def read_undocumented_quantities(dataset: xr.Dataset) -> dict[str, Quantity]:
+def read_quantities_not_in_vocabulary(dataset: xr.Dataset) -> dict[str, Quantity]:
     """Read the quantities of variables that the vocabulary does not describe.
 
     Parameters
@@ -434,7 +434,7 @@ def _is_in_vocabulary(variable_name: str, variable_attributes: Mapping[Any, Any]
 # ---- numerical errors ----------------------------------------------------------------------------
 
 
-def with_propagated_errors(
+def add_propagated_errors(
     reduction: Reduction, dataset: xr.Dataset, reduction_results: xr.Dataset
 ) -> xr.Dataset:
     r"""Propagate the numerical errors of cells to the result of a reduction.

@@ -24,7 +24,7 @@ from rsfstudy.study.reductions._level_crossing import (
 from rsfstudy.study.reductions.base import (
     DerivativesByVariable,
     Reduction,
-    UnitFieldsBySuffix,
+    UnitFieldsByResultSuffix,
     dimension_of_coordinate,
     refused_result_mask,
 )
@@ -74,7 +74,7 @@ class Boundary(Reduction):
     on: str = ""
     level: float = 0.5
     kind: ClassVar[str] = "boundary"
-    unit_fields: ClassVar[UnitFieldsBySuffix] = {"": ("on",)}
+    unit_fields: ClassVar[UnitFieldsByResultSuffix] = {"": ("on",)}
 
     def __call__(self, dataset: xr.Dataset) -> xr.Dataset:
         """Find the boundary for each point of the other dimensions.
@@ -132,7 +132,7 @@ class Boundary(Reduction):
         """
         dimension = dimension_of_coordinate(values, self.on)
         edges: tuple[xr.DataArray, ...] = xr.apply_ufunc(
-            self._bracket_along_coordinate,
+            self._bracket_boundary_along_coordinate,
             values,
             values[self.on].astype(float),
             input_core_dims=[[dimension], [dimension]],
@@ -141,7 +141,7 @@ class Boundary(Reduction):
         )
         return edges
 
-    def _bracket_along_coordinate(
+    def _bracket_boundary_along_coordinate(
         self, values: np.ndarray, coordinate: np.ndarray
     ) -> tuple[float, float, float]:
         """Bracket the first crossing and count the crossings."""
@@ -208,7 +208,7 @@ class Inverse(Reduction):
     uncertainty: float | Mapping[str, float] = 0.0
     along: str = ""
     kind: ClassVar[str] = "inverse"
-    unit_fields: ClassVar[UnitFieldsBySuffix] = {"": ("on",)}
+    unit_fields: ClassVar[UnitFieldsByResultSuffix] = {"": ("on",)}
 
     @property
     def quantities(self) -> Sequence[Quantity]:
@@ -302,7 +302,7 @@ def _invert_along_coordinate(
     values: np.ndarray, coordinate: np.ndarray, level: float, uncertainty: float
 ) -> tuple[float, float, float]:
     """Return the crossing position, its error and its status for one row."""
-    x, y, _places = _log_coordinate_and_values(values, coordinate)
+    x, y, _places = _take_logs_of_positive_samples(values, coordinate)
     if np.isnan(level) or level <= 0.0:
         return np.nan, np.nan, float(CrossingStatus.OUT_OF_REACH)
     found = find_crossing(x, y, np.log(level))
@@ -322,7 +322,7 @@ def _crossing_position_derivatives(
 
     The derivatives are 0 if there is no crossing.
     """
-    x, y, places = _log_coordinate_and_values(values, coordinate)
+    x, y, places = _take_logs_of_positive_samples(values, coordinate)
     slopes = np.zeros(values.size)
     if np.isnan(level) or level <= 0.0:
         return slopes
@@ -339,7 +339,7 @@ def _crossing_position_derivatives(
     return slopes
 
 
-def _log_coordinate_and_values(
+def _take_logs_of_positive_samples(
     values: np.ndarray, coordinate: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Return the logarithms of the sorted coordinate and of the values.

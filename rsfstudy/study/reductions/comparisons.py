@@ -18,7 +18,7 @@ from rsfstudy.slider import CLOSED_FORMS
 from rsfstudy.study.reductions.base import (
     DerivativesByVariable,
     Reduction,
-    UnitFieldsBySuffix,
+    UnitFieldsByResultSuffix,
     dimension_of_coordinate,
     refused_result_mask,
     select_coordinate_range,
@@ -61,7 +61,7 @@ class Difference(Reduction):
     along: str = ""
     reference: str | float = ""
     kind: ClassVar[str] = "difference"
-    unit_fields: ClassVar[UnitFieldsBySuffix] = {"": ("of",)}
+    unit_fields: ClassVar[UnitFieldsByResultSuffix] = {"": ("of",)}
     formula: ClassVar[str] = "{of} less {reference}"
 
     def compare(self, values: xr.DataArray, reference: xr.DataArray) -> xr.DataArray:
@@ -194,7 +194,7 @@ class RelativeDifference(Difference):
     """
 
     kind: ClassVar[str] = "relative_difference"
-    unit_fields: ClassVar[UnitFieldsBySuffix] = {}
+    unit_fields: ClassVar[UnitFieldsByResultSuffix] = {}
     formula: ClassVar[str] = "1 - {of} over {reference}"
 
     def compare(self, values: xr.DataArray, reference: xr.DataArray) -> xr.DataArray:
@@ -268,7 +268,7 @@ class Range(Reduction):
     over: str = ""
     within: tuple[float, float] | None = None
     kind: ClassVar[str] = "range"
-    unit_fields: ClassVar[UnitFieldsBySuffix] = {"": ("of",)}
+    unit_fields: ClassVar[UnitFieldsByResultSuffix] = {"": ("of",)}
 
     def support_status(self, status: xr.DataArray) -> xr.DataArray:
         """Return the status of the points in the range.
@@ -381,7 +381,7 @@ class ClosedFormRatio(Reduction):
 
     form: str = ""
     kind: ClassVar[str] = "over_closed_form"
-    unit_fields: ClassVar[UnitFieldsBySuffix] = {"_closed_form": ("of",)}
+    unit_fields: ClassVar[UnitFieldsByResultSuffix] = {"_closed_form": ("of",)}
 
     def __post_init__(self) -> None:
         """Check that the solution exists."""

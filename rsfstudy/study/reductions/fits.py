@@ -16,7 +16,7 @@ from rsfstudy.error_boundary import guard_methods
 from rsfstudy.study.reductions.base import (
     DerivativesByVariable,
     Reduction,
-    UnitFieldsBySuffix,
+    UnitFieldsByResultSuffix,
     dimension_of_coordinate,
     refused_result_mask,
     select_coordinate_range,
@@ -66,7 +66,7 @@ class LinearFit(Reduction):
     parameter_count: ClassVar[int] = 2
     formula: ClassVar[str] = "{of} = constant + {name} * {on}"
     kind: ClassVar[str] = "linear_fit"
-    unit_fields: ClassVar[UnitFieldsBySuffix] = {"": ("of", "on"), "_misfit": ("of",)}
+    unit_fields: ClassVar[UnitFieldsByResultSuffix] = {"": ("of", "on"), "_misfit": ("of",)}
 
     def centre_values(self, values: xr.DataArray, dimension: str) -> xr.DataArray:
         """Subtract the mean of the values, which eliminates the constant.
@@ -320,7 +320,7 @@ class SemilogFit(LinearFit):
     """
 
     kind: ClassVar[str] = "decade_fit"
-    unit_fields: ClassVar[UnitFieldsBySuffix] = {"": ("of",)}
+    unit_fields: ClassVar[UnitFieldsByResultSuffix] = {"": ("of",)}
     formula: ClassVar[str] = "{of} = constant + {name} * log10({on})"
 
     def transform_abscissa(self, on: xr.DataArray) -> xr.DataArray:
@@ -375,7 +375,7 @@ class PowerLaw(SemilogFit):
     """
 
     kind: ClassVar[str] = "power_law"
-    unit_fields: ClassVar[UnitFieldsBySuffix] = {}
+    unit_fields: ClassVar[UnitFieldsByResultSuffix] = {}
     formula: ClassVar[str] = "log10({of}) = constant + {name} * log10({on})"
 
     def transform_ordinate(self, values: xr.DataArray) -> xr.DataArray:

@@ -12,11 +12,15 @@ from dataclasses import replace
 import xarray as xr
 
 from rsfstudy.quantities import Quantity, format_unit_quotient
-from rsfstudy.study.reductions.base import Reduction, read_undocumented_quantities
+from rsfstudy.study.reductions.base import Reduction, read_quantities_not_in_vocabulary
 from rsfstudy.vocabulary import find_quantity
 
 #: Coordinates that contain the scales of quantities, by the symbol of the scale.
-_SCALE_COORDINATES = {"sigma_*": "sigma_star", "D_c": "slip_distance", "V_*": "reference_velocity"}
+_COORDINATE_NAME_BY_SCALE = {
+    "sigma_*": "sigma_star",
+    "D_c": "slip_distance",
+    "V_*": "reference_velocity",
+}
 
 
 def describe_reduction_results(
@@ -46,7 +50,7 @@ def describe_reduction_results(
         of the dataset that are not in the vocabulary.
     """
     stated = {q.name: q for q in reduction.quantities}
-    found, of = read_undocumented_quantities(dataset) | stated, dataset[reduction.of]
+    found, of = read_quantities_not_in_vocabulary(dataset) | stated, dataset[reduction.of]
     for end, fields in {"": (), **reduction.unit_fields}.items():
         name = f"{reduction.name}{end}"
         if name not in reduction_results or (name in stated and not fields):
@@ -90,7 +94,11 @@ def find_varying_scale(
         Symbol of the first scale in the expression that varies along these dimensions. Empty if no
         scale varies.
     """
-    held = {part: dataset[n].dims for part, n in _SCALE_COORDINATES.items() if n in dataset.coords}
+    held = {
+        part: dataset[n].dims
+        for part, n in _COORDINATE_NAME_BY_SCALE.items()
+        if n in dataset.coords
+    }
     return next(
         (
             part

@@ -25,7 +25,7 @@ from rsfstudy.status import Status
 from rsfstudy.study.reductions.base import (
     DerivativesByVariable,
     Reduction,
-    UnitFieldsBySuffix,
+    UnitFieldsByResultSuffix,
     refused_result_mask,
 )
 from rsfstudy.study.reductions.result_units import find_varying_scale
@@ -54,7 +54,7 @@ class _SampleStatistic(Reduction):
         "_stderr": "standard error, by sampling, of {name}",
         "_points": "samples with a number for {name}",
     }
-    unit_fields: ClassVar[UnitFieldsBySuffix] = {"": ("of",), "_stderr": ("of",)}
+    unit_fields: ClassVar[UnitFieldsByResultSuffix] = {"": ("of",), "_stderr": ("of",)}
     #: Description of the statistic for the attribute ``comment`` of the results.
     description: ClassVar[str]
 

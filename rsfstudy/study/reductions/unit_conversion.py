@@ -11,7 +11,7 @@ import xarray as xr
 from rsfstudy.error_boundary import guard_methods
 from rsfstudy.errors import InvalidValue
 from rsfstudy.quantities import Quantity
-from rsfstudy.rig import find_scale_of_variable, read_si_scales, unit_factor
+from rsfstudy.rig import compute_conversion_factor, find_scale_of_variable, read_si_scales
 from rsfstudy.study.reductions.base import DerivativesByVariable, Reduction
 
 
@@ -100,4 +100,6 @@ class InUnits(Reduction):
         scale = find_scale_of_variable(dataset[self.of], read_si_scales(dataset))
         if scale is None:
             raise InvalidValue("of", self.of, "is a pure number, in no units of a rig")
-        return xr.DataArray(scale.factor / float(unit_factor(self.name, self.units, scale.units)))
+        return xr.DataArray(
+            scale.factor / float(compute_conversion_factor(self.name, self.units, scale.units))
+        )

@@ -27,7 +27,7 @@ from rsfstudy.motion.work_meter import WorkMeter
 from rsfstudy.slider.dynamics.inertia import DIFFERENCE_STEP, NEGLIGIBLE_SECOND_ORDER_WEIGHT
 from rsfstudy.slider.equations import RUPTURE_REGIME, equations_between_ruptures
 from rsfstudy.slider.motion_point import MotionPoint
-from rsfstudy.slider.scene_functions import LOG_RATE_PER_PATH_LENGTH
+from rsfstudy.slider.scene_functions import LOG_SLIP_RATE_PER_PATH_LENGTH
 
 BUDGET = 10**9
 #: Indices of the parameters of a scene.
@@ -247,7 +247,7 @@ def equations(m: Any, law: str, variable: bool, ready: Callable[[Any], Any] = _i
         share = 1.0 / (1.0 + slower)
         loading = p[STIFFNESS] * (slower - 1.0) * share
         evolving = evolution(x, psi - shift, p) * share
-        slant = (loading - evolving) / (LOG_RATE_PER_PATH_LENGTH * p[A])
+        slant = (loading - evolving) / (LOG_SLIP_RATE_PER_PATH_LENGTH * p[A])
         part = 1.0 / sqrt(1.0 + slant * slant)
         return part * loading, part * evolving, part * slower * share / p[LOAD]
 
@@ -258,7 +258,7 @@ def equations(m: Any, law: str, variable: bool, ready: Callable[[Any], Any] = _i
         faster = clamped((f - g) / (p[STIFFNESS] * norm), -1e30, 1e30)
         changes = evolution(x, value - p[A] * x - shift, p) * norm
         loading = p[STIFFNESS] * (p[LOAD] * p[MASS] - norm)
-        slant = faster / LOG_RATE_PER_PATH_LENGTH
+        slant = faster / LOG_SLIP_RATE_PER_PATH_LENGTH
         part = 1.0 / sqrt(1.0 + slant * slant)
         return part * loading, part * faster, part * (p[A] * faster + changes) / slope
 
