@@ -164,11 +164,11 @@ def test_a_time_limit_is_one_of_cpu_time():
     script = """
 import collections, itertools, time
 from rsfstudy.execution import cell_computation as cells
-cells.WALL_TIME_FACTOR = 1e6
-with cells._cpu_time_limits.enforced(0.1):
+cells.WALL_OVER_CPU_TIME_LIMIT = 1e6
+with cells._cpu_time_limits.enforce_in_this_thread(0.1):
     time.sleep(1.5)
 print("slept")
-with cells._cpu_time_limits.enforced(0.1):
+with cells._cpu_time_limits.enforce_in_this_thread(0.1):
     collections.deque(itertools.repeat(1), maxlen=0)
 """
     words = [sys.executable, "-u", "-c", script]
