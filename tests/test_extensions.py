@@ -414,7 +414,9 @@ def test_a_part_has_as_many_numbers_as_there_are_places():
     def numbers(self, scene):
         return tuple(range(parameter_layout.FLUID - parameter_layout.NORMAL_STRESS + 1))
 
-    scene = Scene(normal_stress=made(Unvaried, name="numerous", parameter_values=numbers), stiffness=0.01)
+    scene = Scene(
+        normal_stress=made(Unvaried, name="numerous", parameter_values=numbers), stiffness=0.01
+    )
     with pytest.raises(InvalidValue, match="'numerous': states 3 numbers, .* places for 2"):
         _asked = scene.parameter_values
 

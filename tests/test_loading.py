@@ -120,7 +120,9 @@ def test_events_come_in_order_and_take_turns():
         approach_to_steady_state(1e-9),
     )  # fmt: skip
     events = told(of, *watches, until=60.0)
-    assert all(b.time >= a.time and b.evaluation_count >= a.evaluation_count for a, b in pairwise(events))
+    assert all(
+        b.time >= a.time and b.evaluation_count >= a.evaluation_count for a, b in pairwise(events)
+    )
     for pair in ({EventKind.MAXIMUM, EventKind.MINIMUM}, {EventKind.RISE, EventKind.FALL}):
         turns = [event.kind for event in events if event.kind in pair]
         assert len(turns) > 4
