@@ -178,7 +178,9 @@ def test_it_is_the_same_in_other_processes(tmp_path):
     """
     expected = digest(study_in(tmp_path))
     script = tmp_path / "script.py"
-    ask = "\nfrom rsfstudy.execution import code_digest\nprint(code_digest.digest_classes(Own))"
+    ask = (
+        "\nfrom rsfstudy.execution import code_digest\nprint(code_digest.digest_user_classes(Own))"
+    )
     script.write_text(MEASURE + ask)
     for seed, words in (("1", [str(script)]), ("2", ["-c", MEASURE + ask])):
         said = subprocess.run(
@@ -335,7 +337,7 @@ def test_of_the_physics_its_code_counts_and_no_remark(old, new, same, tmp_path):
 def test_the_digest_of_the_physics_is_that_of_its_files():
     package = Path(rsfstudy.__file__).parent
     files = provenance.read_physics_sources(package)
-    assert {"slider/friction.py", "motion/loop.py", "measure_base/measure.py"} <= set(files)
+    assert {"slider/friction.py", "motion/motion_loop.py", "measure_base/measure.py"} <= set(files)
     moved = {**files, "slider/moved.py": files["slider/friction.py"]}
     digests = [code_digest.digest_sources(each) for each in (files, moved)]
     assert digests[0] == provenance.code_fingerprint()["physics"] != digests[1]

@@ -209,7 +209,7 @@ def test_a_function_of_the_user_that_fails_is_named(dataset):
         raise ZeroDivisionError("no")
 
     with pytest.raises(InvalidValue, match="own = <function .*fails when it is called .*: no"):
-        rsfstudy.plot(dataset, own=draw)
+        rsfstudy.plot(dataset, user_figure=draw)
 
 
 def test_what_a_dataset_lacks_is_named(dataset):

@@ -43,18 +43,18 @@ class Relaxation:
             - values["b"] * -np.expm1(-self.displacement / values["slip_distance"])
         )
 
-    def trend(self, _values: ParameterValues) -> np.ndarray:
+    def compute_friction_trend(self, _values: ParameterValues) -> np.ndarray:
         """Return a trend of zero."""
         return np.zeros(ROWS)
 
-    def is_linear(self, name: str) -> bool:
+    def is_linear_in_parameter(self, name: str) -> bool:
         """Return True for the friction level only."""
         return name == "mu_star"
 
     def check_parameters(self, values: ParameterValues) -> None:
         """Accept all values."""
 
-    def loading_sensitivity(self, _values: ParameterValues) -> np.ndarray:
+    def compute_loading_error_sensitivity(self, _values: ParameterValues) -> np.ndarray:
         """Return an empty sensitivity, because there is no load point."""
         return np.zeros((ROWS, 0))
 

@@ -71,7 +71,7 @@ def test_names_along_y_are_written_from_the_top_down():
 def test_a_curve_along_two_axes_is_refused():
     panel = Panel(x="weakening", y="critical_stiffness")
     with pytest.raises(DataError, match=r"shape \(2,\) and shape \(2, 2\).*facet= or isel="):
-        plots.draw_figure(stiffnesses(), plots.Declared([panel]))
+        plots.draw_figure(stiffnesses(), rsfstudy.Figure([panel]))
 
 
 def test_slip_rates_beyond_the_range_of_floats_are_refused():

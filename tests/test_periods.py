@@ -77,7 +77,7 @@ def test_close_to_critical_stiffness_a_multiplier_is_what_growth_leaves():
 
 
 def followed(scene: Scene, count: int) -> list[Cycle]:
-    return came_to(scene, count, 1e-9, follow_all=True).cycles
+    return came_to(scene, count, 1e-9, follow_all_cycles=True).cycles
 
 
 @pytest.mark.parametrize(
@@ -182,7 +182,7 @@ def test_the_growth_of_departures_is_that_of_the_motion_alone(monkeypatch):
     """
     scene, transient, events = slow(0.853), 24, 16
     found = Bifurcation(transient=transient, events=events)(scene, quick(1e-7)).values
-    seen = came_to(scene, transient + events, 1e-7, follow_all=True).cycles
+    seen = came_to(scene, transient + events, 1e-7, follow_all_cycles=True).cycles
     by = ReturnMap(scene, quick(1e-7), WorkMeter(2_000_000, engine=COMPILED))
     monkeypatch.setattr(return_map, "DIFFERENCE_STEP_OVER_LOG_RATE_RANGE", 3e-5)
     direction, grown = np.array([0.2, 1.0, -0.3]), []

@@ -331,7 +331,7 @@ def composed_functions(
 
     def drawn(**options: Any) -> Any:
         figure = rsfstudy.Figure([rsfstudy.Panel(**options)])
-        return rsfstudy.plot(dataset, own=figure)
+        return rsfstudy.plot(dataset, user_figure=figure)
 
     def measured(kind: Any, scene: Any, accuracy: Any, options: Any) -> Any:
         return kind(**options)(scene, accuracy)
