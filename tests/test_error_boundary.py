@@ -208,7 +208,7 @@ def test_a_function_of_the_user_that_fails_is_named(dataset):
     def draw(dataset, axes):
         raise ZeroDivisionError("no")
 
-    with pytest.raises(InvalidValue, match="own = <function .*fails when it is called .*: no"):
+    with pytest.raises(InvalidValue, match="user_figure = <function .*fails when it is called .*: no"):
         rsfstudy.plot(dataset, user_figure=draw)
 
 
