@@ -85,10 +85,10 @@ class LawBase(Part):
     law. From these arguments, a function can compute the friction coefficient of forward slip,
     :math:`\tau/\sigma = \mu_* + a \ln(V/V_*) + \sum_i \Theta_i`. The functions do not receive shear
     stress, normal stress or pore pressure. If the state evolution depends on one of these
-    quantities, list the quantity in ``needs``, for example ``needs = {"shear_stress"}``. Scenes
-    with variable effective normal stress reject laws that list quantities in ``needs``. If
-    effective normal stress is constant, shear stress divided by :math:`\sigma_*` equals the
-    friction coefficient.
+    quantities, list the quantity in ``needs``, for example ``needs = {"shear_stress"}``. Scenes in
+    which a quantity in ``needs`` is unknown, for example because effective normal stress varies,
+    reject the law. If effective normal stress is constant, shear stress divided by :math:`\sigma_*`
+    equals the friction coefficient.
 
     A law with one state defines ``evolution(log_slip_rate, state, p)``. The function returns the
     change of the state variable per unit slip in :math:`D_c` at constant normal stress. The default
