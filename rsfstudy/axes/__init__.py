@@ -1,8 +1,8 @@
-"""Axes of a lattice: listed values, labelled points, zipped fields and samples.
+"""Axes of a study: lists of values, labelled points, zipped fields and samples.
 
 An ``Axis`` holds the values of one or several fields along one dimension of a study. The package
-checks these values, changes them by overrides, and draws samples from distributions. It never
-creates scenes and never computes results.
+checks the values of an axis, applies overrides to the values, and draws samples from distributions.
+The package never creates scenes and never computes results.
 """
 
 from __future__ import annotations

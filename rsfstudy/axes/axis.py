@@ -1,7 +1,7 @@
-"""Axis of a lattice: one dimension of a study.
+"""Axis of a study: one dimension along which one or several fields vary.
 
-An axis holds a list of values of one field, or points that set several fields. Points have labels
-or are numbered from 0.
+An axis contains either a list of values of one field, or a list of points that each set several
+fields. The points of an axis have labels or are numbered from 0.
 """
 
 from __future__ import annotations
@@ -29,19 +29,19 @@ AxisRow = Mapping[str, Any]
 @guard_methods
 @dataclass(frozen=True, init=False)
 class Axis:
-    """Axis of a lattice.
+    """Axis of a study, along which one or several fields vary.
 
     Parameters
     ----------
     dimension : str
         Name of the dimension. If the axis varies a single field, the dimension has the name of the
-        field. The field belongs to the scene or to the measure of the study. If both have a field
-        of this name, the axis varies the field of the scene.
+        field. The field may belong to the scene or to the measure of the study. If both the scene
+        and the measure have a field with this name, the axis varies the field of the scene.
     values : sequence, mapping of str to mapping, or mapping of str to sequence
         Values of a single field, which may include classes of user-defined parts. For a zipped
         axis, pass a mapping from labels to the fields at each point, for example
         ``{"constant": {"normal_stress": "constant"}, ...}``, or a mapping from labels to rigs. For
-        numbered points, pass a mapping from fields to lists of values. See also `samples` and
+        numbered points, pass a mapping from field names to lists of values. See also `samples` and
         `cases`.
     units : mapping of str to str, optional
         Units of the fields, in a study of a rig. See `Rig.axis`.
@@ -51,8 +51,8 @@ class Axis:
     Raises
     ------
     InvalidValue
-        If the axis is empty, or if it contains repeated values or values that are not finite.
-        Numbered points may be equal, because random samples may be equal.
+        If the axis is empty, or if the axis contains repeated or non-finite values. Numbered points
+        may be equal, because random samples may be equal.
 
     Examples
     --------
@@ -127,28 +127,30 @@ class Axis:
         Parameters
         ----------
         distribution : mapping of str to distribution or float
-            Frozen distributions of `scipy.stats` by name, for example
-            ``{"ln_a": norm(math.log(0.01), 0.1)}``. A float is a mean value, whose variance is
-            given by `covariance`.
+            Frozen `scipy.stats` distribution of each sampled quantity, for example
+            ``{"ln_a": norm(math.log(0.01), 0.1)}``. A float is the mean of a normal distribution
+            with a variance from `covariance`.
         n : int
-            Number of samples. The methods "sobol" and "saltelli" require a power of two. Except for
-            a Latin hypercube, the first n of 2 n samples with the same seed are equal to the n
-            samples, so that a larger run only computes the additional samples.
+            Number of samples. The methods "sobol" and "saltelli" require a power of two. If you
+            increase n and keep the seed, the existing samples do not change, so a larger study only
+            computes the additional samples. The method "latin_hypercube" is an exception.
         seed : int, default: 0
             Seed of the random number generator.
         method : {"sobol", "latin_hypercube", "random", "saltelli"}
-            Scrambled Sobol points, a Latin hypercube, or independent random samples. The method
-            "saltelli" draws n Sobol points in twice the number of dimensions and combines their
-            coordinates to ``n (d + 2)`` samples of d quantities. The reduction `SobolIndices`
-            requires this method. The default is "sobol".
+            Sampling method: scrambled Sobol points, a Latin hypercube, or independent random
+            samples. The method "saltelli" draws n Sobol points in twice the number of dimensions
+            and combines the coordinates of the points into ``n (d + 2)`` samples of d quantities.
+            The reduction `SobolIndices` requires the method "saltelli". The default is "sobol".
         covariance : array_like, optional
-            Covariance matrix of shape (d, d) in the order of `distribution`. Mean values have
-            normal distributions with this covariance. For distributions, only the correlation is
-            used, and it applies to their normal scores.
+            Covariance matrix of shape (d, d) in the order of `distribution`. Quantities given as
+            mean values are normally distributed with this covariance. For quantities given as
+            distributions, only the correlation is used, and the correlation applies to the normal
+            scores of the samples.
         fields : mapping of str to str or callable, optional
-            Fields to set. Each field is given by the name of a sampled quantity, or by a function
-            of all sampled quantities, for example ``{"a": lambda d: np.exp(d["ln_a"])}``. By
-            default, each sampled quantity sets the field of the same name.
+            Fields that the axis sets. The value of each field is a sampled quantity, given by its
+            name, or a function of all sampled quantities, for example
+            ``{"a": lambda d: np.exp(d["ln_a"])}``. By default, each sampled quantity sets the field
+            of the same name.
         units : mapping of str to str, optional
             Units of the fields, in a study of a rig. The default is SI units.
         dimension : str, default: "sample"
@@ -188,7 +190,7 @@ class Axis:
         units: Mapping[str, str] | None = None,
         dimension: str = "case",
     ) -> Axis:
-        """Use the rows of a table as the points of an axis.
+        """Create an axis whose points are the rows of a table.
 
         Parameters
         ----------
@@ -198,7 +200,8 @@ class Axis:
             of a column such as ``slip_distance (um)``. The attribute ``units`` of a data frame maps
             columns to units.
         fields : mapping of str to str or callable, optional
-            Fields to set, as in `samples`. By default, each column sets the field of the same name.
+            Fields that the axis sets, in the format that `samples` accepts. By default, each column
+            sets the field of the same name.
         units : mapping of str to str, optional
             Units of the fields, in a study of a rig. The default is the units of the table, or SI
             units.
@@ -213,7 +216,8 @@ class Axis:
         Raises
         ------
         InvalidValue
-            If the table is not a table of columns, or if its units contradict each other.
+            If `table` does not consist of named columns, or if the units of a column contradict
+            each other.
 
         Examples
         --------
@@ -279,12 +283,12 @@ class Axis:
         units: Mapping[str, str],
         sampling_info: Mapping[str, Any] | None = None,
     ) -> Axis:
-        """Create an axis of the same type with other fields at its points.
+        """Create a copy of the axis with new field values at its points.
 
         Parameters
         ----------
         rows : sequence of mapping
-            Fields at each point.
+            Field values at each point.
         units : mapping of str to str
             Units of the fields.
         sampling_info : mapping, optional
@@ -298,7 +302,7 @@ class Axis:
         return Axis(self.dimension, self._values_for_constructor(rows), units, sampling_info)
 
     def _values_for_constructor(self, rows: Sequence[AxisRow]) -> Any:
-        """Return the argument ``values`` of an axis of the same type."""
+        """Convert the rows to the format of the argument ``values`` of ``Axis``."""
         if self.labels is not None:
             return {label: dict(row) for label, row in zip(self.labels, rows, strict=True)}
         if self.has_numbered_points:
@@ -310,7 +314,7 @@ class Axis:
         return len(self.rows)
 
     def describe(self) -> dict[str, Any]:
-        """Describe the axis by numbers, strings, lists and dictionaries.
+        """Return a description of the axis as built-in Python types.
 
         Returns
         -------
@@ -327,7 +331,7 @@ class Axis:
 
     @property
     def point_names(self) -> list[str]:
-        """Names of the points: labels, numbers, or values with units."""
+        """Name of each point: its label, its number, or its value with units."""
         if self.has_numbered_points:
             return list(map(str, range(len(self))))
         units = self.units.get(self.dimension, "")
@@ -338,9 +342,9 @@ class Axis:
 def classify_rows_by_fields(axis_rows: Sequence[AxisRow]) -> np.ndarray:
     """Assign each row of an axis to a group of similar rows.
 
-    Rows of a group set the same fields. Their strings and flags are equal, and their numbers are
-    either all zero or all nonzero. Scenes with rows of the same group therefore have the same
-    parts.
+    All rows of a group set the same fields. Within a group, the strings and flags of a field are
+    equal, and the numbers of a field are either all zero or all nonzero. Scenes that are built from
+    rows of the same group therefore have the same parts.
 
     Parameters
     ----------
@@ -350,7 +354,7 @@ def classify_rows_by_fields(axis_rows: Sequence[AxisRow]) -> np.ndarray:
     Returns
     -------
     ndarray of int
-        Group of each row. Groups are numbered from 0 in the order of their first row.
+        Group number of each row. Groups are numbered from 0 in the order of their first row.
     """
     known: dict[tuple[Any, ...], int] = {}
     return np.array(
@@ -366,7 +370,7 @@ def _fields_and_texts_of_row(axis_row: AxisRow) -> tuple[Any, ...]:
 
 
 def fields_of_axis_point(axis_point: Any) -> Any:
-    """Return the fields of a rig, or of another object with axis fields.
+    """Return the field values that an object, such as a rig, sets on an axis.
 
     Parameters
     ----------
@@ -376,7 +380,8 @@ def fields_of_axis_point(axis_point: Any) -> Any:
     Returns
     -------
     object
-        Mapping of fields to values. An object without axis fields is returned unchanged.
+        Mapping of fields to values. An object without the attribute ``axis_fields`` is returned
+        unchanged.
     """
     if hasattr(axis_point, "axis_fields"):
         return axis_point.axis_fields
@@ -387,7 +392,7 @@ def fields_of_axis_point(axis_point: Any) -> Any:
 
 
 def _rows_from_points(dimension: str, labelled_points: Mapping[str, Any]) -> tuple[AxisRow, ...]:
-    """Create the rows of a zipped axis from the fields at each label."""
+    """Create the rows of a zipped axis from a mapping of labels to fields."""
     rows = {label: fields_of_axis_point(point) for label, point in labelled_points.items()}
     for label, row in rows.items():
         check_storable_text(dimension, label)
@@ -401,7 +406,7 @@ def _rows_from_points(dimension: str, labelled_points: Mapping[str, Any]) -> tup
 def _rows_from_columns(
     dimension: str, values_by_field: Mapping[str, Sequence[Any]]
 ) -> tuple[AxisRow, ...]:
-    """Create the rows of an axis with numbered points from its columns."""
+    """Create the rows of an axis with numbered points from lists of values."""
     lengths = {name: len(column) for name, column in values_by_field.items()}
     for name, length in lengths.items():
         if not is_variable_name(name) or name == dimension:
@@ -433,7 +438,7 @@ def rows_to_field_columns(rows: Sequence[AxisRow]) -> dict[str, list[Any]]:
 
 
 def check_storable_text(argument_name: str, text: object) -> None:
-    """Check that a value is a string that files can store.
+    """Check that a value is a string that can be stored in files.
 
     Parameters
     ----------
@@ -468,8 +473,8 @@ def to_plain_value(field_name: str, value: Any) -> Any:
     Returns
     -------
     object
-        Value as a built-in type. Values of other types are returned unchanged, and the axis rejects
-        these values.
+        Value of a built-in type. Values that cannot be converted are returned unchanged, and the
+        axis rejects the unconverted values.
 
     Raises
     ------

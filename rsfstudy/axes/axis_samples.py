@@ -1,7 +1,7 @@
-"""Samples of several quantities, and tables of cases, for axes.
+"""Random samples and tables of cases, from which axes are created.
 
-Samples are quantiles of distributions at points of the unit cube. See `Axis.samples` and
-`Axis.cases`.
+The samples are computed from points in the unit cube by the quantile functions of the
+distributions. See `Axis.samples` and `Axis.cases`.
 """
 
 from __future__ import annotations
@@ -21,9 +21,11 @@ from rsfstudy.quantities import split_heading_into_name_and_units
 QuantityNameOrFunction = str | Callable[[Mapping[str, np.ndarray]], Any]
 
 SAMPLING_METHODS = ("sobol", "latin_hypercube", "random", "saltelli")
-#: Methods that use Sobol points. Sobol points are balanced only if their number is a power of two.
+#: Sampling methods that use Sobol points. Sobol points are balanced only if their number is a power
+#: of two.
 _SOBOL_METHODS = ("sobol", "saltelli")
-#: Smallest probability of a sample. Quantiles of unbounded distributions are infinite at 0 and 1.
+#: Smallest probability at which quantiles are computed. The quantiles of unbounded distributions
+#: are infinite at the probabilities 0 and 1.
 _MIN_SAMPLED_PROBABILITY = 2.0**-40
 #: Tolerance for negative eigenvalues of a correlation matrix, which result from rounding errors.
 _EIGENVALUE_ROUNDING_ERROR = 1e-10
@@ -37,7 +39,7 @@ def draw_samples(
     Parameters
     ----------
     distributions : mapping of str to distribution or float
-        Distributions or mean values by name.
+        Distribution or mean value of each quantity.
     sample_count : int
         Number of samples.
     seed : int
@@ -155,7 +157,7 @@ def _matrix_square_root(correlation: np.ndarray) -> np.ndarray:
 def _draw_uniform_samples(
     quantity_count: int, sample_count: int, seed: int, method: str
 ) -> np.ndarray:
-    """Draw points of the unit cube, of shape (samples, quantities)."""
+    """Draw an array of points in the unit cube, with one row per sample."""
     random = np.random.default_rng(seed)
     if method == "random":
         found = random.random((sample_count, quantity_count))
@@ -166,7 +168,8 @@ def _draw_uniform_samples(
             sample_count
         )
     if method == "saltelli":
-        # Saltelli's scheme converts each point to A, B, and copies of A with one coordinate from B.
+        # Saltelli's scheme splits each point into two points A and B, and adds copies of A in which
+        # one coordinate is replaced by the coordinate of B.
         ours, theirs = found[:, :quantity_count], found[:, quantity_count:]
         mixed = np.where(np.eye(quantity_count, dtype=bool), theirs[:, None, :], ours[:, None, :])
         found = np.concatenate([ours[:, None], theirs[:, None], mixed], axis=1)
@@ -180,7 +183,7 @@ def _is_value_with_error(distribution: Any) -> bool:
 
 
 def _quantile_function(distribution: Any) -> Any:
-    """Return the quantile function of a distribution, or None for other types."""
+    """Return the quantile function of a distribution."""
     return (
         getattr(distribution, "ppf", None)
         if hasattr(distribution, "dist")
@@ -191,7 +194,7 @@ def _quantile_function(distribution: Any) -> Any:
 def _compute_quantiles(
     quantity_name: str, distribution: Any, probabilities: np.ndarray
 ) -> np.ndarray:
-    """Compute the quantiles of a distribution, which must be finite."""
+    """Compute the quantiles of a distribution, and check that they are finite."""
     try:
         found = np.asarray(_quantile_function(distribution)(probabilities), dtype=float)
     except ValueError:  # The parameters are arrays.
@@ -206,7 +209,7 @@ def _compute_quantiles(
 
 
 def _describe_distribution(distribution: Any) -> Any:
-    """Describe a distribution by a string, or a mean value by a float."""
+    """Return a distribution as a string for display, or a mean value as a float."""
     if _is_value_with_error(distribution):
         return float(distribution)
     if not hasattr(distribution, "dist"):

@@ -1,10 +1,10 @@
-"""Base classes of user-defined parts of a slider, and their parameter layout.
+"""Base classes and parameter indices for user-defined parts of a slider.
 
 Derive a state evolution law from ``Law`` or ``LawBase``, a normal stress condition from
 ``NormalStress``, a pore fluid from ``Fluid``, the dynamics from ``Dynamics``, and a loading from
 ``Loading``. Declare the fields of the part with ``number`` and ``flag``. The functions of parts
 receive a tuple of parameters ``p``. Constants such as ``LAW`` are the indices of the parameters in
-this tuple. This package only exports names of ``rsfstudy.slider``.
+the tuple ``p``. This package only exports names that are defined in ``rsfstudy.slider``.
 """
 
 from __future__ import annotations

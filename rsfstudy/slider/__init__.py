@@ -2,15 +2,16 @@
 
 A ``Scene`` describes a slider by five parts: a state evolution law, a normal stress condition, a
 pore fluid, the dynamics and the loading. The package checks scenes and provides their equations of
-motion, their steady states and the stability of steady sliding. It never integrates the equations,
-never reads or writes files, and depends only on Python, NumPy and SciPy.
+motion, their steady states and the stability of steady sliding. The package never integrates the
+equations, never reads or writes files, and depends only on Python, NumPy and SciPy.
 
-Each part is a class in a module of ``laws``, ``normal_stress``, ``fluid``, ``dynamics`` or
-``loading``. We suggest reading the other modules in the following order:
+The parts are classes in the packages ``laws``, ``normal_stress``, ``fluid``, ``dynamics`` and
+``loading``. Each of these packages contains one module per part. We suggest reading the other
+modules in the following order:
 
 - ``scene`` combines the parts of a slider.
 - ``friction`` combines the law, the normal stress and the pore pressure into a relation between
-  stress, slip rate and states. Its helper functions for states are in ``state_functions``.
+  stress, slip rate and states. Helper functions for the state variables are in ``state_functions``.
 - ``scene_functions`` combines friction with the dynamics, which determine the slip rate, into
   equations of motion for any combination of parts.
 - ``equations`` provides the unknowns, rates and parameters that an integrator needs. The layout of
@@ -19,22 +20,24 @@ Each part is a class in a module of ``laws``, ``normal_stress``, ``fluid``, ``dy
   friction relation.
 - ``closed_forms`` contains published closed-form solutions.
 
-The evolution of a state passes through the following functions, from the law to the integrator:
+The following functions convert the state evolution of a law to the rates that an integrator needs:
 
 1. The method ``evolution`` of a law computes the change of the state per unit slip.
-2. `state_functions.wrap_single_state_evolution` converts the method to a function ``evolutions`` of
-   tuples. A law with several states defines ``evolutions`` itself. The function
-   `scene_functions.build_scene_functions` decides if the conversion is needed.
-3. `friction.build_friction_functions` appends the unknowns of a fluid or a loading and stores the
-   result as ``FrictionFunctions.evolutions``.
-4. `scene_functions` converts the evolution to rates:
-   `scene_functions.build_displacement_rate_function` between ruptures, and
-   `scene_functions.build_rigid_rate_function` for a rigid slider. For scenes with inertia,
-   ``dynamics.inertia.build_rupture_rate_function`` computes the rates in ruptures, and
-   ``dynamics.inertia.build_slip_rate_functions`` computes the slip rate between ruptures.
+2. `state_functions.wrap_single_state_evolution` converts the method ``evolution`` to a function
+   ``evolutions``, which receives and returns tuples. A law with several states defines
+   ``evolutions`` itself. The function `scene_functions.build_scene_functions` converts the method
+   only if the law does not define ``evolutions``.
+3. `friction.build_friction_functions` appends the rates of the unknowns of a fluid or a loading and
+   stores the combined function as ``FrictionFunctions.evolutions``.
+4. The function `scene_functions.build_displacement_rate_function` computes the rates between
+   ruptures, and `scene_functions.build_rate_function_of_rigid_slider` computes the rates of a rigid
+   slider. For scenes with inertia, ``dynamics.inertia.build_rupture_rate_function`` computes the
+   rates in ruptures, and ``dynamics.inertia.build_slip_rate_functions`` computes the slip rate
+   between ruptures.
 5. `equations` combines the rates, the unknowns and the parameters of a scene.
-6. The ``motion`` package converts the rates to functions that fill arrays, and passes these
-   functions to a stepper. The stepper of SciPy calls ``Equations.rate_function`` directly.
+6. The ``motion`` package converts the rate functions to functions that write to arrays, and passes
+   these functions to an integrator. The SciPy integrators call ``Equations.rate_function``
+   directly.
 
 The equations of doi:10.1007/s11589-014-0098-4 are implemented in the following modules:
 

@@ -11,8 +11,8 @@ from dataclasses import dataclass
 
 from scipy.optimize import brentq
 
-#: Number of points at which the search for a critical normal stress step evaluates the residual,
-#: and the smallest and largest values of sigma_*/sigma - 1.
+#: Grid for the search of the critical normal stress step: number of points, and the smallest and
+#: largest values of sigma_*/sigma - 1.
 _STRESS_FALL_COUNT, _MIN_STRESS_FALL, _MAX_STRESS_FALL = 400, 1e-9, 1e3
 
 
@@ -85,14 +85,14 @@ def critical_stiffness(
 def critical_displacement_step(
     b_over_a: float, law_exponent: float = 0.0, stiffness_ratio: float = 0.0
 ) -> float:
-    r"""Compute the critical displacement step of the family of laws.
+    r"""Compute the critical displacement step for the slip-to-slowness laws.
 
     Parameters
     ----------
     b_over_a : float
         Ratio :math:`b/a`, which is greater than 1.
     law_exponent : float, default: 0.0
-        Exponent :math:`\epsilon` of the family, from 0 (slip law) to 1 (slowness law).
+        Exponent :math:`\epsilon` of the family of laws, from 0 (slip law) to 1 (slowness law).
     stiffness_ratio : float, default: 0.0
         Stiffness ratio :math:`r = k/k_{cr}`.
 
@@ -103,8 +103,8 @@ def critical_displacement_step(
 
     Notes
     -----
-    The normal stress is constant, the load point does not move after the step, and the norm of
-    instability is infinite. The critical step is
+    The formula assumes constant normal stress, a load point that does not move after the step, and
+    an infinite instability norm. The critical step is
 
     .. math::
 
@@ -140,14 +140,14 @@ def critical_velocity_step(b_over_a: float, law_exponent: float = 0.0) -> float:
 
     Notes
     -----
-    The normal stress is constant and the norm of instability is infinite. The critical velocity
-    ratio is
+    The formula assumes constant normal stress and an infinite instability norm. The critical
+    velocity ratio is
 
     .. math:: \frac{V_0}{V_*} = 1 + \frac{a}{(1 - \epsilon)(b - a)}.
 
     With :math:`q = \exp(-\epsilon u)` and :math:`y = V_0/V`, the motion follows Lotka-Volterra
     equations. The straight line from :math:`V_*` through the saddle point :math:`(1 - \epsilon, 0)`
-    is an invariant of these equations.
+    is an invariant line of these Lotka-Volterra equations.
 
     References
     ----------
@@ -189,7 +189,7 @@ def effective_friction(mu_star: float, b_over_a: float, alpha: float) -> float:
 
 
 def steady_state_offset_at_instability(law_exponent: float, stiffness_ratio: float) -> float:
-    r"""Compute the state offset at the onset of instability.
+    r"""Compute the offset from steady state at the onset of instability.
 
     Parameters
     ----------
@@ -201,9 +201,9 @@ def steady_state_offset_at_instability(law_exponent: float, stiffness_ratio: flo
     Returns
     -------
     float
-        Offset :math:`u = \Theta/b + \ln V` that solves :math:`h(u) = -k/k_{cr}`. At this offset,
-        friction decreases with slip as fast as the spring stress. The result is infinite if there
-        is no solution.
+        Offset :math:`u = \Theta/b + \ln V` that solves :math:`h(u) = -k/k_{cr}`. At this offset
+        from steady state, friction decreases with slip as fast as the spring stress. The offset is
+        infinite if the equation has no solution.
     """
     product = law_exponent * stiffness_ratio
     if product >= 1.0:
@@ -214,7 +214,7 @@ def steady_state_offset_at_instability(law_exponent: float, stiffness_ratio: flo
 def steady_state_offset_after_normal_stress_fall(
     mu_star: float, a: float, b_over_a: float, alpha: float, normal_stress_ratio: float
 ) -> float:
-    r"""Compute the state offset immediately after a drop of normal stress.
+    r"""Compute the offset from steady state after a drop of normal stress.
 
     Parameters
     ----------
@@ -252,7 +252,7 @@ def critical_normal_stress_step(
     law_exponent: float,
     stiffness_ratio: float,
 ) -> float:
-    r"""Compute the critical drop of normal stress for the family of laws.
+    r"""Compute the critical drop of normal stress for the slip-to-slowness laws.
 
     Parameters
     ----------
@@ -272,15 +272,15 @@ def critical_normal_stress_step(
     Returns
     -------
     float
-        Critical change of the imposed normal stress in units of :math:`\sigma_*`. The value is
+        Critical change of the imposed normal stress in units of :math:`\sigma_*`, which is
         negative. NaN if no drop of normal stress causes an instability.
 
     Notes
     -----
-    While the load point does not move, the offset obeys
+    While the load point does not move, the offset :math:`u` from steady state obeys
     :math:`du/d\delta = (1 - b/a) [h(u) + q k/k_{cr}]/D_c`. If the offset after the drop exceeds the
     root of :math:`h(u) = -q k/k_{cr}`, the slip rate grows without bound. The function searches for
-    the smallest drop whose offset reaches this root.
+    the smallest drop of normal stress after which the offset reaches this root.
     """
 
     def excess_over_threshold(growth: float) -> float:

@@ -1,7 +1,7 @@
 """Equations of motion of one scene, in the form that integrators use.
 
-`equations_between_ruptures` and `equations_in_rupture` are the main functions. Each function
-returns `Equations` with the names and scales of the unknowns, the rates and the parameters.
+`equations_between_ruptures` and `equations_in_rupture` are the main functions. Both functions
+return `Equations` with the names and scales of the unknowns, the rates and the parameters.
 """
 
 from __future__ import annotations
@@ -21,13 +21,13 @@ from rsfstudy.slider.scene_functions import (
 )
 from rsfstudy.slider.scene_view import SceneView
 
-#: Names of two regimes: the equations with inertia, and the equations of a rigid slider.
+#: Names of two regimes of motion: ruptures with inertia, and the sliding of a rigid slider.
 RUPTURE_REGIME, RIGID_REGIME = "inertial", "rigid"
 
 
 @renamed_members
 class Equations(NamedTuple):
-    r"""Autonomous system of ordinary differential equations of a scene.
+    r"""Autonomous system of ordinary differential equations for a scene.
 
     The rates do not depend on the independent variable.
 
@@ -38,8 +38,8 @@ class Equations(NamedTuple):
     unknown_names : tuple of str
         Names of the unknowns.
     unknown_scales : tuple of float
-        Scale of each unknown. A change of an unknown by its scale is as important as a change of 1
-        in :math:`\ln V`.
+        Scale of each unknown. A change of an unknown by its scale affects the motion as much as a
+        change of :math:`\ln V` by 1.
     rate_function : callable
         Function ``rate(state, p) -> tuple`` that returns the derivatives of the unknowns.
     point_function : callable
@@ -50,7 +50,8 @@ class Equations(NamedTuple):
         Number of states of the scene.
     force_balance_function : callable, optional
         Function ``force_balance_function(spring, psis, p)`` that returns :math:`\ln(V/V_*)`, the
-        frictional stress and the shift of the state. It is None in ruptures and for rigid sliders.
+        frictional stress and the decrease of the state due to stress. The function is None in
+        ruptures and for rigid sliders.
     """
 
     regime: str
@@ -79,11 +80,11 @@ class Equations(NamedTuple):
 
     @property
     def is_rigid(self) -> bool:
-        """True if slip is the independent variable."""
+        """True for a rigid slider, for which slip is the independent variable."""
         return self.regime == RIGID_REGIME
 
     def evaluate_point(self, unknown_values: Numbers) -> MotionPoint:
-        """Evaluate all quantities of a motion for values of the unknowns.
+        """Compute stress, slip rate and states from the values of the unknowns.
 
         Parameters
         ----------
@@ -93,7 +94,7 @@ class Equations(NamedTuple):
         Returns
         -------
         MotionPoint
-            Point of the motion.
+            Stress, slip rate and states of the motion.
         """
         return self.point_function(
             unknown_values, self.rate_function(unknown_values, self.parameters), self.parameters
@@ -117,7 +118,7 @@ def equations_between_ruptures(scene: SceneView, *, with_time: bool) -> Equation
     Returns
     -------
     Equations
-        Equations along the path.
+        Equations with path length as the independent variable.
     """
     return _build_slow_equations(
         scene, scene.equation_functions, scene.dynamics.regime, with_time=with_time
@@ -138,7 +139,7 @@ def equations_without_mass(scene: SceneView, *, with_time: bool) -> Equations:
     Returns
     -------
     Equations
-        Quasi-static equations along the path.
+        Quasi-static equations with path length as the independent variable.
     """
     if scene.dynamics.build_rupture_rate_function is None:
         return equations_between_ruptures(scene, with_time=with_time)
@@ -211,7 +212,7 @@ def equations_in_rupture(scene: SceneView, *, with_time: bool = False) -> Equati
     Returns
     -------
     Equations
-        Equations along the path.
+        Equations with path length as the independent variable.
 
     Raises
     ------
@@ -235,11 +236,11 @@ def _get_required_rupture_functions(scene: SceneView) -> MotionRegimeFunctions:
 
 
 def build_equations_against_displacement(scene: SceneView) -> Equations:
-    """Return the equations between ruptures with displacement as variable.
+    """Return the equations between ruptures as functions of displacement.
 
     The displacement is slip plus load point displacement. Close to steady sliding, the rates are
-    nearly linear functions of the unknowns. The range of this linear behaviour is wider than for
-    the rates along the path.
+    nearly linear functions of the unknowns. The rates with respect to displacement remain linear
+    over a wider range than the rates with respect to path length.
 
     Parameters
     ----------
@@ -296,7 +297,7 @@ def equations_at_imposed_slip_rate(scene: SceneView, log_slip_rate: float) -> Eq
     Returns
     -------
     Equations
-        Equations whose last parameter is the log rate.
+        Equations whose last parameter is :math:`\ln(V/V_*)`.
     """
     forms, unknowns = scene.equation_functions, ("friction", *_state_names(scene)[1:])
     scales, p = (scene.a,) * len(unknowns), (*scene.parameter_values, log_slip_rate)
@@ -340,7 +341,7 @@ def build_friction_relation(
 def effective_normal_stress_at(
     scene: SceneView, frictional_stress: float, states: Numbers = ()
 ) -> float:
-    r"""Compute the effective normal stress for a given frictional stress.
+    r"""Compute the effective normal stress from the frictional stress.
 
     Parameters
     ----------

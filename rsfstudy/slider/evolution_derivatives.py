@@ -11,15 +11,15 @@ from rsfstudy.slider.parts import Numbers
 from rsfstudy.slider.scene_view import SceneView
 from rsfstudy.slider.steady_state import SteadySliding
 
-#: Largest step size of the finite differences, relative to the scale of each argument, and weights
-#: of central differences of order eight.
+#: Largest step size of the finite differences, relative to the scale of each argument, and
+#: coefficients of central differences of order eight.
 _MAX_DIFFERENCE_STEP_OVER_SCALE = 0.05
 _DIFFERENCE_WEIGHTS = ((1, 4.0 / 5.0), (2, -1.0 / 5.0), (3, 4.0 / 105.0), (4, -1.0 / 280.0))
-#: Scale of a state relative to b, and smallest relative change of a steady state with ln V that
-#: determines the scale of the state.
+#: Default scale of a state, divided by b, and smallest change of a steady state with ln V, relative
+#: to the default scale, that replaces the default scale.
 _STATE_SCALE_OVER_B, _MIN_STATE_CHANGE = 0.05, 1e-9
-#: Maximum number of step halvings, relative difference between two successive estimates at
-#: convergence, and relative rounding error of a finite difference.
+#: Maximum number of step halvings, convergence tolerance for the relative difference between two
+#: successive estimates, and relative rounding error of a finite difference.
 _MAX_HALVINGS, _CONVERGENCE_TOLERANCE, _ROUNDING_ERROR = 9, 1e-12, 8.0 * 2.0**-52
 
 NestedListMatrix = list[list[float]]
@@ -31,7 +31,8 @@ class StateEvolutionDerivatives(NamedTuple):
     Parameters
     ----------
     with_respect_to_log_slip_rate, with_respect_to_state_shift : list of float
-        Derivatives with respect to :math:`\ln V` and to the shift, of shape (states,).
+        Derivatives with respect to :math:`\ln V` and to the stress-induced decrease of the state
+        (shift), of shape (states,).
     with_respect_to_states : list of list of float
         Derivatives with respect to each state, of shape (states, states).
     relative_error : float
@@ -44,7 +45,7 @@ class StateEvolutionDerivatives(NamedTuple):
     relative_error: float
 
     def with_perturbed_derivatives(self, relative_change: float) -> StateEvolutionDerivatives:
-        r"""Return a copy with a relative change of all derivatives.
+        r"""Return a copy in which all derivatives are changed by a small factor.
 
         Parameters
         ----------
@@ -56,7 +57,7 @@ class StateEvolutionDerivatives(NamedTuple):
         Returns
         -------
         StateEvolutionDerivatives
-            Changed copy.
+            Copy with the changed derivatives.
         """
         by_log_slip_rate, by_shift = (
             [x * (1.0 + relative_change) for x in row] for row in self[:2]
@@ -99,8 +100,8 @@ def compute_state_evolution_derivatives(
     shift = build_friction_relation(scene)(steady_state.frictional_stress)[2]
     arguments = [steady_state.log_slip_rate, shift, *steady_state.states]
     scales, columns, errors = _finite_difference_scales(scene, steady_state, shift), [], []
-    # Change of each argument that corresponds to one unit of ln V. Rounding errors scale with the
-    # change.
+    # Each unit is the change of an argument that is equivalent to a change of ln V by 1. Rounding
+    # errors are proportional to the units.
     units = [scales[0], *(scale / _STATE_SCALE_OVER_B for scale in scales[1:])]
     rounding = _ROUNDING_ERROR * (
         1.0 + max(abs(x) / y for x, y in zip(arguments, units, strict=True))
@@ -127,9 +128,10 @@ def _differentiate_at_zero(
     """Differentiate a function at zero, and estimate the relative error.
 
     The step is halved until the derivatives of two successive steps differ by no more than the
-    rounding error. The function then returns the derivatives of the longer step, which has the
-    smaller rounding error. If no two successive steps agree, the function uses the pair of steps
-    with the smallest difference, and returns the derivatives of the shorter step.
+    rounding error. If two steps agree, the function returns the derivatives for the longer step,
+    which has the smaller rounding error. If no two successive steps agree, the function selects the
+    pair of steps with the smallest difference, and returns the derivatives for the shorter step of
+    the pair.
     """
     (coarse, _sizes), best, smallest = (
         _central_differences_at_zero(function, initial_step),
@@ -160,8 +162,8 @@ def _central_differences_at_zero(
     derivatives : list of float
         Derivative of each component of the function.
     sizes : list of float
-        Largest ratio of a function value to its distance from zero, for each component. The
-        rounding error is relative to this size.
+        Largest ratio of a function value to the distance of its argument from zero, for each
+        component. Rounding errors are proportional to this ratio.
     """
     slopes = [0.0] * len(function(0.0))
     sizes = slopes
@@ -177,9 +179,9 @@ def _central_differences_at_zero(
 def _finite_difference_scales(
     scene: SceneView, steady_state: SteadySliding, state_shift: float
 ) -> list[float]:
-    """Return the scales of ln V, the shift and each state for finite differences."""
+    """Return the finite-difference scales of ln V, the shift and each state."""
     size = _STATE_SCALE_OVER_B * scene.a * scene.parts.law.state_change_over_a
-    # The total b of several states may be close to zero although the b of each state is large.
+    # With several states, the sum of all b may be close to zero even if b of each state is large.
     of_shift = (
         size if scene.parts.law.state_count > 1 else _STATE_SCALE_OVER_B * abs(scene.b) or size
     )

@@ -23,7 +23,7 @@ _DURATION_HINT = "It belongs to rsfstudy.simulate(scene, duration=...)."
 
 
 def _rig_quantity_hint(symbol: str, name: str) -> str:
-    """Return a hint for a quantity that belongs to a rig."""
+    """Return an error hint for a quantity that rigs have but scenes do not have."""
     return (
         f"{symbol} is {name} of a rig: Rig({name}=...), or an axis or another value of a "
         "study that has one."
@@ -34,7 +34,7 @@ def _map_names_to_same_value(space_separated_names: str, value: str) -> dict[str
     return dict.fromkeys(space_separated_names.split(), value)
 
 
-#: Hints for field names that scenes do not have.
+#: Error hints for field names that users may expect but scenes do not have.
 _HINT_BY_WRONG_FIELD_NAME: Mapping[str, str] = {
     **_map_names_to_same_value("k K kappa spring_constant", f"Write {_STIFFNESS_HINT}."),
     **_map_names_to_same_value("b B", "Write b_over_a, which is b/a."),
@@ -71,7 +71,7 @@ _HINT_BY_WRONG_FIELD_NAME: Mapping[str, str] = {
     **_map_names_to_same_value("evolution evolution_law state_law friction_law", "Write law."),
     **_map_names_to_same_value("duration t_end tmax", _DURATION_HINT),
 }
-#: Names of laws by their synonyms.
+#: Mapping from synonyms of laws to the names that rsfstudy uses.
 _LAW_NAME_BY_ALIAS: Mapping[str, str] = {
     **_map_names_to_same_value(
         "aging ageing dieterich dieterich_ruina dr aging_law ageing_law", "slowness"
@@ -85,7 +85,7 @@ _LAW_NAME_BY_ALIAS: Mapping[str, str] = {
 
 
 def hint_for_unknown_field(field_name: str) -> str:
-    """Return a hint for an unknown field name.
+    """Return an error hint for an unknown field name.
 
     Parameters
     ----------
@@ -121,7 +121,7 @@ def _normalise_name(law_name: str) -> str:
 
 
 def hint_for_unknown_choice(slot_name: str, value: Any, choices: Iterable[str]) -> str:
-    """Return a hint for an unknown choice of a slot.
+    """Return an error hint for an unknown value of a field such as ``law``.
 
     Parameters
     ----------
@@ -150,7 +150,7 @@ def hint_for_unknown_choice(slot_name: str, value: Any, choices: Iterable[str]) 
 def hint_for_positional_argument(
     value: Any, choices_by_slot_name: Mapping[str, Iterable[str]]
 ) -> str:
-    """Return a hint for a positional argument of a scene.
+    """Return an error hint for a positional argument of ``Scene``.
 
     Parameters
     ----------

@@ -23,13 +23,13 @@ If the scene also has a fluid, the pressure around the fault is the first elemen
 of the law.
 
 If the displacement of the load point exceeds its mean motion by :math:`D`, the spring adds the
-shear stress :math:`K D`. The variables f and g exclude this stress, and the functions of friction
-add it. Inertia and radiation damping depend only on the difference f - g, in which the added stress
-cancels.
+shear stress :math:`K D`. The variables f and g exclude the stress :math:`K D`, and the friction
+functions add :math:`K D`. Inertia and radiation damping depend only on the difference f - g, in
+which the added stress cancels.
 
-The functions of this module combine the functions of the parts of a scene. Each combination
-contains only the effects that the scene has. The resulting functions take floats and the parameter
-tuple ``p`` (see ``parameter_layout``), so all scenes with the same parts share them.
+This module combines the functions that the parts of a scene define. Each combination contains only
+the effects that are active in the scene. The combined functions take floats and the parameter tuple
+``p`` (see ``parameter_layout``), so all scenes with the same parts share the combined functions.
 """
 
 from __future__ import annotations
@@ -79,7 +79,7 @@ class FrictionFunctions(NamedTuple):
         Function ``(psis) -> P`` of the pore pressure outside the fault.
     evolutions : callable
         Function ``(log_slip_rate, psis, shift, fraction, p)`` that returns the change of all states
-        per unit slip in :math:`D_c`, multiplied by a fraction.
+        per unit slip in :math:`D_c`, multiplied by ``fraction``.
     steady_states : callable
         Function ``(log_slip_rate, shift, p)`` that returns all states in steady sliding.
     state_sum : callable
@@ -123,14 +123,14 @@ class FrictionFunctions(NamedTuple):
 
 
 def zero_normal_stress_excess(frictional_stress: float, p: Numbers) -> tuple[float, float]:
-    r"""Return zero excess of normal stress and zero slope.
+    r"""Return a zero change of normal stress and a zero derivative.
 
     Parameters
     ----------
     frictional_stress : float
-        Deviation of frictional stress in :math:`\sigma_*`. It is ignored.
+        Deviation of frictional stress in :math:`\sigma_*`. This argument is ignored.
     p : tuple of float
-        Parameters of the scene. They are ignored.
+        Parameters of the scene. This argument is ignored.
 
     Returns
     -------
@@ -200,7 +200,7 @@ def zero_pressure(states: Numbers) -> float:
     Parameters
     ----------
     states : tuple of float
-        States of the scene. They are ignored.
+        States of the scene. This argument is ignored.
 
     Returns
     -------
@@ -225,9 +225,9 @@ def friction_relation_at_constant_normal_stress(
     frictional_stress : float
         Deviation of frictional stress in :math:`\sigma_*`.
     states : tuple of float
-        States of the scene. They are ignored.
+        States of the scene. This argument is ignored.
     p : tuple of float
-        Parameters of the scene. They are ignored.
+        Parameters of the scene. This argument is ignored.
 
     Returns
     -------
@@ -259,7 +259,7 @@ def zero_state_effect(
     Returns
     -------
     shift, slope : float
-        Zero and zero.
+        Two zeros.
     """
     return 0.0, 0.0
 
@@ -320,7 +320,8 @@ def shear_stress_effect_on_state(
     normal_stress_ratio : float
         Normal stress ratio :math:`s`.
     normal_stress_derivative : float
-        Derivative of the normal stress ratio with respect to frictional stress. It is ignored.
+        Derivative of the normal stress ratio with respect to frictional stress. This argument is
+        ignored.
     p : tuple of float
         Parameters of the scene.
 
@@ -413,7 +414,7 @@ def extend_relation_to_reversed_slip(forward_relation: Function) -> Function:
 def build_pressure_derivatives_function(
     normal_stress_function: Function, state_effect_function: Function
 ) -> Function:
-    r"""Return a function that differentiates strength by pore pressure.
+    r"""Return a function that differentiates strength with respect to pressure.
 
     Parameters
     ----------
@@ -451,9 +452,9 @@ def zero_load_point_stress(states: Numbers, p: Numbers) -> float:
     Parameters
     ----------
     states : tuple of float
-        States of the scene. They are ignored.
+        States of the scene. This argument is ignored.
     p : tuple of float
-        Parameters of the scene. They are ignored.
+        Parameters of the scene. This argument is ignored.
 
     Returns
     -------
@@ -476,7 +477,8 @@ def load_point_stress(states: Numbers, p: Numbers) -> float:
     Returns
     -------
     float
-        Shear stress :math:`K D` in :math:`\sigma_*`. It is zero at the start of the oscillation.
+        Shear stress :math:`K D` in :math:`\sigma_*`. The stress is zero at the start of the
+        oscillation.
     """
     return states[-1] - p[LOADING + 2]
 
@@ -502,7 +504,7 @@ def wrap_with_load_point_stress(friction_function: Function) -> Function:
 
 
 def build_load_point_derivatives_function(strength_function: Function) -> Function:
-    """Return a function that differentiates strength by load point stress.
+    """Return a function for the derivatives with respect to load point stress.
 
     Parameters
     ----------
@@ -523,7 +525,7 @@ def build_load_point_derivatives_function(strength_function: Function) -> Functi
     return load_point_derivatives
 
 
-# ---- all of it -----------------------------------------------------------------------------------
+# ---- friction functions of a scene ---------------------------------------------------------------
 
 
 class FrictionTerms(NamedTuple):
@@ -534,7 +536,7 @@ class FrictionTerms(NamedTuple):
     law_state_count : int
         Number of states of the law.
     evolutions, steady_states : callable
-        Evolution and steady states of the law.
+        Functions that compute the evolution and the steady states of the law.
     stress_effects_on_state : tuple of callable
         Functions that compute the decrease of the state variable due to stress. The normal stress
         condition, the law and the shear stress can each contribute a function.
@@ -546,7 +548,7 @@ class FrictionTerms(NamedTuple):
         Number of unknowns of the fluid or the loading. The last unknown is the pore pressure, or
         the stress of the load point.
     auxiliary_rates, auxiliary_steady_states : callable or None
-        Rates and steady values of the auxiliary unknowns.
+        Functions that compute the rates and the steady values of the auxiliary unknowns.
     boundary_pressure_index : int
         Negative index of the pressure outside the fault in the tuple of states. The index is -1 if
         the pore pressure is the pressure outside the fault, and 0 if the loading imposes no
@@ -583,7 +585,7 @@ def build_friction_functions(friction_terms: FrictionTerms) -> FrictionFunctions
     Returns
     -------
     FrictionFunctions
-        Functions of friction. The result is cached.
+        Friction functions of the scene. The result is cached.
     """
     effect = (
         reduce(sum_state_effects, friction_terms.stress_effects_on_state)

@@ -11,15 +11,15 @@ from rsfstudy._deprecation import renamed_members
 class MotionPoint(NamedTuple):
     r"""Stress, slip rate and states of a motion at a point in time.
 
-    The values do not depend on the unknowns of the equations that were integrated.
+    The attributes are the same for all equations of motion, regardless of the integrated unknowns.
 
     Parameters
     ----------
     log_slip_rate : float
         Natural logarithm of the slip rate, :math:`\ln(V/V_*)`.
     log_slip_rate_derivative : float
-        Derivative of ``log_slip_rate`` with respect to the independent variable, the length along
-        the path.
+        Derivative of ``log_slip_rate`` with respect to the independent variable of the equations,
+        which is usually path length.
     spring_stress : float
         Deviation :math:`f` of the spring stress from :math:`\tau_*`, in :math:`\sigma_*`.
     frictional_stress : float
@@ -29,17 +29,17 @@ class MotionPoint(NamedTuple):
     state : float
         State variable :math:`\Theta`. If the law has several states, ``state`` is their sum.
     steady_state_offset : float
-        Difference of ``state`` from steady sliding at this slip rate. For most laws, the difference
-        is :math:`\Theta + b \ln(V/V_*)`.
+        Difference between ``state`` and its steady value at this slip rate. For most laws, the
+        difference is :math:`\Theta + b \ln(V/V_*)`.
     distance_from_steady_state : float
-        Largest absolute difference of a state from steady sliding. Unknowns in
+        Largest absolute difference between a state and its steady value. Unknowns in
         ``excluded_from_distance`` are ignored.
     friction_coefficient : float
         Friction coefficient.
     normal_stress : float
         Effective normal stress in :math:`\sigma_*`.
     apparent_friction : float
-        Friction coefficient that an experimenter measures. It is the spring stress, divided by the
+        Friction coefficient that an experimenter measures: the spring stress, divided by the
         difference between normal stress and the pore pressure outside the fault.
     apparent_friction_derivative : float
         Derivative of ``apparent_friction`` with respect to the independent variable.

@@ -1,9 +1,10 @@
 """Check that a scene provides the quantities that its parts need.
 
-The functions of a part receive the quantities in its attribute ``received_quantities``. If
-effective normal stress is constant, shear stress can be computed from the friction coefficient and
-the normal stress. A part can list further quantities in ``needs``. Scenes in which these quantities
-are unknown then reject the part, because the rates would be computed from wrong values.
+The attribute ``received_quantities`` of a part contains the quantities that the functions of the
+part receive. If effective normal stress is constant, shear stress can be computed from the friction
+coefficient and the normal stress. A part can list additional quantities in its attribute ``needs``.
+If a quantity in ``needs`` is unknown, the scene rejects the part, because the part would compute
+its rates from wrong values.
 """
 
 from __future__ import annotations
@@ -21,7 +22,7 @@ SLIP_RATE, STATE, FRICTION_COEFFICIENT = "slip_rate", "state", "friction_coeffic
 SHEAR_STRESS, NORMAL_STRESS = "shear_stress", "normal_stress"
 PORE_PRESSURE, EFFECTIVE_NORMAL_STRESS = "pore_pressure", "effective_normal_stress"
 
-#: The quantities that a part may need.
+#: Names and descriptions of the quantities that a part may list in ``needs``.
 QUANTITIES_A_PART_MAY_NEED: Mapping[str, str] = {
     SLIP_RATE: "ln(V/V_*)",
     STATE: "the states of the law",
@@ -32,9 +33,9 @@ QUANTITIES_A_PART_MAY_NEED: Mapping[str, str] = {
     EFFECTIVE_NORMAL_STRESS: "normal stress less pore pressure, over sigma_*",
 }
 #: Quantities that the functions of a law receive. The friction coefficient is computed from the
-#: other two quantities.
+#: slip rate and the state.
 QUANTITIES_RECEIVED_BY_LAWS = frozenset({SLIP_RATE, STATE, FRICTION_COEFFICIENT})
-#: Quantities that can be computed from other quantities.
+#: Mapping from each quantity that can be computed to the quantities in its formula.
 _QUANTITIES_COMPUTED_FROM_OTHERS: Mapping[str, frozenset[str]] = {
     EFFECTIVE_NORMAL_STRESS: frozenset({NORMAL_STRESS, PORE_PRESSURE}),
     SHEAR_STRESS: frozenset({FRICTION_COEFFICIENT, NORMAL_STRESS, PORE_PRESSURE}),
@@ -44,7 +45,7 @@ _QUANTITIES_COMPUTED_FROM_OTHERS: Mapping[str, frozenset[str]] = {
 def check_names_of_needed_quantities(slot_name: str, part_class: type[Part]) -> None:
     """Raise ``InvalidValue`` if ``needs`` of a part is invalid.
 
-    The attribute must be a set of known quantities.
+    The attribute ``needs`` must be a set of names of known quantities.
 
     Parameters
     ----------
@@ -92,7 +93,7 @@ def quantities_known_to_part(scene: SceneView, part: Part) -> frozenset[str]:
     """Return the quantities that are known to the functions of a part.
 
     The result contains the quantities that the functions receive, the quantities that are constant
-    in the scene, and all quantities that can be computed from both.
+    in the scene, and all quantities that can be computed from received or constant quantities.
 
     Parameters
     ----------
@@ -119,7 +120,7 @@ def quantities_known_to_part(scene: SceneView, part: Part) -> frozenset[str]:
 
 
 class _CauseOfUnknownQuantity(NamedTuple):
-    """Field of a scene that makes a quantity unavailable to the rates."""
+    """Reason why a quantity is unavailable in a scene, with a remedy."""
 
     unknown_quantity_name: str
     cause_text: str
@@ -127,7 +128,7 @@ class _CauseOfUnknownQuantity(NamedTuple):
 
 
 def _causes_of_unknown_quantities(scene: SceneView) -> list[_CauseOfUnknownQuantity]:
-    """Return the fields of a scene that make a quantity unavailable."""
+    """Return the reasons why quantities are unavailable in a scene."""
     parts, found = scene.parts, []
     if parts.normal_stress.normal_stress is not None:
         cause = f"normal_stress={parts.normal_stress.name!r}"
@@ -150,9 +151,9 @@ def _causes_of_unknown_quantities(scene: SceneView) -> list[_CauseOfUnknownQuant
 def _missing_quantities_error(
     scene: SceneView, slot_name: str, part: Part, missing_quantity_names: list[str]
 ) -> InvalidValue:
-    """Return the error for a part whose rates lack a needed quantity."""
+    """Return the error for a part that needs an unavailable quantity."""
     known = quantities_known_to_part(scene, part)
-    # Determine the missing terms. A field of the scene may be the reason why they are missing.
+    # Determine the missing quantities, and the fields of the scene that make them unavailable.
     wanted = (
         set[str]().union(
             *(_QUANTITIES_COMPUTED_FROM_OTHERS.get(name, {name}) for name in missing_quantity_names)

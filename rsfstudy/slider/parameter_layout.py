@@ -1,9 +1,9 @@
 """Layout of the parameter tuple ``p`` that the equations of a scene read.
 
-Parameters that every scene has come first, followed by the parameters of each slot. The parameters
-of the law are ``p[LAW]``, ``p[LAW + 1]`` and so on. The parameters of the law come last, because a
-law can have any number of parameters. The module also defines the columns of segment tables and
-limits that prevent overflow.
+The tuple starts with the parameters that every scene has, followed by the parameters of each slot.
+The parameters of the law are ``p[LAW]``, ``p[LAW + 1]`` and so on. The parameters of the law come
+last, because a law can have any number of parameters. The module also defines the columns of
+segment tables and limits that prevent overflow.
 """
 
 from __future__ import annotations
@@ -31,11 +31,12 @@ from rsfstudy.slider.scene_view import SceneView
     IMPOSED_NORMAL_STRESS,
 ) = range(8)
 
-#: Index of the first parameter of each slot. A loading with unknowns uses the elements of the
-#: fluid. The tuple is short, because compiled functions pass all of its elements on.
+#: Index of the first parameter of each slot. A loading with unknowns stores its parameters in the
+#: elements of the fluid. The parameter tuple is kept short, because compiled functions copy all of
+#: its elements in each call.
 NORMAL_STRESS, FLUID, DYNAMICS, LAW = 8, 10, 13, 15
 LOADING = FLUID
-#: Index of the rate of the loading if both the loading and the fluid have parameters.
+#: Index of the rate of the imposed pressure if both the loading and the fluid have parameters.
 BOUNDARY_PRESSURE_RATE = DYNAMICS - 1
 
 #: Columns of the segment table of a loading: start time, end time, load point velocity V_0/V_*, its
@@ -51,17 +52,17 @@ BOUNDARY_PRESSURE_RATE = DYNAMICS - 1
 ) = range(6)
 
 #: Upper limit of ln(V/V_*). Larger slip rates occur only in trial steps that the integrator
-#: rejects, because a motion ends at 276 with the status ``slip_rate_unbounded``.
+#: rejects, because a motion ends at ln(V/V_*) = 276 with the status ``slip_rate_unbounded``.
 LARGEST_LOG_SLIP_RATE = 300.0
 #: Upper limit of ln(V_*/V). Slip without loading stops at 10^-290 V_*.
 LARGEST_LOG_SLOWNESS = 680.0
 #: Limits of the normal stress ratio minus one. Values outside these limits occur only in trial
-#: steps.
+#: steps of the integrator.
 SMALLEST_NORMAL_STRESS_EXCESS, LARGEST_NORMAL_STRESS_EXCESS = 1e-12 - 1.0, 1e12
 
 
 class _ParameterValueSource(Protocol):
-    """Part, or combination of parts, with parameters for the equations."""
+    """Protocol of parts and combinations of parts that provide parameters."""
 
     @property
     def name(self) -> str: ...
@@ -80,7 +81,7 @@ def pack_parameter_values(scene: SceneView) -> Numbers:
     Returns
     -------
     tuple of float
-        Parameters at the indices of this module.
+        Parameters in the order that the constants of ``parameter_layout`` define.
     """
     p = scene.friction_parameter_values
     of_load = scene.stiffness, scene.load_velocity, scene.log_load_velocity
@@ -98,8 +99,8 @@ def pack_friction_parameter_values(scene: SceneView) -> Numbers:
     Returns
     -------
     tuple of float
-        Parameters at the indices of this module. The elements for the spring and the load point are
-        NaN.
+        Parameters in the order that the constants of ``parameter_layout`` define. The elements for
+        the spring and the load point are NaN.
     """
     parts, slider, law = scene.parts, scene.parts.slider, scene.parts.law
     size = slider.a * law.state_change_over_a
@@ -120,7 +121,8 @@ def _part_parameters_padded_with_nan(
 ) -> Numbers:
     """Return the parameters of a part, padded with NaN.
 
-    A function that reads an unused element then returns NaN instead of a wrong number.
+    Because of the padding, a function that reads an unused element returns NaN instead of a wrong
+    number.
     """
     own = (
         collect_parameter_values(part, scene)

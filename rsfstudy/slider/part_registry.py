@@ -58,7 +58,7 @@ class Slot:
 
     @property
     def field_quantity(self) -> Quantity:
-        """Quantity that describes the slot as a field."""
+        """Description of the field that selects the part, as a ``Quantity``."""
         return Quantity(self.name, "", "", self.long_name)
 
     @cached_property
@@ -86,7 +86,8 @@ SLOTS: tuple[Slot, ...] = (
     ),
     Slot("loading", loading.Loading, loading.BUILT_IN_PARTS, "step", "what the load point does"),
 )
-#: Slots whose part is selected by name. In the other slots, the values of fields select the part.
+#: Slots whose part is selected by name. In the other slots, the values of fields such as
+#: ``inertia`` select the part.
 SLOTS_WITH_PART_CHOSEN_BY_NAME = tuple(
     slot for slot in SLOTS if not slot.part_class_by_selecting_field
 )
@@ -94,7 +95,7 @@ _ALL_PART_CLASSES: tuple[type[Part], ...] = (
     SliderParameters,
     *(part for slot in SLOTS for part in slot.built_in_parts.values()),
 )
-#: Built-in part that owns each field.
+#: Mapping from field names to the built-in parts that declare the fields.
 PART_CLASS_BY_FIELD_NAME: Mapping[str, type[Part]] = {
     name: part for part in reversed(_ALL_PART_CLASSES) for name in field_names(part)
 }
@@ -153,7 +154,7 @@ def add_scene_fields_to_signature(
     Parameters
     ----------
     *extra_field_names : str
-        Further names to add.
+        Names of additional keyword arguments.
 
     Returns
     -------
@@ -174,10 +175,10 @@ def add_scene_fields_to_signature(
 
 # ---- user-defined parts --------------------------------------------------------------------------
 
-#: Names of the attributes of every scene, except for its fields. The module ``scene`` adds the
-#: names.
+#: Names of the attributes that every scene has in addition to its fields. The module ``scene`` adds
+#: the names to this set.
 RESERVED_NAMES: set[str] = set()
-#: Classes that have been checked.
+#: Classes of user-defined parts that have been checked.
 _CHECKED_PART_CLASSES: set[type[Part]] = set()
 
 
@@ -192,13 +193,13 @@ def class_of_part(part: UserPart) -> type[Part]:
     Returns
     -------
     type
-        The class itself, or the class of the loading.
+        Class of the part. If `part` is a class, the function returns `part` itself.
     """
     return part if isinstance(part, type) else type(part)
 
 
 def find_slot_of_part_class(part_class: type[Part]) -> Slot:
-    """Return the slot that a class of parts fills.
+    """Return the slot that a part class can fill.
 
     Parameters
     ----------
@@ -208,7 +209,7 @@ def find_slot_of_part_class(part_class: type[Part]) -> Slot:
     Returns
     -------
     Slot
-        Slot with a base class of the part.
+        Slot whose base class the part is derived from.
     """
     return next(slot for slot in SLOTS if issubclass(part_class, slot.base_class))
 
@@ -268,7 +269,7 @@ def _check_user_part(slot: Slot, part: Any) -> None:
 def _check_unknowns_excluded_from_distance(slot: Slot, part: type[Part]) -> None:
     """Raise ``InvalidValue`` if ``excluded_from_distance`` is invalid.
 
-    Each name must be the name of an unknown of the part.
+    Each name in ``excluded_from_distance`` must be the name of an unknown of the part.
     """
     excluded: Any = part.excluded_from_distance
     unknowns = [about.name for about in part.unknowns]
@@ -303,7 +304,7 @@ def _check_part_name(slot: Slot, part: UserPart) -> None:
 def _module_and_qualified_name(part: UserPart) -> tuple[str, str]:
     """Return the module and the qualified name of the definition of a part.
 
-    The result is the same if a notebook cell with the definition is run again.
+    The names do not change if a notebook cell with the definition is run again.
     """
     return class_of_part(part).__module__, class_of_part(part).__qualname__
 
@@ -338,7 +339,7 @@ def _check_part_fields(slot: Slot, part: type[Part]) -> None:
 
 
 def register_user_parts(parts: Iterable[UserPart]) -> None:
-    """Register the names of parts that have been checked.
+    """Register user-defined parts by name after they have been checked.
 
     An earlier part with the same name is replaced.
 
@@ -355,7 +356,7 @@ def register_user_parts(parts: Iterable[UserPart]) -> None:
 
 
 def normalise_field_value(field_name: str, value: Any) -> Any:
-    """Convert a part or the synonym of a law to a name.
+    """Convert a part class, or a synonym of a law, to the name of the part.
 
     Parameters
     ----------
@@ -367,7 +368,7 @@ def normalise_field_value(field_name: str, value: Any) -> Any:
     Returns
     -------
     object
-        Name of the part or law, or the value itself.
+        Name of the part or law. Other values are returned unchanged.
 
     Raises
     ------
@@ -411,7 +412,7 @@ def replace_names_by_user_parts(
 
 
 def scene_field_quantities(user_parts: Iterable[UserPart]) -> dict[str, Quantity]:
-    """Return the fields of scenes that may contain the given parts.
+    """Return all fields of scenes, including the fields of user-defined parts.
 
     Parameters
     ----------

@@ -41,7 +41,8 @@ from rsfstudy.errors import InvalidValue
 from rsfstudy.quantities import Quantity
 from rsfstudy.slider.scene_view import SceneView
 
-#: Rules of most fields. The upper limit of integers bounds the number of loading segments.
+#: Validation rules that most fields use. The upper limit of integers bounds the number of loading
+#: segments.
 POSITIVE, NON_NEGATIVE = "must be greater than 0", "must be 0 or greater"
 NON_NEGATIVE_INTEGER, POSITIVE_INTEGER = (
     f"must be a whole number from {least} to 100,000" for least in (0, 1)
@@ -76,10 +77,11 @@ class Part:
     name: ClassVar[str]
     #: Name of the field whose value selects the part. Empty if the part is selected by its name.
     selected_by: ClassVar[str] = ""
-    #: Names of members that follow from the equations of the part, such as closed-form solutions.
+    #: Names of class members that are derived from the equations of the part, such as closed-form
+    #: solutions.
     derived_properties: ClassVar[tuple[str, ...]] = ()
-    #: Names of members that define the equations. If a subclass overrides one of these members, the
-    #: subclass does not inherit the derived properties.
+    #: Names of class members that define the equations. If a subclass overrides one of these
+    #: members, the subclass does not inherit ``derived_properties``.
     defining_methods: ClassVar[frozenset[str]] = frozenset()
     #: Unknowns of a fluid or a loading. The functions ``auxiliary_rates`` and
     #: ``auxiliary_steady_states`` below compute the rates and the steady values of the unknowns
@@ -87,17 +89,17 @@ class Part:
     unknowns: ClassVar[tuple[Quantity, ...]] = ()
     #: Names of unknowns that are excluded from the distance from steady sliding, for example
     #: because their steady values are extremely large at the slip rate of a rupture. The criteria
-    #: for settled motions and for limit cycles ignore these unknowns.
+    #: for settled motions and for limit cycles ignore the excluded unknowns.
     excluded_from_distance: ClassVar[tuple[str, ...]] = ()
-    #: Names of the quantities in ``requirements.QUANTITIES_A_PART_MAY_NEED`` that the rates of the
-    #: part need. A scene rejects the part if it cannot provide a quantity.
+    #: Names of the quantities in ``needed_quantities.QUANTITIES_A_PART_MAY_NEED`` that the rates of
+    #: the part need. A scene that cannot provide one of the quantities rejects the part.
     needs: ClassVar[Collection[str]] = frozenset()
-    #: Names of the quantities that the functions of the slot receive.
+    #: Names of the quantities that the functions of the part receive.
     received_quantities: ClassVar[frozenset[str]] = frozenset()
     auxiliary_rates: ClassVar[Function | None] = None
     auxiliary_steady_states: ClassVar[Function | None] = None
-    #: Words for error messages about fields of other parts of the slot: the circumstance in which
-    #: the fields have no meaning, and a remedy.
+    #: Texts for error messages about a field that belongs to another part: the condition under
+    #: which the field has no meaning, and a remedy.
     rejection_hint: ClassVar[tuple[str, str]] = ("", "")
 
     def __init_subclass__(cls) -> None:
@@ -121,7 +123,7 @@ class Part:
         The first value is stored at the index of the slot. A law can have any number of values. The
         other parts have room for a few values only (see ``parameter_layout``). Fields that a
         subclass declares with ``number`` are appended in the order of their declaration. Override
-        this method only if the functions read values other than these fields.
+        ``parameter_values`` only if the functions read values other than the declared fields.
 
         Parameters
         ----------
@@ -131,7 +133,7 @@ class Part:
         Returns
         -------
         tuple of float
-            Values in addition to the appended fields. The base class returns an empty tuple.
+            Values that precede the appended fields. The base class returns an empty tuple.
         """
         return ()
 
@@ -146,12 +148,13 @@ class Part:
         Raises
         ------
         InvalidValue
-            If the values contradict each other or the scene. The base class accepts all values.
+            If the field values contradict each other or other parts of the scene. The base class
+            accepts all values.
         """
 
     @property
     def effects(self) -> tuple[str, ...]:
-        """Names of the effects that are active in this part."""
+        """Names of the physical effects that are active in the part."""
         return ()
 
     @classmethod
@@ -167,7 +170,7 @@ class Part:
 
     @classmethod
     def rejection_error(cls, name: str, value: Any) -> InvalidValue:
-        """Return the error for a field of another part of the slot.
+        """Return the error for a field that belongs to another part.
 
         Parameters
         ----------
@@ -196,7 +199,7 @@ class Part:
         rule : str
             Rule that the value violates.
         remedy : str, optional
-            Last sentence of the message.
+            Last sentence of the error message, which suggests a remedy.
 
         Returns
         -------
@@ -297,7 +300,7 @@ def flag(default: bool, long_name: str) -> Any:
     return field(default=default, metadata={"about": about, "rule": _BOOLEAN_RULE, "remedy": ""})
 
 
-#: Conditions of numeric fields, by the text of the rule.
+#: Mapping from the text of each validation rule to the function that checks the rule.
 CONDITION_BY_VALUE_RULE: Mapping[str, Callable[[float], bool]] = {
     "": lambda value: True,
     POSITIVE: lambda value: value > 0.0,
@@ -340,8 +343,8 @@ def field_names(part_class: type[Part]) -> tuple[str, ...]:
     -------
     tuple of str
         Names of the fields that ``number`` and ``flag`` declare. The field that selects the part
-        comes first. Journals identify cells by the fields in this order, so the order must not
-        change.
+        comes first. Study journals identify computed scenes by their field values in this order, so
+        the order must not change.
     """
     names = (f.name for f in fields(part_class) if "about" in f.metadata)
     return tuple(sorted(names, key=lambda name: name != part_class.selected_by))
@@ -349,10 +352,10 @@ def field_names(part_class: type[Part]) -> tuple[str, ...]:
 
 @cache
 def _fields_appended_to_parameter_values(part_class: type[Part]) -> tuple[str, ...]:
-    """Return the names of the fields whose values are appended to ``numbers``.
+    """Return the names of the fields that are appended to ``parameter_values``.
 
-    The fields are numeric and are declared in subclasses of the last class that overrides
-    ``numbers``.
+    A field is appended if it is numeric and is declared in a subclass of the class that defines
+    ``parameter_values``.
     """
     overriding = next(kind for kind in part_class.__mro__ if "parameter_values" in vars(kind))
     known = vars(overriding).get("__dataclass_fields__", {})

@@ -52,7 +52,7 @@ class LazySegmentSequence(Sequence[Segment]):
         return len(self._table)
 
     def __getitem__(self, number: Any) -> Any:
-        """Return the segment with an index."""
+        """Return the segment at an index."""
         begins, ends, velocity, *_others = self._table[number].tolist()
         return Segment(velocity, duration=ends - begins)
 
@@ -75,8 +75,8 @@ class SampledHistory(UserLoading):
         If True, the samples include normal stress or pore pressure.
     of_pressure : bool, default: False
         If True, the samples include pore pressure but not normal stress. If the scene has a fluid
-        with pore pressure, the samples are the pressure around the fault, and fluid flows until
-        both pressures are equal.
+        with pore pressure, the samples are the pressure around the fault, and fluid flows until the
+        pore pressure in the fault equals the pressure around the fault.
     first_reversal : tuple of (str, float, str), optional
         Name, value and position of the first sample that moves the load point backwards, for error
         messages.
@@ -103,7 +103,7 @@ class SampledHistory(UserLoading):
     def locate_load_point_reversal(self, segment_index: int) -> tuple[str, float, str]:
         """Describe the input value that moves the load point backwards.
 
-        See the base class.
+        See ``UserLoading.locate_load_point_reversal``.
         """
         velocity = float(self.sample_table[segment_index, VELOCITY_COLUMN])
         return self.first_reversal or ("velocity", velocity, f"sample {segment_index + 1}")
@@ -111,14 +111,14 @@ class SampledHistory(UserLoading):
     def initial_unknowns(self, scene: SceneView) -> Numbers:
         """Return the decrease of normal stress at the first sample.
 
-        See the base class.
+        See ``Loading.initial_unknowns``.
         """
         return (float(self.sample_table[0, STRESS_FALL_COLUMN]),) if self.of_stress else ()
 
     def parameter_values(self, scene: SceneView) -> Numbers:
         """Return the rate of normal stress after the first sample.
 
-        See the base class.
+        See ``Part.parameter_values``.
         """
         return (float(self.sample_table[0, STRESS_RATE_COLUMN]),) if self.of_stress else ()
 
@@ -133,7 +133,7 @@ class SampledHistory(UserLoading):
 
     @cached_property
     def segment_table(self) -> np.ndarray:
-        """Table of the segments, an array of shape (samples, 6)."""
+        """Segment table, an array of shape (samples, 6)."""
         columns = self.sample_table
         table = np.full((len(columns), SEGMENT_STRESS_FALL + 1), math.nan)
         table[:, : SEGMENT_LOG_VELOCITY + 1].T[:] = (
@@ -162,7 +162,8 @@ class SampledHistory(UserLoading):
     def reported_segment_count(self) -> int:
         """Number of segments whose start is reported as an event.
 
-        Only the end of the record is reported, because otherwise every sample would be an event.
+        Only the end of the record is reported as an event, because otherwise every sample would be
+        an event.
         """
         return min(1, len(self.sample_table) - 1)
 
@@ -172,7 +173,7 @@ class SampledHistory(UserLoading):
     def describe(self) -> dict[str, Any]:
         """Return the digest of the samples.
 
-        See the base class.
+        See ``Loading.describe``.
         """
         return {"samples": self.digest}
 
@@ -194,7 +195,7 @@ class SampledHistory(UserLoading):
     def isolate_segment(self, segment_index: int) -> SampledHistory:
         """Return a history that consists of a single segment.
 
-        See the base class.
+        See ``Loading.isolate_segment``.
         """
         one = self.sample_table[segment_index].copy()
         one[TIME_COLUMN] = 0.0
@@ -218,14 +219,14 @@ def build_sampled_history(
         Sampling times in :math:`D_c/V_*`. The history starts at the first sample.
     velocity : ndarray
         Load point velocity between each sample and the next sample, in :math:`V_*`. The last
-        velocity has no end.
+        velocity applies without end.
     normal_stress_fall : ndarray or None
         Decrease of normal stress from :math:`\sigma_*` at the samples, in :math:`\sigma_*`. After
         the last sample, normal stress remains constant.
     name : str
         Name of the history in results.
     of_pressure : bool, default: False
-        If True, the decrease is caused by pore pressure only.
+        If True, pore pressure is the only cause of the decrease of effective normal stress.
     first_reversal : tuple of (str, float, str), optional
         Name, value and position of the first sample that moves the load point backwards.
 

@@ -37,8 +37,8 @@ from rsfstudy.slider.scene_caching import cached_attribute
 from rsfstudy.slider.slider_parameters import SliderParameters
 from rsfstudy.slider.state_functions import check_steady_states
 
-#: Number of cached critical stiffnesses. Studies request the same values repeatedly along axes that
-#: do not affect friction.
+#: Maximum number of cached critical stiffnesses. Studies request the same values repeatedly along
+#: axes that do not affect friction.
 _CRITICAL_STIFFNESS_CACHE_SIZE = 4096
 #: Segment table of loadings that consist of a single segment without an end.
 SINGLE_ENDLESS_SEGMENT_TABLE = np.array([[0.0, math.inf, *[math.nan] * 4]])
@@ -66,19 +66,19 @@ class Scene(SceneBase):
         driving stress that is inclined at the angle ``phi``. A user-defined class is also accepted.
     fluid : str or type, default: "drained"
         Pore fluid. "drained" is constant pore pressure. With "dilatant", pore pressure falls when
-        pores open with slip rate. A user-defined class is also accepted. Stress is normalised by
-        the effective normal stress of steady sliding at :math:`V_*`. Pore pressure is measured from
-        the pressure of the surroundings, which is also its initial value. A history of pore
-        pressure changes the pressure of the surroundings.
+        pores open because the slip rate increases. A user-defined class is also accepted. Stress is
+        normalised by the effective normal stress of steady sliding at :math:`V_*`. Pore pressure is
+        measured from the pressure of the surroundings, which is also its initial value. A history
+        of pore pressure changes the pressure of the surroundings.
     a : float, default: 0.0145
         Direct effect parameter.
     mu_star : float, default: 0.76
         Steady-state friction coefficient at :math:`V_*`.
     stiffness_ratio : float, optional
         Ratio of the stiffness to the critical stiffness at :math:`V_*` without radiation damping.
-        Steady sliding is stable above 1 and, with radiation damping, also slightly below 1. With
-        several states, steady sliding may also be stable at lower ratios. The default is 1 if
-        ``stiffness`` is not given.
+        Steady sliding is stable at ratios above 1 and, with radiation damping, also at ratios
+        slightly below 1. With several states, steady sliding may also be stable at lower ratios.
+        The default is 1 if ``stiffness`` is not given.
     stiffness : float, optional
         Stiffness :math:`k D_c/\sigma_*`, as an alternative to ``stiffness_ratio``.
     period : float, default: 5.0
@@ -87,10 +87,11 @@ class Scene(SceneBase):
     reference_rate : float, default: 1.17e-8
         Reference rate :math:`V_*/D_c` in 1/s.
     instability_norm : float, default: 5e-4
-        Threshold of instability. A motion is unstable if :math:`V T/(2 \pi D_c)` reaches this norm.
+        Threshold of instability. A motion is unstable if :math:`V T/(2 \pi D_c)` reaches the
+        threshold.
     initial_stress : float, default: 0.0
         Initial shear stress, measured from the stress of steady sliding at :math:`V_*`, in
-        :math:`\sigma_*`. The initial values apply before the first step.
+        :math:`\sigma_*`. The initial stress applies before the first step of the loading.
     initial_state : float, default: 0.0
         Initial state variable :math:`\Theta`, which is zero in steady sliding at :math:`V_*`.
     stress_dependence : float, default: 0.0
@@ -110,8 +111,8 @@ class Scene(SceneBase):
     law_exponent : float, default: 0.5
         Exponent of the family of laws, from 0 (slip law) to 1 (slowness law).
     b1_over_a : float, default: 1.0
-        Ratio :math:`b_1/a` of the first state, for laws with two states. These laws do not have the
-        field ``b_over_a``. Negative values are allowed.
+        Ratio :math:`b_1/a` of the first state, for laws with two states. Laws with two states do
+        not have the field ``b_over_a``. Negative values are allowed.
     b2_over_a : float, default: 0.84
         Ratio :math:`b_2/a` of the second state, for laws with two states. Negative values are
         allowed.
@@ -154,13 +155,13 @@ class Scene(SceneBase):
         Number of cycles after which an oscillation ends, which may be fractional. By default an
         oscillation has no end.
     normal_stress_ramp : float, default: 0.0
-        Change of imposed normal stress in :math:`\sigma_*` at a steady rate. If the driving stress
-        is inclined, :math:`\sigma_3` changes. The field does not apply to constant normal stress.
+        Change of imposed normal stress during a ramp, in :math:`\sigma_*`. If the driving stress is
+        inclined, :math:`\sigma_3` changes. The field does not apply to constant normal stress.
     ramp_duration : float, default: 1.0
         Duration of the ramp of normal stress in :math:`D_c/V_*`.
     hold_time : float, default: 0.0
-        Duration in :math:`D_c/V_*` of a hold of the load point. After the hold, the load point
-        moves at ``load_velocity_ratio``.
+        Duration of a hold, during which the load point does not move, in :math:`D_c/V_*`. After the
+        hold, the load point moves at ``load_velocity_ratio``.
     displacement_step : float, default: 0.0
         Sudden displacement of the load point in :math:`D_c`.
     normal_stress_step : float, default: 0.0
@@ -170,7 +171,7 @@ class Scene(SceneBase):
         Amplitude of an oscillation of the load point velocity, relative to the mean velocity
         ``load_velocity_ratio``. By default there is no oscillation.
     velocity_ramp : float, default: 0.0
-        Change of the load point velocity in :math:`V_*` at a steady rate.
+        Change of the load point velocity during a ramp, in :math:`V_*`.
     velocity_ramp_duration : float, default: 10.0
         Duration of the ramp of load point velocity in :math:`D_c/V_*`.
     velocity_ramp_stairs : float, default: 64.0
@@ -198,8 +199,8 @@ class Scene(SceneBase):
     Raises
     ------
     InvalidValue
-        If a value violates its rule or has no meaning in the scene. The message contains the rule
-        and a remedy.
+        If a value violates its rule or has no meaning in the scene. The error message contains the
+        rule and a remedy.
 
     Examples
     --------
@@ -276,7 +277,7 @@ class Scene(SceneBase):
         """Scene under a steadily moving load point, for stability analyses.
 
         If the loading has unknowns, the load point of the returned scene moves at the velocity of
-        the last segment. Otherwise the property is the scene itself.
+        the last segment. If the loading has no unknowns, the property is the scene itself.
         """
         if not self.parts.loading.unknowns:
             return self
@@ -306,8 +307,9 @@ class Scene(SceneBase):
     def continuous_segments(self) -> tuple[tuple[Scene, np.ndarray], ...]:
         """Sequences of segments without jumps between the segments.
 
-        Each sequence is a tuple of the scene during its first segment and the rows of the segment
-        table, an array of shape (segments, 6). The columns are defined in ``parameter_layout``.
+        Each sequence is a tuple of two elements: the scene during the first segment, and an array
+        of shape (segments, 6) with the rows of the segment table. The columns of the table are
+        defined in ``parameter_layout``.
         """
         if len(self._segments) == 1:
             return ((self, SINGLE_ENDLESS_SEGMENT_TABLE),)
@@ -347,7 +349,7 @@ class Scene(SceneBase):
 
     @cached_attribute
     def equation_functions(self) -> scene_functions.SceneFunctions:
-        """Functions of the equations of motion (see ``scene_functions``)."""
+        """Functions that define the equations of motion (see ``scene_functions``)."""
         return scene_functions.build_scene_functions(self)
 
     # ---- derived values -------------------------------------------------------------------------
@@ -361,9 +363,9 @@ class Scene(SceneBase):
     def pressure_source(self) -> fluid.Fluid | loading.Loading | FluidWithBoundaryPressure:
         """Part whose last unknown decreases normal stress.
 
-        The source is the loading, if the loading has unknowns, and otherwise the fluid. If both
-        have unknowns, the source is a combination in which the loading imposes the pressure around
-        the fluid.
+        The pressure source is the loading, if the loading has unknowns, and otherwise the fluid. If
+        both the loading and the fluid have unknowns, the pressure source is a combination in which
+        the loading imposes the pressure around the fault.
         """
         imposed, pores = self.parts.loading, self.parts.fluid
         if not imposed.unknowns:
@@ -379,13 +381,13 @@ class Scene(SceneBase):
     def state_count(self) -> int:
         """Total number of states of the scene.
 
-        The number includes the states of the law and the unknowns of the loading and of the fluid.
+        The total includes the states of the law and the unknowns of the loading and of the fluid.
         """
         return self.parts.law.state_count + len(self.pressure_source.unknowns)
 
     @property
     def effects(self) -> tuple[str, ...]:
-        """Names of the effects that are active in the scene."""
+        """Names of the physical effects that are active in the scene."""
         return tuple(effect for part in self.parts for effect in part.effects)
 
     @cached_attribute
@@ -422,8 +424,8 @@ class Scene(SceneBase):
     def stiffness_ratio(self) -> float:
         """Ratio of the stiffness to the critical stiffness at V_*.
 
-        The ratio is infinite without rate weakening, because steady sliding is then stable at every
-        stiffness. With several states, steady sliding may be unstable only in a range of stiffness,
+        Without rate weakening, steady sliding is stable at every stiffness, so the ratio is
+        infinite. With several states, steady sliding may be unstable only in a range of stiffness,
         so a ratio below 1 does not imply instability.
         """
         given = self.parts.slider.stiffness_ratio
@@ -440,7 +442,7 @@ class Scene(SceneBase):
     def log_load_velocity(self) -> float:
         """Natural logarithm of the magnitude of the load point velocity.
 
-        The value is negative infinity for a stationary load point.
+        The logarithm is negative infinity for a stationary load point.
         """
         return math.log(abs(self.load_velocity)) if self.load_velocity else -math.inf
 
@@ -453,7 +455,7 @@ class Scene(SceneBase):
     def spring_stress_step(self) -> float:
         r"""Change of spring stress due to the first displacement step.
 
-        The unit is :math:`\sigma_*`.
+        The change of spring stress is in units of :math:`\sigma_*`.
         """
         return self.stiffness * self._segments[0].displacement
 
@@ -505,7 +507,7 @@ def _critical_stiffness(
 ) -> float:
     """Compute the critical stiffness of all sliders with the same friction.
 
-    The stiffness of the slider does not affect the result and is set to a.
+    The stiffness of the slider does not affect the critical stiffness and is set to the value of a.
     """
     slider = SliderParameters(a=a, mu_star=mu_star, stiffness=a)
     scene = Scene(

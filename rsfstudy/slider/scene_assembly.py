@@ -112,7 +112,7 @@ def replace_field_values(
     scene_parts : SceneParts
         Parts of a scene.
     changed_field_values : mapping of str to object
-        New values by field name. The fields must belong to these parts.
+        New values by field name. Each field must belong to one of the parts.
 
     Returns
     -------
@@ -122,7 +122,7 @@ def replace_field_values(
     Raises
     ------
     InvalidValue
-        If a value violates its rule or has no meaning for these parts.
+        If a value violates its rule or has no meaning for the parts.
     """
     made: list[Any] = list(scene_parts)
     for place, values in _group_values_by_part_index(
@@ -202,12 +202,12 @@ class FieldIndex(NamedTuple):
     part_index_by_field : mapping of str to int
         Index of the part that owns each field.
     rejecting_part_class_by_field : mapping of str to type
-        For each field without an owner among the parts, the part that rejects the field.
+        Mapping from each field that none of the parts has to the part that rejects the field.
     values_of_inactive_fields : mapping of str to object
-        Values of these fields in the scene.
+        Attribute values in the scene for the fields that none of the parts has.
     inapplicable_fields : frozenset of str
-        Names of these fields that have no meaning, whatever their value. Fields that would select
-        another part are not included.
+        Names of the fields that have no meaning in the scene, regardless of their value. Fields
+        that would select another part are not included.
     names_of_slots_chosen_by_name : tuple of str
         Names of the slots whose parts are selected by name.
     all_field_names : tuple of str
@@ -228,7 +228,7 @@ class FieldIndex(NamedTuple):
 
 @cache
 def build_field_index(part_classes: tuple[type[Part], ...]) -> FieldIndex:
-    """Build the field index of scenes with the given parts.
+    """Build the field index of scenes from the classes of their parts.
 
     Parameters
     ----------
@@ -321,7 +321,7 @@ def find_user_parts(scene_parts: SceneParts) -> dict[str, UserPart]:
     }
 
 
-#: Attributes of a scene that are used only inside the package. They are hidden from ``dir``.
+#: Attributes of a scene that are used only inside the package and are hidden from ``dir``.
 _ATTRIBUTES_HIDDEN_FROM_DIR = frozenset(
     {
         "field_index",
@@ -383,7 +383,7 @@ class SceneBase(HtmlTableMixin):
         return f"Scene({', '.join(f'{k}={v!r}' for k, v in self.as_dict().items())})"
 
     def __dir__(self) -> list[str]:
-        """Return the public attributes, without inapplicable fields."""
+        """Return the names of the public attributes, without inapplicable fields."""
         # Fields without a value may be properties that are computed from other fields.
         stated = {name for name, value in self.as_dict().items() if value is not None}
         names = {*super().__dir__(), *stated} - _ATTRIBUTES_HIDDEN_FROM_DIR
@@ -424,8 +424,8 @@ class SceneBase(HtmlTableMixin):
         Returns
         -------
         dict of str to object
-            Values by field name. A protocol adds its segments in the format of ``protocol``, and a
-            sampled history adds the digest of its samples.
+            Values by field name. A protocol adds its segments in the format that ``protocol``
+            accepts, and a sampled history adds the digest of its samples.
         """
         history = (
             self.parts.loading.describe()
@@ -453,8 +453,9 @@ class SceneBase(HtmlTableMixin):
     def with_(self, **changes: Any) -> Self:
         """Return a copy of the scene with new values of some fields.
 
-        The copy is checked like a new scene. If a change replaces a part, fields that lose their
-        meaning are dropped. Setting ``stiffness`` replaces ``stiffness_ratio``, and vice versa.
+        The values of the copy are checked. If a change replaces a part, the fields that do not
+        apply to the new part are dropped. Setting ``stiffness`` replaces ``stiffness_ratio``, and
+        vice versa.
 
         Parameters
         ----------
@@ -494,7 +495,7 @@ def _unknown_field_error(name: str, value: Any, field_index: FieldIndex) -> Inva
             remedy = f"Leave it out, or set {slot.name}={owner.name!r}."
             return InvalidValue(name, value, rule, remedy=remedy)
     remedy, rule = hint_for_unknown_field(name), "is not a field of a scene"
-    # Similar names would be misleading if the name is a known synonym of a field.
+    # If the name is a known synonym of a field, a list of similar names would be misleading.
     return InvalidValue(
         "field", name, rule, choices=() if remedy else field_index.all_field_names, remedy=remedy
     )

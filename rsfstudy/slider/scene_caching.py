@@ -31,12 +31,12 @@ else:
 def cached_per_scene(
     function: Callable[Concatenate[Any, ParametersAfterScene], FunctionResult],
 ) -> Callable[Concatenate[Any, ParametersAfterScene], FunctionResult]:
-    """Cache the results of a function in the scene that it is called with.
+    """Cache the results of a function in the scene that is its first argument.
 
     Parameters
     ----------
     function : callable
-        Function whose first argument is a scene. Its other arguments must be hashable.
+        Function whose first argument is a scene. The other arguments must be hashable.
 
     Returns
     -------
@@ -50,7 +50,7 @@ def cached_per_scene(
         scene: Any, /, *stated: ParametersAfterScene.args, **named: ParametersAfterScene.kwargs
     ) -> FunctionResult:
         made, key = scene.cache, (function, *stated, *named.values())
-        # The key is used only once for a lookup, because hashing a key can be slow.
+        # The code looks the key up only once, because hashing a key can be slow.
         found = made.get(key)
         if found is None:
             found = made[key] = function(scene, *stated, **named)

@@ -15,8 +15,8 @@ independent variable :math:`\delta` is slip plus load point displacement,
 The dynamics of the scene determine the slip rate from :math:`f` and :math:`\Psi`. In ruptures, the
 independent variable of the full equations is inertial time.
 
-Both systems are integrated along the path length :math:`\lambda`, which combines displacement (or
-inertial time) with :math:`x = \ln(V/V_*)`:
+The equations between ruptures and in ruptures are both integrated along the path length
+:math:`\lambda`, which combines displacement (or inertial time) with :math:`x = \ln(V/V_*)`:
 
 .. math::
 
@@ -25,11 +25,11 @@ inertial time) with :math:`x = \ln(V/V_*)`:
     \frac{d\Psi}{d\delta}\right].
 
 While contacts heal, :math:`\ln V` decreases as the logarithm of displacement. When slip ends after
-a rupture, :math:`\ln V` decreases as the logarithm of the remaining time. In both cases, a step in
-displacement or time would have to be a fraction of the elapsed or remaining interval. The same
-interval is only a few units of path length. The factor of 6 reduces the number of steps where slip
-is fastest, because the path bends over six units of :math:`\ln V` instead of one unit. Factors from
-4 to 12 give similar results.
+a rupture, :math:`\ln V` decreases as the logarithm of the remaining time. If displacement or time
+were the independent variable, each step would have to be a fraction of the elapsed or remaining
+interval. Measured in path length, the whole interval is only a few units long. The factor of 6
+reduces the number of steps where slip is fastest, because the path bends over six units of
+:math:`\ln V` instead of one unit. Factors from 4 to 12 give similar results.
 
 The slip rate of a rigid slider is prescribed, and slip is the independent variable.
 """
@@ -60,24 +60,24 @@ if TYPE_CHECKING:
 STOPPED_LOG_SLIP_RATE = -290.0 * math.log(10.0)
 
 #: Largest difference between ln V_0 and ln V that the rates resolve. At lower slip rates the
-#: contact is stationary, because the remaining slip changes the state by a relative amount below
-#: exp(-100).
+#: contact is treated as stationary, because the remaining slip changes the state by a relative
+#: amount below exp(-100).
 MAX_LOG_LOAD_OVER_SLIP_VELOCITY = 100.0
 
-#: Change of ln V that is as long as one unit of displacement (D_c) or inertial time along the path.
+#: Change of ln V that adds as much path length as one unit of displacement (D_c) or inertial time.
 LOG_SLIP_RATE_PER_PATH_LENGTH = 6.0
-#: Largest slope whose square is computed. Adding 1 to the square of a larger slope has no effect in
-#: double precision.
+#: Largest path slope whose square is computed. Adding 1 to the square of a larger slope has no
+#: effect in double precision.
 MAX_FINITE_PATH_SLOPE = 1e9
 
 
-# ---- clocks --------------------------------------------------------------------------------------
+# ---- velocity ratios and path length -------------------------------------------------------------
 
 VelocityRatios = tuple[float, float, float]
 
 
 def velocity_ratios(log_slip_rate: float, p: Numbers) -> VelocityRatios:
-    r"""Compute the log rate and the ratios of the two velocities.
+    r"""Compute the slip rate and its ratios to the load point velocity.
 
     Parameters
     ----------
@@ -89,7 +89,7 @@ def velocity_ratios(log_slip_rate: float, p: Numbers) -> VelocityRatios:
     Returns
     -------
     log_slip_rate : float
-        Log rate :math:`\ln(V/V_*)`, limited from below.
+        Natural logarithm of the slip rate, :math:`\ln(V/V_*)`, limited from below.
     load_ratio : float
         Velocity ratio :math:`V_0/V`.
     slip_fraction : float
@@ -97,10 +97,10 @@ def velocity_ratios(log_slip_rate: float, p: Numbers) -> VelocityRatios:
 
     Notes
     -----
-    The lower limit of the log rate is the log rate of a stationary contact. At low slip rates, the
-    evolution per unit slip may grow in proportion to :math:`1/V`. The product of the evolution and
-    the slip fraction has a limit, but without the lower limit of the log rate the first factor
-    would overflow and the second factor would underflow.
+    Below the lower limit of :math:`\ln(V/V_*)`, the contact is treated as stationary. At low slip
+    rates, the evolution per unit slip may grow in proportion to :math:`1/V`. The product of the
+    evolution and the slip fraction remains finite, but without the lower limit of
+    :math:`\ln(V/V_*)` the evolution would overflow and the slip fraction would underflow.
     """
     least = p[LOG_LOAD_VELOCITY] - MAX_LOG_LOAD_OVER_SLIP_VELOCITY
     x = least if log_slip_rate < least else log_slip_rate
@@ -135,7 +135,7 @@ def displacement_per_path_length(path_slope: float) -> float:
     Parameters
     ----------
     path_slope : float
-        Slope of the path. The square of the slope may overflow where slip stops, so the function
+        Slope of the path. The square of the slope may overflow when slip stops, so the function
         does not square very large slopes.
 
     Returns
@@ -162,10 +162,10 @@ def build_displacement_rate_function(
     Parameters
     ----------
     friction_functions : FrictionFunctions
-        Friction of the scene.
+        Friction functions of the scene.
     force_balance_function : callable
         Function ``(spring, psis, p)`` that returns :math:`\ln(V/V_*)`, the frictional stress and
-        the shift of the state.
+        the decrease of the state due to stress.
     allows_reversed_slip : bool
         Whether slip and the load point may reverse.
 
@@ -213,7 +213,7 @@ def build_rate_functions_between_ruptures(
     Parameters
     ----------
     friction_functions : FrictionFunctions
-        Friction of the scene.
+        Friction functions of the scene.
     displacement_rate_function : callable
         Output of `build_displacement_rate_function`.
 
@@ -260,7 +260,7 @@ def build_rate_functions_in_rupture(
     Parameters
     ----------
     friction_functions : FrictionFunctions
-        Friction of the scene.
+        Friction functions of the scene.
     rupture_rate_function : callable
         Function ``(state, p)`` that returns the derivatives with respect to inertial time.
 
@@ -291,7 +291,7 @@ def build_rate_function_of_rigid_slider(friction_functions: FrictionFunctions) -
     Parameters
     ----------
     friction_functions : FrictionFunctions
-        Friction of the scene.
+        Friction functions of the scene.
 
     Returns
     -------
@@ -316,23 +316,24 @@ def build_rate_function_of_rigid_slider(friction_functions: FrictionFunctions) -
     return rigid_rate
 
 
-# ---- points --------------------------------------------------------------------------------------
+# ---- stress, slip rate and states at one instant -------------------------------------------------
 
 
 def build_motion_point_assembling_function(friction_functions: FrictionFunctions) -> Function:
-    r"""Return a function that computes all quantities of a point.
+    r"""Return a function that creates a ``MotionPoint`` from stresses and states.
 
     Parameters
     ----------
     friction_functions : FrictionFunctions
-        Friction of the scene.
+        Friction functions of the scene.
 
     Returns
     -------
     callable
         Function ``(x, growth, forces, states, changes, shift, p) -> MotionPoint``. The arguments
         are :math:`x = \ln(V/V_*)` and its derivative, a tuple of f, its derivative, g and its
-        derivative, the states and their derivatives, the shift of the state and the parameters.
+        derivative, the states and their derivatives, the decrease of the state due to stress, and
+        the parameters.
 
     Notes
     -----
@@ -399,19 +400,19 @@ def build_point_function_between_ruptures(
     log_slip_rate_growth_function: Function,
     assemble_point: Function,
 ) -> Function:
-    r"""Return a function that computes points between ruptures.
+    r"""Return a function for stress, slip rate and states between ruptures.
 
     Parameters
     ----------
     friction_functions : FrictionFunctions
-        Friction of the scene.
+        Friction functions of the scene.
     force_balance_function : callable
         Function ``(spring, psis, p)`` that returns :math:`\ln(V/V_*)`, the frictional stress and
-        the shift of the state.
+        the decrease of the state due to stress.
     log_slip_rate_growth_function : callable
         Function ``(unknowns, rates, x, g, p)`` that returns the derivative of :math:`\ln V`.
     assemble_point : callable
-        Output of `build_point_assembling_function`.
+        Output of `build_motion_point_assembling_function`.
 
     Returns
     -------
@@ -444,14 +445,14 @@ def build_point_function_between_ruptures(
 def build_point_function_in_rupture(
     friction_functions: FrictionFunctions, assemble_point: Function
 ) -> Function:
-    """Return a function that computes points in ruptures.
+    """Return a function for stress, slip rate and states in ruptures.
 
     Parameters
     ----------
     friction_functions : FrictionFunctions
-        Friction of the scene.
+        Friction functions of the scene.
     assemble_point : callable
-        Output of `build_point_assembling_function`.
+        Output of `build_motion_point_assembling_function`.
 
     Returns
     -------
@@ -476,14 +477,14 @@ def build_point_function_in_rupture(
 def build_point_function_of_rigid_slider(
     friction_functions: FrictionFunctions, assemble_point: Function
 ) -> Function:
-    """Return a function that computes points of a rigid slider.
+    """Return a function for stress, slip rate and states of a rigid slider.
 
     Parameters
     ----------
     friction_functions : FrictionFunctions
-        Friction of the scene.
+        Friction functions of the scene.
     assemble_point : callable
-        Output of `build_point_assembling_function`.
+        Output of `build_motion_point_assembling_function`.
 
     Returns
     -------
@@ -502,11 +503,11 @@ def build_point_function_of_rigid_slider(
     return point
 
 
-# ---- all of it -----------------------------------------------------------------------------------
+# ---- complete equations of motion ----------------------------------------------------------------
 
 
 class MotionRegimeFunctions(NamedTuple):
-    """Rates and points of a scene in one regime.
+    """Functions for the rates and the physical quantities in one regime.
 
     Parameters
     ----------
@@ -514,10 +515,11 @@ class MotionRegimeFunctions(NamedTuple):
         Function ``(state, p)`` that returns the derivatives of the unknowns with respect to
         displacement or inertial time.
     rates_along_path : callable
-        Function ``(state, p)`` that returns the derivatives of the unknowns along the path.
+        Function ``(state, p)`` that returns the derivatives of the unknowns with respect to path
+        length.
     rates_along_path_with_time : callable
-        Function ``(state, p)`` that returns the derivatives along the path, including the
-        derivative of time.
+        Function ``(state, p)`` that returns the derivatives with respect to path length, including
+        the derivative of time.
     point_function : callable
         Function ``(state, derivatives, p) -> MotionPoint``.
     """
@@ -529,23 +531,24 @@ class MotionRegimeFunctions(NamedTuple):
 
 
 class SceneFunctions(NamedTuple):
-    r"""Functions of the equations of a scene.
+    r"""Functions that define the equations of motion of a scene.
 
     Parameters
     ----------
     friction_functions : FrictionFunctions
-        Functions of friction.
+        Friction functions of the scene.
     force_balance_function : callable
         Function ``(spring, psis, p)`` that returns :math:`\ln(V/V_*)`, the frictional stress and
-        the shift of the state between ruptures.
-    functions_between_ruptures : RegimeFunctions
-        Equations between ruptures.
-    functions_in_rupture : RegimeFunctions or None
-        Full equations. None if the scene has no inertia.
+        the decrease of the state due to stress between ruptures.
+    functions_between_ruptures : MotionRegimeFunctions
+        Functions for the motion between ruptures.
+    functions_in_rupture : MotionRegimeFunctions or None
+        Functions for the motion in ruptures, from the full equations. None if the scene has no
+        inertia.
     rigid_rate_function : callable
-        Rates of a rigid slider with respect to slip.
+        Function that computes the rates of a rigid slider with respect to slip.
     rigid_point_function : callable
-        Points of a rigid slider.
+        Function that computes stress, slip rate and states of a rigid slider.
     """
 
     friction_functions: FrictionFunctions
@@ -562,23 +565,23 @@ def assemble_scene_functions(
     slip_rate_functions_builder: Callable[[FrictionFunctions], tuple[Function, Function]],
     rupture_rate_function_builder: Callable[[FrictionFunctions], Function] | None,
 ) -> SceneFunctions:
-    """Assemble the functions of a combination of parts.
+    """Assemble the equations of motion for a combination of parts.
 
     Parameters
     ----------
     friction_terms : FrictionTerms
         Contributions of the parts to friction.
     slip_rate_functions_builder : callable
-        Function that returns the force balance and the growth of the log rate for a
-        `FrictionFunctions` object.
+        Function that receives a `FrictionFunctions` object and returns two functions, the force
+        balance and the derivative of ln V.
     rupture_rate_function_builder : callable or None
-        Function that returns the rates in ruptures for a `FrictionFunctions` object. None if the
-        dynamics have no inertia.
+        Function that receives a `FrictionFunctions` object and returns the rate function in
+        ruptures. None if the dynamics have no inertia.
 
     Returns
     -------
     SceneFunctions
-        Functions of the scene. The result is cached.
+        Functions that define the equations of motion. The result is cached.
     """
     made = build_friction_functions(friction_terms)
     balance, growth = slip_rate_functions_builder(made)
@@ -602,12 +605,12 @@ def assemble_scene_functions(
 
 
 def state_indices_excluded_from_distance(scene: SceneView) -> tuple[int, ...]:
-    """Return the indices of states excluded from the distance.
+    """Return the indices of states excluded from the steady-state distance.
 
     Parameters
     ----------
     scene : Scene
-        Scene with states.
+        Scene to examine.
 
     Returns
     -------
@@ -620,7 +623,7 @@ def state_indices_excluded_from_distance(scene: SceneView) -> tuple[int, ...]:
 
 
 def build_scene_functions(scene: SceneView, dynamics: Dynamics | None = None) -> SceneFunctions:
-    """Build the functions of a scene.
+    """Build the functions that define the equations of motion of a scene.
 
     Parameters
     ----------
@@ -632,7 +635,7 @@ def build_scene_functions(scene: SceneView, dynamics: Dynamics | None = None) ->
     Returns
     -------
     SceneFunctions
-        Functions of the scene.
+        Functions that define the equations of motion.
     """
     law, stress, source = scene.parts.law, scene.parts.normal_stress, scene.pressure_source
     of_shear_stress = friction.shear_stress_effect_on_state if law.stress_dependence else None

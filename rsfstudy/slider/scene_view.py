@@ -1,8 +1,8 @@
 """Protocol with the attributes of a scene that the parts and the equations read.
 
 A scene consists of parts, so modules of parts cannot import the class ``Scene``, even for type
-annotations, without an import cycle. They use this protocol instead. The types of the parts and of
-the compiled functions are ``Any`` here for the same reason.
+annotations, without an import cycle. Modules of parts use the protocol ``SceneView`` instead. To
+avoid the same import cycle, the protocol declares the parts and the compiled functions as ``Any``.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ class SceneView(Protocol):
 
     @property
     def parts(self) -> Any:
-        """Parts of the scene, by slot."""
+        """Parts of the scene, with one part per slot."""
 
     @property
     def mu_star(self) -> float:
@@ -42,7 +42,7 @@ class SceneView(Protocol):
 
     @property
     def equation_functions(self) -> Any:
-        """Functions of the equations of motion."""
+        """Functions that define the equations of motion."""
 
     @property
     def dynamics(self) -> Any:
@@ -50,7 +50,7 @@ class SceneView(Protocol):
 
     @property
     def pressure_source(self) -> Any:
-        """Fluid, loading, or combination of both with auxiliary unknowns."""
+        """Part with auxiliary unknowns: the fluid, the loading or a combination of both."""
 
     @property
     def has_mass(self) -> bool:

@@ -79,7 +79,7 @@ class SliderParameters(Part):
     def check(self, scene: SceneView) -> None:
         """Check the initial stress and the initial state.
 
-        See the base class.
+        See ``Part.check``.
         """
         if self.initial_stress <= -self.mu_star:
             rule = f"must exceed -mu_star = {-self.mu_star:g}: shear stress is that of forward slip"
@@ -105,7 +105,7 @@ def with_stiffness_default(field_values: dict[str, Any]) -> dict[str, Any]:
     Returns
     -------
     dict of str to float
-        The same values, with a stiffness ratio of 1 if no stiffness is given.
+        Field values, with a stiffness ratio of 1 if no stiffness is given.
 
     Raises
     ------

@@ -1,7 +1,7 @@
 r"""Linear stability of steady sliding, computed from the friction relation.
 
-`critical_stiffness` and `largest_linear_growth_rate` are the main functions. They work for any
-combination of parts.
+`critical_stiffness` and `largest_linear_growth_rate` are the main functions. Both functions work
+for any combination of parts.
 
 Consider a small perturbation of slip, :math:`du`, that grows as :math:`\exp(p s)` with slip
 :math:`s` in units of :math:`D_c`. The perturbation of the frictional stress is
@@ -55,14 +55,14 @@ from rsfstudy.slider.scene_caching import cached_per_scene
 from rsfstudy.slider.scene_view import SceneView
 from rsfstudy.slider.steady_state import SteadySliding, steady_sliding
 
-#: Rounding errors of a critical stiffness of zero, divided by a, and of a growth rate of zero per
-#: unit slip in D_c.
+#: Values below which a critical stiffness, divided by a, and a growth rate per unit slip in D_c
+#: cannot be distinguished from zero because of rounding errors.
 _MIN_CRITICAL_STIFFNESS_OVER_A, _GROWTH_RATE_FLOOR = 1e-12, 1e-9
 #: Rounding error of the growth rates, relative to the largest growth rate.
 _RELATIVE_ROOT_ROUNDING_ERROR = 64.0 * 2.0**-52
 
-#: Ratio of the leading coefficient to the next coefficient below which the mass is treated as
-#: small, and the number of Newton iterations that follow.
+#: Ratio of the two leading polynomial coefficients below which the mass is treated as small, and
+#: the number of Newton iterations for a small mass.
 _SMALL_MASS_RATIO, _NEWTON_STEPS = 1e-6, 2
 
 PolynomialCoefficients = list[float]
@@ -108,7 +108,8 @@ def critical_stiffness(
     around = _linearise_force_balance(scene, steady, quasi_static=quasi_static)
     crossings = _find_critical_stiffnesses(around, _MIN_CRITICAL_STIFFNESS_OVER_A * scene.a)
     critical = crossings[-1] if crossings else 0.0
-    # With one state and constant pore pressure, no perturbation grows above the only crossing.
+    # With one state and constant pore pressure, no perturbation grows above the only critical
+    # stiffness.
     if scene.state_count == 1 or critical == math.inf:
         return critical
     return math.inf if _is_unstable_at_stiffness(around, 2.0 * critical or scene.a) else critical
@@ -150,7 +151,7 @@ def all_critical_stiffnesses(scene: SceneView, log_slip_rate: float) -> list[flo
 
 
 class _LinearisedForceBalance(NamedTuple):
-    """Coefficients of the linearised force balance around steady sliding."""
+    """Coefficients of the force balance, linearised around steady sliding."""
 
     friction_response_numerator: PolynomialCoefficients
     friction_response_denominator: PolynomialCoefficients
@@ -177,12 +178,12 @@ def _linearise_force_balance(
 def _find_critical_stiffnesses(
     linearised_balance: _LinearisedForceBalance, min_stiffness: float
 ) -> list[float]:
-    """Find all stiffnesses above a minimum with an imaginary growth rate.
+    """Find all stiffnesses above a minimum at which a growth rate is imaginary.
 
-    The result is in ascending order. If inertia leaves no finite stiffness for a frequency, the
-    result contains ``math.inf``.
+    The stiffnesses are in ascending order. If no finite stiffness exists for a frequency because of
+    inertia, the list of stiffnesses contains ``math.inf``.
     """
-    # For p = i omega, these polynomials depend on omega**2 only.
+    # For p = i omega, the polynomials depend on omega**2 only.
     (a_even, a_odd), (b_even, b_odd) = (
         _split_even_and_odd_powers(linearised_balance.friction_response_numerator),
         _split_even_and_odd_powers(linearised_balance.friction_response_denominator),
@@ -232,9 +233,9 @@ def _compute_growth_rates(
 def _find_roots_with_one_distant_root(polynomial: PolynomialCoefficients) -> np.ndarray:
     """Find the roots of a polynomial with one root of large magnitude.
 
-    A small mass makes one root about 1e20 times larger. If all roots were computed together, the
-    other roots would lose digits. The function computes the other roots without the leading
-    coefficient and improves all roots by Newton iterations.
+    A small mass makes one root about 1e20 times larger than the other roots. If all roots were
+    computed together, the small roots would lose digits. The function computes the small roots
+    without the leading coefficient and improves all roots by Newton iterations.
     """
     falling = polynomial[::-1]
     roots = np.append(np.roots(falling[1:]), -falling[1] / falling[0]).astype(complex)
@@ -306,7 +307,7 @@ def _log_slip_rate_change_by_each_state(
 ) -> tuple[list[float], float]:
     """Return the weight of each state in the friction relation.
 
-    The second returned value is the derivative of the shift with respect to the last state.
+    The function also returns the derivative of the shift with respect to the last state.
     """
     law, fluid = scene.parts.law.state_count, len(scene.parts.fluid.unknowns)
     if not fluid:
@@ -446,8 +447,8 @@ def largest_linear_growth_rate(scene: SceneView, log_slip_rate: float) -> Growth
     changes = [
         abs(perturbed_growth_rates(part)[0].real - found[0].real) for part in (error, -error)
     ]
-    # A small mass makes one root very large. The rounding error excludes this root, because it is
-    # computed separately.
+    # A small mass makes one root very large. The rounding error excludes the large root, because
+    # the large root is computed separately.
     sizes = np.sort(np.abs(found))[: -1 if scene.has_mass else None]
     rounding = _RELATIVE_ROOT_ROUNDING_ERROR * float(sizes.max(initial=0.0))
     return GrowthRate(float(found[0].real), float(max(changes)) + rounding + _GROWTH_RATE_FLOOR)
@@ -534,7 +535,7 @@ def _split_even_and_odd_powers(
 ) -> tuple[PolynomialCoefficients, PolynomialCoefficients]:
     """Return the real part and the imaginary part of a polynomial at i omega.
 
-    Both parts are polynomials in omega**2. The imaginary part is divided by omega.
+    The real part, and the imaginary part divided by omega, are polynomials in omega**2.
     """
     even = [x * (-1.0) ** n for n, x in enumerate(polynomial[0::2])]
     odd = [x * (-1.0) ** n for n, x in enumerate(polynomial[1::2])]

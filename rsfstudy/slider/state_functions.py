@@ -1,9 +1,10 @@
 """State variables of a scene: evolution, steady states and sums.
 
-The states of the law come first, and their sum acts on friction. The unknowns of a loading that
-changes normal stress and of a fluid follow. The last unknown is the pore pressure P, or the stress
-that the loading imposes. Most functions of this module return other functions, which are
-specialised for the number of states so that Numba can compile them.
+The tuple of states starts with the states of the law, whose sum acts on friction. The unknowns of a
+loading that changes normal stress, and then the unknowns of a fluid, follow the states of the law.
+The last unknown is the pore pressure P, or the stress that the loading imposes. Most functions of
+this module return other functions, which are specialised for the number of states so that Numba can
+compile them.
 """
 
 from __future__ import annotations
@@ -17,8 +18,8 @@ from rsfstudy.slider.parameter_layout import A, B
 from rsfstudy.slider.parts import Function, Numbers
 from rsfstudy.slider.scene_view import SceneView
 
-#: Values of ln(V/V_*) at which steady states are checked, and the tolerance of the change of a
-#: state per unit slip in D_c, divided by a. The tolerance is far above rounding errors.
+#: Values of ln(V/V_*) at which steady states are checked, and the largest accepted change of a
+#: steady state per unit slip in D_c, divided by a. The tolerance is far above rounding errors.
 _CHECKED_LOG_SLIP_RATES, _REST_TOLERANCE = (0.0, -0.5, 0.5), 1e-6
 
 
@@ -34,8 +35,8 @@ def wrap_single_state_evolution(single_state_evolution: Function) -> Function:
     Returns
     -------
     callable
-        Function that returns the derivative of :math:`\Psi` with respect to slip, multiplied by a
-        fraction, as a tuple.
+        Function ``evolutions(log_slip_rate, psis, shift, fraction, p)`` that returns the derivative
+        of :math:`\Psi` with respect to slip, multiplied by ``fraction``, as a tuple.
     """
 
     def evolutions(
@@ -69,12 +70,12 @@ def default_steady_state(log_slip_rate: float, state_shift: float, p: Numbers) -
 def append_auxiliary_evolutions(
     law_evolutions: Function, auxiliary_rates: Function, law_state_count: int
 ) -> Function:
-    """Append the rates of unknowns to the rates of the states of the law.
+    """Return an evolution function for the law states and other unknowns.
 
     Parameters
     ----------
     law_evolutions : callable
-        Function ``law_evolutions`` of the law.
+        Function ``evolutions`` of the law.
     auxiliary_rates : callable
         Function ``auxiliary_rates`` of the fluid or the loading.
     law_state_count : int
@@ -83,7 +84,7 @@ def append_auxiliary_evolutions(
     Returns
     -------
     callable
-        Function ``law_evolutions`` of all states.
+        Function with the arguments of ``evolutions`` that returns the changes of all states.
     """
 
     def all_evolutions(
@@ -100,19 +101,19 @@ def append_auxiliary_evolutions(
 def append_auxiliary_steady_states(
     law_steady_states: Function, auxiliary_steady_states: Function
 ) -> Function:
-    """Append the steady unknowns to the steady states of the law.
+    """Return a steady-state function for the law states and other unknowns.
 
     Parameters
     ----------
     law_steady_states : callable
-        Function ``law_steady_states`` of the law.
+        Function ``steady_states`` of the law.
     auxiliary_steady_states : callable
         Function ``auxiliary_steady_states`` of the fluid or the loading.
 
     Returns
     -------
     callable
-        Function ``law_steady_states`` of all states.
+        Function with the arguments of ``steady_states`` that returns all states.
     """
 
     def all_steady_states(log_slip_rate: float, shift: float, p: Numbers) -> Numbers:
@@ -184,9 +185,9 @@ def _tuple_sum_expression(tuple_name: str, term_count: int) -> str:
 
 
 def _build_function_from_expression(argument_names: str, expression: str) -> Function:
-    """Create a function from the source code of its arguments and value.
+    """Create a function from source code for its arguments and its return value.
 
-    The code has no loop, because the compiler cannot iterate over tuples.
+    The source code has no loop, because the compiler cannot iterate over tuples.
     """
     function: Function = eval(f"lambda {argument_names}: {expression}", {"__name__": __name__})
     return function
@@ -203,13 +204,13 @@ def build_state_contribution_function(
         Number of states of the law.
     pressure_derivatives : callable or None
         Function ``(g, psis, p)`` that returns the derivative of the strength with respect to the
-        last unknown as its first value. None if the scene has no such unknown.
+        last unknown as its first value. None if the scene has only the states of the law.
 
     Returns
     -------
     callable
-        Function ``(changes, g, psis, p) -> float``. It returns the decrease of :math:`a \ln(V/V_*)`
-        due to changes of the states.
+        Function ``(changes, g, psis, p) -> float``. The function returns the decrease of :math:`a
+        \ln(V/V_*)` due to changes of the states.
     """
     if pressure_derivatives is None:
         return _build_function_from_expression(
@@ -260,8 +261,8 @@ def check_steady_states(scene: SceneView) -> None:
     """Check the steady states of a user-defined law.
 
     The states must not change in steady sliding, must add up to zero at :math:`V_*` and must be
-    stable at constant slip rate. Otherwise the critical stiffness and the limit cycles would
-    contradict each other.
+    stable at constant slip rate. If a law violated these conditions, the critical stiffness would
+    contradict the limit cycles.
 
     Parameters
     ----------
@@ -301,7 +302,7 @@ def _evolution_jacobian(
 ) -> list[list[float]]:
     """Compute the Jacobian matrix of the evolution by central differences.
 
-    The step is 1e-4 times ``finite_difference_scale``.
+    The step size is 1e-4 times ``finite_difference_scale``.
     """
     step, rows = 1e-4 * finite_difference_scale, list[list[float]]()
     for n, psi in enumerate(states):

@@ -64,8 +64,7 @@ def steady_sliding(scene: SceneView, log_slip_rate: float) -> SteadySliding | No
     Returns
     -------
     SteadySliding or None
-        Stresses and states. None if steady friction does not reach the required value at any
-        stress.
+        Stresses and states. None if no frictional stress satisfies the friction relation.
 
     Notes
     -----
@@ -117,7 +116,7 @@ def steady_friction_minus_reference(scene: SceneView, log_slip_rate: float) -> f
 def frictional_stress_for_friction(
     scene: SceneView, friction_minus_reference: float
 ) -> float | None:
-    r"""Compute the frictional stress for a given friction coefficient.
+    r"""Compute the frictional stress from the friction coefficient.
 
     Parameters
     ----------
@@ -129,8 +128,8 @@ def frictional_stress_for_friction(
     Returns
     -------
     float or None
-        Deviation of frictional stress from :math:`\tau_*`, in units of :math:`\sigma_*`. None if
-        the friction coefficient does not reach the given value at any stress.
+        Deviation of frictional stress from :math:`\tau_*`, in units of :math:`\sigma_*`. None if no
+        frictional stress corresponds to the friction coefficient.
 
     Notes
     -----
@@ -168,11 +167,11 @@ def frictional_stress_after_jump(
     -------
     float or None
         Deviation of frictional stress from :math:`\tau_*`, in units of :math:`\sigma_*`. None if no
-        frictional stress has the given strength.
+        frictional stress corresponds to `strength`.
 
     Notes
     -----
-    The states :math:`\Psi_i` do not change during a sudden change, so that
+    The states :math:`\Psi_i` do not change when stress or slip rate changes suddenly, so that
     :math:`\mathrm{strength}(g) = a \ln(V/V_*) + \sum_i \Psi_i` (eqs. 12 and 13 of
     doi:10.1007/s11589-014-0098-4).
     """
@@ -185,10 +184,10 @@ def frictional_stress_after_jump(
 def _min_frictional_stress(scene: SceneView) -> float:
     """Return the frictional stress above which slip is forward.
 
-    Normal stress is positive above this limit.
+    Normal stress is positive above the returned stress.
     """
     weakest = scene.parts.normal_stress.min_frictional_stress(scene)
-    # Strength increases with stress of either sign if slip may reverse.
+    # If slip may reverse, strength increases with the magnitude of positive and negative stress.
     return max(weakest, -scene.mu_star) if scene.parts.law.regularised else weakest
 
 

@@ -43,7 +43,7 @@ class UserLoading(Loading, ABC):
     def check(self, scene: SceneView) -> None:
         """Check that the load point moves backwards only if slip may reverse.
 
-        See the base class.
+        See ``Part.check``.
         """
         back = np.asarray(self.segment_table)[:, SEGMENT_VELOCITY] < 0.0
         if back.any() and not scene.parts.law.regularised:
@@ -79,7 +79,7 @@ class UserLoading(Loading, ABC):
     @property
     @abstractmethod
     def duration(self) -> float:
-        """Total duration of the input in D_c/V_*."""
+        """Total duration of the input segments or samples in D_c/V_*."""
 
 
 @guard_methods
@@ -100,7 +100,7 @@ class Protocol(UserLoading):
     def describe(self) -> dict[str, Any]:
         """Return the input segments as plain data.
 
-        See the base class. The duration of the last segment is included if it is finite.
+        See ``Loading.describe``. The duration of the last segment is included if it is finite.
         """
         return {"segments": [segment.as_dict() for segment in self.input_segments]}
 
@@ -113,7 +113,7 @@ class Protocol(UserLoading):
     def duration(self) -> float:
         """Total duration of the segments with a finite duration.
 
-        The unit is :math:`D_c/V_*`.
+        The duration is in units of :math:`D_c/V_*`.
         """
         return math.fsum(s.duration for s in self.input_segments if s.duration < math.inf)
 
@@ -131,8 +131,9 @@ def protocol(segments: Sequence[Segment | Mapping[str, float]], name: str = "pro
 
         - ``velocity`` is the load point velocity in :math:`V_*`. Negative values move the load
           point backwards, which requires a scene with ``regularised=True``.
-        - ``duration`` is the duration in :math:`D_c/V_*`. Alternatively, ``distance`` is the load
-          point displacement in :math:`D_c`. Only the last segment may omit both.
+        - ``duration`` is the duration in :math:`D_c/V_*`. Instead of ``duration``, you can pass
+          ``distance``, the load point displacement in :math:`D_c`. Only the last segment may omit
+          both ``duration`` and ``distance``.
         - ``step`` is a sudden displacement of the load point at the start of the segment, in
           :math:`D_c`. The default is 0.
         - ``normal_stress`` is the imposed normal stress in :math:`\sigma_*`. The default is the
@@ -229,7 +230,7 @@ def _parse_segment(declared_segment: Any, previous_normal_stress: float, locatio
 
 
 def _read_positive_number(declared_segment: Mapping[str, Any], key: str, rule: str) -> float:
-    """Return a positive finite value of a mapping."""
+    """Return a value of a mapping, which must be positive and finite."""
     value = declared_segment[key]
     if not (_is_number(value) and 0.0 < value < math.inf):
         raise InvalidValue(key, value, f"must be {rule}")

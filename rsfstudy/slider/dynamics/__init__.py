@@ -1,8 +1,8 @@
 """Dynamics of the slider.
 
 Each module of this package defines one choice of dynamics. The dynamics define the forces that
-balance the spring in addition to friction. They determine how the slip rate depends on spring
-stress and state. The base class is ``Dynamics``.
+balance the spring in addition to friction. The balance of forces determines how the slip rate
+depends on spring stress and state. The base class is ``Dynamics``.
 """
 
 from __future__ import annotations
@@ -29,10 +29,10 @@ class Dynamics(Part):
       due to stress. The function ``growth(state, rates, x, g, p)`` returns the derivative of
       :math:`x = \ln(V/V_*)` along the motion. The argument ``state`` contains the spring stress and
       the states ``psis``, and ``rates`` contains the derivatives of ``state``.
-    - ``build_rupture_rate_function(friction)`` is optional. It returns a function ``rate(state,
-      p)`` for the full equations of motion during ruptures. This function returns the derivatives
-      of the spring stress f, of x, of g and of all states except the first with respect to inertial
-      time.
+    - ``build_rupture_rate_function(friction)`` is optional. It returns a function
+      ``rate(state, p)`` for the full equations of motion during ruptures. The function ``rate``
+      returns the derivatives of the spring stress f, of x, of g and of all states except the first
+      with respect to inertial time.
 
     Examples
     --------
@@ -65,7 +65,7 @@ class Dynamics(Part):
         return ("build_slip_rate_functions",)
 
     def radiated_stress(self, log_slip_rate: float) -> float:
-        r"""Compute the part of the spring stress that seismic waves radiate.
+        r"""Compute the stress that seismic waves radiate.
 
         Parameters
         ----------

@@ -29,16 +29,17 @@ from rsfstudy.slider.state_functions import build_state_step_function
 #: Upper limit of rates per inertial time. Larger rates occur only in trial steps, because a motion
 #: returns to the slow manifold long before its slip rate relaxes this fast.
 MAX_RATE_PER_INERTIAL_TIME = 1e30
-#: Weights of inertia below which the second order, and the derivative of the first order, are
-#: negligible. The third constant is the displacement step of difference quotients, in D_c.
+#: Values of the inertia weight below which the second-order term, and the derivative of the
+#: first-order term, are negligible. The third constant is the displacement step of difference
+#: quotients, in D_c.
 NEGLIGIBLE_SECOND_ORDER_WEIGHT, NEGLIGIBLE_GROWTH_WEIGHT, DIFFERENCE_STEP = 1e-7, 1e-9, 1e-6
-#: Range of V_0/V in which the ratio determines the slip rate. The ratio is outside this range in
-#: extreme trial steps, at a stationary load point and in stationary contact.
+#: Range of V_0/V in which the slip rate is computed from this ratio. The ratio is outside this
+#: range in extreme trial steps, for a stationary load point and for a stationary contact.
 MIN_VELOCITY_RATIO, MAX_VELOCITY_RATIO = 1e-60, 1e40
 
 
 def build_slip_rate_functions(friction_functions: FrictionFunctions) -> tuple[Function, Function]:
-    r"""Return the functions of the slip rate on the slow manifold.
+    r"""Return the functions that compute the slip rate on the slow manifold.
 
     Parameters
     ----------
@@ -64,9 +65,10 @@ def build_slip_rate_functions(friction_functions: FrictionFunctions) -> tuple[Fu
 
         f - g = r = a W(x) \frac{dx}{ds}, \quad a x = S(f - r) - \Psi.
 
-    The weight of inertia is :math:`W(x) = (K/a) w (w + w_0)`, with :math:`w = V T/(2 \pi D_c)` and
-    :math:`w_0 = V_0 T/(2 \pi D_c)`. If :math:`W` is small, :math:`r` is small as well, and the
-    solution is a series in :math:`W`. The series starts with the motion without inertia:
+    The inertia weight, which measures the effect of the mass, is :math:`W(x) = (K/a) w (w + w_0)`,
+    with :math:`w = V T/(2 \pi D_c)` and :math:`w_0 = V_0 T/(2 \pi D_c)`. If :math:`W` is small,
+    :math:`r` is small as well, and the solution is a series in :math:`W`. The series starts with
+    the motion without inertia:
 
     .. math::
 
@@ -74,7 +76,7 @@ def build_slip_rate_functions(friction_functions: FrictionFunctions) -> tuple[Fu
           G(x) = \frac{1}{a} \left[S'(f) \frac{df}{ds}(x) - \frac{d\Psi}{ds}(x)\right].
 
     Here :math:`G(x)` is the derivative of :math:`x_0` along a motion with the slip rate :math:`x`.
-    The first and second orders are
+    The first-order and second-order terms are
 
     .. math::
 
@@ -122,7 +124,7 @@ def build_slip_rate_functions(friction_functions: FrictionFunctions) -> tuple[Fu
     def inertial_stress(spring_stress: float, psis: Numbers, alone: Numbers, p: Numbers) -> float:
         """Compute the stress that accelerates the mass, in sigma_*.
 
-        The motion without inertia is passed as a tuple, the result of ``quasi_static_values``.
+        The quasi-static motion is passed as the tuple that ``quasi_static_values`` returns.
         """
         x, growing, slope, weight, _shift = alone
         first = clamped_inertial_stress(weight, growing, p)
@@ -145,10 +147,10 @@ def build_slip_rate_functions(friction_functions: FrictionFunctions) -> tuple[Fu
         )
 
     def quasi_static_values(spring_stress: float, psis: Numbers, p: Numbers) -> Numbers:
-        """Compute the motion without inertia and the weight of inertia.
+        """Compute the quasi-static motion and the inertia weight.
 
-        The result contains ln(V/V_*), its derivative, the slope of the strength, the weight of
-        inertia and the decrease of the state due to stress.
+        The returned tuple contains ln(V/V_*), its derivative, the slope of the strength, the
+        inertia weight and the decrease of the state due to stress.
         """
         a = p[A]
         value, slope, shift, _shift_slope = strength(spring_stress, psis, p)
@@ -162,8 +164,7 @@ def build_slip_rate_functions(friction_functions: FrictionFunctions) -> tuple[Fu
     def log_slip_rate_offset(spring_stress: float, psis: Numbers, p: Numbers) -> float:
         """Compute the difference of ln V from its quasi-static value.
 
-        Subtracting two values of ln V instead would produce rounding errors that are visible in the
-        derivative.
+        If two values of ln V were subtracted, rounding errors would be visible in the derivative.
         """
         taken = inertial_stress(spring_stress, psis, quasi_static_values(spring_stress, psis, p), p)
         return -strength(spring_stress - 0.5 * taken, psis, p)[1] * taken / p[A]
@@ -171,8 +172,8 @@ def build_slip_rate_functions(friction_functions: FrictionFunctions) -> tuple[Fu
     def growth(state: Numbers, rates: Numbers, x: float, g: float, p: Numbers) -> float:
         """Compute the derivative of ln V along the motion.
 
-        The derivative includes the change of ``log_slip_rate_offset``. Without this term, the peak
-        slip rate would occur too early, by a slip of ``(K/a) w**2`` in D_c.
+        The derivative includes the change of ``log_slip_rate_offset``. Without this change, the
+        peak slip rate would occur too early, by a slip distance of ``(K/a) w**2`` in D_c.
         """
         spring_stress, psis = state[0], state[1:]
         slope = strength(spring_stress, psis, p)[1]
@@ -195,13 +196,13 @@ def clamped_inertial_stress(
     r"""Compute the bounded stress that accelerates the mass.
 
     The magnitude of the stress is limited to :math:`a`. A motion leaves the slow manifold long
-    before the stress reaches the limit. In trial steps beyond that point, the limit keeps the
+    before the stress reaches the limit. In trial steps that exceed the limit, the limit keeps the
     stress finite and preserves its sign.
 
     Parameters
     ----------
     inertia_weight : float
-        Weight :math:`W` of inertia.
+        Inertia weight :math:`W`.
     log_slip_rate_derivative : float
         Derivative of :math:`\ln V` with respect to displacement.
     p : tuple of float
@@ -219,11 +220,11 @@ def clamped_inertial_stress(
 def compute_inertia_weight(
     log_slip_rate: float, load_to_slip_velocity_ratio: float, p: Numbers
 ) -> float:
-    r"""Compute the weight of inertia.
+    r"""Compute the inertia weight, which measures the effect of the mass.
 
-    The weight is the lag of :math:`\ln V` behind its quasi-static value, divided by the derivative
-    of :math:`\ln V`. If possible, the function computes the slip rate from the ratio
-    ``load_to_slip_velocity_ratio``, because this saves the evaluation of an exponential function.
+    The inertia weight is the lag of :math:`\ln V` behind its quasi-static value, divided by the
+    derivative of :math:`\ln V`. If possible, the function computes the slip rate from the ratio
+    ``load_to_slip_velocity_ratio``, which saves the evaluation of an exponential function.
 
     Parameters
     ----------
@@ -237,7 +238,7 @@ def compute_inertia_weight(
     Returns
     -------
     float
-        Weight :math:`W = (K/a) w (w + w_0)`.
+        Inertia weight :math:`W = (K/a) w (w + w_0)`.
     """
     load = p[LOAD_VELOCITY] * p[DYNAMICS]
     if MIN_VELOCITY_RATIO < load_to_slip_velocity_ratio < MAX_VELOCITY_RATIO:
@@ -355,20 +356,20 @@ class Inertia(Dynamics):
 
     @property
     def effects(self) -> tuple[str, ...]:
-        """Names of the effects that are active."""
+        """Names of the physical effects that are active in the part."""
         return ("inertia",)
 
     def parameter_values(self, scene: SceneView) -> Numbers:
         r"""Return the time scale of inertia and its logarithm.
 
-        See the base class. The time scale is :math:`T V_*/(2 \pi D_c)`.
+        See ``Part.parameter_values``. The time scale is :math:`T V_*/(2 \pi D_c)`.
         """
         return scene.inertial_time, math.log(scene.inertial_time)
 
     def slip_rate_norm(self, scene: SceneView, log_slip_rate: float) -> float:
         """Compute the slip rate norm, which measures the effect of inertia.
 
-        See the base class.
+        See ``Dynamics.slip_rate_norm``.
         """
         return scene.inertial_time * math.exp(log_slip_rate)
 
@@ -376,7 +377,7 @@ class Inertia(Dynamics):
     def rejection_error(cls, name: str, value: Any) -> InvalidValue:
         """Return the error for a field of another dynamics class.
 
-        See the base class.
+        See ``Part.rejection_error``.
         """
         rule = "stands in for mass, and this scene has mass"
         return InvalidValue(name, value, rule, remedy="Leave one of them out.")

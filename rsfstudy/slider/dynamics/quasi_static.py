@@ -11,7 +11,7 @@ from rsfstudy.slider.parts import Function, Numbers
 
 
 def build_slip_rate_functions(friction_functions: FrictionFunctions) -> tuple[Function, Function]:
-    r"""Return the functions of the quasi-static slip rate.
+    r"""Return the functions that compute the quasi-static slip rate.
 
     Parameters
     ----------

@@ -16,8 +16,9 @@ from rsfstudy.slider.scene_view import SceneView
 
 _MAX_ITERATIONS = 200
 _RTOL_OF_ROOT_ITERATION_STEPS = 1e-15
-#: Relative tolerance of the strength for convergence. Small Newton steps are not sufficient,
-#: because slopes are very steep at the lower limit of normal stress, which only trial steps reach.
+#: Relative tolerance of the strength for convergence. A small Newton step does not imply
+#: convergence, because slopes are very steep at the lower limit of normal stress, which only trial
+#: steps reach.
 _STRESS_BALANCE_TOLERANCE = 1e-6
 #: Upper limit of ln V. Only trial steps reach the limit, where the radiated stress is 10^300 eta.
 _MAX_LOG_SLIP_RATE = 690.0
@@ -47,7 +48,7 @@ def compute_radiated_stress(log_slip_rate: float, damping: float) -> float:
 
 
 def build_slip_rate_functions(friction_functions: FrictionFunctions) -> tuple[Function, Function]:
-    r"""Return the functions of the slip rate with radiation damping.
+    r"""Return the functions that compute the slip rate with radiation damping.
 
     Parameters
     ----------
@@ -73,17 +74,17 @@ def build_slip_rate_functions(friction_functions: FrictionFunctions) -> tuple[Fu
         S(f - \eta (V - 1)) = a \ln V + \Psi, \quad
           \left[a + S'(g) \eta V\right] d\ln V = S'(g) \, df - d\Psi.
 
-    We solve the balance by Newton's method. The left side decreases with :math:`V` and the right
-    side increases, so the equation has a unique root. If a Newton step leaves the bracket or the
-    steps shrink too slowly, the solver bisects the bracket.
+    We solve the balance by Newton's method. The left side of the balance decreases with :math:`V`
+    and the right side increases, so the balance has a unique root. If a Newton step leaves the
+    bracket or the steps shrink too slowly, the solver bisects the bracket.
     """
     strength, state_sum = friction_functions.strength, friction_functions.state_sum
     contribution = friction_functions.state_contribution
 
     def balance(spring_stress: float, psis: Numbers, p: Numbers) -> tuple[float, float, float]:
         a, damping, psi = p[A], p[DYNAMICS], state_sum(psis)
-        # Slip is always forward, so the radiated stress is at least -eta. This bounds ln V from
-        # above.
+        # Slip is always forward, so the radiated stress is at least -eta. The lower bound of the
+        # radiated stress limits ln V from above.
         low, high = (
             -math.inf,
             min((strength(spring_stress + damping, psis, p)[0] - psi) / a, _MAX_LOG_SLIP_RATE),
@@ -160,26 +161,26 @@ class RadiationDamping(Dynamics):
 
     @property
     def effects(self) -> tuple[str, ...]:
-        """Names of the effects that are active."""
+        """Names of the physical effects that are active in the part."""
         return ("radiation_damping",)
 
     def parameter_values(self, scene: SceneView) -> Numbers:
         """Return the damping coefficient.
 
-        See the base class.
+        See ``Part.parameter_values``.
         """
         return (self.radiation_damping,)
 
     def radiated_stress(self, log_slip_rate: float) -> float:
-        """Compute the part of the spring stress that seismic waves radiate.
+        """Compute the stress that seismic waves radiate.
 
-        See the base class.
+        See ``Dynamics.radiated_stress``.
         """
         return compute_radiated_stress(log_slip_rate, self.radiation_damping)
 
     def radiated_stress_slope(self, log_slip_rate: float) -> float:
         """Compute the derivative of the radiated stress with respect to ln V.
 
-        See the base class.
+        See ``Dynamics.radiated_stress_slope``.
         """
         return self.radiation_damping * math.exp(log_slip_rate)

@@ -20,7 +20,7 @@ class Fluid(Part):
     """Base class of all pore fluids.
 
     A fluid with unknowns declares them in ``unknowns``. The last unknown must be the pore pressure
-    P. Such a fluid defines two functions as static methods:
+    P. A fluid with unknowns also defines two functions as static methods:
 
     - ``auxiliary_rates(log_slip_rate, states, fraction, p)`` returns the changes of the unknowns
       per unit slip in :math:`D_c`, multiplied by ``fraction``, which is the slip per unit of the
@@ -29,7 +29,7 @@ class Fluid(Part):
       is zero.
 
     The distance from steady sliding determines if a motion has settled and if a cycle repeats. A
-    fluid can exclude unknowns from this distance by listing their names in
+    fluid can exclude unknowns from the distance by listing their names in
     ``excluded_from_distance``. Exclude an unknown if its steady value at the slip rate of a rupture
     is extremely large.
 

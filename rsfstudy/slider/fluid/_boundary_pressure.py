@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 
 @cache
 def add_boundary_pressure_rate(fluid_auxiliary_rates: Function) -> Function:
-    r"""Extend the rates of a fluid by the pressure of the surroundings.
+    r"""Return a rate function that includes the pressure of the surroundings.
 
     Parameters
     ----------
@@ -34,8 +34,8 @@ def add_boundary_pressure_rate(fluid_auxiliary_rates: Function) -> Function:
     Returns
     -------
     callable
-        Function ``auxiliary_rates`` of the combination. The first unknown is the pressure R of the
-        surroundings, and the unknowns of the fluid follow.
+        Function ``auxiliary_rates`` of the fluid and its surroundings. The first unknown is the
+        pressure R of the surroundings, and the unknowns of the fluid follow.
 
     Notes
     -----
@@ -62,7 +62,7 @@ def add_boundary_pressure_rate(fluid_auxiliary_rates: Function) -> Function:
 
 @cache
 def add_boundary_pressure_steady_state(fluid_auxiliary_steady_states: Function) -> Function:
-    """Extend the steady states of a fluid by the surrounding pressure.
+    """Return a steady-state function that includes the surrounding pressure.
 
     Parameters
     ----------
@@ -72,8 +72,8 @@ def add_boundary_pressure_steady_state(fluid_auxiliary_steady_states: Function) 
     Returns
     -------
     callable
-        Function ``auxiliary_steady_states`` of the combination. The pressure of the surroundings is
-        zero, because pressures are measured from steady sliding before the loading.
+        Function ``auxiliary_steady_states`` of the fluid and its surroundings. The pressure of the
+        surroundings is zero, because pressures are measured from steady sliding before the loading.
     """
 
     def auxiliary_steady_states(log_slip_rate: float, p: Numbers) -> Numbers:
@@ -113,10 +113,9 @@ class FluidWithBoundaryPressure:
 
     @property
     def excluded_from_distance(self) -> tuple[str, ...]:
-        """Names of the unknowns that are excluded from the distance.
+        """Names of the unknowns excluded from the steady-state distance.
 
-        The distance from steady sliding ignores these unknowns. The names come from both the
-        loading and the fluid.
+        The tuple includes the excluded unknowns of both the loading and the fluid.
         """
         return (*self.loading.excluded_from_distance, *self.fluid.excluded_from_distance)
 

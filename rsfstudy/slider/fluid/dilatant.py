@@ -29,7 +29,7 @@ def porosity_and_pressure_rates(
     states : tuple of float
         Porosity :math:`(\varphi - \varphi_0)/(\beta \sigma_*)` and pore pressure :math:`P`.
     slip_per_independent_variable : float
-        Factor of the result, equal to the slip per unit of the independent variable. When slip
+        Slip per unit of the independent variable, by which the result is multiplied. When slip
         stops, the changes per unit slip are infinite, but their product with
         ``slip_per_independent_variable`` remains finite.
     p : tuple of float
@@ -149,7 +149,7 @@ class DilatantFluid(Fluid):
     def check(self, scene: SceneView) -> None:
         """Check that the stiffness ratio of the scene is defined.
 
-        See the base class.
+        See ``Part.check``.
         """
         if lacks_critical_stiffness(scene):
             rule = f"leaves no critical stiffness with dilatancy = {self.dilatancy:g}"
@@ -158,20 +158,20 @@ class DilatantFluid(Fluid):
     def highest_pressure(self, log_slip_rate: float, states: Numbers) -> float:
         r"""Compute an upper bound of the future pore pressure.
 
-        See the base class. The bound follows from the largest rate at which pores can close,
-        :math:`V (\varphi - \varphi_0 - \epsilon \ln(V/V_*))`, and the drainage rate.
+        See ``Fluid.highest_pressure``. The upper bound follows from the largest rate at which pores
+        can close, :math:`V (\varphi - \varphi_0 - \epsilon \ln(V/V_*))`, and the drainage rate.
         """
         closing = max(states[0] - self.dilatancy * log_slip_rate, self.dilatancy)
         return max(states[1], math.exp(log_slip_rate) * closing / self.drainage)
 
     @property
     def effects(self) -> tuple[str, ...]:
-        """Names of the effects that are active."""
+        """Names of the physical effects that are active in the part."""
         return ("dilatancy",)
 
     def parameter_values(self, scene: SceneView) -> Numbers:
         """Return the dilatancy and the drainage rate.
 
-        See the base class.
+        See ``Part.parameter_values``.
         """
         return self.dilatancy, self.drainage

@@ -85,9 +85,10 @@ class LawBase(Part):
     law. From these arguments, a function can compute the friction coefficient of forward slip,
     :math:`\tau/\sigma = \mu_* + a \ln(V/V_*) + \sum_i \Theta_i`. The functions do not receive shear
     stress, normal stress or pore pressure. If the state evolution depends on one of these
-    quantities, list the quantity in ``needs``, for example ``needs = {"shear_stress"}``. Scenes
-    with variable effective normal stress then reject the law. If effective normal stress is
-    constant, shear stress divided by :math:`\sigma_*` equals the friction coefficient.
+    quantities, list the quantity in ``needs``, for example ``needs = {"shear_stress"}``. Scenes in
+    which a quantity in ``needs`` is unknown, for example because effective normal stress varies,
+    reject the law. If effective normal stress is constant, shear stress divided by :math:`\sigma_*`
+    equals the friction coefficient.
 
     A law with one state defines ``evolution(log_slip_rate, state, p)``. The function returns the
     change of the state variable per unit slip in :math:`D_c` at constant normal stress. The default
@@ -98,13 +99,14 @@ class LawBase(Part):
     friction coefficient is :math:`\mu_*` there. A scene rejects a law if its evolution does not
     vanish at its steady states.
 
-    A law with several states sets their number, for example ``state_count = 3``. Such a law must
-    define ``steady_states`` and ``evolutions(log_slip_rate, psis, shift, fraction, p)``. The
-    function ``evolutions`` returns a tuple with the change of each state, multiplied by
-    ``fraction``, which is the slip per unit of the independent variable. Both functions distribute
-    the shift among the states, and the contributions must add up to the whole shift. The field or
-    property ``b_over_a`` is the evolution effect of all states together, divided by a. See the
-    module ``two_slip_states`` for an example.
+    A law with several states sets the attribute ``state_count``, for example ``state_count = 3``. A
+    law with several states must also define ``steady_states`` and
+    ``evolutions(log_slip_rate, psis, shift, fraction, p)``. The function ``evolutions`` returns a
+    tuple with the change of each state, multiplied by ``fraction``, which is the slip per unit of
+    the independent variable. The functions ``evolutions`` and ``steady_states`` distribute the
+    shift among the states, and the contributions of the states must add up to the whole shift. The
+    field or property ``b_over_a`` is the evolution effect of all states together, divided by a. See
+    the module ``two_slip_states`` for an example.
 
     Any unknown that affects friction, such as temperature, can be modelled as a state. The value of
     the state must be expressed as a contribution to the friction coefficient.
@@ -148,8 +150,9 @@ class LawBase(Part):
     #: Number of states of the law.
     state_count: ClassVar[int] = 1
     #: True if every orbit around steady sliding is closed at the critical stiffness, provided that
-    #: the motion is quasi-static and stress does not affect the state. The derivative of the
-    #: evolution with respect to the state must be a linear function of the evolution.
+    #: the motion is quasi-static and stress does not affect the state. Set this attribute to True
+    #: only if the derivative of the evolution with respect to the state is a linear function of the
+    #: evolution.
     has_closed_orbits: ClassVar[bool] = False
     #: True if Theta = b ln(theta/theta_*), so that theta can be computed from the state variable.
     has_logarithmic_state: ClassVar[bool] = True
@@ -157,14 +160,14 @@ class LawBase(Part):
     scale_free: ClassVar[bool] = False
     #: Closed-form solution ``relaxation(rate, slip)`` at constant normal stress and constant slip
     #: rate, with rate = ln(V/V_*) and slip in D_c: the difference between the stress and its steady
-    #: value, divided by b. The solution is a method if it uses fields of the law.
+    #: value, divided by b. If the solution uses fields of the law, ``relaxation`` is a method.
     relaxation: ClassVar[Function | None] = None
     evolution: ClassVar[Function | None] = None
     evolutions: ClassVar[Function | None] = None
     steady_states: ClassVar[Function | None] = None
     #: Function ``state_effect(friction, ratio, change, p) -> (shift, slope)``: decrease of the
     #: state variable due to stress, and its derivative with respect to frictional stress. Most laws
-    #: do not define this function.
+    #: do not define ``state_effect``.
     state_effect: ClassVar[Function | None] = None
 
     @classmethod
@@ -183,14 +186,14 @@ class LawBase(Part):
     def b_over_a(self) -> float:
         """Ratio of the total evolution effect to the direct effect.
 
-        Subclasses must override this property or define a field with this name.
+        Subclasses must override ``b_over_a`` as a property or as a field.
         """
         raise TypeError(f"{type(self).__name__} states no b_over_a")
 
     def parameter_values(self, scene: SceneView) -> Numbers:
         """Return the parameters that precede the fields of the law in ``p``.
 
-        The base class has no such parameters.
+        The base class returns an empty tuple.
 
         Parameters
         ----------
@@ -263,7 +266,7 @@ class LawBase(Part):
 @renamed_members
 @dataclass(frozen=True, kw_only=True)
 class Law(LawBase):
-    r"""Base class of the laws with a single b.
+    r"""Base class of the laws with a single evolution effect parameter b.
 
     A law is defined by a plain function of floats, which is stored in the class as ``evolution =
     staticmethod(evolution)``::
@@ -281,11 +284,12 @@ class Law(LawBase):
         check(self, scene) -> None
 
     Override ``parameter_values`` if ``evolution`` uses values other than the fields, such as
-    logarithms of the fields. The method must return ``(*super().parameter_values(scene), ...)``.
-    Override ``check`` to raise ``InvalidValue`` if field values contradict each other. The class
-    attribute ``name`` is the name of the law. The attributes ``relaxation``, ``steady_states`` and
-    ``state_effect`` are optional as well. A law with one b can have several states. Such a law
-    defines ``evolutions`` and ``steady_states``, as described for ``LawBase``.
+    logarithms of the fields. The overriding method must return
+    ``(*super().parameter_values(scene), ...)``. Override ``check`` to raise ``InvalidValue`` if
+    field values contradict each other. The class attribute ``name`` is the name of the law. The
+    attributes ``relaxation``, ``steady_states`` and ``state_effect`` are also optional. A law with
+    one parameter b can have several states. To define several states, write ``evolutions`` and
+    ``steady_states``, as described for ``LawBase``.
 
     Parameters
     ----------
@@ -378,8 +382,8 @@ class Law(LawBase):
             raise self.field_error("b_over_a", rule, MISSING_CRITICAL_STIFFNESS_REMEDY)
 
 
-#: Value of b/a that replaces zero in equations that divide by b. Its effect on the results is far
-#: smaller than rounding errors.
+#: Value of b/a that replaces zero in equations that divide by b. The effect of the replacement is
+#: far smaller than rounding errors.
 B_OVER_A_STANDING_FOR_ZERO = 1e-60
 #: Smallest nonzero b/a. Powers and quotients of smaller values would underflow or overflow.
 MIN_B_OVER_A = 1e-30
@@ -392,8 +396,8 @@ MISSING_CRITICAL_STIFFNESS_REMEDY = (
 def lacks_critical_stiffness(scene: SceneView) -> bool:
     """Return True if the stiffness ratio of a scene is undefined.
 
-    The stiffness ratio is undefined if the critical stiffness is zero or infinite, because steady
-    sliding then has the same stability at every stiffness.
+    The stiffness ratio is undefined if the critical stiffness is zero or infinite, because the
+    stability of steady sliding is then the same at every stiffness.
 
     Parameters
     ----------

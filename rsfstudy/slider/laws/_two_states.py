@@ -38,7 +38,7 @@ def steady_states(log_slip_rate: float, state_shift: float, p: Numbers) -> Numbe
 
     Notes
     -----
-    With the shares :math:`c_i` of the two states in the shift, the steady states are
+    If each state contributes a share :math:`c_i` of the total shift, the steady states are
 
     .. math::
 
@@ -54,9 +54,9 @@ def steady_states(log_slip_rate: float, state_shift: float, p: Numbers) -> Numbe
 class TwoStateLaw(LawBase):
     r"""Base class of the laws with two state variables.
 
-    Each state has its own b. The first state evolves over the slip distance :math:`D_c`, and the
-    second state evolves over :math:`L_2`. The default values are taken from Gu et al. (1984).
-    Becker (2000) found chaotic motions for these values.
+    Each state has its own evolution effect parameter b. The first state evolves over the slip
+    distance :math:`D_c`, and the second state evolves over :math:`L_2`. The default values are
+    taken from Gu et al. (1984). Becker (2000) found chaotic motions for these values.
 
     Parameters
     ----------
@@ -79,9 +79,9 @@ class TwoStateLaw(LawBase):
 
     Effects of stress on the state, such as :math:`\alpha \ln(\sigma/\sigma_*)`, are distributed to
     the two states in proportion to :math:`\lvert b_i \rvert`. Experiments do not determine this
-    distribution. With this choice, two states with equal slip distances and coefficients of equal
-    sign are equivalent to a single state. In addition, no share exceeds 1 if :math:`b_1 + b_2` is
-    small.
+    distribution. With this distribution, two states with equal slip distances and coefficients
+    :math:`b_i` of the same sign are equivalent to a single state. The share of a state never
+    exceeds 1, even if :math:`b_1 + b_2` is small.
 
     References
     ----------
@@ -119,11 +119,13 @@ class TwoStateLaw(LawBase):
     def parameter_values(self, scene: SceneView) -> Numbers:
         """Return the parameters of both states and the length ratio.
 
-        See the base class. The parameters of a state are its b and its share of the shift. The last
-        value is :math:`L_1/L_2`, the inverse of ``length_ratio``.
+        See ``Part.parameter_values``. The parameters of each state are its evolution effect
+        parameter b and its share of the shift. The last value is :math:`L_1/L_2`, the inverse of
+        ``length_ratio``.
         """
         both, size = (self.b1_over_a, self.b2_over_a), self.state_change_over_a
-        # If both b are zero, the shares are undefined. The method ``check`` rejects this case.
+        # If b is zero for both states, the shares are undefined. The method ``check`` rejects this
+        # case.
         shares = (abs(b) / size if size else 0.5 for b in both)
         return (*(scene.a * b for b in both), *shares, 1.0 / self.length_ratio)
 
@@ -131,7 +133,8 @@ class TwoStateLaw(LawBase):
     def rejection_error(cls, name: str, value: object) -> InvalidValue:
         """Return the error for a field of another law.
 
-        See the base class. The message for ``b_over_a`` names the two fields that replace it.
+        See ``Part.rejection_error``. The message for ``b_over_a`` names the two fields that replace
+        it.
         """
         if name == "b_over_a":
             rule = f"is b1_over_a + b2_over_a for {cls.name}, and follows from them"
@@ -141,7 +144,7 @@ class TwoStateLaw(LawBase):
     def check(self, scene: SceneView) -> None:
         """Check the evolution effects and the critical stiffness.
 
-        See the base class. The critical stiffness is required only if the stiffness is given by
+        See ``Part.check``. The critical stiffness is required only if the stiffness is given by
         ``stiffness_ratio``.
         """
         super().check(scene)

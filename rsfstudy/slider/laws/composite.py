@@ -129,7 +129,7 @@ def clamp_exponent(exponent: float) -> float:
     Returns
     -------
     float
-        Smaller value of the exponent and the limit.
+        Exponent or limit, whichever is smaller.
     """
     return min(exponent, LARGEST_EVOLUTION_EXPONENT)
 
@@ -183,9 +183,10 @@ class CompositeLaw(Law):
         return 1.0 / (1.0 + ahead / ((1.0 + ahead) * self.cutoff_velocity_ratio))
 
     def parameter_values(self, scene: SceneView) -> Numbers:
-        """Return b, the logarithm of the cut-off velocity, and the offset.
+        """Return b, the logarithm of the cut-off velocity, and the steady offset.
 
-        See the base class. The offset is the value :math:`u_*` in steady sliding at :math:`V_*`.
+        See ``Part.parameter_values``. The offset is the value :math:`u_*` in steady sliding at
+        :math:`V_*`.
         """
         logarithm = math.log(self.cutoff_velocity_ratio)
         return (

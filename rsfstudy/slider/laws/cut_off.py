@@ -156,7 +156,8 @@ class CutOffLaw(Law):
     def parameter_values(self, scene: SceneView) -> Numbers:
         """Return b and the two velocity fractions.
 
-        See the base class. The fractions are :math:`V_c/(V_c + V_*)` and :math:`V_*/(V_c + V_*)`.
+        See ``Part.parameter_values``. The fractions are :math:`V_c/(V_c + V_*)` and :math:`V_*/(V_c
+        + V_*)`.
         """
         return (*super().parameter_values(scene), *self._cutoff_and_reference_velocity_fractions())
 

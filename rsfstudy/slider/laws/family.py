@@ -111,6 +111,6 @@ class SlipToSlownessLaw(Law):
     def parameter_values(self, scene: SceneView) -> Numbers:
         """Return b and the exponent of the law.
 
-        See the base class.
+        See ``Part.parameter_values``.
         """
         return (*super().parameter_values(scene), self.law_exponent)

@@ -33,7 +33,7 @@ def evolutions(
     state_shift : float
         Decrease of the sum of the states due to stress.
     slip_per_independent_variable : float
-        Factor of the result, equal to the slip per unit of the independent variable.
+        Slip per unit of the independent variable, by which the result is multiplied.
     p : tuple of float
         Parameters of the scene. The parameters of the law start at ``p[LAW]``.
 

@@ -36,7 +36,7 @@ def evolutions(
     state_shift : float
         Decrease of the sum of the states due to stress.
     slip_per_independent_variable : float
-        Factor of the result, equal to the slip per unit of the independent variable.
+        Slip per unit of the independent variable, by which the result is multiplied.
     p : tuple of float
         Parameters of the scene. The parameters of the law start at ``p[LAW]``.
 
@@ -88,7 +88,7 @@ class TwoStateSlownessLaw(TwoStateLaw):
     def check(self, scene: SceneView) -> None:
         """Check that both states have an effect.
 
-        See the base class. A state without an effect is rejected because the evolution equations
+        See ``Part.check``. A state without an effect is rejected because the evolution equations
         divide by its parameter b.
         """
         for name in ("b1_over_a", "b2_over_a"):

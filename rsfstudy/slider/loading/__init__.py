@@ -19,7 +19,7 @@ from rsfstudy.slider.parts import NON_NEGATIVE, Numbers, Part, discover_parts, n
 from rsfstudy.slider.scene_view import SceneView
 
 #: Minimum duration of a segment in D_c/V_*. The integrator cannot resolve shorter segments. At
-#: times above 1, rounding errors of the time exceed this value.
+#: times above 1, rounding errors of the time exceed this minimum duration.
 MIN_SEGMENT_DURATION = 1e-16
 
 
@@ -38,7 +38,7 @@ class Segment(NamedTuple):
     normal_stress : float, default: 0.0
         Deviation of the imposed normal stress from :math:`\sigma_*` during the segment, divided by
         :math:`\sigma_*`. If the driving stress is inclined to the fault, the deviation is a change
-        of :math:`\sigma_3`, and changes of shear stress contribute further to the normal stress.
+        of :math:`\sigma_3`, and changes of shear stress also change the normal stress.
 
     Examples
     --------
@@ -85,8 +85,8 @@ class Loading(Part):
     displacement in :math:`D_c`, a duration in :math:`D_c/V_*` and an imposed normal stress in
     :math:`\sigma_*`. The last segment must have an infinite duration.
 
-    If a loading changes normal stress continuously, the changes are described by unknowns. Such a
-    loading defines the class attributes ``unknowns``, ``auxiliary_rates`` and
+    If a loading changes normal stress continuously, the changes are described by unknowns. A
+    loading with unknowns defines the class attributes ``unknowns``, ``auxiliary_rates`` and
     ``auxiliary_steady_states`` in the same way as ``Fluid``, and the method ``initial_unknowns``.
     All unknowns must be zero in steady sliding. The last unknown is the decrease of imposed normal
     stress, divided by :math:`\sigma_*`. The unknowns describe the first segment of the loading, and
@@ -112,12 +112,12 @@ class Loading(Part):
     """
 
     #: True if the last unknown determines a shear stress instead of a decrease of normal stress.
-    #: The load point then moves ahead of its mean motion. The shear stress is the unknown minus the
-    #: third value of ``numbers``.
+    #: The shear stress is caused by the displacement of the load point relative to its mean motion,
+    #: and is equal to the unknown minus the third element of ``parameter_values``.
     has_load_point_unknown: ClassVar[bool] = False
     received_quantities = frozenset({SLIP_RATE})
-    #: True if the decrease of normal stress is a rise of pore pressure. If the fluid has unknowns,
-    #: this is the pore pressure around the fault.
+    #: True if the loading decreases the effective normal stress by a rise of pore pressure. If the
+    #: fluid has unknowns, the pore pressure around the fault rises.
     of_pressure: ClassVar[bool] = True
 
     def initial_unknowns(self, scene: SceneView) -> Numbers:
@@ -202,8 +202,8 @@ class Loading(Part):
         Returns
         -------
         Loading or Segment
-            The segment. The method returns the loading itself if the loading has only one segment,
-            or if the segment is the first and the loading has unknowns.
+            Segment with this index. The method returns the loading itself if the loading has only
+            one segment, or if the loading has unknowns and the index is 0.
         """
         history = self.segments
         if len(history) == 1 or (self.unknowns and segment_index == 0):
@@ -222,8 +222,8 @@ class Loading(Part):
     def segment_table(self) -> Any:
         """Table of the segments, with one row per segment.
 
-        The columns are the constants ``SEGMENT_START`` to ``SEGMENT_STRESS_FALL`` of
-        ``rsfstudy.parts``.
+        The constants ``SEGMENT_START`` to ``SEGMENT_STRESS_FALL`` of ``rsfstudy.parts`` are the
+        column indices.
         """
         rows, begins = [], 0.0
         for velocity, _step, lasts, _stress in self.segments:
@@ -277,7 +277,7 @@ class Loading(Part):
         owners = (p for p in BUILT_IN_PARTS.values() if str(name) in p.__dataclass_fields__)
         wanted = " or ".join(p.selected_by for p in owners if p.selected_by not in ("", name))
         remedy = f"Leave it out, or state {wanted} too." if wanted else "Leave it out."
-        # A protocol has its name in the instance, not in the class.
+        # The name of a protocol is an attribute of the instance, not of the class.
         of = getattr(cls, "name", cls.__name__)
         return InvalidValue(name, value, f"has no meaning for {of}", remedy=remedy)
 
@@ -303,13 +303,14 @@ def declare_load_velocity_field() -> Any:
 
 @dataclass(frozen=True, kw_only=True)
 class LoadingWithFinalLoadVelocity(Loading):
-    """Base class of the loadings with a load point velocity.
+    """Base class of the loadings with a field for the load point velocity.
 
-    The velocity applies to the whole loading or to its last segment. The default is the reference
-    velocity :math:`V_*`.
+    The load point velocity applies to the whole loading or to its last segment. The default is the
+    reference velocity :math:`V_*`.
     """
 
-    # Each subclass declares this field, because the order of the fields must match existing files.
+    # Each subclass declares ``load_velocity_ratio``, because the order of the fields must match
+    # existing files.
     if TYPE_CHECKING:
         load_velocity_ratio: float | None
 
@@ -317,7 +318,7 @@ class LoadingWithFinalLoadVelocity(Loading):
     def load_velocity(self) -> float:
         """Load point velocity divided by the reference velocity.
 
-        The velocity excludes oscillations.
+        The load point velocity excludes oscillations.
         """
         return 1.0 if self.load_velocity_ratio is None else self.load_velocity_ratio
 

@@ -1,7 +1,7 @@
 r"""Base class of the oscillations of normal stress and of the load point.
 
-The oscillation is a train of waves. The oscillation begins at the time :math:`t_b` as :math:`\sin[2
-\pi (t - t_b)/T_o + \phi_o]` and ends after a given number of cycles.
+The oscillation begins at the time :math:`t_b` as :math:`\sin[2 \pi (t - t_b)/T_o + \phi_o]` and
+ends after a given number of cycles.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ def harmonic_oscillation_rates(
     states : tuple of float
         Unknowns :math:`y` and :math:`P`.
     slip_per_independent_variable : float
-        Factor of the result, equal to the slip per unit of the independent variable.
+        Slip per unit of the independent variable, by which the result is multiplied.
     p : tuple of float
         Parameters of the scene. The function reads :math:`\omega D_c/V_*` from ``p[LOADING]`` and
         the amplitude :math:`A` from ``p[LOADING + 1]``.
@@ -53,8 +53,9 @@ def harmonic_oscillation_rates(
 
     With the initial values :math:`y = A` and :math:`P = 0`, the solution is :math:`P = -A \sin
     \omega t`. To correct numerical errors of the amplitude within about one period, the function
-    adds the term :math:`(\omega/2) [1 - (y^2 + P^2)/A^2]`, multiplied by :math:`y` or :math:`P`, to
-    each rate. The term vanishes for the exact solution.
+    adds the term :math:`(\omega/2) [1 - (y^2 + P^2)/A^2] y` to the rate of :math:`y`, and the same
+    term with the factor :math:`P` to the rate of :math:`P`. The term vanishes for the exact
+    solution.
     """
     ahead, relief = states
     turn = (
@@ -146,7 +147,7 @@ class OscillationBase(LoadingWithFinalLoadVelocity):
     def check(self, scene: SceneView) -> None:
         """Check that the scene has inertia if the oscillation is fast.
 
-        See the base class. Without inertia, the period must not be shorter than the period of free
+        See ``Part.check``. Without inertia, the period must not be shorter than the period of free
         oscillation of the slider.
         """
         super().check(scene)
@@ -165,7 +166,7 @@ class OscillationBase(LoadingWithFinalLoadVelocity):
     def angular_frequency(self) -> float:
         """Dimensionless angular frequency of the oscillation.
 
-        The unit is :math:`V_*/D_c`.
+        The angular frequency is in units of :math:`V_*/D_c`.
         """
         return 2.0 * math.pi / self.oscillation_period
 
@@ -195,8 +196,8 @@ class OscillationBase(LoadingWithFinalLoadVelocity):
     def isolate_segment(self, segment_index: int) -> Loading | Segment:
         """Return the loading of a single segment.
 
-        See the base class. For the oscillation itself, the method returns a loading that oscillates
-        from the start without an end.
+        See ``Loading.isolate_segment``. For the segment with the oscillation, the method returns a
+        loading that oscillates from the start and has no end.
         """
         segments = self.segments
         if segment_index % len(segments) != bool(self.oscillation_begin):

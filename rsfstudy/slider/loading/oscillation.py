@@ -1,6 +1,7 @@
 """Oscillation of imposed normal stress.
 
-Examples of such oscillations are tides, passing waves and modulations by the testing machine.
+Examples of normal stress oscillations are tides, passing seismic waves and modulation by a testing
+machine.
 """
 
 from __future__ import annotations
@@ -62,7 +63,7 @@ class NormalStressOscillation(_oscillation_base.OscillationBase):
     def check(self, scene: SceneView) -> None:
         """Check that normal stress remains positive.
 
-        See the base class.
+        See ``Part.check``.
         """
         if self.oscillation_amplitude >= 1.0:
             remedy = "Normal stress stays positive: it oscillates by less than all of it."
@@ -72,7 +73,7 @@ class NormalStressOscillation(_oscillation_base.OscillationBase):
     def initial_unknowns(self, scene: SceneView) -> Numbers:
         """Return the unknowns y and P for the initial phase.
 
-        See the base class.
+        See ``Loading.initial_unknowns``.
         """
         amplitude, angle = self.oscillation_amplitude, self.initial_phase
         return amplitude * math.cos(angle), -amplitude * math.sin(angle)
@@ -80,6 +81,6 @@ class NormalStressOscillation(_oscillation_base.OscillationBase):
     def parameter_values(self, scene: SceneView) -> Numbers:
         """Return the angular frequency and the amplitude.
 
-        See the base class.
+        See ``Part.parameter_values``.
         """
         return self.angular_frequency, self.oscillation_amplitude

@@ -22,7 +22,7 @@ from rsfstudy.slider.scene_view import SceneView
 def pending_normal_stress_rates(
     log_slip_rate: float, states: Numbers, slip_per_independent_variable: float, p: Numbers
 ) -> Numbers:
-    r"""Compute the rate of the unknown of a ramp.
+    r"""Compute the rate of the remaining normal stress change of a ramp.
 
     Parameters
     ----------
@@ -31,7 +31,7 @@ def pending_normal_stress_rates(
     states : tuple of float
         Unknown :math:`P`, the remaining change of normal stress.
     slip_per_independent_variable : float
-        Factor of the result, equal to the slip per unit of the independent variable.
+        Slip per unit of the independent variable, by which the result is multiplied.
     p : tuple of float
         Parameters of the scene. The function reads the rate of imposed normal stress, in
         :math:`\sigma_* V_*/D_c`, from ``p[LOADING]``.
@@ -58,7 +58,7 @@ def pending_normal_stress_rates(
 
 
 def zero_pending_normal_stress(log_slip_rate: float, p: Numbers) -> Numbers:
-    r"""Return the unknown of the ramp in steady sliding.
+    r"""Return the remaining normal stress change in steady sliding.
 
     Parameters
     ----------
@@ -138,13 +138,13 @@ class NormalStressRamp(LoadingWithFinalLoadVelocity):
     def initial_unknowns(self, scene: SceneView) -> Numbers:
         """Return the total change of normal stress.
 
-        See the base class.
+        See ``Loading.initial_unknowns``.
         """
         return (self.normal_stress_ramp,)
 
     def parameter_values(self, scene: SceneView) -> Numbers:
         """Return the rate of imposed normal stress.
 
-        See the base class.
+        See ``Part.parameter_values``.
         """
         return (self.normal_stress_ramp / self.ramp_duration,)

@@ -17,14 +17,14 @@ from rsfstudy.slider.scene_caching import cached_attribute
 class StepLoading(LoadingWithFinalLoadVelocity):
     r"""Step of load velocity, load displacement or normal stress at time zero.
 
-    A displacement step changes the spring stress by :math:`k \Delta\delta_0`. Several steps can be
-    combined.
+    A displacement step changes the spring stress by :math:`k \Delta\delta_0`. Steps of velocity,
+    displacement and normal stress can be combined.
 
     Parameters
     ----------
     load_velocity_ratio : float, optional
-        Load point velocity :math:`V_0/V_*` after the step. By default the load point stops (0)
-        after a step of displacement or normal stress. Otherwise the default is 1.
+        Load point velocity :math:`V_0/V_*` after the step. The default is 0 (no motion) after a
+        step of displacement or normal stress, and 1 otherwise.
     displacement_step : float, default: 0.0
         Displacement :math:`\Delta\delta_0` of the load point at time zero, in :math:`D_c`.
     normal_stress_step : float, default: 0.0
@@ -59,8 +59,8 @@ class StepLoading(LoadingWithFinalLoadVelocity):
     def load_velocity(self) -> float:
         """Load point velocity after the step, in units of V_*.
 
-        By default the load point stops after a step of displacement or normal stress. Otherwise the
-        load point continues at the reference velocity.
+        By default the load point stops after a step of displacement or normal stress, and otherwise
+        continues at the reference velocity.
         """
         if self.load_velocity_ratio is None and (self.displacement_step or self.normal_stress_step):
             return 0.0

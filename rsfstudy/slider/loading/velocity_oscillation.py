@@ -64,7 +64,7 @@ class VelocityOscillation(_oscillation_base.OscillationBase):
     def check(self, scene: SceneView) -> None:
         """Check the amplitude and the mean velocity of the oscillation.
 
-        See the base class. The load point may move backwards only if the law allows reversed slip.
+        See ``Part.check``. The load point may move backwards only if the law allows reversed slip.
         The mean velocity must not be zero.
         """
         if (self.velocity_oscillation or 0.0) > 1.0 and not scene.parts.law.regularised:
@@ -79,7 +79,7 @@ class VelocityOscillation(_oscillation_base.OscillationBase):
     def initial_unknowns(self, scene: SceneView) -> Numbers:
         r"""Return the unknowns for the initial phase.
 
-        See the base class. The last unknown is :math:`-K R \cos(\omega t + \phi_o)`.
+        See ``Loading.initial_unknowns``. The last unknown is :math:`-K R \cos(\omega t + \phi_o)`.
         """
         stress = self.stress_amplitude(scene)
         return -stress * math.sin(self.initial_phase), -stress * math.cos(self.initial_phase)
@@ -90,7 +90,7 @@ class VelocityOscillation(_oscillation_base.OscillationBase):
         The parameters are the angular frequency, the stress amplitude and the initial value of the
         last unknown.
 
-        See the base class.
+        See ``Part.parameter_values``.
         """
         return self.angular_frequency, self.stress_amplitude(scene), self.initial_unknowns(scene)[1]
 

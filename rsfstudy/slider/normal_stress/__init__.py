@@ -45,10 +45,11 @@ class NormalStress(Part):
     def state_effect(self) -> Function | None:
         """Effect of normal stress on the state variable.
 
-        The property is None if normal stress has no effect on the state. Otherwise the effect is a
-        function ``state_effect(friction, ratio, change, p) -> (shift, slope)``. The shift is the
-        decrease of the state variable due to normal stress, and the slope is the derivative of the
-        shift with respect to frictional stress.
+        The property is None if normal stress has no effect on the state. If normal stress affects
+        the state, the property is a function
+        ``state_effect(friction, ratio, change, p) -> (shift, slope)``. The shift is the decrease of
+        the state variable due to normal stress, and the slope is the derivative of the shift with
+        respect to frictional stress.
         """
         return None
 
@@ -61,9 +62,9 @@ class NormalStress(Part):
     def coupling(self) -> tuple[float, float] | None:
         r"""Coupling coefficients of normal stress.
 
-        The coefficients are the derivative of normal stress with respect to shear stress, and the
-        coefficient :math:`\alpha` of the effect of normal stress on the state. The value is None if
-        two coefficients do not describe the condition completely.
+        The first coefficient is the derivative of normal stress with respect to shear stress, and
+        the second coefficient :math:`\alpha` is the effect of normal stress on the state. The
+        property is None if two coefficients do not fully describe the normal stress condition.
         """
         return None
 
@@ -73,7 +74,7 @@ class NormalStress(Part):
         Parameters
         ----------
         scene : Scene
-            Scene that the condition belongs to.
+            Scene that the normal stress condition belongs to.
 
         Returns
         -------

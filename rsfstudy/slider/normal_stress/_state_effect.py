@@ -62,7 +62,7 @@ def linker_dieterich_effect(
 
 @dataclass(frozen=True, kw_only=True)
 class NormalStressWithStateEffect(NormalStress):
-    r"""Base class of the conditions with variable normal stress.
+    r"""Base class of the normal stress conditions with variable normal stress.
 
     Parameters
     ----------
@@ -84,5 +84,5 @@ class NormalStressWithStateEffect(NormalStress):
 
     @property
     def effects(self) -> tuple[str, ...]:
-        """Names of the effects that are active."""
+        """Names of the physical effects that are active in the part."""
         return ("linker_dieterich",) if self.alpha else ()

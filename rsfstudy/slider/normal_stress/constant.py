@@ -29,7 +29,7 @@ class ConstantNormalStress(NormalStress):
     def check(self, scene: SceneView) -> None:
         """Check that the loading does not change normal stress.
 
-        See the base class.
+        See ``Part.check``.
         """
         if scene.parts.loading.changes_normal_stress:
             remedy = "Set normal_stress='imposed', or 'variable' where it follows shear stress too."

@@ -29,7 +29,7 @@ def imposed_normal_stress_excess(frictional_stress: float, p: Numbers) -> tuple[
     excess : float
         Normal stress ratio minus one, :math:`\sigma/\sigma_* - 1`.
     change : float
-        Derivative of the excess with respect to frictional stress, which is zero.
+        Derivative of the normal stress ratio with respect to frictional stress, which is zero.
     """
     return p[IMPOSED_NORMAL_STRESS], 0.0
 
@@ -73,6 +73,6 @@ class ImposedNormalStress(NormalStressWithStateEffect):
     def parameter_values(self, scene: SceneView) -> Numbers:
         """Return the coefficient of the effect on the state.
 
-        See the base class.
+        See ``Part.parameter_values``.
         """
         return (self.alpha,)

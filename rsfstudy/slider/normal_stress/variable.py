@@ -35,7 +35,7 @@ def shear_coupled_normal_stress_excess(frictional_stress: float, p: Numbers) -> 
     excess : float
         Normal stress ratio minus one, :math:`\sigma/\sigma_* - 1`.
     change : float
-        Derivative of the excess with respect to frictional stress.
+        Derivative of the normal stress ratio with respect to frictional stress.
 
     Notes
     -----
@@ -106,27 +106,27 @@ class VariableNormalStress(NormalStressWithStateEffect):
 
     @property
     def effects(self) -> tuple[str, ...]:
-        """Names of the effects that are active."""
+        """Names of the physical effects that are active in the part."""
         return ("inclined_driving", *super().effects)
 
     def parameter_values(self, scene: SceneView) -> Numbers:
         """Return the coefficient alpha and the cotangent of phi.
 
-        See the base class.
+        See ``Part.parameter_values``.
         """
         return self.alpha, self.cot_phi
 
     def min_frictional_stress(self, scene: SceneView) -> float:
         """Compute the frictional stress at which normal stress vanishes.
 
-        See the base class.
+        See ``NormalStress.min_frictional_stress``.
         """
         return -(1.0 + scene.imposed_normal_stress) / self.cot_phi
 
     def check(self, scene: SceneView) -> None:
         r"""Check the angle of the driving stress.
 
-        See the base class. The angle must be greater than :math:`\arctan\mu_*`, because
+        See ``Part.check``. The angle must be greater than :math:`\arctan\mu_*`, because
         :math:`\sigma_3` must be positive, and less than 90 degrees.
         """
         if self.phi >= 90.0:
