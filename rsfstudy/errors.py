@@ -125,7 +125,7 @@ class InvalidValue(RsfStudyError, ValueError):
         self.value = value
 
     def with_location(self, place: str) -> InvalidValue:
-        """Return a copy of the error whose message begins with a location.
+        """Return a copy of the error with a location at the beginning of the message.
 
         Parameters
         ----------

@@ -267,7 +267,7 @@ class Accessor:
     def plot(self, *plot_arguments: Any, **plot_options: Any) -> Figure:
         """Plot the results of a study, a motion or a limit cycle.
 
-        The axes are in the units of the dataset.
+        The axes of the figure have the units of the dataset.
 
         Parameters
         ----------
