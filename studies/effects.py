@@ -44,8 +44,8 @@ DYNAMICS: dict[str, dict[str, bool | float]] = {
 FULL_SCENE_PLACE = {"coupling": "inclined driving, alpha", "dynamics": "inertia"}
 
 
-#: Number of evaluations per timing, and number of timings. The equations between ruptures and
-#: during ruptures are timed in short turns, so that other processes on the machine affect all
+#: Number of evaluations per timing, and number of timings. The equations of the scene and of the
+#: simplest scene are timed in short turns, so that other processes on the machine affect all
 #: timings equally.
 _EVALUATIONS_PER_TIMING, _TIMING_REPEATS = 100, 25
 #: Values of the unknowns at which the equations are evaluated. Additional states are zero.
@@ -89,10 +89,10 @@ _OUTPUTS = (
 class EffectCost(Measure):
     """Limit cycle with the computational cost of its physical effects.
 
-    The results include the number of unknowns, the time of a right-hand-side evaluation between
-    ruptures and during ruptures, and the fraction of evaluations during ruptures. Times are also
-    reported relative to the simplest scene of the same law, which is quasi-static with constant
-    normal stress.
+    The number of unknowns and the time of a right-hand-side evaluation are reported separately for
+    the equations between ruptures and during ruptures. The results also include the fraction of
+    evaluations during ruptures. Times are also reported relative to the simplest scene of the same
+    law, which is quasi-static with constant normal stress.
     """
 
     name: ClassVar[str] = "effect_cost"
