@@ -1,15 +1,14 @@
 """Former names of public functions, classes, members and keywords.
 
 A former name works for one release and emits a ``DeprecationWarning`` that contains the new name.
-The module and its uses will be removed in version 1.0.0. The dictionary ``RENAMED`` maps former
-names to new names. The keys of ``RENAMED`` have three forms:
+The former names will be removed in version 1.0.0. The dictionary ``RENAMED`` maps former names to
+new names. The keys of ``RENAMED`` have three forms:
 
 ``"package.module"``
-    Names of a module. The module sets ``__getattr__ = renamed_names(__name__)``.
+    Names in a module. The module sets ``__getattr__ = renamed_names(__name__)``.
 ``"package.module:Class"``
-    Members of a class, which has the decorator ``renamed_members``. If users may override the
-    members in a subclass, the method ``__init_subclass__`` of the class calls
-    ``adopt_former_members``.
+    Members of a class with the decorator ``renamed_members``. If users may override the members in
+    a subclass, the method ``__init_subclass__`` of the class calls ``adopt_former_members``.
 ``"package.module:function()"``, ``"package.module:Class()"``
     Keyword arguments of a function or of a constructor. The outermost decorator of the function or
     class is ``renamed_keywords``.
@@ -27,7 +26,7 @@ from typing import Any, TypeVar
 F = TypeVar("F", bound=Callable[..., Any])
 C = TypeVar("C", bound=type)
 
-#: New names by former names, for each module, class, function or constructor.
+#: Mapping from former names to new names, for each module, class, function or constructor.
 RENAMED: Mapping[str, Mapping[str, str]] = {
     "rsfstudy": {
         "Laboratory": "Rig",
@@ -432,7 +431,7 @@ def user_stacklevel() -> int:
     Returns
     -------
     int
-        Argument ``stacklevel`` of ``warnings.warn``, for the calling function.
+        Value that the calling function passes as ``stacklevel`` to ``warnings.warn``.
     """
     level, frame = 1, sys._getframe(1)
     while frame.f_back and frame.f_globals.get("__name__", "").partition(".")[0] == "rsfstudy":
@@ -450,7 +449,7 @@ def warn_renamed(former_name: str, new_name: str, owner_name: str) -> None:
     new_name : str
         New name.
     owner_name : str
-        Name of the class, function or module, for the warning.
+        Name of the class, function or module, which the warning contains.
     """
     text = (
         f"{former_name!r} of {owner_name} is now called {new_name!r}. The old name will be "
@@ -527,8 +526,8 @@ def adopt_former_members(subclass: type) -> None:
     """Add new names for members that a subclass defines by former names.
 
     If the subclass also defines the new name, the former name is ignored. A dataclass field becomes
-    a property if its new name is a property of the base class. Other dataclass fields keep their
-    name and their meaning.
+    a property if its new name is a property of the base class. If the new name is not a property of
+    the base class, the dataclass field is unchanged.
 
     Parameters
     ----------
@@ -610,7 +609,7 @@ class _FormerField(_FormerMember):
 
 
 def _field_property(field_name: str) -> property:
-    """Return a property with the value of a field."""
+    """Return a property that reads the value of a field."""
     return property(lambda self: getattr(self, field_name))
 
 

@@ -14,9 +14,9 @@ from importlib.machinery import ModuleSpec
 from types import ModuleType
 from typing import Any
 
-#: Paths below ``rsfstudy`` by former module path. The first path is the module that now contains
-#: the names. The second path is the public module to import the names from. Both paths are empty
-#: for former packages without public names.
+#: Pairs of new module paths, relative to ``rsfstudy``, by former module path. The first path of a
+#: pair is the module that now contains the names. The second path of a pair is the public module
+#: from which users import the names. Both paths are empty for former packages without public names.
 FORMER_MODULES = {
     "analysis": ("", ""),
     "analysis.fitting": ("", ""),

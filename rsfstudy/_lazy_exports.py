@@ -21,11 +21,11 @@ def lazy_exports(
     Parameters
     ----------
     package_name : str
-        Full name of the package. Former names of the package that ``RENAMED`` lists are looked up
-        too.
+        Full name of the package. The functions also look up the former names of the package in
+        ``RENAMED``.
     names_by_module : mapping of str to iterable of str
-        Exported names by module. A module is given by its path below ``rsfstudy``. The entry
-        ``"name as other"`` exports ``name`` under the name ``other``.
+        Exported names by module. Each module is specified by its path relative to ``rsfstudy``. The
+        entry ``"name as other"`` exports ``name`` under the name ``other``.
 
     Returns
     -------

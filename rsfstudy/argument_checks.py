@@ -24,15 +24,16 @@ from rsfstudy.errors import InvalidValue, shorten_text
 #: Maximum number of items of a list that is passed as an argument. A ``range`` or an array that
 #: repeats a single value can be longer than any list that fits in memory.
 MAX_ITEMS = 2**20
-#: Maximum numbers of items and of nesting levels of an argument that the checks examine.
+#: Maximum number of items, and maximum number of nesting levels, that the checks examine in an
+#: argument.
 _MAX_CHECKED_ITEMS, _MAX_CHECKED_NESTING_LEVELS = 1000, 4
-#: Modules by the import alias that annotations use.
+#: Mapping from the import aliases that annotations use to module names.
 _MODULE_ALIASES = {"xr": "xarray", "pd": "pandas", "np": "numpy"}
-#: Messages of xarray about a missing array dimension.
+#: Pattern of the error messages of xarray about a missing array dimension.
 _MISSING_DIMENSION_MESSAGE_PATTERN = re.compile(
     r"'(.+?)' (?:not found in array dimensions|is not a valid dimension)"
 )
-#: Descriptions of simple types in messages.
+#: Descriptions of simple types for error messages.
 _TYPE_DESCRIPTIONS: Mapping[Any, str] = {
     str: "a text",
     bool: "True or False",
@@ -74,7 +75,7 @@ def string_instead_of_list_error(
     """Return an error if a string was passed in place of a list of strings.
 
     A function that expects a list iterates over the characters of the string, so its own error
-    refers to a single character. If there are several arguments of this kind, only the first
+    refers to a single character. If several strings were passed in place of lists, only the first
     argument is reported.
 
     Parameters
@@ -116,7 +117,7 @@ def type_mismatch_error(
     arguments : mapping of str to object
         Arguments of the function, as in ``inspect.BoundArguments``.
     remedy : str
-        Last sentence of the message.
+        Last sentence of the error message.
 
     Returns
     -------
@@ -145,7 +146,7 @@ def unusable_value_error(
     error : Exception
         Exception that the function raised.
     remedy : str
-        Last sentence of the message.
+        Last sentence of the error message.
 
     Returns
     -------
@@ -315,7 +316,7 @@ def describe_type(annotation: Any) -> str:
 
 
 def _is_number_of_type(value: object, number_type: type) -> bool:
-    """Return True if a value is a number or Boolean of the given type."""
+    """Return True if a value is a number or Boolean of the annotated type."""
     name = type(value).__name__
     is_flag = name in ("bool", "bool_")  # Python and NumPy Booleans
     if number_type is bool or is_flag:
@@ -361,7 +362,7 @@ def _is_matching_container(
 
 
 def _is_sequence_like(value: object, container_type: type) -> bool:
-    """Return True if a value can be used like the given container type."""
+    """Return True if a value behaves like a container type."""
     if isinstance(value, str | bytes):
         return False
     dimensions = getattr(value, "ndim", None)
@@ -448,7 +449,7 @@ def _iterate_nested_values(value: object, nesting_levels: int) -> Iterator[Any]:
 def _is_too_long_lazy_sequence(value: Any) -> bool:
     """Return True if a lazy sequence has more than ``MAX_ITEMS`` items.
 
-    Lazy sequences are a ``range`` and an array with a stride of zero. The memory of a lazy sequence
+    A lazy sequence is a ``range``, or an array with a stride of zero. The memory of a lazy sequence
     does not grow with the number of items.
     """
     if isinstance(value, range):

@@ -32,10 +32,10 @@ C = TypeVar("C", bound=type)
 
 #: Exceptions that the error boundary does not convert.
 _EXCEPTIONS_PASSED_UNCHANGED = (RsfStudyError, Warning, bdb.BdbQuit)
-#: Special methods that users call, in addition to methods without a leading underscore.
+#: Special methods that are wrapped in addition to the methods without a leading underscore.
 _GUARDED_SPECIAL_METHODS = ("__init__", "__new__", "__call__", "__getitem__")
 #: Modules that are skipped when the error boundary looks for the calling module, because they only
-#: pass the call on.
+#: forward calls from other modules.
 _MODULES_CALLING_FOR_THEIR_CALLER = ("dataclasses", "functools", "rsfstudy._deprecation")
 
 
@@ -52,7 +52,7 @@ def error_boundary(
     function : callable
         A public function or method.
     is_called_internally : bool, default: False
-        If True, calls from within rsfstudy are guarded too.
+        If True, the error boundary also converts exceptions in calls from within rsfstudy.
     unchanged_exceptions : tuple of type, optional
         Exceptions that are not converted. The defaults are errors of rsfstudy, warnings, and the
         exception that a debugger raises to quit.
@@ -81,7 +81,8 @@ def guard_methods(guarded_class: C) -> C:
 
     The wrapped constructor also rejects arguments that do not match their annotations. Most
     dataclasses store any argument, so a wrong argument would cause an error much later. Static
-    methods are not wrapped, because the engines compile the static methods of parts.
+    methods are not wrapped, because the engines compile the static methods of friction laws and
+    other model components.
 
     Parameters
     ----------

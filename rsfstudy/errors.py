@@ -20,13 +20,13 @@ __getattr__ = renamed_names(__name__)
 _MAX_CHARACTERS_OF_VALUE, _MAX_CHOICES, _MAX_CHOICES_WITH_SUGGESTIONS = 200, 60, 20
 #: Maximum number of characters of a message.
 _MAX_MESSAGE_LENGTH = 5000
-#: Maximum number and maximum length of the choices that are compared with a value. The limits bound
-#: the time of the comparison.
+#: Maximum number and maximum length of the valid choices that are compared with an invalid value to
+#: suggest similar choices. The limits bound the computing time of the comparison.
 _MAX_COMPARED_CHOICES, _MAX_CHOICE_LENGTH_FOR_SUGGESTION = 1000, 100
 
 
 class _ShortValueRepr(reprlib.Repr):
-    """Formatter of values with limited length.
+    """Formatter that limits the length of formatted values.
 
     NumPy scalars are formatted as Python numbers.
     """
@@ -125,7 +125,7 @@ class InvalidValue(RsfStudyError, ValueError):
         self.value = value
 
     def with_location(self, place: str) -> InvalidValue:
-        """Return a copy of the error whose message begins with a location.
+        """Return a copy of the error with a location at the beginning of the message.
 
         Parameters
         ----------
@@ -135,7 +135,7 @@ class InvalidValue(RsfStudyError, ValueError):
         Returns
         -------
         InvalidValue
-            Copy with the same name and value.
+            Copy of the error with the same name and value.
         """
         placed = InvalidValue.__new__(InvalidValue)
         Exception.__init__(placed, f"{shorten_text(place)}: {self}")
@@ -214,19 +214,20 @@ class IncompleteWarning(RsfStudyWarning):
 
 
 def shorten_text(text: object, max_length: int = _MAX_CHARACTERS_OF_VALUE) -> str:
-    """Shorten a text by replacing its middle with an ellipsis.
+    """Shorten a string by replacing its middle with an ellipsis.
 
     Parameters
     ----------
     text : object
-        Text, or an object that is converted to a string.
+        String, or an object that is converted to a string.
     max_length : int, default: 200
         Maximum number of characters without the ellipsis.
 
     Returns
     -------
     str
-        The text itself if it is short enough. Otherwise the beginning and the end of the text.
+        The unchanged string if it is short enough. Otherwise the beginning and the end of the
+        string.
     """
     whole, half = str(text), max_length // 2
     return whole if len(whole) <= max_length else f"{whole[:half]}...{whole[-half:]}"
@@ -238,12 +239,12 @@ def escape_control_characters(text: str) -> str:
     Parameters
     ----------
     text : str
-        Text of a message. Newline characters are kept.
+        Message. Newline characters are not replaced.
 
     Returns
     -------
     str
-        Text that can be printed safely on a terminal.
+        Message that can be printed safely on a terminal.
     """
     characters = (c if c.isprintable() or c == "\n" else c.encode("unicode_escape") for c in text)
     return "".join(c if isinstance(c, str) else c.decode() for c in characters)

@@ -8,9 +8,9 @@ from typing import Any
 
 import numpy as np
 
-#: Maximum number of values of a list that are printed without abbreviation.
+#: Maximum length of a list that is printed without abbreviation.
 _MAX_LISTED_VALUES = 8
-#: Decimal numbers with at least six decimal places, which are rounded in titles and messages.
+#: Pattern of decimal numbers with at least six decimal places, which titles and messages round.
 _LONG_DECIMAL_NUMBER_PATTERN = re.compile(r"(?<![\w.])\d+\.\d{6,}(?:e[+-]?\d+)?")
 
 
@@ -50,7 +50,7 @@ def is_sequence_of_axis_values(value: Any) -> bool:
 
 
 def format_overrides(overrides: Mapping[str, Any]) -> str:
-    """Format overrides as a user types them on the command line.
+    """Format overrides in the syntax of the command line.
 
     Long lists are abbreviated, and long decimal numbers are rounded to six significant digits.
 
@@ -101,7 +101,7 @@ def pluralize(count: int, noun: str) -> str:
     count : int
         Number of objects.
     noun : str
-        Noun in the singular. The plural is formed with "s".
+        Singular noun. The plural is formed by adding "s".
 
     Returns
     -------

@@ -60,7 +60,7 @@ class Quantity:
 
     @property
     def attributes(self) -> dict[str, Any]:
-        """Attributes of a variable that holds the quantity.
+        """Attributes of a variable that contains the quantity.
 
         Empty attributes are omitted.
         """
@@ -83,8 +83,8 @@ class Quantity:
 class Output(Quantity):
     r"""Number or array that a measure computes.
 
-    If only a name is given, the shared vocabulary describes the output. An output that the
-    vocabulary does not contain is described by its name.
+    If only a name is passed, the symbol, units and description of the output are taken from the
+    shared vocabulary. If the vocabulary does not contain the output, the description is the name.
 
     Parameters
     ----------
@@ -96,24 +96,24 @@ class Output(Quantity):
         Units in the syntax of UDUNITS.
     long_name : str, default: ""
         Description of the output. The description is required if a symbol, units or a scale is
-        given.
+        passed.
     scale : str, default: ""
         Scale of a dimensionless output, for example "D_c/V_*". The product of value and scale is a
         quantity in SI units.
     flags : tuple of str, default: ()
         Meanings of the codes 0, 1, 2, ... of a categorical output.
     dims : tuple of str, default: ()
-        Dimensions of the output within one cell.
+        Names of the dimensions of the output in a single cell of a study.
     error : bool, default: False
         If True, the measure also computes the numerical error estimate ``<name>_error``.
     optional : bool, default: False
-        If True, a successful outcome may omit the output and its error estimate. The message of the
-        outcome then gives the reason.
+        If True, a successful outcome may omit the output and its error estimate. If the output is
+        omitted, the message of the outcome contains the reason.
 
     Raises
     ------
     InvalidValue
-        If a symbol, units or a scale is given without a long name.
+        If a symbol, units or a scale is passed without a long name.
 
     Examples
     --------
@@ -153,8 +153,8 @@ def is_variable_name(name: object) -> bool:
     Returns
     -------
     bool
-        True for Python identifiers in Unicode normalisation form C. NetCDF files normalise names to
-        this form.
+        True for Python identifiers in Unicode normalisation form C. NetCDF files normalise variable
+        names to form C.
     """
     return isinstance(name, str) and name.isidentifier() and unicodedata.is_normalized("NFC", name)
 
@@ -194,7 +194,7 @@ def split_unit_quotient(unit_quotient: str) -> list[str]:
 
 
 def units_or_scale_of_variable(attributes: Mapping[Any, Any]) -> str:
-    """Return the units of a variable, with scales of dimensionless quantities.
+    """Return the units of a variable, or the scale of a normalised variable.
 
     Parameters
     ----------
@@ -204,7 +204,8 @@ def units_or_scale_of_variable(attributes: Mapping[Any, Any]) -> str:
     Returns
     -------
     str
-        Units. If the variable has a scale, the scale replaces the units of the numerator.
+        Units of the variable. If the variable has a scale, the scale replaces the units of the
+        numerator.
     """
     units, scale = str(attributes.get("units", "")), str(attributes.get("scale", ""))
     return format_unit_quotient([scale, *split_unit_quotient(units)[1:]]) if scale else units
@@ -221,7 +222,8 @@ def split_heading_into_name_and_units(text: str) -> tuple[str, str] | None:
     Returns
     -------
     tuple of str or None
-        Name and units. The value is None if the heading does not have this form.
+        Name and units. The value is None if the heading contains no units in parentheses or
+        brackets.
     """
     match = _HEADING_WITH_UNITS_PATTERN.fullmatch(text.strip())
     return (match[1], match[2].strip()) if match else None
@@ -263,14 +265,14 @@ def html_table(
 ) -> HtmlMarkup:
     """Format a table in HTML.
 
-    All texts are escaped except ``HtmlMarkup`` objects.
+    All strings except ``HtmlMarkup`` objects are escaped.
 
     Parameters
     ----------
     headings : sequence of str
         Column headings.
     rows : iterable of sequence
-        Rows of texts and numbers. Each row has one item per heading.
+        Rows of strings and numbers. Each row has one item per heading.
     caption : str, default: ""
         Text above the table.
 
@@ -365,7 +367,8 @@ def html_symbol(formula: str) -> HtmlMarkup:
     Parameters
     ----------
     formula : str
-        Symbol of a quantity. A text without dollar signs is only escaped.
+        Symbol of a quantity. If the symbol contains no dollar signs, it is escaped but not
+        converted.
 
     Returns
     -------
@@ -392,7 +395,7 @@ def html_unit(quantity: Quantity) -> HtmlMarkup:
     Returns
     -------
     HtmlMarkup
-        Scale of a dimensionless quantity, or the units. The text is empty if a dimensionless
+        Scale of a dimensionless quantity, or the units. The string is empty if a dimensionless
         quantity has no scale.
     """
     if quantity.scale:

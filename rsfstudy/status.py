@@ -1,6 +1,6 @@
 """Status codes of a cell.
 
-A status is an answer, a failure, or the mark of a cell that has not been computed yet.
+A status indicates a valid answer, a failure, or a cell that has not been computed yet.
 """
 
 from __future__ import annotations
@@ -12,8 +12,8 @@ from enum import IntEnum, unique
 class Status(IntEnum):
     """Outcome of one cell.
 
-    Results files store the integer value of the status as a flag variable. Values from
-    ``WORK_BUDGET_SPENT`` onwards are not answers.
+    Results files store the integer value of the status as a flag variable. Statuses with an integer
+    value of at least ``WORK_BUDGET_SPENT`` are not answers.
 
     Attributes
     ----------
@@ -74,7 +74,7 @@ class Status(IntEnum):
     def has_values(self) -> bool:
         """True if the cell has usable values.
 
-        The standard errors of the values may be invalid.
+        The values may be usable even if their standard errors are invalid.
         """
         return self in (Status.OK, Status.ERRORS_NOT_VALID)
 
@@ -87,5 +87,5 @@ class Status(IntEnum):
         return self < Status.WORK_BUDGET_SPENT
 
 
-#: Labels of the statuses by the integer that files store.
+#: Mapping from the integer codes in results files to the labels of the statuses.
 STATUS_LABELS = {int(status): status.label for status in Status}

@@ -20,7 +20,7 @@ from rsfstudy.slider import SCENE_FIELD_QUANTITIES as SCENE
 
 
 def _read_vocabulary() -> Iterator[Quantity]:
-    """Yield the quantities of ``vocabulary.csv``, which exclude scene fields.
+    """Yield the quantities of ``vocabulary.csv``, which contains no scene fields.
 
     The file lists quantities of scenes and rigs first, then quantities of measures and motions,
     then quantities of reductions, and finally quantities that every lattice has. Datasets and pages
@@ -48,7 +48,8 @@ _DESCRIPTION_BY_VARIABLE_SUFFIX = {
 
 _SUFFIXES_OF_COUNT_VARIABLES = ("points", "crossings")
 
-#: Variables with measured times, which differ between two runs of the same study.
+#: Variables that contain measured computing times, and therefore differ between two runs of the
+#: same study.
 TIMING_VARIABLES = (
     "wall_time",
     "run_time",
@@ -60,7 +61,8 @@ TIMING_VARIABLES = (
     "time_per_evaluation_in_rupture",
 )
 
-#: Coordinates that are computed from an axis. Each name maps to the axis and the formula.
+#: Coordinates that are computed from an axis. The dictionary maps the name of a coordinate to the
+#: name of the axis and the formula.
 FORMULAS_OF_DERIVED_COORDINATES: dict[str, tuple[str, Callable[[float], float]]] = {
     "log_load_velocity_ratio": (
         "load_velocity_ratio",

@@ -120,8 +120,8 @@ class Bifurcation(Measure):
     mean growth of perturbations over the recorded events, with a standard error. If the motion
     approaches a cycle, the Lyapunov exponent is the logarithm of the absolute value of the largest
     multiplier divided by the period, without a standard error. The peaks of a chaotic motion have
-    no error estimate, because a more accurate integration does not reproduce them. The error of the
-    number of events per period is zero, because this number is an integer.
+    no error estimate, because a more accurate integration does not reproduce the peaks. The error
+    of the number of events per period is zero, because this number is an integer.
 
     Parameters
     ----------
@@ -157,7 +157,7 @@ class Bifurcation(Measure):
         return {"event": np.arange(1, self.events + 1)}
 
     def compute(self, scene: Scene, accuracy: Accuracy, meter: WorkMeter) -> Outcome:
-        """Follow the events, and find the period-one cycle.
+        """Integrate the motion event by event, and find the period-one cycle.
 
         The period-one cycle is computed at two accuracies to estimate its errors.
 
@@ -236,7 +236,7 @@ def _one_event_cycle_outputs(
     message : str
         Explanation of the status.
     values : dict of str to float
-        Results of the cycle. Empty if no period-one cycle is found.
+        Results of the cycle. The dictionary is empty if no period-one cycle is found.
     """
     one = _find_one_event_cycle(ReturnMap(scene, accuracy, meter), motion.cycles)
     if one is None:
@@ -282,8 +282,8 @@ def _mean_growth(by: ReturnMap, seen: Sequence[Cycle], kept: int) -> tuple[float
     Returns
     -------
     tuple of float
-        Mean growth and its standard error. Both are NaN if a perturbed motion does not complete a
-        cycle.
+        Mean growth and its standard error. The two values are NaN if a perturbed motion does not
+        complete a cycle.
     """
     seen = seen[-(kept + _ALIGNMENT_EVENTS) :]
     step = (
@@ -321,7 +321,7 @@ def _find_one_event_cycle(by: ReturnMap, seen: Sequence[Cycle]) -> PeriodicOrbit
     Returns
     -------
     Orbit or None
-        None if the search fails from all starting points.
+        Period-one cycle. The value is None if the search fails from all starting points.
     """
     for near in _closest_returns(seen):
         # After a period doubling, successive events alternate between the two sides of the cycle.

@@ -26,17 +26,17 @@ _RESULT_DESCRIPTIONS = {
 class CheapestIntegrator(Reduction):
     """Integrator that reaches a number of correct digits with the least work.
 
-    The work for exactly this number of digits is interpolated logarithmically between neighbouring
-    runs of the same integrator. Failed runs are ignored.
+    The work is the number of right-hand-side evaluations, which is interpolated logarithmically
+    between neighbouring runs of the same integrator. Failed runs are ignored.
 
     Parameters
     ----------
     name : str
         Prefix of the results, which have a dimension ``digits``. ``<name>_integrator`` is the name
-        of the most efficient integrator, ``<name>_work`` is its work, and ``<name>_relative`` is
-        the work of each integrator relative to the default integrator. The results
-        ``<name>_default_work``, ``<name>_default_time``, ``<name>_default_request`` (number of
-        digits to request) and ``<name>_ratio`` (work relative to the least work) describe the
+        of the most efficient integrator, ``<name>_work`` is the work of this integrator, and
+        ``<name>_relative`` is the work of each integrator relative to the default integrator. The
+        results ``<name>_default_work``, ``<name>_default_time``, ``<name>_default_request`` (number
+        of digits to request) and ``<name>_ratio`` (work relative to the least work) describe the
         default integrator.
     of : str
         Variable that contains the achieved digits along ``integrator`` and ``requested_digits``.
@@ -69,7 +69,8 @@ class CheapestIntegrator(Reduction):
         Returns
         -------
         xarray.Dataset
-            Empty if the default integrator is not part of the dataset.
+            Comparison of the integrators. The dataset is empty if the default integrator was not
+            run.
         """
         names = dataset["integrator"].values.astype(str)
         if self.default not in names:
@@ -123,7 +124,7 @@ def _values_at_digits(achieved: np.ndarray, values: np.ndarray, wanted: np.ndarr
     Returns
     -------
     ndarray
-        Interpolated values. NaN for numbers of digits that the runs do not reach.
+        Interpolated values, with NaN for numbers of digits that the runs do not reach.
     """
     known = np.isfinite(achieved) & np.isfinite(values)
     achieved, values = achieved[known], values[known]
@@ -141,7 +142,7 @@ def _first_value_with_digits(kept: np.ndarray, values: np.ndarray, digits: float
     Parameters
     ----------
     kept : ndarray
-        Digits that a run and all runs with tighter tolerances achieve.
+        Number of digits that both the run and all runs with tighter tolerances achieve.
     values : ndarray
         Values of each run.
     digits : float
@@ -150,7 +151,7 @@ def _first_value_with_digits(kept: np.ndarray, values: np.ndarray, digits: float
     Returns
     -------
     float
-        NaN if the runs do not reach the number of digits.
+        Interpolated value. The value is NaN if the runs do not reach the number of digits.
     """
     reached = np.flatnonzero(kept >= digits)
     if reached.size == 0:

@@ -37,8 +37,8 @@ START_DISPLACEMENT_STEP, MAX_EVENTS = 0.1, 300
 #: Lower bound of error estimates, relative to the requested accuracy, because two runs may agree by
 #: chance.
 _COINCIDENCE_FLOOR = 0.06
-#: Value of ln(V/V_*) at which the linear equations stop. The remaining time to the event is then
-#: approximately exp(-9) D_c/V_*, which is negligible.
+#: Value of ln(V/V_*) at which the linear equations stop. The remaining time to the event at this
+#: slip rate is approximately exp(-9) D_c/V_*, which is negligible.
 NEGLIGIBLE_TIME_LOG_RATE = 9.0
 #: Number of times at which Coulomb stress is evaluated.
 COULOMB_STRESS_SAMPLES = 2001
@@ -182,7 +182,7 @@ class ClockAdvance(Measure):
         Returns
         -------
         _NextEvent or None
-            None if there is no stick-slip motion.
+            Next event. The value is None if there is no stick-slip motion.
         """
         free = scene.with_segment(Segment(scene.load_velocity))
         cycle = _find_free_cycle(free, accuracy, meter)
@@ -211,7 +211,7 @@ class _NextEvent(NamedTuple):
     remaining_time : float
         Time in D_c/V_* from the beginning of the train to the event that occurs without waves.
     cycle_start : Point
-        Point of the slider at the beginning of the train.
+        State of the slider at the beginning of the train.
     train_start : float
         Friction coefficient at the onset of an event without waves, when V rises through V_0.
     """
@@ -240,8 +240,8 @@ def _find_free_cycle(
     Returns
     -------
     tuple or None
-        Point of the cycle at which V = V_0, and the times of the next two events. None if the
-        motion settles to steady sliding.
+        State of the slider when V = V_0, and the times of the next two events. The value is None if
+        the motion settles to steady sliding.
     """
     nudged = free.with_segment(Segment(free.load_velocity, START_DISPLACEMENT_STEP))
     approach = LimitCycleSearch(nudged, accuracy, meter)
@@ -257,14 +257,15 @@ def _find_free_cycle(
 
 
 def _event_specifications(scene: Scene) -> list[EventSpecification]:
-    """Return the specification of a rise of slip rate through the norm."""
+    """Return the event at which slip rate rises through the instability norm."""
     return [rise("log_slip_rate", scene.log_instability_rate)]
 
 
 def _event_times(motion: Iterator[Event], count: int) -> list[float]:
     """Return the times of the first events of a motion.
 
-    The motion must have no event specifications except the rise through the norm.
+    The only event specification of the motion must be the rise of slip rate through the instability
+    norm.
     """
     return list(islice((event.time for event in motion if event.specification is not None), count))
 
@@ -330,8 +331,8 @@ def _linear_clock_advance(scene: Scene, found: _NextEvent, meter: WorkMeter) -> 
     Returns
     -------
     float
-        Clock advance in D_c/V_*. NaN if the scene has other equations, for example radiation
-        damping, another evolution law, or a dependence of the state on normal stress.
+        Clock advance in D_c/V_*. The value is NaN if the scene has other equations, for example
+        radiation damping, another evolution law, or a dependence of the state on normal stress.
     """
     damps = scene.parts.dynamics.radiated_stress_slope(0.0)
     if scene.law not in LINEARISED_LAWS or scene.normal_stress != "imposed" or scene.alpha or damps:
@@ -344,7 +345,7 @@ def _linear_clock_advance(scene: Scene, found: _NextEvent, meter: WorkMeter) -> 
     )
 
     def along(t: float, y: np.ndarray, pressed: float) -> tuple[float, float, list[float]]:
-        """Evaluate the equations of the motion and of the perturbations.
+        """Evaluate the equations of motion and the equations of the perturbations.
 
         Parameters
         ----------

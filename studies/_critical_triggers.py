@@ -15,8 +15,8 @@ from rsfstudy.measures import CriticalStep, Measure, Outcome, Output, Status
 from rsfstudy.motion import WorkMeter
 from rsfstudy.slider import effective_friction
 
-#: Triggers. The decrease of normal stress comes first, because a scene with constant normal stress
-#: rejects this step.
+#: Triggers in the order of computation. The decrease of normal stress comes first, because a scene
+#: with constant normal stress rejects a step of normal stress.
 _NORMAL_STRESS_FALL = CriticalStep(of="normal_stress_step", direction="down")
 _DISPLACEMENT_STEP, _VELOCITY_STEP = (
     CriticalStep(of="displacement_step"),
@@ -38,7 +38,7 @@ def _trigger_outputs(trigger: CriticalStep) -> tuple[Output, ...]:
 
 
 _SYMBOL = r"$\Delta\mathrm{CFS}/\sigma_*$"
-#: Stress changes and their ratios.
+#: Outputs for the stress changes and their ratios.
 _STRESS_OUTPUTS = (
     Output(
         "coulomb_stress_of_displacement",
@@ -115,7 +115,7 @@ class Triggers(Measure):
 
     @property
     def work_by_digits(self) -> Mapping[float, float]:
-        """Relative work by number of digits, as for ``CriticalStep``."""
+        """Relative number of right-hand-side evaluations by number of digits."""
         return _NORMAL_STRESS_FALL.work_by_digits
 
     def compute(self, scene: Scene, accuracy: Accuracy, meter: WorkMeter) -> Outcome:
@@ -171,7 +171,7 @@ def _reason_without_effective_friction(scene: Scene) -> str:
     Returns
     -------
     str
-        Description of the part. Empty if the effective friction is defined.
+        Description of the part. The string is empty if the effective friction is defined.
     """
     law, stress, fluid = scene.parts.law, scene.parts.normal_stress, scene.parts.fluid
     if stress.coupling is None or stress.normal_stress is None:
@@ -239,7 +239,7 @@ def _trigger_stresses(
     Returns
     -------
     dict
-        Stress changes in sigma_*, their ratios, and the errors of both.
+        Stress changes in sigma_*, ratios of stress changes, and errors of all values.
     """
     friction = effective_friction(scene.mu_star, scene.parts.law.b_over_a, alpha)
     pulled = _scale_with_error(
@@ -264,7 +264,7 @@ def _trigger_stresses(
 
 
 def _scale_with_error(factor: float, name: str, values: Mapping[str, float]) -> tuple[float, float]:
-    """Return a result multiplied by a factor, and its error."""
+    """Return a result multiplied by a factor, and the error of the product."""
     value, error = values.get(name, math.nan), values.get(f"{name}_error", math.nan)
     return factor * value, abs(factor) * error
 
@@ -272,9 +272,10 @@ def _scale_with_error(factor: float, name: str, values: Mapping[str, float]) -> 
 def _quotient_with_error(
     above: tuple[float, float], below: tuple[float, float]
 ) -> tuple[float, float]:
-    r"""Return the quotient of two results and its error.
+    r"""Return the quotient of two results, and the error of the quotient.
 
-    The error is absolute: :math:`(\Delta x + |x/y|\,\Delta y)/|y|` for a quotient :math:`x/y`.
+    The error of a quotient is absolute: :math:`(\Delta x + |x/y|\,\Delta y)/|y|` for a quotient
+    :math:`x/y`.
     """
     (value, error), (divisor, its_error) = above, below
     if not divisor:

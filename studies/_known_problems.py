@@ -31,14 +31,13 @@ class Problem:
     measure : Measure
         Measure that is computed for the scene.
     quantity : str, optional
-        Output of the measure that is known. By default, the primary output.
+        Name of the output whose value is known. The default is the primary output of the measure.
     answer : float, optional
-        Known value. None if the answer is a status.
+        Known value. The value is None if the answer is a status.
     status : Status, optional
         Expected status of the outcome.
     scale : float, default: 0.0
-        Errors are relative to this scale. By default, the scale is the absolute value of the
-        answer.
+        Value to which errors are relative. The default is the absolute value of the answer.
     uncertainty : float, default: 0.0
         Error of the known value, relative to the scale.
     source : str
@@ -90,7 +89,7 @@ class Problem:
         return float(outcome.values[f"{self.quantity}_error"]) / self._error_scale
 
     def _output_value(self, outcome: Outcome) -> float:
-        """Return the value of the known output."""
+        """Return the value of the output whose exact value is known."""
         return float(outcome.values[self.quantity])
 
     @property
@@ -187,7 +186,7 @@ class ProblemMeasure(Measure):
         Returns
         -------
         dict
-            Field ``problems``. Empty if the description contains no problems.
+            Field ``problems``. The dictionary is empty if the description contains no problems.
 
         Raises
         ------
@@ -220,12 +219,12 @@ class ProblemMeasure(Measure):
         Returns
         -------
         Problem
-            Problem with this scene.
+            Known problem that has the scene.
 
         Raises
         ------
         InvalidValue
-            If there is no problem with this scene, for example because an axis or a fixed value was
+            If no known problem has the scene, for example because an axis or a fixed value was
             changed.
         """
         for problem in self.problems:

@@ -20,7 +20,7 @@ COMPOSITE_CUTOFF_VELOCITY, CUT_OFF_VELOCITY = 100.0, 1e4
 
 
 def _family_fields(exponent: float) -> dict[str, str | float]:
-    """Return the scene fields of a member of the family of laws."""
+    """Return the scene fields that select a law of the family."""
     return {"law": "family", "law_exponent": exponent}
 
 
@@ -71,7 +71,7 @@ _STYLES_OUTSIDE_FAMILY = {
 
 
 def family_colour(exponent: float) -> Any:
-    """Return the colour of a member of the family of laws.
+    """Return the colour in which a law of the family is drawn.
 
     Parameters
     ----------
@@ -91,7 +91,7 @@ def family_colour(exponent: float) -> Any:
 def law_style(row: xr.Dataset) -> dict[str, Any]:
     """Return the line style of a law.
 
-    Members of the family are drawn as solid lines with markers, from dark to light. Other laws are
+    Laws of the family are drawn as solid lines with markers, from dark to light. Other laws are
     drawn as dashed lines in other colours, without markers.
 
     Parameters

@@ -55,7 +55,7 @@ class ExactResponse(NamedTuple):
         Returns
         -------
         ndarray
-            Displacements in um. Negative before the step.
+            Displacements in um, which are negative before the step.
         """
         late = time - self.step
         return np.where(late < 0.0, self.before, self.after) * late
@@ -169,7 +169,8 @@ class NoiseKind:
     def _times(self, truth: ExactResponse, rng: np.random.Generator, margin: int) -> np.ndarray:
         """Return the sample times.
 
-        The record is longer by ``margin`` rows at both ends, because the running mean shortens it.
+        The record is longer by ``margin`` rows at both ends, because the running mean shortens the
+        record.
         """
         slow, fast = (1.0 / rate for rate in self.rate)
         first = np.arange(-margin * slow + 0.5 * slow, truth.step, slow)

@@ -117,7 +117,7 @@ class _ResponseRecord(NamedTuple):
         Samples at regular intervals. The last sample is one response period after the first.
     spring_stress : ndarray
         Spring stress at all samples except the last. The linear trend over the period is removed,
-        because it would contribute to the overtones.
+        because a trend would contribute to the overtones.
     imposed : ndarray
         Imposed normal stress at all samples except the last.
     trend : float
@@ -225,18 +225,18 @@ class NormalStressResponse(RecordingMeasure):
     and provides the results.
 
     The response to strong oscillations may repeat only after 2, 3 or 4 forcing periods. The result
-    ``response_period`` reports this number, and all other results refer to a complete response
-    period. The result ``settled`` is 1 if the two records agree to 0.1 % of the range of spring
-    stress. If the response does not repeat within 4 forcing periods, the status is
+    ``response_period`` reports the number of forcing periods, and all other results refer to a
+    complete response period. The result ``settled`` is 1 if the two records agree to 0.1 % of the
+    range of spring stress. If the response does not repeat within 4 forcing periods, the status is
     ``not_periodic``. If steady sliding is unstable, transients do not decay, and the status is
     ``not_applicable``.
 
     Parameters
     ----------
     samples : int, default: 64
-        Number of samples per forcing period, an even number. The measure uses up to eight times
-        this number if necessary for the requested accuracy. The record along ``phase`` contains
-        ``samples + 1`` points of one response period.
+        Number of samples per forcing period, an even number. The measure uses up to eight times as
+        many samples if necessary for the requested accuracy. The record along ``phase`` contains
+        ``samples + 1`` samples of one response period.
 
     References
     ----------
@@ -258,7 +258,7 @@ class NormalStressResponse(RecordingMeasure):
 
     @property
     def recorded_point_count(self) -> int:
-        """Number of points of the record along ``phase``."""
+        """Number of samples of the record along ``phase``."""
         return self.samples + 1
 
     def error_scales(self, scene: Scene, values: Mapping[str, Any]) -> Mapping[str, float]:
@@ -310,7 +310,7 @@ class NormalStressResponse(RecordingMeasure):
         Raises
         ------
         InvalidValue
-            If the oscillation begins later or ends.
+            If the oscillation does not begin at time 0, or if the oscillation ends.
         """
         loading = scene.parts.loading
         if not isinstance(loading, NormalStressOscillation):
@@ -381,9 +381,9 @@ class NormalStressResponse(RecordingMeasure):
         Returns
         -------
         point : Point
-            End of the motion.
+            State of the slider at the end of the motion.
         count : int
-            Number of forcing periods. Zero if the response does not repeat.
+            Number of forcing periods. The number is zero if the response does not repeat.
         """
         period = scene.oscillation_period
         *_earlier, begin = integrate_events(scene, accuracy, meter, until=waits * period)
@@ -414,14 +414,14 @@ class NormalStressResponse(RecordingMeasure):
         accuracy: Accuracy,
         meter: WorkMeter,
     ) -> tuple[_ResponseRecord, _ResponseRecord]:
-        """Record the response with enough samples for the requested accuracy.
+        """Record the response with sufficient samples for the requested accuracy.
 
         Parameters
         ----------
         scene : Scene
             Parameters of the slider.
         start : Point
-            Point at which the first record begins.
+            State of the slider at the beginning of the first record.
         way : _ResponsePeriod
             Period of the response.
         accuracy : Accuracy
@@ -432,8 +432,8 @@ class NormalStressResponse(RecordingMeasure):
         Returns
         -------
         tuple of _ResponseRecord
-            Two records. The resolution error may be too large if the maximum number of samples is
-            not sufficient.
+            Two records of the response. The resolution error may be too large if the maximum number
+            of samples is not sufficient.
         """
         instants = way.forcing_periods * self.samples
         most = _MAX_SAMPLE_REFINEMENT * instants
@@ -465,7 +465,7 @@ class NormalStressResponse(RecordingMeasure):
         scene : Scene
             Parameters of the slider.
         start : Point
-            Point at which the first record begins.
+            State of the slider at the beginning of the first record.
         way : _ResponsePeriod
             Period of the response.
         instants : int
@@ -509,7 +509,7 @@ class NormalStressResponse(RecordingMeasure):
         scene : Scene
             Parameters of the slider.
         start : Point
-            Point at which the record begins.
+            State of the slider at the beginning of the record.
         way : _ResponsePeriod
             Period of the response.
         instants : int
@@ -585,7 +585,7 @@ def _estimate_errors(
     again : _ResponseRecord
         Record of the second run.
     moved : float
-        Relative change of the response between the two records of the first run.
+        Relative difference of the response between the two records of the first run.
     asked : tuple[Scene, Accuracy]
         Scene and requested accuracy.
 
@@ -619,7 +619,7 @@ def _estimate_errors(
 
 
 def _record_outputs(scene: Scene, events: Sequence[Event]) -> dict[str, np.ndarray]:
-    """Return the record along ``phase``."""
+    """Return the recorded variables along the dimension ``phase``."""
     time = np.array([event.time for event in events])
     return {
         "time": time,

@@ -40,8 +40,8 @@ _FINAL_SHARE, _FINAL_FRICTION_RTOL = 0.1, 0.01
 #: Largest value of |ln(V/V_*)| at ``fit_from``. If the slip rate is closer to V_*, the spring
 #: stress has followed the change of strength.
 _SPRING_RESPONSE_LOG_RATE = math.log(2.0)
-#: Number of iterations that find the time at which a slip is reached, and the smallest ln(V/V_*)
-#: that is used in these iterations.
+#: Number of iterations that find the time at which slip reaches a prescribed value, and the
+#: smallest ln(V/V_*) that is used in the iterations.
 _MAX_EXTENSIONS, _MIN_LOG_SLIP_RATE = 3, -600.0
 #: Largest direct change of friction relative to mu_* that is attributed to rounding.
 _NEGLIGIBLE_DIRECT_CHANGE = 10.0 * RELATIVE_ROUNDING_ERROR
@@ -96,8 +96,8 @@ class _TransientRecord(NamedTuple):
     rows : ndarray
         Recorded samples.
     friction : mapping of float to float
-        Friction by the slip at which friction is read. Empty if the spring stress has not followed
-        the change of strength at the first slip.
+        Mapping from slip to the friction at this slip. The mapping is empty if the spring stress
+        has not followed the change of strength at the first slip.
     """
 
     begin: Event
@@ -120,8 +120,8 @@ class _TransientRecord(NamedTuple):
         Returns
         -------
         float
-            Friction at the slip minus friction at the end of the record. NaN if friction was not
-            read at this slip.
+            Friction at the slip minus friction at the end of the record. The value is NaN if
+            friction was not read at this slip.
         """
         return self.friction.get(slip, math.nan) - self.final_friction
 
@@ -158,7 +158,7 @@ class NormalStressTransient(RecordingMeasure):
         Load point displacement of the record, in D_c. Friction at the end of the record is regarded
         as steady.
     phases : int, default: 300
-        Number of points of the record along ``phase``.
+        Number of samples of the record along ``phase``.
 
     References
     ----------
@@ -287,7 +287,8 @@ class NormalStressTransient(RecordingMeasure):
         Returns
         -------
         _TransientRecord or None
-            None if slip does not reach the values at which friction is read.
+            Record of the motion. The value is None if slip does not reach the values at which
+            friction is read.
         """
         recording = Recording()
         begin, *_others = integrate_events(
@@ -348,8 +349,8 @@ class NormalStressTransient(RecordingMeasure):
         Returns
         -------
         dict
-            Empty if the spring stress has not followed the change of strength, or if the remaining
-            transient does not decay exponentially.
+            Results by name. The dictionary is empty if the spring stress has not followed the
+            change of strength, or if the remaining transient does not decay exponentially.
         """
         first, last = (
             record.remaining_transient(self.fit_from),
@@ -391,7 +392,7 @@ class NormalStressTransient(RecordingMeasure):
     def _record_outputs(
         self, scene: Scene, record: _TransientRecord
     ) -> dict[str, float | np.ndarray]:
-        """Return the record, and the results that need no exponential fit."""
+        """Return the recorded variables, and the results that need no exponential fit."""
         rows, friction = record.rows, recorded_friction_coefficient(record.rows)
         late = rows[:, 0] >= (1.0 - _FINAL_SHARE) * self.record
         is_flat = bool(
@@ -428,7 +429,7 @@ class NormalStressTransient(RecordingMeasure):
         Returns
         -------
         float
-            Largest absolute difference. NaN if the law provides no closed form.
+            Largest absolute difference. The value is NaN if the law provides no closed form.
         """
         law, coupling = scene.parts.law, scene.parts.normal_stress.coupling
         if law.relaxation is None or law.depends_on_stress or coupling is None:

@@ -24,7 +24,7 @@ LN10 = math.log(10.0)
 
 
 def steady_line_key(cell: xr.Dataset) -> tuple[str, float, float]:
-    """Return the choices that determine the line of steady sliding.
+    """Return the parameters that determine the line of steady sliding.
 
     Cells with the same key share the same line, so the line is drawn only once.
 
@@ -81,7 +81,7 @@ def steady_line(cell: xr.Dataset, log10_rates: np.ndarray) -> np.ndarray:
     Returns
     -------
     ndarray
-        Shear stress in sigma_*. NaN if there is no steady sliding at a slip rate.
+        Shear stress in sigma_*. The stress is NaN if there is no steady sliding at a slip rate.
     """
     scene = scene_from_coordinates(cell)
     excesses = [
@@ -105,7 +105,7 @@ def constant_state_line(cell: xr.Dataset, state: float, log10_rates: np.ndarray)
     Returns
     -------
     ndarray
-        Shear stress in sigma_*. NaN if no shear stress balances friction.
+        Shear stress in sigma_*. The stress is NaN if no shear stress balances friction.
     """
     scene = scene_from_coordinates(cell)
     return _stresses_from_friction(scene, scene.a * log10_rates * LN10 + state)

@@ -1,4 +1,4 @@
-"""Random scenes, and the questions that are asked about them.
+"""Random scenes, and the quantities that are computed for the scenes.
 
 A question consists of a measure and of the random distributions of the loading parameters. All
 other parameters of a scene are drawn from wide ranges.
@@ -42,7 +42,7 @@ def draw_uniform(low: float, high: float) -> DrawFunction:
     Returns
     -------
     DrawFunction
-        Function of a random number generator.
+        Function that draws a number with a random number generator.
     """
     return lambda draw: float(draw.uniform(low, high))
 
@@ -60,7 +60,7 @@ def draw_log_uniform(low: float, high: float) -> DrawFunction:
     Returns
     -------
     DrawFunction
-        Function of a random number generator.
+        Function that draws a number with a random number generator.
     """
     exponent = draw_uniform(math.log(low), math.log(high))
     return lambda draw: math.exp(exponent(draw))
@@ -77,7 +77,7 @@ def draw_signed(size: DrawFunction) -> DrawFunction:
     Returns
     -------
     DrawFunction
-        Function of a random number generator.
+        Function that draws a number with a random number generator.
     """
     return lambda draw: size(draw) * (1.0 if draw.uniform() < 0.5 else -1.0)
 
@@ -158,8 +158,8 @@ ALL_QUESTIONS = {**MOTION_QUESTIONS, **LABORATORY_QUESTIONS}
 def random_scene(like: Scene, question: str, sample: int) -> Scene:
     """Draw a random scene.
 
-    The random number generator is seeded with the sample number and the type of the scene. The
-    result is therefore the same for each call.
+    The random number generator is seeded with the sample number and the type of the scene. Calls
+    with the same arguments therefore return the same scene.
 
     Parameters
     ----------

@@ -1,12 +1,12 @@
 """Reference values for the numerical accuracy of the package.
 
 The values of limit cycles and of critical steps were computed with
-``tests/benchmarks/extended_precision.py``. That program integrates the unknowns of the paper
-instead of the unknowns of rsfstudy. It uses extrapolated midpoint steps in extended precision
-(64-bit mantissa), and removes the error of the slow manifold by Richardson extrapolation. Two
-computations with different thresholds for the change of regime, at slip rate norms of 0.02 and
-0.01, agree to the uncertainty that is listed with each value. All other values are closed forms
-that were evaluated with 30 digits.
+``tests/benchmarks/extended_precision.py``. The program ``extended_precision.py`` integrates the
+unknowns of the paper instead of the unknowns of rsfstudy. The program uses extrapolated midpoint
+steps in extended precision (64-bit mantissa), and removes the error of the slow manifold by
+Richardson extrapolation. Two computations with different thresholds for the change of regime, at
+slip rate norms of 0.02 and 0.01, agree to the uncertainty that is listed with each value. All other
+values are closed forms that were evaluated with 30 digits.
 """
 
 from typing import NamedTuple
@@ -28,7 +28,7 @@ class KnownValue(NamedTuple):
     uncertainty : float, default: 0.0
         Error of the value, relative to ``scale``.
     scale : float, default: 0.0
-        Errors are relative to this scale. If the scale is zero, errors are relative to the known
+        Value to which errors are relative. If the scale is zero, errors are relative to the known
         value.
     """
 
@@ -45,7 +45,7 @@ CRITICAL_VELOCITY = KnownValue(
     2.633547063232728405, EXTENDED_PRECISION_SOURCE, 1e-17, 2.633547063232728405 - 1.0
 )
 
-#: Critical V_0/V_* for the same parameters, but k = (1 + 1e-8) k_cr.
+#: Critical V_0/V_* for the parameters of ``CRITICAL_VELOCITY``, except that k = (1 + 1e-8) k_cr.
 JUST_ABOVE_CRITICAL_STIFFNESS = KnownValue(1.9999494063490342617, scale=1.9999494063490342617 - 1.0)
 
 #: Critical V_0/V_* for the slowness law, alpha = 0.56, phi = 60 degrees, b/a = e and k = 1.5 k_cr.

@@ -47,8 +47,8 @@ BASE_SCENE = Scene(normal_stress="constant", a=0.01, b_over_a=1.3, stiffness=0.0
 FIT_ACCURACY = Accuracy(budget=50_000_000, engine="compiled")
 STEP_UP_PROTOCOL, STEP_BACK_PROTOCOL = "1:30, 10:270", "10:30, 1:270"
 _NUMBER_PATTERN = r"\s*(\d+\.?\d*(?:e[-+]?\d+)?)\s*"
-#: Velocity and displacement of a segment. If the letter s follows, the second number is the
-#: duration.
+#: Pattern of a protocol segment: velocity and displacement. If the letter s follows the second
+#: number, this number is the duration in s.
 _SEGMENT_PATTERN = re.compile(rf"{_NUMBER_PATTERN}:{_NUMBER_PATTERN}(s?)\s*")
 #: Ratio of the initial slip distance of a fit to the exact value.
 _INITIAL_SLIP_DISTANCE_FACTOR = 1.5
@@ -132,7 +132,7 @@ class SyntheticFit(Measure):
     noise : str, default: "ar"
         Noise model of the fit (see ``Fit``).
     fitted_law : str, optional
-        Law that is fitted. By default, the law of the scene.
+        Law that is fitted. The default is the law of the scene.
     seed : int, default: 0
         Seed of the random noise.
     """
@@ -189,7 +189,8 @@ class SyntheticFit(Measure):
     def inner_coordinates(self) -> Mapping[str, np.ndarray]:
         """Names of the parameters.
 
-        If each window has a separate value of a parameter, the first window is reported.
+        If each window has a separate value of a parameter, the value of the first window is
+        reported.
         """
         return {"parameter": np.array(self.free, dtype=object)}
 
@@ -199,7 +200,7 @@ class SyntheticFit(Measure):
         return add_window_numbers(self.free, len(self._window_segments()))
 
     def compute(self, scene: Scene, accuracy: Accuracy, meter: WorkMeter) -> Outcome:
-        """Draw a record and fit it.
+        """Draw a synthetic record, and fit the record.
 
         Parameters
         ----------
@@ -236,7 +237,7 @@ class SyntheticFit(Measure):
         return Outcome(Status.OK, self._compare_with_exact(search, found, true, promised, reasons))
 
     def _fit_noisy_record(self, scene: Scene, accuracy: Accuracy, meter: WorkMeter) -> Outcome:
-        """Draw a laboratory record and fit it in the same way as ``rsfstudy.fit``."""
+        """Draw a laboratory record, and fit the record in the same way as ``fit``."""
         from rsfstudy.measures import Fit  # The import is slow.
 
         kind, true = NOISE_KINDS[self.process], self._exact_parameters(scene)
@@ -329,7 +330,7 @@ class SyntheticFit(Measure):
         return values | {"flagged": float(bool(reasons))}
 
     def _window_segments(self) -> list[list[_ProtocolSegment]]:
-        """Return the segments of each window."""
+        """Return the protocol segments of each window."""
         return [_parse_segments(text, self.rows) for text in self.protocol.split(";")]
 
     def _exact_parameters(self, scene: Scene) -> dict[str, float]:
@@ -360,7 +361,7 @@ class SyntheticFit(Measure):
     def _joint_model(
         self, scene: Scene, accuracy: Accuracy, meter: WorkMeter, friction: np.ndarray | None = None
     ) -> JointModel:
-        """Return the model of the windows."""
+        """Return the joint model of all windows."""
         smooth = replace(accuracy, rtol=min(accuracy.rtol, 1e-9))
         parts = []
         for number, pieces in enumerate(self._window_segments()):
@@ -384,7 +385,7 @@ class SyntheticFit(Measure):
 
 
 def _parse_segments(text: str, rows: int) -> list[_ProtocolSegment]:
-    """Return the segments of a window."""
+    """Return the protocol segments of a window."""
     found: list[tuple[float, float, float]] = []
     for part in text.split(","):
         stated = _SEGMENT_PATTERN.fullmatch(part)

@@ -3,9 +3,9 @@
 Several problems with answers that are known to 12 or more digits are solved with each integrator of
 SciPy and at several requested accuracies. Limit cycles are also solved with combinations of two
 integrators, one of which is used during ruptures. The error is measured against the known answer,
-and the work includes all right-hand-side evaluations. Processor times are relative to DOP853 with 3
-requested digits on the same problem, and both are measured in alternation. The default settings of
-the package are based on this study.
+and the work includes all right-hand-side evaluations. Processor times are relative to the time of
+DOP853 with 3 requested digits on the same problem. The two integrators are timed in alternation.
+The default settings of the package are based on this study.
 """
 
 import math
@@ -189,7 +189,7 @@ class WorkPrecision(ProblemMeasure):
 
     @property
     def work_by_digits(self) -> Mapping[float, float]:
-        """Relative work by number of digits.
+        """Relative number of right-hand-side evaluations by number of digits.
 
         The work does not depend on the accuracy of the study, because each run has its own
         accuracy.

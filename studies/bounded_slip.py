@@ -48,12 +48,13 @@ class PathSeparation(Reduction):
     ----------
     name : str
         Prefix of the results. ``<name>_parting`` and ``<name>_merging`` are decimal logarithms of
-        V/V_*. They are NaN if the paths never separate, or if they do not merge before the first
-        minimum of slip rate. ``<name>_offset`` is the median difference of stress after the peak.
+        V/V_*. The slip rates are NaN if the paths never separate, or if the paths do not merge
+        before the first minimum of slip rate. ``<name>_offset`` is the median difference of stress
+        after the peak.
     of : str
         Variable that contains the stress along the path.
     along : str, default: "inertia"
-        Dimension of the two paths. It must have two points.
+        Dimension that distinguishes the two paths. The dimension must have a length of 2.
     tolerance : float, default: 0.001
         Largest difference of stress between paths that are considered equal, relative to the range
         of stress along the second path.
@@ -85,7 +86,8 @@ class PathSeparation(Reduction):
         Returns
         -------
         xarray.Dataset
-            Empty unless the dimension has two points.
+            Slip rates and difference of stress. The dataset is empty unless the dimension has a
+            length of 2.
         """
         if dataset.sizes.get(self.along, 0) != 2:
             return xr.Dataset()
@@ -114,7 +116,7 @@ class PathSeparation(Reduction):
         )
 
     def _compare(self, rates: np.ndarray, stresses: np.ndarray) -> tuple[float, float, float]:
-        """Return the two slip rates and the median difference of stress."""
+        """Return the slip rates of separation and merging, and the stress difference."""
         if not (np.isfinite(rates).all() and np.isfinite(stresses).all()):
             return np.nan, np.nan, np.nan
         one, other = (_branches(rate, stress) for rate, stress in zip(rates, stresses, strict=True))

@@ -56,10 +56,10 @@ _OUTPUTS = (
 class Coverage(Measure):
     """Ratios of errors to error estimates in a random scene.
 
-    The random scene has the law, normal stress condition and dynamics of the given scene. All other
-    parameters are drawn from wide ranges and are the same for each call. The exact results are
-    known from a run with a tolerance that is smaller by a factor of 100, within the error estimate
-    of that run.
+    The random scene has the law, normal stress condition and dynamics of a scene of the study. All
+    other parameters are drawn from wide ranges, with a fixed seed for each sample. The reference
+    results are computed with a tolerance that is smaller by a factor of 100, and their uncertainty
+    is the error estimate of the reference run.
 
     Parameters
     ----------
@@ -150,7 +150,7 @@ def _compare_errors(
 ) -> dict[str, np.ndarray]:
     """Compute the ratios of errors to their estimates and to the tolerance.
 
-    The uncertainty of the exact results is subtracted from the errors.
+    The uncertainty of the reference results is subtracted from the errors.
 
     Parameters
     ----------
@@ -164,7 +164,7 @@ def _compare_errors(
     Returns
     -------
     dict
-        Both ratios for each result. NaN for results that are missing.
+        Two ratios for each result. The ratios of missing results are NaN.
     """
     over_estimate, over_request = (np.full(len(_ESTIMATED_OUTPUTS), math.nan) for _ in range(2))
     for i, name in enumerate(_ESTIMATED_OUTPUTS):
@@ -207,7 +207,8 @@ class CoverageStatistics(Reduction):
         estimates), ``<name>_worst`` (largest ratio of an error to its estimate), ``<name>_typical``
         (median ratio of estimates to errors) and ``<name>_numbers`` (number of errors).
     of : str
-        Variable that contains the ratios of errors to estimates. NaN for missing results.
+        Variable that contains the ratios of errors to error estimates, with NaN for missing
+        results.
     by : tuple of str, optional
         Dimensions that are kept.
     """

@@ -6,8 +6,8 @@ law at variable normal stress, where it reaches 10^13 to 10^19 V_*. A cycle with
 needs half as many right-hand-side evaluations as a cycle with inertia. However, a cycle with
 radiation damping has no overshoot, so the static stress drop is smaller by 25 to 50 %. An effect
 that is not part of the scene adds no unknowns and no computing time. Times of a right-hand-side
-evaluation are relative to a quasi-static scene at constant normal stress. Both are timed in
-alternation.
+evaluation are relative to a quasi-static scene at constant normal stress. The two scenes are timed
+in alternation.
 """
 
 import math
@@ -44,8 +44,9 @@ DYNAMICS: dict[str, dict[str, bool | float]] = {
 FULL_SCENE_PLACE = {"coupling": "inclined driving, alpha", "dynamics": "inertia"}
 
 
-#: Number of evaluations per timing, and number of timings. The forms of the equations are timed in
-#: short turns, so that other processes on the machine affect all forms equally.
+#: Number of evaluations per timing, and number of timings. The equations of the scene and of the
+#: simplest scene are timed in short turns, so that other processes on the machine affect all
+#: timings equally.
 _EVALUATIONS_PER_TIMING, _TIMING_REPEATS = 100, 25
 #: Values of the unknowns at which the equations are evaluated. Additional states are zero.
 _SLOW_UNKNOWNS, _RUPTURE_UNKNOWNS = (0.01, 0.0), (0.01, 10.0, 0.01)
@@ -88,10 +89,10 @@ _OUTPUTS = (
 class EffectCost(Measure):
     """Limit cycle with the computational cost of its physical effects.
 
-    The results include the number of unknowns and the time of a right-hand-side evaluation for each
-    form of the equations. The fraction of evaluations during ruptures is reported as well. Times
-    are also reported relative to the simplest scene of the same law, which is quasi-static with
-    constant normal stress.
+    The number of unknowns and the time of a right-hand-side evaluation are reported separately for
+    the equations between ruptures and during ruptures. The results also include the fraction of
+    evaluations during ruptures. Times are also reported relative to the simplest scene of the same
+    law, which is quasi-static with constant normal stress.
     """
 
     name: ClassVar[str] = "effect_cost"

@@ -34,9 +34,10 @@ from ._synthetic_fit import (
 
 RECORDS = 24
 CLASSIC_PROCESSES, LAWS = ("white", "ar1", "ma3"), ("slip", "slowness")
-#: Kinds that cannot be modelled, with the smallest fraction of records that must be flagged.
+#: Kinds of noise that cannot be modelled, with the smallest fraction of records that must be
+#: flagged.
 FLAGGED_KINDS = {"coarsely_rounded": 0.95, "unstated_average": 0.8}
-#: Kinds whose coverage is reported without a claim, because 1/f noise is not modelled.
+#: Kinds of noise whose coverage is reported without a claim, because 1/f noise is not modelled.
 KINDS_WITHOUT_CLAIM = ("pink",)
 MODELLED_KINDS = [
     kind for kind in NOISE_KINDS if kind not in (*FLAGGED_KINDS, *KINDS_WITHOUT_CLAIM)
@@ -55,8 +56,8 @@ class ShareInside(Reduction):
     Parameters
     ----------
     name : str
-        Name of the fraction. ``<name>_least`` is the smallest fraction of any parameter minus
-        ``covers``, in binomial standard deviations.
+        Name of the fraction. ``<name>_least`` is the smallest fraction among all parameters minus
+        the nominal coverage, in binomial standard deviations.
     of : str
         Variable that is 1 inside the interval and 0 outside.
     covers : float, optional

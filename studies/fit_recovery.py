@@ -55,8 +55,9 @@ LOADINGS = {
 INITIAL_FACTORS = {"a": 1.2, "b": 0.8, "slip_distance": 1.5, "stiffness": 1.3}
 INITIAL_OFFSETS = {"alpha": 0.1, "law_exponent": 0.2}
 #: Largest deviation of a parameter by source of the record. For records of the model, the deviation
-#: is due to rounding and to the termination of the fit. For records of other code, it is due to the
-#: numerical errors of both motions, which are amplified because the parameters are correlated.
+#: is due to rounding and to the termination of the fit. For records of other code, the deviation is
+#: due to the numerical errors of both motions, which are amplified because the parameters are
+#: correlated.
 MAX_DEVIATIONS = {"the model": 1e-8, "other code": 1e-6}
 
 
@@ -72,9 +73,9 @@ class RecoveryError(Measure):
         Name of the loading history, a key of ``LOADINGS``.
     looked_for : str, default: "a b slip_distance mu_star trend1"
         Names of the free parameters, separated by spaces.
-    record_by : {"the model", "other code"
-        , default: "the model"} Method that computes the record: the model of the fit, or equations
-        for friction and ln(theta) with an integrator of SciPy.
+    record_by : {"the model", "other code"}, default: "the model"
+        Method that computes the record: the model of the fit, or equations for friction and
+        ln(theta) with an integrator of SciPy.
     """
 
     loading_of_record: str = "step up"
@@ -138,7 +139,7 @@ class RecoveryError(Measure):
         return {"largest_deviation": 1.0}
 
     def compute(self, scene: Scene, accuracy: Accuracy, meter: WorkMeter) -> Outcome:
-        """Compute a record and fit it.
+        """Compute a record, and fit the record.
 
         Parameters
         ----------

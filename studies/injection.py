@@ -1,7 +1,7 @@
 """Slow fluid injection and the stability of steady sliding.
 
-Pore pressure around the fault rises slowly and falls again, as given by a sampled record. The fault
-is drained, or dilatant with pores that drain into the surroundings. Before the injection, the
+Pore pressure around the fault rises slowly and falls again, according to a sampled record. The
+fault is drained, or dilatant with pores that drain into the surroundings. Before the injection, the
 spring is slightly softer than critical. The critical stiffness decreases with effective normal
 stress. Small perturbations therefore stop growing when k exceeds the critical stiffness at the
 current pressure in the fault, and start to grow again when k falls below the critical stiffness.
@@ -177,7 +177,7 @@ class _Departures(NamedTuple):
     when : ndarray
         Times at which the absolute difference of ln V has a local maximum.
     log_size : ndarray
-        Logarithm of the absolute difference at these times.
+        Logarithm of the absolute difference of ln V at the times ``when``.
     """
 
     time: np.ndarray
@@ -188,7 +188,7 @@ class _Departures(NamedTuple):
 
     @classmethod
     def follow(cls, scene: Scene, accuracy: Accuracy, meter: WorkMeter) -> "_Departures":
-        """Integrate the unperturbed and the perturbed motion along the record.
+        """Integrate the unperturbed and the perturbed motion over the record.
 
         Parameters
         ----------
@@ -300,7 +300,7 @@ base = Scene(normal_stress="imposed", alpha=0.0, b_over_a=2.0, stiffness_ratio=0
 
 
 def pressure_record(lasts: float) -> SampledHistory:
-    """Return a record of pressure that rises and falls as a cosine.
+    """Return a record of pore pressure that rises and falls as a cosine.
 
     Parameters
     ----------
@@ -318,7 +318,7 @@ def pressure_record(lasts: float) -> SampledHistory:
 
 
 def max_pressure_rate(lasts: float) -> float:
-    """Return the maximum rate of pressure.
+    """Return the maximum rate of change of pore pressure.
 
     Parameters
     ----------
@@ -462,7 +462,7 @@ def plot_critical_pressure(dataset: xr.Dataset, axes: Axes) -> None:
 
 
 def pressure_rates(row: xr.Dataset) -> xr.DataArray:
-    """Return the maximum rate of pressure of each record.
+    """Return the maximum rate of change of pore pressure in each record.
 
     Parameters
     ----------
@@ -480,7 +480,7 @@ def pressure_rates(row: xr.Dataset) -> xr.DataArray:
 
 
 def plot_one_to_one_line(dataset: xr.Dataset, axes: Axes) -> None:
-    """Draw the pressure change within D_c/V_*.
+    """Draw a line at the pressure change within a time of D_c/V_*.
 
     Parameters
     ----------

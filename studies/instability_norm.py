@@ -97,7 +97,7 @@ def select_law(law: str, values: xr.DataArray) -> xr.DataArray:
     Returns
     -------
     xarray.DataArray
-        Values of this law. NaN for the other law.
+        Values of this law. The values of the other law are NaN.
     """
     return values.where(values["law"] == law)
 

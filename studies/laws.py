@@ -7,9 +7,10 @@ critical step increases with stiffness and does not exist if eps k >= k_cr. On s
 an instability occurs only if the slip rate reaches the norm during the step. Laws with a faster
 evolution than the slip law far from steady sliding have smaller critical steps, in particular on
 stiff springs. Variable normal stress has little influence on the critical step under the slip law
-(Fig. 7 of the paper) and under similar laws. The influence is larger under the slowness law and
-under a law with a cut-off velocity. The composite law has V_c = 100 V_*, and the cut-off velocity
-is 10^4 V_*. The instability norm of 1e6 is so high that closed forms for an infinite norm apply.
+(Fig. 7 of the paper) and under similar laws. Variable normal stress has a larger influence under
+the slowness law and under a law with a cut-off velocity. The composite law has V_c = 100 V_*, and
+the cut-off velocity is 10^4 V_*. The instability norm of 1e6 is so high that closed forms for an
+infinite norm apply.
 """
 
 import math

@@ -155,7 +155,7 @@ def _label_line(
     Returns
     -------
     ndarray
-        Points of the label. Empty if the line is not visible.
+        Points that the label covers. The array is empty if the line is not visible.
     """
     seen = line[((line > 0.06) & (line < 0.94)).all(axis=1)][::8]
     others = np.concatenate([points[np.isfinite(points).all(axis=1)] for points in taken])

@@ -101,7 +101,8 @@ def critical_stiffness_curve(row: xr.Dataset) -> tuple[np.ndarray, np.ndarray]:
     Returns
     -------
     tuple of ndarray
-        Slip rates V/V_* and critical stiffness in sigma_*/D_c. NaN if there is no steady sliding.
+        Slip rates V/V_* and critical stiffness in sigma_*/D_c. The stiffness is NaN if there is no
+        steady sliding.
     """
     scene, rates = (
         scene_from_coordinates(row.isel(load_velocity_ratio=-1)),
@@ -174,7 +175,7 @@ def stiffness_rise_claim(row: xr.Dataset) -> xr.DataArray:
     Returns
     -------
     xarray.DataArray
-        Relative increase. NaN if the increase is too small to be resolved.
+        Relative increase. The value is NaN if the increase is too small to be resolved.
     """
     massless = row["critical_stiffness"] / (1.0 + row["rise_by_dynamics"])
     rise = row["critical_stiffness_from_growth"] / massless - 1.0

@@ -56,11 +56,11 @@ def remaining_transient(law: str, step: float, ratio: float, slip: float) -> flo
 
     Let :math:`r` be one plus the step, and :math:`\delta` the slip in :math:`D_c`. The transient of
     a rigid slider is :math:`-\alpha \ln r \, e^{-\delta}` under the slip law. Under the slowness
-    law, it is :math:`b \ln(1 + y)` with :math:`y = (r^{-\alpha/b} - 1)\,e^{-\delta}`. The finite
-    stiffness :math:`K` has two effects. While the spring follows the change of strength, ln V
-    returns to zero over a slip of approximately :math:`a r/K`, and the state does not evolve as at
-    :math:`V_*`. Later, the slip rate differs from the velocity of the load point while friction
-    changes.
+    law, the transient is :math:`b \ln(1 + y)` with :math:`y = (r^{-\alpha/b} - 1)\,e^{-\delta}`.
+    The finite stiffness :math:`K` has two effects. While the spring follows the change of strength,
+    ln V returns to zero over a slip of approximately :math:`a r/K`, and the state does not evolve
+    as at :math:`V_*`. Later, the slip rate differs from the velocity of the load point while
+    friction changes.
 
     Parameters
     ----------
@@ -93,7 +93,7 @@ def remaining_transient(law: str, step: float, ratio: float, slip: float) -> flo
 
 
 def expected_readings(law: str, step: float, ratio: float = math.inf) -> tuple[float, float]:
-    """Compute the estimates of the measure from the closed form.
+    """Compute the expected estimates of alpha and D_c from the closed form.
 
     Parameters
     ----------
@@ -220,7 +220,7 @@ def friction_change(row: xr.Dataset) -> xr.DataArray:
     Returns
     -------
     xarray.DataArray
-        Change of friction. NaN outside the plotted range.
+        Change of friction, with NaN outside the plotted range.
     """
     return (row["friction_coefficient"] - row["mu_star"]).where(row["slip"] <= PLOTTED_SLIP)
 

@@ -25,8 +25,8 @@ from ._paper import (
     WEAK_NORMAL_STRESS_EFFECT,
 )
 
-#: Values of a/(b-a). They are closely spaced over the range of the paper, which is fitted, and
-#: extend to values at which the finite norm bends the curves.
+#: Values of a/(b-a). The values are closely spaced over the fitted range, which is the range of the
+#: paper, and extend to values at which the finite norm bends the curves.
 a_over_b_minus_a = np.concatenate([np.arange(5, 20) / 20, np.arange(4, 17) / 4])
 
 

@@ -274,7 +274,7 @@ def settled_values(variable: str, row: xr.Dataset) -> xr.DataArray:
     Returns
     -------
     xarray.DataArray
-        Values of the variable. NaN in cells without a settled response.
+        Values of the variable, with NaN in cells without a settled response.
     """
     return row[variable].where(row["settled"] == 1.0)
 

@@ -65,7 +65,7 @@ def remaining_stress(row: xr.Dataset) -> xr.DataArray:
     Returns
     -------
     xarray.DataArray
-        Difference in a sigma_*. NaN if the step is not a whole number of decades.
+        Difference in a sigma_*. The difference is NaN if the step is not a whole number of decades.
     """
     future = row["mu_star"] + row["steady_stress_change"]
     return ((row["shear_stress"] - future) / row["a"]).where(step_in_decades(row) is not None)
@@ -82,7 +82,7 @@ def step_in_decades(row: xr.Dataset) -> int | None:
     Returns
     -------
     int or None
-        None if the step is not a whole number of decades.
+        Number of decades. The value is None if the step is not a whole number of decades.
     """
     decades = math.log10(row["load_velocity_ratio"]) if row["load_velocity_ratio"] > 0.0 else 0.0
     whole = round(decades)

@@ -47,7 +47,7 @@ class CycleRegionEdge(Reduction):
     The boundary lies between the stiffest cell with a limit cycle and the softest cell that settles
     to steady sliding. The position of the boundary between these cells is not interpolated. The
     result is compared with the critical stiffness at :math:`V_0` from the eigenvalues of steady
-    sliding with inertia. Both are relative to :math:`k_{cr}(V_*)`.
+    sliding with inertia. Both stiffnesses are relative to :math:`k_{cr}(V_*)`.
 
     Parameters
     ----------
@@ -59,11 +59,13 @@ class CycleRegionEdge(Reduction):
         the eigenvalues), ``<name>_farthest`` (largest distance between the boundary and the
         critical stiffness along ``across``, relative to the width of the bracket), and
         ``<name>_misplaced`` (number of limit cycles above and of settling cells below the critical
-        stiffness). The boundary is NaN unless there is exactly one change.
+        stiffness). The boundary is NaN unless there is exactly one change between limit cycles and
+        steady sliding.
     of : str
         Variable that has a value in cells with a limit cycle.
     across : str, default: "load_velocity_ratio"
-        Coordinate along the boundary, over which the last two results are computed.
+        Coordinate along the boundary, over which ``<name>_farthest`` and ``<name>_misplaced`` are
+        computed.
     """
 
     across: str = "load_velocity_ratio"
@@ -100,8 +102,8 @@ class CycleRegionEdge(Reduction):
         Returns
         -------
         xarray.Dataset
-            Empty if the scenes contain user-defined parts that cannot be reconstructed from the
-            coordinates.
+            Results of the comparison. The dataset is empty if the scenes contain user-defined
+            components that cannot be reconstructed from the coordinates.
 
         Raises
         ------
@@ -156,7 +158,8 @@ def _linear_boundary(places: xr.DataArray, dataset: xr.Dataset) -> xr.DataArray 
     Returns
     -------
     xarray.DataArray or None
-        None if a scene cannot be reconstructed from the coordinates.
+        Ratio for each cell. The value is None if a scene cannot be reconstructed from the
+        coordinates.
     """
     values, cells = np.full(places.shape, np.nan), dataset.coords.to_dataset()
     cells = cells.isel({d: 0 for d in cells.dims if d not in places.dims})
@@ -186,7 +189,7 @@ def spans_stiffness(softest: float, dataset: xr.Dataset) -> bool:
     Parameters
     ----------
     softest : float
-        Limit of the stiffness ratio. Zero for a map of all springs.
+        Limit of the stiffness ratio. The limit is zero for a map of all stiffness ratios.
     dataset : xarray.Dataset
         Results of one case.
 
@@ -205,7 +208,8 @@ def plot_map(softest: float, dataset: xr.Dataset, axes: Axes) -> None:
     Parameters
     ----------
     softest : float
-        Smallest stiffness ratio of the magnified map. Zero for a map of all springs.
+        Smallest stiffness ratio of the magnified map. The value is zero for a map of all stiffness
+        ratios.
     dataset : xarray.Dataset
         Results of one case.
     axes : matplotlib.axes.Axes
@@ -265,7 +269,8 @@ def map_title(softest: float, case: xr.Dataset) -> str:
     Parameters
     ----------
     softest : float
-        Smallest stiffness ratio of the magnified map. Zero for a map of all springs.
+        Smallest stiffness ratio of the magnified map. The value is zero for a map of all stiffness
+        ratios.
     case : xarray.Dataset
         Results of one case.
 

@@ -52,7 +52,7 @@ def slip_law_slope_claim(drop: str, case: str, multiple: float, unit: float, law
     case : str
         Name of the case.
     multiple : float
-        Expected slope in ``unit``.
+        Expected slope, as a multiple of ``unit``.
     unit : float
         Unit of the slope, for example (a-b) sigma_*.
     law : str
@@ -160,7 +160,7 @@ def fit_line(drop: str, row: xr.Dataset) -> tuple[xr.DataArray, xr.DataArray]:
     Returns
     -------
     tuple of xarray.DataArray
-        Values of ln(V_0/V_*) and of the line. NaN if a line does not fit.
+        Values of ln(V_0/V_*) and of the line. The values are NaN if a line does not fit.
     """
     known = row[f"{drop}_stress_drop"]
     x = row[ABSCISSA].where(known.notnull() & is_fitted_by_line(drop, row))
@@ -204,7 +204,7 @@ def scaled_slope(row: xr.Dataset) -> xr.DataArray:
     Returns
     -------
     xarray.DataArray
-        Slopes relative to (a-b) sigma_*. NaN if a line does not fit.
+        Slopes relative to (a-b) sigma_*. The slopes are NaN if a line does not fit.
     """
     places = range(row.sizes["stiffness_ratio"])
     straight = [is_fitted_by_line("static", row.isel(stiffness_ratio=place)) for place in places]

@@ -18,10 +18,10 @@ degrees, and the decrease of normal stress is a decrease of sigma_3.
 
 The change of Coulomb stress is ``dtau - mu' dsigma``. A displacement d of the load point changes
 shear stress by K d, and normal stress by cot(phi) times this amount. A step of imposed normal
-stress, or of sigma_3, does not change shear stress. The rule holds to first order in k/k_cr for all
-laws whose evolution depends on Theta/b + ln V. A step of load point velocity does not change stress
-instantaneously. The study represents a velocity step by its direct effect a ln(V_0/V_*), which is
-the increase of friction before the state changes.
+stress, or of sigma_3, does not change shear stress. The rule of equal Coulomb stress holds to first
+order in k/k_cr for all laws whose evolution depends on Theta/b + ln V. A step of load point
+velocity does not change stress instantaneously. The study represents a velocity step by its direct
+effect a ln(V_0/V_*), which is the increase of friction before the state changes.
 """
 
 from dataclasses import replace

@@ -38,11 +38,11 @@ COVARIANCE = np.array(
 # ---- the study ----------------------------------------------------------------------------------
 
 SAMPLES = 256
-#: Derivatives of the logarithm of the interval in s with respect to the logarithm of each
-#: parameter, computed at the estimates with the measure ``Elasticities``.
+#: Derivatives of the logarithm of the recurrence interval in s with respect to the logarithm of
+#: each parameter, computed at the estimates with the measure ``Elasticities``.
 ELASTICITIES = {"a": -7.54, "b": 8.69, "slip_distance": -0.113}
-#: Standard deviation of the logarithm of the interval to first order, from the full covariance
-#: matrix and from the variances only.
+#: Standard deviation of the logarithm of the recurrence interval to first order, computed from the
+#: full covariance matrix and from the variances only.
 LOG_INTERVAL_SLOPES = np.array([ELASTICITIES[name] / value for name, value in ESTIMATES.items()])
 FIRST_ORDER_SPREAD = math.sqrt(LOG_INTERVAL_SLOPES @ COVARIANCE @ LOG_INTERVAL_SLOPES)
 SPREAD_WITHOUT_CORRELATION = math.sqrt(LOG_INTERVAL_SLOPES**2 @ np.diag(COVARIANCE))

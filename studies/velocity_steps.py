@@ -5,8 +5,8 @@ effect, the following evolution, and the displacement over which the evolution d
 estimates of a, b and D_c. On soft machines, the estimates of a and b are too small. At 10 k_cr,
 tenfold steps give a value of a that is 14 to 40 % too small. The estimate of a - b is correct if
 friction has reached steady state. The error of D_c depends on the machine and, under the slowness
-law, on the direction of the step, and a correction for stiffness does not remove it. Under the slip
-law, large steps up on soft machines end in instability.
+law, on the direction of the step, and a correction for stiffness does not remove this dependence.
+Under the slip law, large steps up on soft machines end in instability.
 """
 
 import math
@@ -32,7 +32,7 @@ STEP_DESCRIPTIONS = {0.01: "down by 100", 0.1: "down by 10", 10.0: "up by 10", 1
 def peak_departure(law: str, ratio: float) -> float:
     """Compute the difference of peak friction from the closed form.
 
-    The difference is computed to first order in a/K. The difference has two causes. The evolution
+    The difference is computed to first order in a/K. The difference has two causes: the evolution
     is incomplete while slip accelerates, and slip is faster than the load point while friction
     decreases, which increases the direct effect.
 
@@ -206,7 +206,7 @@ def friction_change(row: xr.Dataset) -> xr.DataArray:
     Returns
     -------
     xarray.DataArray
-        Change of friction divided by a. NaN outside the plotted range.
+        Change of friction divided by a, with NaN outside the plotted range.
     """
     change = (row["friction_coefficient"] - row["friction_before"]) / row["a"]
     return change.where(row["load_point_displacement"] <= PLOTTED_DISPLACEMENT)

@@ -35,7 +35,7 @@ from rsfstudy.study.figure_declarations import Axes
 INPUT_MEANS = {"ln_a": 0.01, "ln_net": 0.02, "ln_stiffness": 0.006}
 RELATIVE_UNCERTAINTY = 0.1
 SOBOL_POINTS = 128
-#: Output of each index, by the prefix of the index.
+#: Output whose Sobol index is computed, by the prefix of the index.
 INDEXED_OUTPUTS = {
     "displacement": "critical_displacement",
     "drop": "static_stress_drop",
@@ -74,8 +74,8 @@ class Headlines(Measure):
         Returns
         -------
         Outcome
-            Outcome of the measure. If one of the computations fails, the outcome has its status and
-            message.
+            Outcome of the measure. If one of the computations fails, the outcome has the status and
+            message of the failed computation.
         """
         at_critical = scene.without_mass().with_(stiffness_ratio=1.0)
         values: dict[str, OutputValue] = {}
@@ -118,7 +118,7 @@ def interval_claim(name: str, order: str, end: str) -> Claim:
 
 
 def first_order_claim(of: str, name: str, share: float) -> Claim:
-    """Return a claim on an index of the limit cycle (W3).
+    """Return a claim on a total Sobol index of the limit cycle (W3).
 
     Parameters
     ----------

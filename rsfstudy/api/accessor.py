@@ -205,7 +205,7 @@ class Accessor:
         Returns
         -------
         xarray.Dataset
-            Dataset in the new units. Variables that lose their normalisation are renamed as in
+            Dataset in the new units. Variables that are no longer normalised are renamed as in
             ``rsfstudy.to_si``.
 
         Raises
@@ -267,7 +267,7 @@ class Accessor:
     def plot(self, *plot_arguments: Any, **plot_options: Any) -> Figure:
         """Plot the results of a study, a motion or a limit cycle.
 
-        The axes are in the units of the dataset.
+        The axes of the figure have the units of the dataset.
 
         Parameters
         ----------
@@ -276,8 +276,9 @@ class Accessor:
             study are plotted with ``rsfstudy.plot``. Motions and limit cycles are plotted with
             ``rsfstudy.plot_motion``.
         **plot_options : object
-            Keyword arguments for the same function, such as ``variable`` and ``style`` for the
-            results of a study, or ``rig`` and ``against`` for a motion.
+            Keyword arguments for ``rsfstudy.plot`` or ``rsfstudy.plot_motion``, such as
+            ``variable`` and ``style`` for the results of a study, or ``rig`` and ``against`` for a
+            motion.
 
         Returns
         -------
@@ -301,7 +302,7 @@ class Accessor:
     def events(self, slip_rate: float | None = None) -> xr.Dataset:
         """Find the events of a motion.
 
-        An event is a part of the motion with a slip rate above a threshold.
+        An event is a time interval of the motion in which the slip rate exceeds a threshold.
 
         Parameters
         ----------
@@ -318,8 +319,9 @@ class Accessor:
             spring stress before the event and smallest spring stress after the event),
             ``static_stress_drop`` and ``dynamic_stress_drop``. Each variable has an interpolation
             error ``<name>_error``, which does not include the error of the motion. ``cut`` is
-            nonzero if the motion contains only a part of the event. In this case, the variables
-            describe only this part.
+            nonzero if the event is incomplete because the motion begins or ends within the event.
+            The other variables of an incomplete event describe only the part that the motion
+            contains.
 
         Raises
         ------
@@ -359,7 +361,7 @@ class Accessor:
         xarray.DataArray
             Variable ``slip_mode`` of the dataset with the new limit between slow slip and
             stick-slip. The codes are 0 (steady), 1 (damped oscillation), 2 (slow slip) and 3
-            (stick-slip). The codes of cells that settle are unchanged.
+            (stick-slip). If the motion of a cell settles to steady sliding, the code is unchanged.
 
         Raises
         ------
@@ -404,10 +406,10 @@ class Accessor:
         Returns
         -------
         pandas.DataFrame
-            Table with one row per cell of a study, or with one row per time of a motion. Orbits
-            inside the cells are omitted. For other datasets of one scene, the table has a single
-            row. The dictionary ``attrs["constant"]`` of the table contains the values of the
-            omitted columns.
+            Table with one row per cell of a study, or with one row per time of a motion. Variables
+            with additional dimensions inside a cell, such as orbits, are omitted. For other
+            datasets of one scene, the table has a single row. The dictionary ``attrs["constant"]``
+            of the table contains the values of the omitted columns.
 
         Raises
         ------

@@ -25,9 +25,9 @@ from rsfstudy.fitting import (
 from rsfstudy.netcdf_encoding import copy_with_cf_encoding
 from rsfstudy.rig import compute_conversion_factor, convert_to_si, read_table
 
-#: Variables from which a quantity takes its units, by the scale of the quantity.
+#: Variables of the record that determine the units of a quantity, by the scale of the quantity.
 _RECORD_VARIABLE_BY_SCALE = {"D_c/V_*": "time", "D_c": "slip", "sigma_*": "shear_stress"}
-#: Quantities that require displacement.
+#: Quantities of an event that can be computed only if displacement is known.
 _QUANTITIES_REQUIRING_DISPLACEMENT = ("slip", "peak_slip_rate", "dynamic_stress_drop")
 #: Meanings of the codes 0, 1, 2 and 3 of the variable ``cut``.
 _MEANINGS_OF_CUT_FLAGS = ("whole", "begins_before", "lasts_beyond", "both")
@@ -96,7 +96,7 @@ def _build_unit_attributes(
 ) -> dict[str, str]:
     """Return the attributes ``units`` and ``scale`` of a quantity of an event.
 
-    Times, slips and stresses have the units of the variable from which they were read. A slip
+    Times, slips and stresses have the units of the corresponding variable of the record. A slip
     rate is in units of slip over units of time. All other quantities are dimensionless.
     """
     if scale in _RECORD_VARIABLE_BY_SCALE:
@@ -123,7 +123,8 @@ def events(
 ) -> xr.Dataset:
     """Detect drops of shear stress in a laboratory record.
 
-    A drop is a decrease of shear stress that the noise of the record does not explain.
+    A drop is a decrease of shear stress that is too large to be explained by the noise of the
+    record.
 
     Parameters
     ----------
@@ -153,10 +154,10 @@ def events(
         previous event), ``stress_before``, ``stress_after``, ``static_stress_drop`` and ``cut`` (0
         for complete events, 1 if the record begins within the event, 2 if the record ends within
         the event, 3 if both apply). If displacement is known, the dataset also has ``slip``,
-        ``peak_slip_rate`` between neighbouring samples, and ``dynamic_stress_drop``. Values that do
-        not exceed the noise are NaN. For each variable, ``<name>_error`` is the half width of a 95
-        % confidence interval. The scalar ``noise`` is the standard deviation of the noise, and
-        ``smallest_drop`` is the smallest drop that can be detected. The attribute
+        ``peak_slip_rate`` between neighbouring samples, and ``dynamic_stress_drop``. Quantities
+        that are not larger than the noise are NaN. For each variable, ``<name>_error`` is the half
+        width of a 95 % confidence interval. The scalar ``noise`` is the standard deviation of the
+        noise, and ``smallest_drop`` is the smallest drop that can be detected. The attribute
         ``sign_of_shear_stress`` contains the sign that was used.
 
     Raises
@@ -180,7 +181,7 @@ def events(
     every sample. The window lengths are 4, 8, 16 and more sampling intervals, up to a hundredth of
     the record. The noise is estimated from the most frequent differences between the two means,
     because most differences occur during loading. The noise may be correlated over times that are
-    short compared with the longest window, and drops may take up to 40 % of the record. The
+    short compared with the longest window, and drops may occupy up to 40 % of the record. The
     detection threshold corresponds to one false detection in 10,000 records of Gaussian noise. If
     sampling intervals differ by more than a factor of three, as in triggered bursts, the samples
     are first averaged over equal intervals of time.
@@ -193,8 +194,8 @@ def events(
     separates the drop from other drops. If the noise is white and the record has at least 3,200
     samples, ``smallest_drop`` is less than three standard deviations of the noise. If the noise is
     correlated, ``smallest_drop`` is larger. Spikes of single samples are not Gaussian noise and may
-    cause false detections. The function also detects a relaxation of stress within a window, as in
-    a hold, as a drop.
+    cause false detections. A relaxation of stress within a window, for example during a hold of the
+    load point, is also detected as a drop.
 
     Slip is displacement minus shear stress divided by ``stiffness``. If ``stiffness`` is not
     passed, the function uses displacement as slip only if displacement moves faster during the

@@ -38,7 +38,8 @@ from rsfstudy.rig import Rig, convert_to_si, is_stiffness_over_normal_stress
 from rsfstudy.slider import Scene
 from rsfstudy.study import Study
 
-#: Default free parameters. Each law uses the parameters that the law has.
+#: Default free parameters. Parameters that do not exist in a law are ignored in the fits of the
+#: law.
 DEFAULT_FREE_PARAMETERS = (
     "a",
     "b",
@@ -56,11 +57,11 @@ _STATE_PARAMETERS_REMEDY = (
 )
 #: Initial guess of the slip distance, as a fraction of the load point displacement after a step.
 _SLIP_DISTANCE_GUESS_OVER_DISPLACEMENT = 0.05
-#: Maximum number of windows.
+#: Maximum value of the argument ``windows``.
 _MAX_WINDOWS = 1000
 #: A backward jump of displacement is a reset to zero if the jump exceeds each of three limits: a
 #: multiple of the noise and of the neighbouring changes, and a fraction of the total displacement.
-#: The noise is estimated only if the record has more rows than the last number.
+#: The noise is estimated only if the record has more than 20 rows.
 (
     _MIN_DISPLACEMENT_RESET_OVER_NOISE,
     _MIN_DISPLACEMENT_RESET_OVER_EXTENT,
@@ -68,7 +69,7 @@ _MAX_WINDOWS = 1000
 ) = 10.0, 0.01, 20
 #: Length of the shortest window, as a fraction of the displacement after a step.
 _SHORTEST_WINDOW_FRACTION = 0.5
-#: Initial values of the fields of a scene, which the values of the user override.
+#: Initial values of the scene fields in a fit. Values that the user passes take precedence.
 _INITIAL_SCENE_FIELDS = {"a": 0.01, "mu_star": 0.6, "normal_stress": "constant"}
 _INITIAL_FIELDS_OF_ONE_STATE_LAW = {"b_over_a": 1.2}
 _INITIAL_FIELDS_OF_TWO_STATE_LAW = {"b1_over_a": 0.9, "b2_over_a": 0.3, "length_ratio": 10.0}
@@ -118,16 +119,17 @@ def fit(
     free : sequence of str, optional
         Names of the free parameters: ``a``, ``b`` (``b1``, ``b2`` and ``slip_distance_2`` for laws
         with two states), ``slip_distance``, ``mu_star``, ``stiffness``, ``alpha``, ``law_exponent``
-        (for the law "family"), ``step_time``, ``trend1``, ``trend2`` and so on. Each fit uses the
-        parameters that its law has. By default, the free parameters are ``a``, all b and slip
-        distances, ``mu_star`` and ``trend1``.
+        (for the law "family"), ``step_time``, ``trend1``, ``trend2`` and so on. Parameters that do
+        not exist in a law are ignored in the fits of the law. By default, the free parameters are
+        ``a``, the ``b`` and the slip distance of each state, ``mu_star`` and ``trend1``.
     steps : sequence of int, optional
         Numbers of the steps to fit, starting from 1. ``record.steps()`` lists the steps. By
         default, all steps are fitted.
     together : bool, default: False
-        If True, the steps of all records are fitted jointly. The joint fit has one set of ``a``,
-        ``b`` and slip distance. Each step has its own friction before the step, trend and step
-        time, with names such as ``mu_star_1`` and ``mu_star_2``.
+        If True, the steps of all records are fitted jointly. In a joint fit, all steps share the
+        same ``a``, ``b`` and slip distance. The friction before the step, the trend and the step
+        time are fitted separately for each step, and their names end with the number of the step,
+        such as ``mu_star_1`` and ``mu_star_2``.
     before, after : quantity, default: 0.0
         Load point displacement to fit before and after each step, such as "100 um", or a number in
         um. If ``before`` is 0, the window begins halfway between the previous step and this step,
@@ -149,17 +151,17 @@ def fit(
     averaging : quantity, optional
         Time over which the data logger averaged friction around each row, such as "1 s", or a
         number in s. Use "trailing 1 s" if the average ends at the row. The same average is applied
-        to the model. By default, friction was not averaged.
+        to the model. By default, the fit assumes that friction was not averaged.
     low_pass : str, optional
         Low-pass filter that was applied to friction, with its corner frequency: "first_order 2 Hz",
         "butterworth_2 2 Hz" or "butterworth_4 2 Hz". The same filter is applied to the model. By
-        default, friction was not filtered.
+        default, the fit assumes that friction was not filtered.
     posterior : int, default: 0
         Number of draws from the posterior distribution, which are stored in ``posterior`` along the
         dimension ``draw``. Sampling requires emcee. The priors are flat between the bounds of the
-        search, and the noise model is fixed. A chain needs about 1,000 to 10,000 motions. If the
-        budget is exceeded before the chain is 50 autocorrelation times long, the status of the fit
-        is ``work_budget_spent``.
+        search, and the noise model is fixed. A chain requires the integration of about 1,000 to
+        10,000 motions. If the budget is exceeded before the chain is 50 autocorrelation times long,
+        the status of the fit is ``work_budget_spent``.
     stiffness : quantity, optional
         Stiffness of the machine, required if there is no rig. The stiffness is a string in MPa/um,
         a string in 1/um such as "1.6e-3 1/um" (stiffness divided by normal stress), or a number in
@@ -184,8 +186,8 @@ def fit(
         Command line to record in the history of the dataset.
     **scene : object
         Values of other fields of the scene, which are not fitted. For example, ``alpha=0.3``
-        selects imposed normal stress with this coefficient, and ``a=0.01`` fixes the direct effect
-        if ``free`` does not contain "a".
+        selects imposed normal stress with the coefficient 0.3, and ``a=0.01`` fixes the direct
+        effect if ``free`` does not contain "a".
 
     Returns
     -------
@@ -438,15 +440,14 @@ def _initial_stiffness(
 ) -> tuple[float, float]:
     """Return the initial stiffness of the fit.
 
-    The stiffness has the units in which the user has passed the stiffness.
+    A stiffness in MPa/um is returned as ``machine``, and a stiffness in 1/um as ``ratio``.
 
     Returns
     -------
     ratio : float
-        Stiffness divided by normal stress in 1/um. The ratio is 0 if the stiffness of the machine
-        is known.
+        Stiffness divided by normal stress in 1/um. The ratio is 0 if ``machine`` is positive.
     machine : float
-        Stiffness of the machine in Pa/um, or 0 if the ratio is known.
+        Stiffness of the machine in Pa/um. The value is 0 if ``ratio`` is positive.
     """
     if stated_stiffness is None:
         if rig is not None and rig.stiffness is not None:
@@ -557,7 +558,7 @@ def _free_parameters(
 
 
 def _describe_filter(averaging: Any, low_pass: str) -> str:
-    """Return the filter as a string that the measure expects.
+    """Return the filter of friction in the string format of the measure ``Fit``.
 
     The string contains the type of the filter and its duration in s or frequency in Hz. The string
     is empty if the user passes neither ``averaging`` nor ``low_pass``.
@@ -583,7 +584,7 @@ def _describe_filter(averaging: Any, low_pass: str) -> str:
 
 
 def _to_micrometres(argument_name: str, value: Any) -> float:
-    """Convert a quantity to um. A plain number is already in um."""
+    """Convert a length to um. A number without units is assumed to be in um."""
     return (
         float(value)
         if isinstance(value, int | float)

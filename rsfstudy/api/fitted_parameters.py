@@ -20,7 +20,7 @@ from rsfstudy.storage import build_scene_from_stored
 
 
 def _require_single_fit(dataset: xr.Dataset) -> xr.Dataset:
-    """Return the only fit of a dataset, or raise ``InvalidValue``."""
+    """Return the fit of a dataset, or raise ``InvalidValue`` if there are several."""
     found = split_into_single_fits(dataset)
     if len(found) != 1:
         remedy = "Select one first, as in dataset.sel(law='slip')."
@@ -97,8 +97,8 @@ def sample_parameters(dataset: xr.Dataset, sample_count: int, seed: int = 0) -> 
 def fitted_scene(dataset: xr.Dataset) -> Scene:
     """Return the scene of a fit with the fitted parameters.
 
-    The load point velocity changes in a single step. Quantities are in units of the fitted slip
-    distance and of the load point velocity before the step.
+    The scene contains a single step of the load point velocity. Quantities are normalised by the
+    fitted slip distance and the load point velocity before the step.
 
     Parameters
     ----------

@@ -293,19 +293,19 @@ def dataset_html(dataset: xr.Dataset) -> str:
 
 
 def _escape(text: object) -> str:
-    """Escape a text and its control characters for HTML."""
+    """Escape a string and its control characters for HTML."""
     return escape_html(text)
 
 
 def _html_paragraph(text: str, colour: str = "") -> str:
-    """Return a paragraph of HTML."""
+    """Return a string as an HTML paragraph."""
     return f'<p class="{colour}">{_escape(text)}</p>'
 
 
 def _format_summary_piece_as_html(piece: SummaryTableOrSentence) -> str:
     """Format a sentence, a mapping or a table as HTML.
 
-    A wide table is placed in a box that scrolls. If the mapping or the table is empty, the function
+    A wide table is placed in a scrollable box. If the mapping or the table is empty, the function
     returns an empty string.
     """
     if isinstance(piece, str):
@@ -352,7 +352,7 @@ def _format_figure_as_html(results_path: Path, draw_figure: Callable[[], Any]) -
 
 
 def _png_width_in_inches(image: bytes) -> float:
-    """Return the printed width of a PNG image in inches.
+    """Return the width in inches at which a PNG image is printed.
 
     The page scales all figures by this width, so that letters have the same size in all figures.
     """

@@ -17,16 +17,17 @@ from rsfstudy.fitting import EventNumbers
 from rsfstudy.rig import slip_rate_from_log
 from rsfstudy.slider import Scene
 
-#: Ratio of slip rate to load point velocity above which a motion is an event. The ratio is 1 for
-#: steady sliding. A stable slider overshoots a step of the load point velocity by less than this
-#: ratio.
+#: Slip rate above which an event is detected, as a multiple of the load point velocity. The
+#: multiple is 1 for steady sliding, and remains below this limit if a stable slider overshoots
+#: after a step of the load point velocity.
 _EVENT_SLIP_RATE_OVER_LOAD_VELOCITY = 10.0
-#: Number of rows of the interpolating polynomial, and of the second polynomial that estimates the
-#: error. A motion has six rows per integration step.
+#: Number of rows that the interpolating polynomial uses, and number of rows that a second
+#: polynomial uses to estimate the interpolation error. A motion has six rows per integration step.
 _ROWS_PER_INTERPOLANT, _ROWS_PER_ERROR_CHECK_INTERPOLANT = 6, 4
-#: Maximum time difference between the two sides of a jump, in spacings of floating-point numbers.
+#: Maximum time difference between the rows before and after a jump, in spacings of floating-point
+#: numbers.
 _MAX_FLOAT_SPACINGS_OF_JUMP = 16
-#: Maximum change of log10 slip rate between rows for interpolation. Motions with a tolerance of
+#: Maximum change of log10 slip rate between rows that are interpolated. Motions with a tolerance of
 #: 1e-4 have rows that differ by up to 0.37, except at the sudden beginning or end of a rupture.
 _MAX_LOG10_SLIP_RATE_STEP = 0.5
 
@@ -44,7 +45,8 @@ def find_motion_events(
         Threshold of the slip rate in V_*. The default is 10 times the highest load point velocity
         of the scene, and at least 10.
     scene : callable
-        Function that returns the scene, which is called only if ``slip_rate`` is None.
+        Function without arguments that returns the scene of the motion. The function is called only
+        if ``slip_rate`` is None.
 
     Returns
     -------
@@ -91,7 +93,7 @@ class _InterpolatedMotionRows:
     values : numpy.ndarray of shape (n, 3)
         Logarithm (base 10) of slip rate, slip and shear stress.
     event_slip_rate_level : float
-        Logarithm (base 10) of the slip rate above which the motion is an event.
+        Logarithm (base 10) of the threshold of the slip rate.
     """
 
     def __init__(self, times: np.ndarray, values: np.ndarray, event_slip_rate_level: float) -> None:
@@ -109,12 +111,12 @@ class _InterpolatedMotionRows:
         )
 
     def iterate_event_row_spans(self) -> list[tuple[int, int]]:
-        """Return the first and last row above the threshold per event.
+        """Return the first and the last row of each event above the threshold.
 
         Returns
         -------
         list of (int, int)
-            Row numbers of each event.
+            Pair of row numbers for each event.
         """
         above = label(self._values[:, 0] > self._event_slip_rate_level)[0]
         return [(part.start, part.stop - 1) for (part,) in find_objects(above)]
@@ -168,8 +170,9 @@ class _InterpolatedMotionRows:
     def _interpolate_after_row(self, row: int, row_count: int) -> KroghInterpolator:
         """Interpolate around the interval between a row and the next row.
 
-        The polynomial is a function of the time since the row. Half of the rows precede the
-        interval. Rows on the other side of a jump are not used.
+        The interpolating polynomial is a function of the time since the first row of the interval.
+        Half of the interpolated rows precede the interval. Rows on the other side of a jump are not
+        used.
         """
         first = max(row + 1 - row_count // 2, 0)
         last = min(row + row_count // 2, len(self._times) - 1)
@@ -192,7 +195,7 @@ class _InterpolatedMotionRows:
 
     @staticmethod
     def _interpolant_slope(interpolant: KroghInterpolator, time: float, column: int) -> float:
-        """Return the slope of a column of the interpolating polynomial."""
+        """Return the time derivative of a column of the interpolating polynomial."""
         return float(interpolant.derivative(time)[column])
 
     def _level_crossing(self, row: int) -> tuple[np.ndarray, np.ndarray]:
@@ -216,18 +219,18 @@ class _InterpolatedMotionRows:
         return many, error + self._is_too_coarse_to_interpolate(sides) * np.array(left)
 
     def _values_at_end_row(self, row: int) -> tuple[np.ndarray, np.ndarray]:
-        """Return time and slip at the first or the last row without errors."""
+        """Return time and slip at the first or the last row, with errors of zero."""
         return np.array([self._times[row], self._values[row, 1]]), np.zeros(2)
 
     def _find_extreme(self, row: int, column: int, sign: float) -> tuple[np.ndarray, np.ndarray]:
-        """Find the extreme of a column near a row.
+        """Find a maximum or a minimum of a column near a row.
 
-        The extreme is a maximum if ``sign`` is positive, and a minimum if ``sign`` is negative.
+        The function finds a maximum if ``sign`` is positive, and a minimum if ``sign`` is negative.
 
         Returns
         -------
         values, errors : numpy.ndarray of shape (3,)
-            All columns at the extreme, and their errors.
+            Values of all columns at the maximum or minimum, and their errors.
         """
         sides = slice(max(row - 1, 0), row + 2)
         times, found = self._times[sides], []

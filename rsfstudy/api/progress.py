@@ -48,7 +48,7 @@ def show_progress(study_name: str, is_shown: bool) -> Iterator[ProgressCallback]
         task = bar.add_task(study_name, total=None)
 
         def update(done: int, total: int) -> None:
-            """Update the bar."""
+            """Update the progress bar."""
             bar.start()  # The bar starts late because a run may fail before its first report.
             bar.update(task, completed=done, total=total)
 
@@ -68,7 +68,7 @@ def _print_progress_lines(study_name: str, console: Console) -> ProgressCallback
     told = 0
 
     def update(done: int, total: int) -> None:
-        """Print a line if enough cells have been completed."""
+        """Print a progress line if enough cells have been completed."""
         nonlocal said, told
         now, part = time.monotonic(), _MAX_PROGRESS_LINES * done // total
         if part > told and (

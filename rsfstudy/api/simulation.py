@@ -63,15 +63,16 @@ _INSTABILITY_TIME_QUANTITY = Quantity(
 )
 #: Attribute that contains the time after which a motion has no physical meaning.
 BEYOND_NORM_ATTRIBUTE_NAME = "beyond_instability_norm"
-#: Attribute that contains time, slip and motion point at the end of a motion.
+#: Attribute that contains the time, the slip and the state of the slider at the end of a motion.
 MOTION_END_ATTRIBUTE_NAME = "end"
 #: Ratio of slip rate to load point velocity that defines instability if the load point velocity
-#: itself exceeds the norm. This case may occur if the period of the scene is not the period of the
-#: slider.
+#: itself exceeds the instability norm. The load point velocity may exceed the norm if the period of
+#: the scene is not the period of the slider.
 _INSTABILITY_SLIP_RATE_OVER_LOAD_RATE = 1e6
 #: Variables of motions that are computed from spring stress.
 _VARIABLES_OF_SPRING_STRESS = ("shear_stress", "friction_coefficient")
-#: Names of the regimes of the built-in dynamics. Regimes of user-defined dynamics have later codes.
+#: Names of the regimes (forms of the equations of motion) of the built-in dynamics. Regimes of
+#: user-defined dynamics have larger codes.
 _STANDARD_REGIMES = ("quasi_static", "slow_manifold", RUPTURE_REGIME, "quasi_dynamic")
 
 
@@ -121,9 +122,9 @@ def simulate(
         user-defined stepper is passed as a class.
     accuracy, meter : Accuracy and WorkMeter, optional
         Arguments of ``Measure.compute``, which a user-defined measure passes to ``simulate``. The
-        two arguments replace ``rtol``, ``budget`` and ``engine``. The right-hand side evaluations
-        are then added to the work of the cell, and a motion that cannot continue ends the cell with
-        the status of the motion.
+        two arguments replace ``rtol``, ``budget`` and ``engine``. If ``meter`` is passed, the
+        right-hand side evaluations are added to the count of the cell. If the motion cannot
+        continue, the cell ends with the status of the motion.
 
     Returns
     -------
@@ -132,8 +133,9 @@ def simulate(
         in sigma_*, slip in D_c, time in D_c/V_* and slip rate in V_*.
 
         - ``slip``, ``log10_slip_rate`` and ``state_variable`` describe the slider. For laws with
-          several states, ``state_1``, ``state_2`` and so on are the states without their changes
-          due to stress. If stress does not affect the states, they add up to ``state_variable``.
+          several states, ``state_1``, ``state_2`` and so on are the states without the changes that
+          normal stress causes. If normal stress does not affect the states, the sum of the states
+          is ``state_variable``.
         - ``shear_stress`` is the spring stress. With radiation damping, the damping stress at V_*
           is subtracted, so that spring stress equals frictional stress in steady sliding at V_*.
         - ``frictional_stress`` is the frictional resistance, and ``normal_stress_ratio`` is the
@@ -142,8 +144,8 @@ def simulate(
           rig measures. The friction coefficient is spring stress divided by the difference of
           normal stress and the pore pressure outside the fault.
         - ``porosity`` and ``pore_pressure`` exist for a dilatant fluid.
-        - ``regime`` is the code of the equations of motion. Its attribute ``flag_meanings`` lists
-          the names of the regimes.
+        - ``regime`` is the code of the equations of motion. The attribute ``flag_meanings`` of
+          ``regime`` lists the names of the codes.
         - ``instability_time`` exists if the motion exceeds the instability norm without inertia or
           radiation damping.
 
@@ -175,13 +177,14 @@ def simulate(
     -----
     Time strictly increases. If a quantity jumps, the row at the time of the jump contains the value
     before the jump, and the next row contains the value after the jump. The two times differ by a
-    few spacings of floating-point numbers. The rows of a rupture have the same spacing if the
-    rupture is too short for the resolution of time.
+    few spacings of floating-point numbers. If a rupture is shorter than the floating-point
+    resolution of time, the times of its rows also differ by a few spacings.
 
-    Without inertia and radiation damping, a motion has no physical meaning beyond the instability
-    norm. The variable ``instability_time`` and the attribute ``beyond_instability_norm`` contain
-    the time at which the slip rate first exceeds the norm. If the load point velocity itself
-    exceeds the norm, the limit is :math:`10^6` times the load point velocity.
+    Without inertia and radiation damping, a motion has no physical meaning after the slip rate has
+    exceeded the instability norm. The variable ``instability_time`` and the attribute
+    ``beyond_instability_norm`` contain the time at which the slip rate first exceeds the
+    instability norm. If the load point velocity itself exceeds the norm, the limit of the slip rate
+    is :math:`10^6` times the load point velocity.
 
     Examples
     --------
@@ -292,7 +295,7 @@ def simulate(
 def _recording_to_dataset(
     scene: Scene, recorded_rows: np.ndarray, regime_names: Sequence[str]
 ) -> xr.Dataset:
-    """Convert the rows of a recording to a dataset along time."""
+    """Convert a recorded motion to a dataset with the dimension ``time``."""
     fluid = scene.parts.fluid.unknowns
     columns = {
         find_quantity(name): recorded_rows[:, column]
@@ -330,8 +333,8 @@ def motion_variable_attributes(quantity: Quantity, scene: Scene) -> dict[str, An
     """Return the attributes of a variable of a motion.
 
     If the scene has radiation damping, the radiation damping stress at V_* is subtracted from the
-    spring stress, and the long name describes the subtraction. Spring stress and frictional stress
-    are then equal at V_*.
+    spring stress, and the long name describes the subtraction. As a result of the subtraction,
+    spring stress and frictional stress are equal at V_*.
 
     Parameters
     ----------
@@ -352,7 +355,7 @@ def motion_variable_attributes(quantity: Quantity, scene: Scene) -> dict[str, An
 
 
 def _state_quantity(state_number: int) -> Quantity:
-    """Return the quantity of one state of a law with several states."""
+    """Return the quantity of a single state, for laws with several states."""
     about = (
         f"state {state_number} of the law, as a part of the friction coefficient, freed of stress"
     )
@@ -360,7 +363,7 @@ def _state_quantity(state_number: int) -> Quantity:
 
 
 def _read_end_of_motion(motion: object, scene: Scene) -> Event:
-    """Return the final point of a stored motion."""
+    """Return the state of the slider at the end of a stored motion."""
     if not isinstance(motion, xr.Dataset) or MOTION_END_ATTRIBUTE_NAME not in motion.attrs:
         remedy = "Give a motion that simulate returned, and that lasted as long as was asked."
         raise InvalidValue("start", motion, "is no motion with an end", remedy=remedy)
@@ -375,7 +378,7 @@ def _read_end_of_motion(motion: object, scene: Scene) -> Event:
 def _build_history_variable(history: SampledHistory) -> xr.Variable:
     """Convert the samples of a loading history to a variable.
 
-    The scene can be recreated from the variable.
+    The loading of the scene can be recreated from the variable.
     """
     about = {
         "long_name": "time, load point velocity, fall and rate of normal stress of the loading",
@@ -386,7 +389,7 @@ def _build_history_variable(history: SampledHistory) -> xr.Variable:
 
 
 def _log_slip_rate_limit_of_instability(scene: Scene) -> float:
-    """Return ln(V/V_*) beyond which a motion has no physical meaning."""
+    """Return ln(V/V_*) above which a motion has no physical meaning."""
     if scene.has_mass or scene.dynamics.radiated_stress_slope(0.0):
         return math.inf
     loads = np.asarray(scene.parts.loading.segment_table)[:, SEGMENT_VELOCITY]
@@ -443,7 +446,7 @@ def with_increasing_times(table: np.ndarray) -> np.ndarray:
     A regime or a segment of the loading begins with a row at the time at which the previous regime
     or segment ended. If the two rows are equal, the first row is removed. Otherwise, the time of
     the second row is increased by a few spacings of floating-point numbers. The times of a rupture
-    that is shorter than this spacing are increased as well.
+    that is shorter than the floating-point spacing are increased as well.
 
     Parameters
     ----------

@@ -71,9 +71,9 @@ def critical_step(
         ``critical_displacement`` (in D_c) or ``critical_normal_stress_step`` (in sigma_*). The
         dataset also contains the numerical error ``<name>_error`` and two steps that verify the
         critical value. The slider settles after the step ``<name>_stable`` and becomes unstable
-        after the step ``<name>_unstable``. ``rhs_evaluations`` is the work. The attributes
-        ``status`` and ``message`` describe the outcome. If there is no critical step, the critical
-        value is NaN.
+        after the step ``<name>_unstable``. ``rhs_evaluations`` is the number of right-hand side
+        evaluations. The attributes ``status`` and ``message`` describe the outcome. If there is no
+        critical step, the critical value is NaN.
 
     Raises
     ------
@@ -86,8 +86,8 @@ def critical_step(
         If there is no critical step.
     UserWarning
         If the instability norm is close to the load point velocity, for example because the period
-        of a rig is short. The coordinate ``instability_slip_rate`` contains the norm as a slip rate
-        in V_*.
+        of a rig is short. The coordinate ``instability_slip_rate`` contains the instability norm as
+        a slip rate in V_*.
 
     See Also
     --------

@@ -135,9 +135,10 @@ def run(
     keep_going : bool, default: False
         If True, continue even if the first cells all fail.
     despite_failures : bool, default: False
-        If True, compute reductions without the failed cells. The results contain a remark.
+        If True, compute reductions without the failed cells. The results contain a remark about the
+        failed cells.
     format : {"netcdf", "zarr"}, default: "netcdf"
-        Format of the results: a NetCDF file, or a Zarr store that is written in pieces. Use Zarr
+        Format of the results: a NetCDF file, or a Zarr store that is written in chunks. Use Zarr
         for lattices that do not fit into memory.
     command : str, default: "rsfstudy.run"
         Command line to record in the history of the dataset.
@@ -167,7 +168,7 @@ def run(
     Warns
     -----
     IncompleteWarning
-        If cells failed, or if a reduction could not be computed because of its cells.
+        If cells failed, or if a reduction could not be computed because of failed cells.
     UserWarning
         If a study of a rig has results for which the instability norm is close to the load point
         velocity.
@@ -371,7 +372,7 @@ def read_results(path: Path) -> xr.Dataset:
 
 
 def _resolve_results_dataset(dataset: xr.Dataset | str | Path) -> xr.Dataset:
-    """Return results, which are loaded if a name or a path is passed."""
+    """Return results, and load the results first if a name or a path is passed."""
     if not isinstance(dataset, xr.Dataset):
         return open(dataset)
     check_contains_study_results(dataset, "the dataset")
@@ -544,7 +545,7 @@ def rerun(
         If the measure or a reduction is not part of rsfstudy and ``study`` is not passed, or if
         ``output`` already contains results of the study.
     DataError
-        If the file is damaged, or if its motion cannot be recomputed.
+        If the file is damaged, or if the motion in the file cannot be recomputed.
     RunError
         If the run cannot start or finish.
 
@@ -665,7 +666,7 @@ def recompute_cell(
     scene : Scene
         Scene of the cell.
     outcome : Outcome
-        Status, values, message and work of the cell.
+        Status, values, message and number of right-hand side evaluations of the cell.
 
     Raises
     ------

@@ -139,7 +139,7 @@ def parse_rig(option_texts: Mapping[str, str]) -> Rig:
     Returns
     -------
     Rig
-        Rig with the given quantities.
+        Rig with the quantities that the options specify.
 
     Raises
     ------
@@ -175,7 +175,7 @@ def parse_cell_coordinate(text: str) -> tuple[str, str]:
     Raises
     ------
     InvalidValue
-        If the text has no equals sign.
+        If the argument has no equals sign.
     """
     name, equals, value = text.partition("=")
     if not equals:
@@ -222,7 +222,7 @@ def parse_column_assignments(text: str | None) -> dict[str, str] | None:
     Returns
     -------
     dict of str to str or None
-        Column headings by quantity. The value is None if the text is empty.
+        Column headings by quantity. The value is None if the option is empty.
 
     Raises
     ------
@@ -271,17 +271,17 @@ def parse_axis_assignment(text: str, known_labels: Collection[str]) -> tuple[str
 
 
 def parse_flag_number_or_text(text: str) -> Any:
-    """Convert a text to a Boolean or a number if possible.
+    """Convert a string to a Boolean or a number if possible.
 
     Parameters
     ----------
     text : str
-        Text such as ``yes``, ``false``, ``0.01`` or ``slip``.
+        String such as ``yes``, ``false``, ``0.01`` or ``slip``.
 
     Returns
     -------
     bool, float or str
-        Converted value. Any other text is returned unchanged.
+        Converted value. Any other string is returned unchanged.
     """
     return (
         _FLAG_VALUE_BY_WORD[text.lower()]
@@ -291,17 +291,17 @@ def parse_flag_number_or_text(text: str) -> Any:
 
 
 def parse_number_or_text(text: str) -> float | str:
-    """Convert a text to a number if possible.
+    """Convert a string to a number if possible.
 
     Parameters
     ----------
     text : str
-        Text such as ``0.01`` or ``10 um``.
+        String such as ``0.01`` or ``10 um``.
 
     Returns
     -------
     float or str
-        Number. Any other text is returned unchanged.
+        Number. Any other string is returned unchanged.
     """
     read = parse_number(text)
     return text if read is None else read

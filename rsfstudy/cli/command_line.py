@@ -159,11 +159,11 @@ def _raise_signal_interrupt(signal_number: int, _frame: object) -> None:
 class _WarnOnceHandler(logging.Handler):
     """Log handler that prints each message of a library once, as a warning.
 
-    Matplotlib logs the same message for each text of a figure.
+    Matplotlib logs the same message for each text label in a figure.
     """
 
     def __init__(self, level: int) -> None:
-        """Create a handler without printed messages."""
+        """Create a handler that has not printed any messages yet."""
         super().__init__(level)
         self._printed: set[str] = set()
 

@@ -367,7 +367,8 @@ def export(options: CommandOptions) -> int:
 def _read_results_file(file: Path, study_file: Path | None) -> xr.Dataset:
     """Read a results file.
 
-    If a study file is given, it is executed first, because it may define parts of the scenes.
+    If a study file is passed, the file is executed first, because the file may define laws or other
+    components of the scenes.
     """
     if study_file is not None:
         load_study(str(study_file))
@@ -378,7 +379,7 @@ def _read_results_file(file: Path, study_file: Path | None) -> xr.Dataset:
 
 
 def _selected_study_names(options: CommandOptions) -> list[str]:
-    """Return the given study name or file, or the names of all studies."""
+    """Return the requested study name or file, or the names of all studies."""
     if options.every == (options.name is not None):
         raise click.UsageError("name one study, or say --all")
     return list(study_names()) if options.every else [options.name]
@@ -387,7 +388,7 @@ def _selected_study_names(options: CommandOptions) -> list[str]:
 def _build_study_from_options(study_name: str, options: CommandOptions) -> Study:
     """Load a study, and apply the overrides and the rig of the options.
 
-    If the rig has a stiffness, this stiffness replaces the points of a stiffness axis.
+    If the rig has a stiffness, the stiffness of the rig replaces the values of a stiffness axis.
     """
     study, stated = load_study(study_name), options.rig_option_texts
     varied = {field for axis in study.axes for field in axis.fields}
@@ -431,7 +432,7 @@ def _open_worker_pool(
 def _default_figure_path(results_path: Path, options: CommandOptions) -> Path:
     """Return the path of the figure in the directory of the results.
 
-    The results file itself need not exist.
+    The results file need not exist.
     """
     name = results_path.name.removesuffix(".nc").removesuffix(".zarr")
     words = [name, options.variable, options.form or FIGURE_FORMATS[0]]
@@ -441,8 +442,8 @@ def _default_figure_path(results_path: Path, options: CommandOptions) -> Path:
 def _figure_path_from_output_option(options: CommandOptions) -> Path | None:
     """Return the path of ``--output`` if it is a figure file.
 
-    The result is None for a directory. If the path has the suffix of another file type, the path
-    must be an existing directory.
+    If the path is a directory, the function returns None. If the path has the suffix of another
+    file type, the path must be an existing directory.
     """
     output: Path | None = options.output
     ending = "" if output is None else output.suffix[1:].lower()
@@ -463,9 +464,9 @@ def _figure_path_from_output_option(options: CommandOptions) -> Path | None:
 def _load_user_figure(dataset: xr.Dataset, study_file: Path | None) -> Any:
     """Load the user-defined figure of a dataset.
 
-    The result is None if the study uses a figure of rsfstudy. If the figure cannot be loaded and
-    the user passed no study file, the function prints a note and returns "lines", so that maps or
-    lines are drawn.
+    The function returns None if the study uses a figure of rsfstudy. If the figure cannot be loaded
+    and the user passed no study file, the function prints a note and returns "lines", so that maps
+    or lines are drawn.
     """
     if read_declaration(dataset).plot in FIGURE_NAMES:
         return None
@@ -514,7 +515,7 @@ def load_user_figure(results: xr.Dataset, study_file: str | Path | None = None) 
     Raises
     ------
     InvalidValue
-        If no file is given, or if the file does not define the figure.
+        If no study file is passed, or if the file does not define the figure.
 
     Notes
     -----

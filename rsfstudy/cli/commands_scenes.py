@@ -176,7 +176,7 @@ def _print_steps(record: Record) -> None:
 
 
 def _format_normal_stresses_of_step(step: LoadingStep, is_shown: bool) -> dict[str, str]:
-    """Format the normal stresses of a step in MPa if ``is_shown`` is True."""
+    """Return the normal stresses of a step in MPa, or an empty dictionary."""
     stresses = {"sigma0 (MPa)": step.stress_before, "sigma1 (MPa)": step.stress_after}
     return {heading: f"{of * 1e-6:.6g}" for heading, of in stresses.items() if is_shown}
 
@@ -184,7 +184,7 @@ def _format_normal_stresses_of_step(step: LoadingStep, is_shown: bool) -> dict[s
 def _check_output_may_be_replaced(
     output_path: Path, is_of_same_kind: Callable[[xr.Dataset], bool], kind_of_contents: str
 ) -> None:
-    """Raise ``InvalidValue`` if the output file has another kind of data."""
+    """Raise ``InvalidValue`` if the output file contains another kind of data."""
     check_regular_file("--output", output_path)
     if not output_path.exists():
         return

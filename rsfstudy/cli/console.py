@@ -9,7 +9,7 @@ from rich.text import Text
 
 from rsfstudy.errors import RunError, escape_control_characters, shorten_text
 
-#: Maximum number of characters of a printed text, because texts in files can have any length.
+#: Maximum number of characters of a printed string, because strings in files can have any length.
 _MAX_PRINTED_CHARACTERS = 5000
 #: Bounds of the console width, because the environment variable can have any value.
 _MIN_WIDTH, _MAX_WIDTH = 16, 1000
@@ -76,7 +76,7 @@ class PlainConsole(Console):
 
 
 def make_text_printable(text: str) -> str:
-    """Shorten a long text, and escape its control characters.
+    """Shorten a long string, and escape its control characters.
 
     Parameters
     ----------

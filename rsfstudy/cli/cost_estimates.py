@@ -130,7 +130,7 @@ def format_duration(seconds: float) -> str:
 
 
 def _timed_at_same_accuracy_and_engine(cell_plan: CellPlan, cell_timings: CellTimings) -> bool:
-    """Return True if the timings belong to the same rtol and engine."""
+    """Return True if the timings were measured with the same rtol and engine."""
     asked = cell_plan.study.accuracy
     return cell_timings.fingerprint.get("rtol") == asked.rtol and cell_timings.fingerprint.get(
         "engine"

@@ -257,7 +257,7 @@ study_file_option = click.option(
     help="File that declares the study, if its measure, a part or the figure is its own.",
 )
 
-#: Variable names of abscissae that have a different name on the command line.
+#: Mapping from the names of abscissae on the command line to variable names, if the names differ.
 _ABSCISSA_VARIABLES = {"displacement": "load_point_displacement"}
 abscissa_option = click.option(
     "--against",

@@ -56,7 +56,7 @@ if TYPE_CHECKING:
     from rsfstudy.plots import Figure
 
 EXIT_STATUS_OK, EXIT_STATUS_FAILED = 0, 1
-#: Maximum number of printed points of an axis, maximum number of printed cells with different
+#: Maximum number of printed values of an axis, maximum number of printed cells with different
 #: statuses, and maximum number of characters of a printed value.
 _MAX_PRINTED_AXIS_POINTS, _MAX_DIFFERING_CELLS, _MAX_VALUE_CHARACTERS = 40, 10, 60
 
@@ -113,7 +113,7 @@ def print_study_declaration(study: Study, output_directory: Path) -> None:
 
 
 def _format_axis_points(axis_points: Sequence[str]) -> str:
-    """Format the points of an axis, and abbreviate a long list."""
+    """Format the values of an axis, and abbreviate a long list."""
     return ", ".join(
         axis_points
         if len(axis_points) <= _MAX_PRINTED_AXIS_POINTS

@@ -98,9 +98,9 @@ def _print_row_as_list(row: Mapping[str, str], prose_columns: Collection[str], s
 
 
 def _longest_unbreakable_length(text: str, is_prose: bool) -> int:
-    """Return the length of the longest part that must not be broken.
+    """Return the length of the longest part that cannot be split across lines.
 
-    Prose can be broken between words. Any other text must not be broken.
+    Prose can be split between words. Any other string must not be split.
     """
     return max(map(cell_len, text.split() if is_prose else [text]), default=0)
 
@@ -108,7 +108,7 @@ def _longest_unbreakable_length(text: str, is_prose: bool) -> int:
 def _min_column_width(heading: str, cell_texts: Sequence[str], is_prose: bool) -> int:
     """Return the minimum width of a column.
 
-    Headings may be broken between words.
+    Headings may be split between words.
     """
     needed = max(_longest_unbreakable_length(text, is_prose) for text in cell_texts)
     if is_prose:
@@ -133,7 +133,7 @@ def _distribute_widths(
 
 
 def _is_number_text(text: str) -> bool:
-    """Return True if a text is a number, a dash or empty."""
+    """Return True if a string is empty, a dash, or a number."""
     try:
         float(text.strip("<> ").replace(",", ""))
     except ValueError:

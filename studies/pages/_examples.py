@@ -1,8 +1,9 @@
-"""Examples of parts, measures and reductions for the reference page."""
+"""Examples of scene components, measures and reductions for the reference page."""
 
 from __future__ import annotations
 
-#: Example of a scene for each choice of a slot.
+#: Example scene for each built-in friction law, normal stress condition, fluid, dynamics and
+#: loading.
 SCENES = {
     "composite": 'Scene(law="composite", b_over_a=1.5, cutoff_velocity_ratio=0.1)',
     "cut_off": 'Scene(law="cut_off", b_over_a=1.5, cutoff_velocity_ratio=1000)',

@@ -1,7 +1,6 @@
 """Content of the site that is generated from the code.
 
-A line ``<!-- made: NAME -->`` of a page is replaced by the text that the function of this name
-returns.
+A line ``<!-- made: NAME -->`` of a page is replaced by the return value of the function ``NAME``.
 """
 
 from __future__ import annotations
@@ -65,7 +64,7 @@ def fill_page(text: str) -> str:
     Raises
     ------
     KeyError
-        If there is no generator with the name of a line.
+        If a line of the page contains the name of an unknown function.
     """
     return re.sub(r"<!-- made: (\w+) -->", lambda found: MADE[found[1]](), text)
 
@@ -73,7 +72,7 @@ def fill_page(text: str) -> str:
 def escape_asterisks(text: str) -> str:
     """Escape the asterisks of symbols such as V_*.
 
-    Otherwise the asterisks would start emphasised text.
+    Unescaped asterisks would start emphasised text.
 
     Code is not changed.
 
@@ -108,7 +107,7 @@ def markdown_table(headings: Iterable[str], rows: Iterable[Iterable[object]]) ->
     Returns
     -------
     str
-        Table. Empty if there are no rows.
+        Table in Markdown. The string is empty if there are no rows.
     """
     lines = [[_cell(value) for value in row] for row in rows]
     head = list(headings)
@@ -117,7 +116,7 @@ def markdown_table(headings: Iterable[str], rows: Iterable[Iterable[object]]) ->
 
 
 def _cell(value: object) -> str:
-    """Format a cell of a table."""
+    """Format a value for a cell of a Markdown table."""
     if value is None:
         return ""
     if isinstance(value, bool):
@@ -199,7 +198,7 @@ def first_paragraph(thing: object) -> str:
 
 
 def scene_fields() -> str:
-    """Format a table of all fields of a scene, in the order of the parts.
+    """Format a table of all fields of a scene, in the order of the components.
 
     Returns
     -------
@@ -242,7 +241,7 @@ def _rule(name: str) -> str:
 
 
 def _parts_with(name: str) -> str:
-    """Return the parts that have a field.
+    """Return the names of the scene components that have a field.
 
     Parameters
     ----------
@@ -252,7 +251,7 @@ def _parts_with(name: str) -> str:
     Returns
     -------
     str
-        Names of the parts. Empty if all scenes have the field.
+        Names of the components. The string is empty if all scenes have the field.
     """
     owners = [
         f"`{part.name}`"
@@ -264,7 +263,7 @@ def _parts_with(name: str) -> str:
 
 
 def parts() -> str:
-    """Format tables of the choices of all slots.
+    """Format tables of all built-in friction laws and other scene components.
 
     Returns
     -------
@@ -275,7 +274,7 @@ def parts() -> str:
 
 
 def _slot(slot: part_registry.Slot) -> str:
-    """Format the section of a slot."""
+    """Format the section of a type of component, such as the friction law."""
     rows = (
         (f"`{name}`" + (" (default)" if name == slot.default_part_name else ""),
          first_paragraph(part), equation(part),

@@ -57,8 +57,8 @@ html_math_renderer = "mathml"
 html_show_sphinx = False
 #: Style of tables. Seven columns fit into a window with a width of 1200 pixels.
 TABLES = "table.docutils { font-size: .78rem } table.docutils :is(td, th) { padding: .2rem .35rem }"
-#: Pages below the directory ``studies`` in the order of the contents, by caption. Pages that are
-#: not listed come last.
+#: Pages below the directory ``studies`` in the order of the table of contents, by caption. Pages
+#: that are not listed here come last.
 CONTENTS = {
     "Use": ["pages/rig", "pages/studies", "pages/running", "pages/own_studies", "clusters/README"],
     "Notebooks": sorted(file.stem for file in HERE.parent.glob("*.ipynb")),
@@ -67,7 +67,7 @@ CONTENTS = {
 
 
 def _site_contents() -> str:
-    """Return the contents of the site for the first page."""
+    """Return the table of contents of the site for the first page."""
     named = {page for pages in CONTENTS.values() for page in pages}
     others = {f"pages/{file.stem}" for file in HERE.glob("*.md")} - named
     rooms = CONTENTS | {"More": [*sorted(others), "MISPRINTS"]}
@@ -82,8 +82,8 @@ def _site_contents() -> str:
 def _fill_source(app: Any, page: str, text: list[str]) -> None:
     """Insert generated content into a page.
 
-    Notebooks are converted to Markdown, and the contents of the site are appended to the first
-    page.
+    Notebooks are converted to Markdown, and the table of contents of the site is appended to the
+    first page.
     """
     if str(app.env.doc2path(page)).endswith(".ipynb"):
         text[0] = _notebook_to_markdown(text[0])
