@@ -143,7 +143,7 @@ def interpolate_rows(columns, row_positions, result):
     row_positions : array of shape (points,)
         Fractional row numbers.
     result : array of shape (result columns, points)
-        Output array of the interpolated values, one row per column.
+        Output array, with one row of interpolated values for each of the first columns.
     """
     last, weights = columns.shape[1] - 1, np.empty(SAMPLES_PER_STEP + 1)
     for i in range(len(row_positions)):
