@@ -156,7 +156,7 @@ def compile_equations_of_scene(scene: Scene, *, with_time: bool) -> None:
         Scene of the motions.
     with_time : bool
         If True, the equations include time as an unknown. If False, the equations without inertia
-        are also compiled, because critical paths use them.
+        are also compiled, because closed orbits are integrated with these equations.
 
     Raises
     ------
