@@ -24,30 +24,30 @@ regime                                    enter_initial_regime (at the start and
                                           advance_motion (at changes of regime)
 pending_start                             MotionDriver (START_CODE), advance_motion
                                           (REGIME_CODE), start_next_segment (KINK_CODE),
-                                          follow_regime (cleared after the first step)
-regime_start_time                         follow_regime (at the end of a regime),
+                                          integrate_one_regime (cleared after the first step)
+regime_start_time                         integrate_one_regime (at the end of a regime),
                                           start_next_segment (set to 0)
 clock                                     stepper (set to 0 at the start of a regime),
                                           advance_to_step_end
 end, step_length                          stepper (each step),
                                           step_integration.truncate_step_at_clock (end only)
-next_step_length                          stepper, step_integration.halve_unresolved_step,
-                                          advance_motion and start_next_segment (set to 0)
-time_per_step                             stepper (each step), follow_regime (set to 0)
+next_step_length                          stepper, advance_motion and start_next_segment (set to 0),
+                                          step_integration.halve_step_until_dense_output_is_accurate
+time_per_step                             stepper (each step), integrate_one_regime (set to 0)
 is_dense                                  steppers.order_eight (cleared by each step, set by the
                                           first interpolation)
-dense_output_limit                        follow_regime (at the start of a regime),
-                                          step_integration.halve_unresolved_step
+dense_output_limit                        integrate_one_regime (at the start of a regime),
+                                          step_integration.halve_step_until_dense_output_is_accurate
 steps                                     step_integration.take_step
 evaluations_slow, evaluations_fast        workspace.count_evaluations, steppers.scipy
 jacobians                                 steppers.scipy
-target_time                               truncate_step_at_regime_or_time_end,
+target_time                               truncate_step_at_end_of_regime_or_segment,
                                           step_events.record_requested_samples
 event_rows, recorded_rows                 step_events.append_event_row,
                                           step_events.append_recorded_row,
                                           advance_motion (set to 0 in each call)
 samples_taken                             step_events.record_requested_samples
-must_report                               follow_regime (at a kink), advance_motion (cleared)
+must_report                               integrate_one_regime (at a kink), advance_motion (cleared)
 termination, final_normal_stress          is_step_end_valid (if may_terminate is set)
 ========================================  =====================================================
 """

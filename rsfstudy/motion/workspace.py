@@ -14,13 +14,13 @@ y_end, rates_at_end                        stepper (each step),
                                            step_integration.truncate_step_at_clock (y_end only)
 stage_rates, order_eight_step_block,       steppers.order_eight
 dense_output_rows
-y_within                                   stepper (each interpolation), has_left_rupture
+y_within                                   stepper (each interpolation), has_rupture_regime_ended
 rates_within, point_within                 step_integration.evaluate_point_at_clock,
-                                           step_integration.is_step_resolved (rates_within),
-                                           has_left_rupture (point_within)
-dense_slopes                               step_integration.is_step_resolved
-point_at_begin                             follow_regime (at its start), advance_to_step_end
-point_at_end                               follow_regime (each step), end_step_at_end_time,
+                                           step_integration.is_dense_output_accurate (rates_within),
+                                           has_rupture_regime_ended (point_within)
+dense_slopes                               step_integration.is_dense_output_accurate
+point_at_begin                             integrate_one_regime (at its start), advance_to_step_end
+point_at_end                               integrate_one_regime (each step), end_step_at_end_time,
                                            step_integration.truncate_step_at_clock
 event_clocks, event_specs                  step_events.locate_events_in_step
 parameters, parameters_before              start_next_segment
