@@ -1,8 +1,8 @@
 """Critical steps, the smallest steps of the load that trigger an instability.
 
 The package contains the measures ``CriticalStep`` and ``Triggered`` and the algorithms that the
-measures use: the critical path, the motion after a step, and a shooting method. The package does
-not compute limit cycles, and does not read or write files.
+measures use: the critical path, the motion after a step, and a shooting method. The package never
+computes limit cycles, and never reads or writes a file.
 """
 
 from __future__ import annotations

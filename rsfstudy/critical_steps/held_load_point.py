@@ -70,8 +70,8 @@ def peak_log_rate_excess_over_norm(
     Returns
     -------
     float
-        Excess of ln V over the instability norm, which is negative if the slip rate does not reach
-        the norm.
+        Excess over the instability norm, which is negative if the slip rate does not reach the
+        norm.
 
     Raises
     ------

@@ -1,8 +1,8 @@
 """Responses of a slider to small perturbations, steps, holds and ramps.
 
 The package contains the measures ``LinearStability``, ``VelocityStep``, ``Healing``,
-``StepResponse`` and ``RigidResponse``. The package does not search for stability boundaries or
-limit cycles, and does not read or write files.
+``StepResponse`` and ``RigidResponse``. The package never searches for stability boundaries or limit
+cycles, and never reads or writes a file.
 """
 
 from __future__ import annotations
