@@ -1,9 +1,9 @@
 """Base class of measures, and functions that several measures share.
 
 A ``Measure`` computes named results of one scene, with a status, error estimates and the cost of
-the computation. The base class checks the results. The package never contains a concrete measure.
-The concrete measures are in separate packages for critical steps, limit cycles, responses and fits,
-and ``rsfstudy.measures`` exports all measures.
+the computation. The base class checks the results. The package never contains measures of critical
+steps, limit cycles, responses or fits, which are in separate packages. The module
+``rsfstudy.measures`` exports all measures.
 """
 
 from __future__ import annotations
