@@ -1,13 +1,15 @@
 """Critical paths, integrated backwards from the instability norm.
 
-The main class is ``CriticalPath``. At the end of a critical path, ln V equals the norm and its time
-derivative is zero, which leaves one scalar equation for the stress. From this tangency point, the
-path is integrated backwards in time. Neighbouring paths converge in this direction, so a few short
-integrations with a moderate tolerance yield many digits. An integration forwards in time would
-amplify every error. Gu et al. [1]_ derive the critical path under the slip law.
+The main class is ``CriticalPath``. At the end of a critical path, ln V equals the instability norm
+and the time derivative of ln V is zero, which leaves one scalar equation for the stress. From this
+tangency point, the path is integrated backwards in time. Backwards in time, neighbouring paths
+converge, so a few short integrations with a moderate tolerance yield many digits. An integration
+forwards in time would amplify every error. Gu et al. [1]_ derive the critical path under the slip
+law.
 
 The path has only two unknowns, spring stress and one state. Two unknowns are sufficient if the
-effect of inertia is small at the norm, because inertia has no effect when ln V is stationary.
+effect of inertia is small at the instability norm, because inertia has no effect when ln V is
+stationary.
 
 Stresses are deviations from steady sliding at V_* and are divided by sigma_*, slip is divided by
 D_c, and slip rate is divided by V_*.
@@ -53,11 +55,13 @@ from rsfstudy.slider import (
 from rsfstudy.status import Status
 
 #: Number of right-hand-side evaluations, at a tolerance of 1e-5, after which the search for the
-#: start of a path is abandoned.
+#: start of a critical path is abandoned.
 _PATH_EVALUATION_BUDGET = 1_500
-#: ln(V/V_*) at which a path is abandoned, about 1e-100 V_*.
+#: Value of ln(V/V_*) below which the integration of a critical path is abandoned. The slip rate is
+#: about 1e-100 V_*.
 _MIN_LOG_SLIP_RATE = -230.0
-#: Distance in ln V above the norm at which a path is known to touch the norm from above.
+#: Distance in ln V above the instability norm at which a path is considered to touch the norm from
+#: above.
 _LOG_RATE_OFFSET_ABOVE_NORM = 1e-6
 
 
@@ -67,15 +71,15 @@ class CriticalPath(NamedTuple):
     Parameters
     ----------
     log_slip_rate_at_norm : float
-        Logarithm ln(V/V_*) at the norm.
+        Value of ln(V/V_*) at the instability norm.
     min_frictional_stress : float
         Frictional stress at which the normal stress vanishes, in units of sigma_*.
     radiated_stress_at_norm : float
-        Stress that seismic waves radiate at the norm, in units of sigma_*.
+        Stress that seismic waves radiate at the instability norm, in units of sigma_*.
     unknowns_after_step : tuple of float
         Spring stress and states immediately after the step.
     parameters : tuple of float
-        Numbers of the scene.
+        Parameters of the scene.
     solve_tangency : callable
         Function ``(x, weakest, p) -> (g, Psi)``. See ``_build_tangency_solver``.
     evaluate_point : callable
@@ -83,7 +87,7 @@ class CriticalPath(NamedTuple):
     motion_driver : MotionDriver
         Driver that integrates the path.
     engine : str
-        Name of the engine of the driver.
+        Name of the engine that integrates the path.
     has_single_state : bool
         True if the scene has one state. Scenes with several states have no critical path.
     """
@@ -159,9 +163,9 @@ class CriticalPath(NamedTuple):
     def tangency_point(self) -> tuple[float, float] | None:
         """Spring stress f and state Psi at the tangency point.
 
-        At the tangency point, ln V equals the norm and its time derivative is zero. The spring
-        stress is the sum of frictional stress and radiated stress. The result is None if the scene
-        has no tangency point, or if the scene has several states.
+        At the tangency point, ln V equals the instability norm, and the time derivative of ln V is
+        zero. The spring stress is the sum of frictional stress and radiated stress. The result is
+        None if the scene has no tangency point, or if the scene has several states.
         """
         if not self.has_single_state:
             return None
@@ -188,12 +192,13 @@ class CriticalPath(NamedTuple):
         crossing_quantity_and_level : tuple of str and float
             Quantity and level that define the start.
         is_start : callable
-            Function that returns True if a point at this level is the start of the requested step.
+            Function that returns True if a point at the crossing is the start of the requested
+            step.
 
         Returns
         -------
-        Point or None
-            Start of the path. None if the path touches the norm from above, or does not reach a
+        MotionPoint or None
+            Start of the path, or None if the path touches the norm from above or does not reach a
             start.
         """
         above = rise(
@@ -224,9 +229,9 @@ class CriticalPath(NamedTuple):
     ) -> Iterator[Event]:
         """Yield the events of the path, starting at the tangency point.
 
-        The integration ends early if the path cannot continue, or if the path budget is spent. The
-        path budget depends on the tolerance in the same way as the work of an integrator of order
-        eight.
+        The integration ends early if the path cannot continue, or if its evaluation budget is
+        exceeded. This budget depends on the tolerance in the same way as the number of evaluations
+        of an order-eight integrator.
         """
         start = self.tangency_point
         if start is None:
@@ -249,8 +254,9 @@ class CriticalPath(NamedTuple):
     def state_misfit_at_start(self, tolerance: float, work_meter: WorkMeter) -> float | None:
         """Compute the misfit of the state at the start of the path.
 
-        The misfit is Psi/a at the slip rate at which the motion of the scene starts. The misfit is
-        zero for the critical step, because a step from steady sliding at V_* leaves Psi = 0.
+        The misfit is the value of Psi/a where the path passes the initial slip rate of the motion.
+        The misfit is zero for the critical step, because a step from steady sliding at V_* leaves
+        Psi = 0.
 
         Parameters
         ----------
@@ -262,8 +268,8 @@ class CriticalPath(NamedTuple):
         Returns
         -------
         float or None
-            Misfit, or None if the path does not pass this slip rate in the same direction as the
-            motion.
+            Misfit, or None if the path does not pass the initial slip rate in the same direction as
+            the motion.
         """
         given = self.unknowns_after_step, self.parameters
         begin = scalar_function_for_engine(self.evaluate_point, self.engine, *given)(*given)
@@ -278,7 +284,7 @@ class CriticalPath(NamedTuple):
         return None if start is None else start.psi / self.parameters[A]
 
     def norm_misfit_of_next_peak(self, tolerance: float, work_meter: WorkMeter) -> float | None:
-        """Compute the height of the next peak of ln V above the norm.
+        """Compute the height of the next ln V peak above the instability norm.
 
         The motion starts at the tangency point and is integrated forwards for one orbit. The misfit
         is zero if the orbit is a limit cycle that touches the norm.
@@ -301,9 +307,10 @@ class CriticalPath(NamedTuple):
         return None
 
     def exceeds_norm_on_return(self, tolerance: float, work_meter: WorkMeter) -> bool:
-        """Return True if the next peak of the motion exceeds the norm.
+        """Return True if the next peak of ln V exceeds the instability norm.
 
-        If the next peak exceeds the norm, other motions may reach the norm at their second peak.
+        If the next peak of ln V exceeds the instability norm, other motions may reach the norm at
+        their second peak.
 
         Parameters
         ----------
@@ -394,7 +401,7 @@ def _build_tangency_solver(friction_functions: FrictionFunctions) -> Function:
 
 @cache
 def build_point_evaluator(rate_function: Function, point_function: Function) -> Function:
-    """``(state, p) -> MotionPoint``."""
+    """Build a function ``(state, p) -> MotionPoint`` that evaluates a point."""
 
     def at(state: Numbers, p: Numbers) -> MotionPoint:
         now: MotionPoint = point_function(state, rate_function(state, p), p)
@@ -411,16 +418,16 @@ def scalar_function_for_engine(
     Parameters
     ----------
     function : callable
-        Function of floats and of tuples of floats.
+        Function whose arguments are floats or tuples of floats.
     engine : str
         Name of the engine.
     *arguments : float or tuple of float
-        Arguments with the types for which the function is compiled.
+        Example arguments, whose types are the argument types of the compiled function.
 
     Returns
     -------
     callable
-        The compiled function, or the function itself for the other engines.
+        The compiled function, or ``function`` itself if the engine is not the compiled engine.
     """
     return (
         import_compiled_engine().compile_scalar_function(function, *arguments)

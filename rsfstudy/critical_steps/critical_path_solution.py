@@ -1,8 +1,8 @@
-"""Boundary between stable and unstable steps, with its numerical error.
+"""Boundary between stable and unstable step sizes, with its numerical error.
 
 The function ``find_boundary_by_critical_path`` computes the boundary from the critical path. The
-function ``find_boundary_by_limit_cycle`` computes the boundary at which a limit cycle touches the
-norm.
+function ``find_boundary_by_limit_cycle`` computes the step size at which a limit cycle touches the
+instability norm.
 """
 
 from __future__ import annotations
@@ -18,16 +18,17 @@ from rsfstudy.critical_steps.shooting_steps import LOCAL_TOLERANCE_OF_FIRST_ROOT
 from rsfstudy.critical_steps.slow_manifold_accuracy import slow_manifold_relative_error
 from rsfstudy.motion import MIN_LOCAL_TOLERANCE, Accuracy, WorkMeter, estimate_error
 
-#: Error that two paths may share by chance, as a fraction of the requested relative accuracy.
+#: Minimum error estimate, as a fraction of the requested relative accuracy, because two
+#: integrations of a path may have the same error by chance.
 _ERROR_FLOOR_OVER_RTOL = 0.004
 
-#: Largest number of local tolerances with which a path is integrated.
+#: Maximum number of integrations of a path with successively smaller local tolerances.
 _MAX_TOLERANCES_PER_BOUNDARY = 5
 
 
 @dataclass(frozen=True)
 class StepBoundary:
-    """Boundary in step size before verification, with its numerical error.
+    """Unverified boundary between stable and unstable step sizes.
 
     Parameters
     ----------
@@ -36,9 +37,9 @@ class StepBoundary:
     relative_error : float
         Relative error of the size.
     found_from_motions : bool, default: False
-        True if the boundary follows from forward motions.
+        True if the boundary was computed from motions that are integrated forwards in time.
     found_from_limit_cycle : bool, default: False
-        True if a limit cycle touches the norm at the boundary.
+        True if a limit cycle touches the instability norm at the boundary.
     """
 
     step_size: float
@@ -50,7 +51,7 @@ class StepBoundary:
 def find_boundary_by_critical_path(
     step_family: StepFamily, accuracy: Accuracy, work_meter: WorkMeter
 ) -> StepBoundary | None:
-    """Find the boundary that corresponds to the critical path.
+    """Find the critical step size from the critical path.
 
     The boundary is rejected if smaller steps may be unstable. Smaller steps may be unstable if
     steady sliding is unstable, or if the next peak of the motion exceeds the norm.
@@ -58,7 +59,7 @@ def find_boundary_by_critical_path(
     Parameters
     ----------
     step_family : StepFamily
-        Steps among which the boundary is sought.
+        Family of steps in which to search for the boundary.
     accuracy : Accuracy
         Requested accuracy.
     work_meter : WorkMeter
@@ -92,15 +93,15 @@ def find_boundary_by_critical_path(
 def find_boundary_by_limit_cycle(
     step_family: StepFamily, accuracy: Accuracy, work_meter: WorkMeter
 ) -> StepBoundary | None:
-    """Find the boundary at which a limit cycle touches the norm.
+    """Find the step size at which a limit cycle touches the instability norm.
 
-    A limit cycle can touch the norm if larger steps make steady sliding less stable, and if steady
-    sliding is unstable after the largest step.
+    A limit cycle can touch the instability norm if larger steps make steady sliding less stable,
+    and if steady sliding is unstable after the largest step.
 
     Parameters
     ----------
     step_family : StepFamily
-        Steps among which the boundary is sought.
+        Family of steps in which to search for the boundary.
     accuracy : Accuracy
         Requested accuracy.
     work_meter : WorkMeter
@@ -131,12 +132,12 @@ def _find_boundary_with_error(
     accuracy: Accuracy,
     work_meter: WorkMeter,
 ) -> StepBoundary | None:
-    """Find a boundary, and estimate its error from several tolerances.
+    """Find a boundary, and estimate its error from runs with several tolerances.
 
     The path is integrated with decreasing tolerances until the difference between two runs is
-    within the requested accuracy. A path has so few steps that a single underestimated local error
-    may dominate the result. The result is None if the search finds no size between the smallest and
-    the largest step.
+    within the requested accuracy. More than one tolerance is necessary, because a path has so few
+    integration steps that a single underestimated local error may dominate the result. The result
+    is None if the search finds no size between the smallest and the largest step.
     """
     boundary = None
     of_path = slow_manifold_relative_error(step_family.scene) if step_family.scene.has_mass else 0.0

@@ -1,13 +1,14 @@
 """Critical step, the smallest step of the load that triggers instability.
 
 The step may be a change of load point velocity, load point displacement or normal stress. A step is
-critical if the peak slip rate of the motion that follows just reaches the instability norm.
+critical if the peak slip rate after the step just reaches the instability norm.
 
-If the effect of inertia is small up to the norm, the end of the critical path is known, because ln
-V equals the norm and its time derivative is zero. The path is integrated backwards in time to the
-step at which it starts (see ``critical_path``). If inertia is important below the norm, the peak
-slip rate of motions is computed forwards in time (see ``forward_motion``). A critical step is
-accepted only if the motions after a slightly smaller and a slightly larger step confirm the result.
+If the effect of inertia is small up to the instability norm, the end of the critical path is known,
+because ln V equals the norm and its time derivative is zero. The critical path is integrated
+backwards in time to the step at which it starts (see ``critical_path``). If inertia is important
+below the norm, the peak slip rate is computed by integration forwards in time (see
+``motion_after_step``). A critical step is accepted only if the motions after a slightly smaller and
+a slightly larger step confirm the result.
 """
 
 from __future__ import annotations
@@ -48,17 +49,17 @@ STEP_FAMILY_BY_QUANTITY: Mapping[str, type[StepFamily]] = {
     "normal_stress_step": NormalStressSteps,
 }
 STEP_DIRECTIONS = ("up", "down")
-#: Aliases of the quantities in ``STEP_FAMILY_BY_QUANTITY``, which are names of scene fields.
+#: Aliases of the keys of ``STEP_FAMILY_BY_QUANTITY``, which are names of scene fields.
 QUANTITY_ALIASES: Mapping[str, str] = {"velocity_step": "load_velocity_ratio"}
 
 #: Largest relative accuracy of a boundary at which a limit cycle touches the norm.
 _CYCLE_BOUNDARY_RTOL = 1e-8
 
-#: Largest width of a bracket that confirms a boundary, relative to the step size.
+#: Maximum width of a bracket that confirms a critical step, relative to the step size.
 _MAX_CONFIRMED_BRACKET_OVER_SIZE = 0.02
 
-#: Excess above which the first peak of a motion reaches the norm before the motion can approach a
-#: limit cycle.
+#: Excess over the instability norm above which the first peak of a motion exceeds the norm before
+#: the motion can approach a limit cycle.
 _EXCESS_OF_PEAK_BEYOND_TOUCHING_CYCLE = 0.1
 
 #: Slip rate norm at which the effect of inertia is negligible.
@@ -83,22 +84,22 @@ def _outputs_for_quantity(quantity: str) -> tuple[Output, ...]:
 class CriticalStep(Measure):
     r"""Smallest step after which slip rate reaches the instability norm.
 
-    The critical step is a ratio of velocities, a displacement (in units of D_c), or a change of
-    normal stress (in units of sigma_*). The outputs include the sizes of two steps that confirm the
-    critical step. The slider settles after the smaller step, and becomes unstable after the larger
-    step.
+    Depending on ``of``, the critical step is a velocity ratio, a displacement (in units of D_c), or
+    a change of normal stress (in units of sigma_*). The outputs include the sizes of two steps that
+    confirm the critical step. The slider settles after the smaller step, and becomes unstable after
+    the larger step.
 
     Parameters
     ----------
     of : str, default: "load_velocity_ratio"
         Type of the step: "load_velocity_ratio", "displacement_step" or "normal_stress_step". The
-        value of this field in the scene is ignored. "velocity_step" is an alias of
-        "load_velocity_ratio". After a step of displacement or of normal stress, the load point is
-        held (V_0 = 0) unless the scene specifies ``load_velocity_ratio``. Steps of normal stress
-        require a normal stress that is not constant. If a decrease of normal stress triggers the
-        instability, the direction is "down" and the critical step is negative.
+        scene field of this name is ignored. "velocity_step" is an alias of "load_velocity_ratio".
+        After a step of displacement or of normal stress, the load point is held (V_0 = 0) unless
+        the scene specifies ``load_velocity_ratio``. Steps of normal stress require a normal stress
+        that is not constant. If a decrease of normal stress triggers the instability, the direction
+        is "down" and the critical step is negative.
     direction : {"up", "down"}, default: "up"
-        Steps that increase or decrease the load.
+        Direction of the steps: "up" increases the load, and "down" decreases the load.
 
     Raises
     ------
@@ -107,9 +108,9 @@ class CriticalStep(Measure):
 
     Notes
     -----
-    The norm limits the dimensionless slip rate :math:`V T/(2 \pi D_c)`, with the period :math:`T`
-    of the scene. Under the slip law at constant normal stress and critical stiffness, and with an
-    infinite norm, the critical step [1]_ is
+    The instability norm is a limit of the dimensionless slip rate :math:`V T/(2 \pi D_c)`, with the
+    period :math:`T` of the scene. Under the slip law at constant normal stress and critical
+    stiffness, and with an infinite norm, the critical step [1]_ is
 
     .. math:: \frac{V_0}{V_*} = 1 + \frac{a}{b - a},
 
@@ -142,7 +143,7 @@ class CriticalStep(Measure):
     needs_time: ClassVar[tuple[bool, ...]] = (False,)
 
     def __post_init__(self) -> None:
-        """Check the fields, and replace aliases."""
+        """Check the fields of the measure, and replace aliases."""
         if isinstance(self.of, str):
             object.__setattr__(self, "of", QUANTITY_ALIASES.get(self.of, self.of))
         if not isinstance(self.of, str) or self.of not in STEP_FAMILY_BY_QUANTITY:
@@ -152,7 +153,7 @@ class CriticalStep(Measure):
 
     @property
     def primary_output(self) -> str:
-        """Name of the critical step size."""
+        """Name of the main result, which is the critical step size."""
         return STEP_FAMILY_BY_QUANTITY[self.of].critical_output_name
 
     @property
@@ -162,21 +163,21 @@ class CriticalStep(Measure):
 
     @property
     def solved_fields(self) -> tuple[str, ...]:
-        """Field of the step, which the measure ignores."""
+        """Scene field of the step, whose value the measure ignores."""
         return (self.of,)
 
     @property
     def work_by_digits(self) -> Mapping[float, float]:
-        """Relative number of right-hand-side evaluations by number of digits.
+        """Relative number of right-hand-side evaluations for each number of digits.
 
-        The values were measured for velocity steps in the study ``accuracy_cost``.
+        The numbers of evaluations were measured for velocity steps in the study ``accuracy_cost``.
         """
         return {3.0: 0.59, 5.0: 0.74, 7.0: 1.0, 8.0: 1.21, 9.0: 1.58, 10.0: 1.89}
 
     def error_scales(self, scene: Scene, values: Mapping[str, Any]) -> Mapping[str, float]:
         """Return the scale of the numerical error of the critical step.
 
-        The scale is the size of the change.
+        The scale is the magnitude of the change of velocity, displacement or normal stress.
 
         Parameters
         ----------
@@ -271,13 +272,14 @@ class CriticalStep(Measure):
         accuracy: Accuracy,
         work_meter: WorkMeter,
     ) -> Outcome:
-        """Confirm a boundary with one motion on each side.
+        """Confirm a critical step with motions after a smaller and a larger step.
 
-        The distance of the two motions from the boundary is the error of the boundary. If the
-        motions do not confirm a boundary that follows from forward motions or from a limit cycle,
-        the distance is increased tenfold, up to 2 %. The confirming distance is then the error of
-        the boundary. A boundary that follows from a critical path is rejected at the first failure,
-        because a smaller step may be critical if oscillations below the norm grow.
+        The distance between the boundary and the two step sizes is the error of the boundary. If
+        the motions do not confirm a boundary that follows from forward motions or from a limit
+        cycle, the distance is increased tenfold, up to 2 %. The error of the boundary is the
+        distance at which the motions confirm it. A boundary that was computed from a critical path
+        is rejected at the first failure, because a smaller step may be critical if oscillations
+        below the norm grow.
         """
         first = (
             boundary.relative_error
@@ -383,7 +385,7 @@ class CriticalStep(Measure):
         accuracy: Accuracy,
         work_meter: WorkMeter,
     ) -> Outcome:
-        """Find the boundary between a stable and an unstable log size.
+        """Find the boundary between a stable and an unstable logarithm of step size.
 
         The excess of the motions over the norm changes sign at the boundary. If a motion inside the
         bracket cannot continue, the boundary is the centre of the remaining bracket.
@@ -430,7 +432,7 @@ class CriticalStep(Measure):
     def _no_critical_step_outcome(
         self, step_family: StepFamily, largest_size: float, work_meter: WorkMeter, reason: str = ""
     ) -> Outcome:
-        """Return the outcome if no step up to the largest is critical.
+        """Return the outcome if no step up to the largest size is critical.
 
         The status is ``norm_unreachable`` if inertia keeps the slip rate below the norm, ``ok`` if
         the largest step itself reaches the norm, and ``stable_for_all_steps`` otherwise.
@@ -467,7 +469,7 @@ class CriticalStep(Measure):
 def _excess_after_step_of_size(
     step_family: StepFamily, step_size: float, accuracy: Accuracy, work_meter: WorkMeter
 ) -> float | None:
-    """Compute the excess of the motion after a step of a given size.
+    """Compute the excess of ln V over the norm after a step of a given size.
 
     The result is None if the motion cannot continue.
     """
@@ -484,7 +486,7 @@ def _excess_after_step_of_size(
 def _critical_size_without_inertia(step_family: StepFamily, work_meter: WorkMeter) -> float | None:
     """Compute the critical step for a norm at which inertia is negligible.
 
-    The estimate takes little work. The result is None if there is no critical path.
+    The estimate requires few evaluations. The result is None if there is no critical path.
     """
     norm = min(step_family.scene.instability_norm, _NORM_WITH_NEGLIGIBLE_INERTIA)
     massless = type(step_family)(
@@ -498,7 +500,7 @@ def _critical_size_without_inertia(step_family: StepFamily, work_meter: WorkMete
 def _bracket_critical_log_size(
     step_family: StepFamily, size_guess: float, accuracy: Accuracy, work_meter: WorkMeter
 ) -> tuple[float, float] | None:
-    """Find a stable and an unstable log size around a guess.
+    """Find a stable and an unstable logarithm of step size around a guess.
 
     If the guess is unstable, the search tests sizes down to 0.73 times the guess. If the guess is
     stable, the search tests sizes up to 1.37 times the guess. The result is None if the search

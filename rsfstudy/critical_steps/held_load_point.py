@@ -1,12 +1,12 @@
 """Peak slip rate of a motion with a held load point.
 
 The main function is ``peak_log_rate_excess_over_norm``. Spring stress can only decrease while the
-load point is held. With one state, the first peak of ln V is also the last peak. At the peak,
-friction weakens with slip. The weakening decreases after the peak, so ln V has no minimum.
+load point is held. With one state variable, the first peak of ln V is also the last peak, because
+the rate at which friction weakens with slip decreases after the peak.
 
-With several states, friction may weaken repeatedly. States with b < 0, and pore pressure that
-dilatancy has lowered, weaken friction when the slip rate decreases. The motion is therefore
-integrated until no state can weaken friction enough for another peak above the norm.
+With several state variables, friction may weaken repeatedly. States with b < 0, and pore pressure
+that dilatancy has lowered, weaken friction when the slip rate decreases. The motion is therefore
+integrated until no state can weaken friction enough for another peak above the instability norm.
 """
 
 from __future__ import annotations
@@ -37,24 +37,26 @@ from rsfstudy.slider import (
 )
 from rsfstudy.status import Status
 
-#: Spacing in ln V of the levels at which the motion is tested for further peaks: an absolute
-#: minimum, and a fraction of the distance from the norm.
+#: Minimum spacing in ln V of the levels at which the motion is tested for further peaks, and
+#: spacing as a fraction of the distance from the instability norm.
 _MIN_LEVEL_SPACING, _RELATIVE_LEVEL_SPACING = 1.0, 0.12
-#: Decreases of ln V at which the weakening of the states is tested.
+#: Decreases of ln V at which the weakening of friction by the states is tested.
 _TESTED_LOG_RATE_DECREASES = (0.0, 1.0, 3.0, 10.0, 30.0, 100.0, 300.0)
 #: Increases of ln V that are tested as upper bounds of the effect of pore pressure.
 _TESTED_LOG_RATE_INCREASES = (1e-4, 1e-3, 1e-2, 0.1, 1.0)
-#: Largest weakening of friction, as a fraction of the decrease of spring stress.
+#: Maximum weakening of friction by the states, as a fraction of the decrease of spring stress, at
+#: which no further peak is possible.
 _MAX_WEAKENING_OVER_UNLOADING = 0.5
 
 
 def peak_log_rate_excess_over_norm(
     scene: Scene, accuracy: Accuracy, work_meter: WorkMeter
 ) -> float:
-    """Compute the height of the highest peak of ln V above the norm.
+    """Compute the height of the highest ln V peak above the instability norm.
 
-    If the effect of inertia is small, the motion is integrated only up to the norm. The excess is
-    then the square of the rate of ln V at the norm, which vanishes at the boundary.
+    If the effect of inertia is small, the motion is integrated only up to the instability norm, and
+    the returned excess is the squared rate of change of ln V at the norm. This rate vanishes at the
+    boundary between stable and unstable steps.
 
     Parameters
     ----------
@@ -68,12 +70,13 @@ def peak_log_rate_excess_over_norm(
     Returns
     -------
     float
-        Excess, which is negative if the slip rate does not reach the norm.
+        Excess over the instability norm, which is negative if the slip rate does not reach the
+        norm.
 
     Raises
     ------
     MotionStopped
-        If the motion cannot continue. A motion that stops slipping does not raise the exception.
+        If the motion cannot continue. The exception is not raised if slip stops.
     """
     norm, heavy, highest = (
         scene.log_instability_rate,
@@ -102,8 +105,8 @@ def _events_at_held_load_point(
 ) -> list[EventSpecification]:
     """Return the events at which the motion is tested.
 
-    The events are the peaks of ln V, the norm, the loss of shear stress, and decreasing levels of
-    ln V below the norm.
+    The events are peaks of ln V, the rise to the instability norm, the loss of shear stress, and
+    crossings of decreasing levels of ln V below the norm.
     """
     specs = [maximum("log_slip_rate")]
     if not with_inertia:
@@ -118,7 +121,7 @@ def _events_at_held_load_point(
 
 
 def _no_later_peak_reaches_norm(scene: Scene, event: Event) -> bool:
-    """Return True if no later peak can reach the norm."""
+    """Return True if no later peak of ln V can reach the instability norm."""
     slows = event.kind is EventKind.START and event.point.log_slip_rate_derivative <= 0.0
     if scene.state_count == 1:
         return slows or event.kind is EventKind.MAXIMUM
@@ -128,14 +131,15 @@ def _no_later_peak_reaches_norm(scene: Scene, event: Event) -> bool:
 
 
 def _stays_below_norm(scene: Scene, point: MotionPoint) -> bool:
-    """Return True if ln V provably stays below the norm.
+    """Return True if ln V provably stays below the instability norm.
 
-    The slip rate is decreasing at the point. A state that strengthens friction approaches its
+    The slip rate must be decreasing at the point. A state that strengthens friction approaches its
     steady state at the present slip rate. If b > 0, the steady state rises as ln V decreases, so
     the state continues to strengthen friction.
 
-    Pore pressure raises ln V by at most the loss of strength divided by a. The proof also requires
-    that, at the raised ln V, the states weaken friction more slowly than spring stress decreases.
+    Pore pressure raises ln V by at most the resulting loss of strength divided by a. The proof also
+    requires that, at the raised ln V, the states weaken friction more slowly than spring stress
+    decreases.
     """
     _value, slope, shift, shift_slope = build_friction_relation(scene, point.psis)(
         point.frictional_stress
@@ -163,9 +167,10 @@ def _stays_below_norm(scene: Scene, point: MotionPoint) -> bool:
 def _bound_pore_pressure_effect(scene: Scene, point: MotionPoint) -> tuple[float, float]:
     """Compute an upper bound of the increase of ln V by pore pressure.
 
-    The second result is the state shift due to stress at the upper bound. The first result is
-    infinite if there is no bound. An increase of ln V is a bound if the highest pore pressure at
-    the increased ln V reduces strength by less than a times the increase.
+    The function returns the upper bound, and the stress-induced change of the state at the upper
+    bound. The upper bound is infinite if no bound is found. An increase of ln V is an upper bound
+    if the highest pore pressure at the increased ln V reduces strength by less than a times the
+    increase.
     """
     fluid, psis = scene.parts.fluid, point.psis
     value, _slope, shift, _ = build_friction_relation(scene, psis)(point.frictional_stress)

@@ -9,9 +9,10 @@ from rsfstudy.measure_base import Outcome, check_loading_changes_stress_only_in_
 from rsfstudy.slider import Scene, SliderParameters
 from rsfstudy.status import Status
 
-#: Slip rate over that of the load point from which on a norm is that of an instability.
+#: Minimum ratio of the instability norm to the load point velocity. A slower norm may be reached
+#: without an instability.
 _MIN_NORM_OVER_LOAD_VELOCITY = 1e3
-#: How a text begins that tells of a slower one.
+#: Beginning of the warning that the instability norm is a slow slip rate.
 SLOW_NORM_WARNING_PREFIX = "the instability norm "
 
 
@@ -66,9 +67,9 @@ def outcome_if_norm_is_below_load_velocity(scene: Scene, load_velocity: float = 
 def slow_norm_warning(scene: Scene, load_velocity: float) -> str:
     """Return a warning if the instability norm is a slow slip rate.
 
-    The norm is slow if it is less than a thousand times the load point velocity, because a slip
-    rate may then reach the norm without an instability. There is no warning for scenes with the
-    default reference rate, because they represent published studies and not a rig.
+    The norm is slow if it is less than a thousand times the load point velocity. A motion may reach
+    a slow norm without an instability. There is no warning for scenes with the default reference
+    rate, because such scenes represent published studies and not a laboratory apparatus.
 
     Parameters
     ----------

@@ -1,9 +1,9 @@
 """Monotonic rise of slip rate to a fast load point velocity.
 
-If waves radiate most of the stress, V follows the spring over a slip of eta V_0/(K D_c), which is
-many times D_c, while the state stays close to its steady state. An explicit integrator would need
-steps of about D_c for the whole rise. The functions of this module test if the integration can end
-early, because the rest of the rise is monotonic.
+If seismic waves radiate most of the stress, V follows the spring over a slip of eta V_0/(K D_c),
+which is many times D_c, while the state stays close to its steady state. An explicit integrator
+would need steps of about D_c during the whole rise of the slip rate. The functions of this module
+test if the rest of the rise is monotonic, so that the integration can end early.
 
 The test uses two curves in the plane of ln V and state, which meet only in steady sliding. The
 first curve is the steady state. The second curve is a lag behind the steady state that motions can
@@ -28,14 +28,14 @@ from rsfstudy.slider import (
     steady_friction_minus_reference,
 )
 
-#: Distances of ln V below the load point velocity at which the motion is tested.
+#: Differences ln V_0 - ln V at which the motion is tested for a monotonic rise.
 _TESTED_LOG_RATE_DISTANCES = (10.0, 8.0, 7.0, 6.0, 5.0, 4.0, 3.0, 2.5, 2.0, 1.5, 1.0, 0.5, 0.2)
-#: The first number is the lag of the second curve, relative to the lag that a state at rest would
-#: have after a slip of D_c. The second number is the fraction of the evolution that must remain to
-#: cross the curve. The third number is the smallest distance in ln V from the load point velocity
-#: at which the curves are tested, because all changes are proportional to the distance if the
-#: distance is small. The last two numbers are the largest spacing of the logarithms of the
-#: distances, and the step of the finite differences.
+#: Constants of the test for a monotonic rise. The first number is the lag of the second curve,
+#: relative to the lag that a state at rest would have after a slip of D_c. The second number is the
+#: fraction of the evolution that must remain to cross the curve. The third number is the smallest
+#: distance in ln V from the load point velocity at which the curves are tested, because all changes
+#: are proportional to the distance if the distance is small. The last two numbers are the largest
+#: spacing of the logarithms of the distances, and the step of the finite differences.
 (
     _LAG_FACTOR,
     _REQUIRED_EVOLUTION_FRACTION,
@@ -44,12 +44,13 @@ _TESTED_LOG_RATE_DISTANCES = (10.0, 8.0, 7.0, 6.0, 5.0, 4.0, 3.0, 2.5, 2.0, 1.5,
     _DIFFERENCE_STEP,
 ) = 2.0, 0.25, 1e-4, 0.25, 1e-5
 #: Largest change of ln V over a slip of D_c, relative to the distance from the load point velocity,
-#: at which the test is worthwhile. Such a slow motion would take hundreds of steps.
+#: at which the test for a monotonic rise is worthwhile. Such a slow motion would take hundreds of
+#: integration steps.
 _MAX_LOG_RATE_GROWTH_OVER_DISTANCE = 0.02
 
 
 def monotone_rise_events(scene: Scene) -> list[EventSpecification]:
-    """Return the events at which ``rises_monotonically_to_load_rate`` should be called.
+    """Return the events at which to test for a monotonic rise.
 
     Parameters
     ----------
@@ -59,8 +60,9 @@ def monotone_rise_events(scene: Scene) -> list[EventSpecification]:
     Returns
     -------
     list of EventSpecification
-        Levels of ln V below the load point velocity. The list is empty if the rise is not slow, or
-        if the scene has several states or inertia, for which the test is not valid.
+        Rises of ln V through levels below ln V_0. The function ``rises_monotonically_to_load_rate``
+        is the test. The list is empty if the rise is not slow, or if the scene has several states
+        or inertia, for which the test is not valid.
     """
     load = scene.log_load_velocity
     if scene.state_count > 1 or scene.has_mass:
@@ -73,7 +75,7 @@ def monotone_rise_events(scene: Scene) -> list[EventSpecification]:
 
 
 def rises_monotonically_to_load_rate(scene: Scene, point: MotionPoint) -> bool:
-    """Return True if ln V rises to the load point velocity and not beyond.
+    """Return True if ln V rises monotonically to ln V_0 without overshoot.
 
     The test is based on a finite number of points between the present slip rate and the load point
     velocity.
@@ -82,14 +84,14 @@ def rises_monotonically_to_load_rate(scene: Scene, point: MotionPoint) -> bool:
     ----------
     scene : Scene
         Scene of the motion.
-    point : Point
+    point : MotionPoint
         Present point of the motion.
 
     Returns
     -------
     bool
-        True if the motion is between the two curves, and if motions at all tested points cross the
-        curves inwards.
+        True if the motion is between the two curves of the module description, and if motions at
+        all tested points cross the curves inwards.
     """
     change, load = _build_rate_and_lag_change_function(scene), scene.log_load_velocity
     distance = load - point.log_slip_rate
@@ -118,11 +120,11 @@ def rises_monotonically_to_load_rate(scene: Scene, point: MotionPoint) -> bool:
 def _build_rate_and_lag_change_function(
     scene: Scene,
 ) -> Callable[[float, float], tuple[float, float]]:
-    """Build a function that computes the changes of ln V and of the lag.
+    """Build a function that computes the changes of ln V and of the state lag.
 
     The arguments of the function are ln(V/V_*) and the lag of the state behind the steady state.
-    The results are changes per D_c of slip, or NaN if no stress corresponds to this value of
-    friction.
+    The function returns the changes per D_c of slip, or NaN if no stress corresponds to the
+    friction at this slip rate and lag.
     """
     relation, evolution = (
         build_friction_relation(scene),

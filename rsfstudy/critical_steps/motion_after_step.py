@@ -1,4 +1,4 @@
-"""Outcome of the motion after a step, relative to the instability norm.
+"""Motion after a step, and its peak slip rate relative to the instability norm.
 
 The main functions are ``motion_reaches_norm`` and ``motion_excess_over_norm``.
 """
@@ -42,23 +42,24 @@ from rsfstudy.slider import (
 )
 from rsfstudy.status import Status
 
-#: Relative distance below the critical stiffness, and decay rate per D_c of slip, that cannot be
-#: distinguished from zero.
+#: Smallest significant difference from neutral stability, both for the relative distance below the
+#: critical stiffness and for the decay rate per D_c of slip.
 _NEUTRAL_STABILITY_MARGIN = 1e-9
 #: Largest amplitude of ln V for which linear theory predicts the growth of oscillations.
 _MAX_LINEAR_LOG_RATE_AMPLITUDE = 0.05
-#: Ratio of the sizes of successive orbits when growth is slow, and smallest such ratio. A leap may
-#: skip limit cycles whose sizes differ by less than this ratio. Leaps are shortened if they would
-#: end above the norm.
+#: Ratio of the sizes of successive orbits between which the computation leaps when growth is slow,
+#: and smallest permitted ratio. A leap may skip limit cycles whose sizes differ by less than this
+#: ratio. Leaps are shortened if they would end above the instability norm.
 _LEAP_FACTOR, _MIN_LEAP_FACTOR = 1.3, 1.002
 
-#: Number of successive equal peaks after which a motion with several states repeats. Close to an
-#: unstable cycle, the peaks would not remain equal.
+#: Number of successive equal peaks after which a motion with several states is considered periodic.
+#: Close to an unstable limit cycle, the peaks would not remain equal.
 _REQUIRED_EQUAL_PEAKS_IN_A_ROW = 4
-#: Assumed height of the peak of ln V above the norm, if the motion is integrated only up to the
-#: norm.
+#: Assumed height of the ln V peak above the instability norm, if the motion is integrated only up
+#: to the norm.
 _ASSUMED_LOG_RATE_OVERSHOOT_OF_NORM = 1.0
-#: Fraction of the largest distance from steady sliding below which a motion has settled.
+#: Distance from steady sliding below which a motion has settled, as a fraction of the largest
+#: distance.
 _SETTLED_FRACTION_OF_MAX_DISTANCE = 1e-3
 
 _SLIP_RATE_PEAK_EVENT = maximum("log_slip_rate")
@@ -66,11 +67,12 @@ _SLIP_RATE_PEAK_EVENT = maximum("log_slip_rate")
 
 @dataclass(frozen=True)
 class _SteadySlidingWithMargin(SteadySliding):
-    """Steady sliding at the load point velocity, with its stability margin.
+    """Steady sliding at the load point velocity, and its stability margin.
 
     At constant normal stress and critical stiffness, steady sliding is neutrally stable and every
     orbit is closed. Gu et al. (1984) show this for the slip law, and Ranjith and Rice (1999) for
-    the slowness law. In this neutral case, only numerical errors change the height of the peaks.
+    the slowness law. If steady sliding is neutrally stable, only numerical errors change the height
+    of the peaks.
     """
 
     stability_margin: float
@@ -87,13 +89,14 @@ class _OrbitOutcome:
     Parameters
     ----------
     log_slip_rate_peaks : tuple of float
-        Peaks of ln V.
+        Values of ln V at its peaks.
     reached_norm : bool
-        True if the motion has reached the norm.
-    point_of_too_slow_growth : Point, optional
-        Peak at which the orbit grows too slowly to integrate further.
+        True if the motion has reached the instability norm.
+    point_of_too_slow_growth : MotionPoint, optional
+        Point at the peak of ln V at which the integration ended, because the orbit grows too
+        slowly.
     initial_log_slip_rate : float, default: -inf
-        Value of ln V at the start, if the slip rate decreases from there.
+        Value of ln V at the start of the motion, if the slip rate initially decreases.
     """
 
     log_slip_rate_peaks: tuple[float, ...]
@@ -103,7 +106,7 @@ class _OrbitOutcome:
 
 
 def motion_reaches_norm(scene: Scene, accuracy: Accuracy, work_meter: WorkMeter) -> bool:
-    """Return True if the slip rate reaches the norm after the step.
+    """Return True if the slip rate reaches the instability norm after the step.
 
     Parameters
     ----------
@@ -123,11 +126,11 @@ def motion_reaches_norm(scene: Scene, accuracy: Accuracy, work_meter: WorkMeter)
 
 
 def motion_excess_over_norm(scene: Scene, accuracy: Accuracy, work_meter: WorkMeter) -> float:
-    """Compute the excess of the motion after the step over the norm.
+    """Compute the excess of ln V over the instability norm after the step.
 
     The excess is negative if the slip rate never reaches the instability norm. With inertia, the
     excess is the height of the highest peak of ln V above the norm. Without inertia, the excess is
-    the growth of ln V from one peak to the next. If possible, the excess is continuous at the
+    the increase of ln V from one peak to the next. If possible, the excess is continuous at the
     boundary between stable and unstable steps.
 
     Parameters
@@ -142,7 +145,7 @@ def motion_excess_over_norm(scene: Scene, accuracy: Accuracy, work_meter: WorkMe
     Returns
     -------
     float
-        Excess, which is positive or zero if the slip rate reaches the norm.
+        Excess of ln V, which is positive or zero if the slip rate reaches the instability norm.
 
     Raises
     ------
@@ -152,9 +155,9 @@ def motion_excess_over_norm(scene: Scene, accuracy: Accuracy, work_meter: WorkMe
 
     Notes
     -----
-    Without inertia, the motion is planar and autonomous, so paths cannot cross. If a peak is not
-    higher than the previous peak, no later peak is higher. If peaks grow, they grow until they
-    reach the norm or a limit cycle.
+    Without inertia, the motion is planar and autonomous, so trajectories in the phase plane cannot
+    cross. If a peak is not higher than the previous peak, no later peak is higher. If peaks grow,
+    they grow until they reach the norm or a limit cycle.
 
     If growth is slow, the motion leaps to a somewhat larger orbit instead of following a large
     number of orbits. If all larger orbits grow up to the norm, the inner orbit also grows up to the
@@ -184,8 +187,8 @@ def motion_excess_over_norm(scene: Scene, accuracy: Accuracy, work_meter: WorkMe
 def has_frictional_damping_only(scene: Scene) -> bool:
     """Return True if friction is the only source of damping.
 
-    The effective normal stress must also be constant. Sudden changes of normal stress by the
-    loading are permitted.
+    The function also requires a constant effective normal stress, except for sudden changes by the
+    loading.
 
     Parameters
     ----------
@@ -253,14 +256,14 @@ def is_neutrally_stable(scene: Scene, tolerance: float) -> bool:
     scene : Scene
         Scene with the step.
     tolerance : float
-        Largest relative difference from the critical stiffness.
+        Maximum relative difference from the critical stiffness.
 
     Returns
     -------
     bool
         True if growth and decay are indistinguishable. The result is False if the load point is
-        held, or if the stiffness is exactly critical and all orbits are closed, because these cases
-        are decided without a motion.
+        held, or if the stiffness is exactly critical and all orbits are closed, because stability
+        is known without integration in both cases.
     """
     off = abs(stiffness_ratio_after_step(scene) - 1.0)
     known = scene.log_load_velocity == -math.inf or (off == 0.0 and may_have_closed_orbits(scene))
@@ -317,7 +320,7 @@ def stability_margin(scene: Scene) -> float:
 def _max_log_slip_rate_of_closed_orbit(
     scene: Scene, accuracy: Accuracy, work_meter: WorkMeter
 ) -> float:
-    """Compute the largest ln V of a closed orbit.
+    """Compute the largest value of ln V on a closed orbit.
 
     The largest ln V is the peak closest to the start, before or after the start. If the motion
     starts with a decreasing slip rate, the motion is integrated backwards in time to the previous
@@ -349,7 +352,7 @@ def _max_log_slip_rate_of_closed_orbit(
 
 
 def _orbit_touching_norm_shrinks(scene: Scene, accuracy: Accuracy, work_meter: WorkMeter) -> bool:
-    """Return True if the orbit that touches the norm shrinks.
+    """Return True if the orbit that touches the instability norm shrinks.
 
     Paths in a plane cannot cross, so no orbit inside a shrinking orbit reaches the norm.
     """
@@ -367,10 +370,11 @@ def _slow_orbit_grows_to_norm(
     *,
     with_inertia: bool,
 ) -> bool:
-    """Return True if a slowly growing orbit grows up to the norm.
+    """Return True if a slowly growing orbit grows up to the instability norm.
 
-    The motion leaps from the orbit to larger orbits, until an orbit shrinks or reaches the norm. A
-    leap is shortened if the first peak of the new orbit is above the norm.
+    The function tests successively larger orbits, until an orbit shrinks or reaches the instability
+    norm. The distance to the next orbit is reduced if the first peak of the next orbit is above the
+    norm.
     """
     if not with_inertia and _orbit_touching_norm_shrinks(scene, accuracy, work_meter):
         return False
@@ -407,7 +411,7 @@ def _follow_one_orbit(
 ) -> _OrbitOutcome:
     """Integrate an orbit until the outcome of the motion is certain.
 
-    The integration also ends if the orbit grows too slowly.
+    The integration also ends if the orbit grows too slowly to decide the outcome.
     """
     norm = scene.log_instability_rate
     specs = (
@@ -468,9 +472,9 @@ class _CycleRepetitionDetector:
     """Detector of repeating motions in scenes with several states.
 
     A motion repeats if its unknowns are the same at several successive peaks, within numerical
-    errors. A motion that is at rest within the tolerance also repeats. If steady sliding is
-    unstable and the oscillation is small, the motion continues, because the growth may be too small
-    to measure.
+    errors. A motion whose unknowns are constant within the tolerance is also considered periodic.
+    If steady sliding is unstable and the oscillation is small, the motion continues, because the
+    growth may be too small to measure.
     """
 
     def __init__(
@@ -484,13 +488,13 @@ class _CycleRepetitionDetector:
 
         Parameters
         ----------
-        peak_point : Point
+        peak_point : MotionPoint
             Point at the latest peak of ln V.
 
         Returns
         -------
         bool
-            True if the required number of successive peaks are equal.
+            True if the required number of successive peaks of ln V are equal.
         """
         current = (peak_point.spring_stress, *peak_point.psis)
         change = max(abs(x - y) for x, y in zip(current, self._previous, strict=True))
@@ -523,7 +527,7 @@ def _peaks_have_stopped_growing(
 def _orbit_excess_over_norm(
     orbit: _OrbitOutcome, log_slip_rate_at_norm: float, *, with_inertia: bool
 ) -> float:
-    """Compute an excess that changes sign at the boundary.
+    """Compute an excess over the norm that changes sign at the critical step.
 
     A single orbit may not reveal the sign of the excess.
     """

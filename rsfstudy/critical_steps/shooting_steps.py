@@ -21,30 +21,32 @@ from rsfstudy.critical_steps.motion_after_step import is_linearly_stable
 from rsfstudy.motion import WorkMeter
 from rsfstudy.slider import Scene, quasi_static_log_slip_rate
 
-#: Smallest step size of the search, and its upper limit as a fraction of the largest step size.
+#: Minimum step size of the search, and its maximum as a fraction of the largest step size.
 MIN_STEP_SIZE, _MIN_SIZE_FRACTION = 1e-3, 0.1
-#: Extension of the largest step, in ln V, if inertia delays the rise of slip rate.
+#: Amount of ln V by which the largest step is increased if inertia delays the rise of slip rate.
 LOG_RATE_MARGIN_FOR_INERTIA = 5.0
-#: Largest effect of a delay by inertia that is neglected, as a fraction of the requested accuracy.
+#: Largest change of step size by inertia that is neglected, as a fraction of the requested
+#: accuracy.
 INERTIA_TOLERANCE_FRACTION = 0.01
 #: Number of step sizes at which stability is tested, if stability may change repeatedly with size.
 _STABILITY_TESTED_SIZE_COUNT = 24
-#: Local tolerance of the approximate root.
+#: Local tolerance of the integrations for the approximate root of the misfit.
 LOCAL_TOLERANCE_OF_FIRST_ROOT = 1e-5
-#: Smallest and largest distance in log size over which the slope of the misfit is computed. If a
-#: correction of the approximate root exceeds the largest distance, the refinement ends.
+#: Smallest and largest difference of ln(step size) over which the slope of the misfit is computed.
+#: If a correction of the approximate root exceeds the largest distance, the refinement ends.
 _MIN_SLOPE_DISTANCE, _MAX_SLOPE_DISTANCE = 1e-3, 0.05
 _MAX_SECANT_ITERATIONS = 8
-#: Largest stride and upper end of the search for a sign change, in logit(size/largest size).
+#: Largest stride and upper end of the search for a sign change of the misfit, in logit(size/largest
+#: size).
 _MAX_STRIDE, _MAX_POSITION = 0.7, 4.0
 #: Number of successive strides without a critical path after which the search is abandoned.
 _MAX_STRIDES_WITHOUT_PATH = 3
 
 
 class StepFamily:
-    """Base class of families of steps with one type and one direction.
+    """Base class of step families. A family contains steps of one type and direction.
 
-    The size of a step is a positive number that increases with the step.
+    The step size is a positive number that increases with the magnitude of the step.
 
     Parameters
     ----------
@@ -66,7 +68,7 @@ class StepFamily:
     critical_output_name: ClassVar[str]
     #: Names of additional results for the critical step.
     extra_output_names: ClassVar[tuple[str, ...]] = ()
-    #: True if the largest step itself raises the slip rate to the norm immediately.
+    #: True if the largest step immediately raises the slip rate to the instability norm.
     largest_step_reaches_norm = False
 
     def __init__(self, scene: Scene, sign: int) -> None:
@@ -105,7 +107,7 @@ class StepFamily:
         raise TypeError(f"{type(self).__name__} steps nothing")
 
     def user_value_error(self, step_size: float, relative_error: float) -> float:
-        """Return the error of the step value.
+        """Return the error of the step value that results from an error of the size.
 
         Parameters
         ----------
@@ -122,7 +124,7 @@ class StepFamily:
         raise TypeError(f"{type(self).__name__} steps nothing")
 
     def size_rtol_for_value_rtol(self, step_size: float, rtol: float) -> float:
-        r"""Return the size tolerance for a tolerance of the step value.
+        r"""Return the tolerance of the size for a tolerance of the step value.
 
         If the size has the returned relative error, the change of the step value has the relative
         error ``rtol``. The size tolerance is at most ``rtol``.
@@ -185,7 +187,7 @@ class StepFamily:
     def find_sizes_by_limit_cycle(
         self, local_tolerances: Iterable[float], work_meter: WorkMeter
     ) -> Iterator[float]:
-        """Yield sizes of the step whose limit cycle touches the norm.
+        """Yield sizes of the step whose limit cycle touches the instability norm.
 
         Parameters
         ----------
@@ -197,7 +199,7 @@ class StepFamily:
         Returns
         -------
         iterator of float
-            Size for each tolerance. The iterator is empty if there is no such step.
+            Size for each tolerance. The iterator is empty if no limit cycle touches the norm.
         """
         return iter(())
 
@@ -221,7 +223,7 @@ class StepFamily:
         return False
 
     def size_error_if_neutrally_stable(self, step_size: float, rtol: float) -> float:
-        """Return the size error if steady sliding is nearly neutral.
+        """Return the size error if steady sliding is almost neutrally stable.
 
         Close to neutral stability, forward motions cannot distinguish growth from decay.
 
@@ -235,7 +237,7 @@ class StepFamily:
         Returns
         -------
         float
-            Additional relative error of the size.
+            Additional relative error of the step size.
         """
         return 0.0
 
@@ -244,8 +246,8 @@ class StepFamily:
 
         If steady sliding is unstable after a smaller step, small oscillations grow, and the smaller
         step may be critical. The critical stiffness decreases with the load point velocity, so a
-        test at the ends of the range is sufficient. If the law has a characteristic slip rate, more
-        sizes are tested.
+        test at the smallest and at the largest step is sufficient. If the friction law has a
+        characteristic slip rate, more step sizes are tested.
 
         Parameters
         ----------
@@ -289,8 +291,8 @@ def slip_lag_due_to_inertia(scene: Scene) -> tuple[float, float]:
 class ShootingSteps(StepFamily):
     """Base class of steps whose critical path depends on the step size.
 
-    The critical path depends on the size if the step changes friction or the load point velocity.
-    The critical size follows from a shooting method.
+    The critical path depends on the step size if the step changes friction or the load point
+    velocity. The critical step size is computed by a shooting method.
 
     Parameters
     ----------
@@ -320,10 +322,10 @@ class ShootingSteps(StepFamily):
     ) -> Iterator[float]:
         """Yield sizes of the step at which the critical path starts.
 
-        The critical path of this step begins with the state before the step. An approximate root
-        and its slope are computed first, with a loose tolerance. Each smaller tolerance then needs
-        one to three paths. With several states, there are no critical paths. See the base class for
-        the parameters.
+        The critical path of the critical step begins with the state before the step. An approximate
+        root and its slope are computed first, with a loose tolerance. For each smaller tolerance,
+        one to three paths are integrated. With several states, there are no critical paths. See the
+        base class for the parameters.
         """
         path_at = self.build_critical_path_factory(work_meter.engine)
         loose = (
@@ -356,10 +358,11 @@ class ShootingSteps(StepFamily):
     def find_sizes_by_limit_cycle(
         self, local_tolerances: Iterable[float], work_meter: WorkMeter
     ) -> Iterator[float]:
-        """Yield the size of the step whose limit cycle touches the norm.
+        """Yield the size of the step whose limit cycle touches the instability norm.
 
-        The step is the smallest step after which an orbit that touches the norm does not shrink.
-        Each misfit requires the integration of one orbit. See the base class for the parameters.
+        The method searches for the smallest step after which an orbit that touches the norm does
+        not shrink. The computation of each misfit requires the integration of one orbit. See the
+        base class for the parameters.
         """
         found, path_at = dict[float, float](), self.build_critical_path_factory(work_meter.engine)
 
@@ -383,7 +386,7 @@ class ShootingSteps(StepFamily):
     def _find_loose_misfit_root(
         self, build_critical_path: Callable[[float], CriticalPath], work_meter: WorkMeter
     ) -> tuple[float, float] | None:
-        """Return the log size at which the misfit vanishes, and its slope.
+        """Return the root of the misfit in ln(step size), and the slope at the root.
 
         The misfit is computed with a loose tolerance. The result is None if there is no root.
         """
@@ -406,7 +409,7 @@ class ShootingSteps(StepFamily):
     def _bracket_misfit_root(
         self, misfit_function: Callable[[float], float]
     ) -> tuple[float, float] | None:
-        """Return two log sizes between which the misfit changes sign.
+        """Return two values of ln(step size) between which the misfit changes sign.
 
         The search proceeds outwards from a guess, and first in the direction that the sign of the
         misfit indicates. The misfit is NaN, and has no sign, if there is no critical path. The
@@ -454,7 +457,7 @@ class ShootingSteps(StepFamily):
         return int(math.copysign(1.0, misfit_at_guess))
 
     def _guess_size(self) -> float:
-        """Return a size at which the search starts."""
+        """Return the step size at which the search starts."""
         raise TypeError(f"{type(self).__name__} steps nothing")
 
     def _misfit_without_path(self, scene: Scene, work_meter: WorkMeter) -> float:
@@ -469,9 +472,9 @@ class ShootingSteps(StepFamily):
 def _find_misfit_root(
     misfit_function: Callable[[float], float], known_misfits: Mapping[float, float], *bracket: float
 ) -> tuple[float, float] | None:
-    """Find the log size at which a misfit vanishes, and its slope.
+    """Find the root of a misfit in ln(step size), and the slope at the root.
 
-    A misfit without a critical path has a sign but no magnitude. The root and the slope are
+    If there is no critical path, the misfit has a sign but no magnitude. The root and the slope are
     computed from misfits with a magnitude. The result is None if there are too few misfits with a
     magnitude.
     """
@@ -508,7 +511,7 @@ def _refine_misfit_root(
     local_tolerances: Iterable[float],
     misfit_function: Callable[[float, float], float | None],
 ) -> Iterator[float]:
-    """Yield sizes at which a misfit vanishes, for decreasing local tolerances.
+    """Yield the root of a misfit, as a step size, for decreasing local tolerances.
 
     The refinement uses the secant method, starting from an approximate root and its slope with
     respect to the log size. The iteration for each tolerance ends when the residual is below thirty

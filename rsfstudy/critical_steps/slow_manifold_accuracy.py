@@ -1,4 +1,4 @@
-"""Accuracy of boundaries that are computed on the slow manifold."""
+"""Accuracy of critical steps that are computed on the slow manifold."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ def inertia_matters_below_norm(scene: Scene, accuracy: Accuracy) -> bool:
 
 
 def slow_manifold_relative_error(scene: Scene) -> float:
-    r"""Estimate the relative error of a boundary that is computed on the slow manifold.
+    r"""Estimate the relative error of a critical step due to the slow manifold.
 
     Parameters
     ----------
@@ -46,7 +46,7 @@ def slow_manifold_relative_error(scene: Scene) -> float:
 
     with the stiffness :math:`K` and the instability norm :math:`w`. Inertia moves a boundary by up
     to :math:`0.8 (K/a) w^2`, if the norm corresponds to a slip rate of a few :math:`V_*`. The error
-    of the slow manifold is at most 0.9 times the square of this effect. The tests measure both
-    coefficients.
+    of the slow manifold is at most 0.9 times the square of this effect. The test suite measures
+    both coefficients.
     """
     return 3.0 * (scene.stiffness / scene.a * scene.instability_norm**2) ** 2

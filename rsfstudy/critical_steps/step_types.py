@@ -39,16 +39,17 @@ from rsfstudy.status import Status
 
 #: Smallest load point velocity of the search, in units of V_*.
 MIN_LOAD_VELOCITY = 1e-20
-#: Smallest b/a - 1 in the formula of the first guess, because some laws weaken friction with b < a.
+#: Minimum value of b/a - 1 in the formula of the first guess. The minimum is necessary because some
+#: laws weaken friction although b < a.
 _MIN_B_OVER_A_EXCESS_FOR_GUESS = 1e-6
 #: Largest spring stress after a step, in units of sigma_*.
 _MAX_SPRING_STRESS = 1e6
 _LOG_OF_MAX_FLOAT = math.log(sys.float_info.max)
 #: Largest |ln(sigma/sigma_*)| after a step.
 _MAX_LOG_NORMAL_STRESS_RATIO = math.log(1e3)
-#: Relative accuracy of the largest step size.
+#: Relative accuracy to which the largest step size is computed.
 _RTOL_OF_MAX_STEP_SIZE = 1e-6
-#: Smallest effective friction in the formula of the first guess, as a fraction of mu_*. The effect
+#: Minimum effective friction in the formula of the first guess, as a fraction of mu_*. The effect
 #: of normal stress on the state may cancel friction completely.
 _MIN_EFFECTIVE_FRICTION_OVER_MU_STAR = 0.1
 
@@ -99,7 +100,7 @@ class RateSteps(ShootingSteps):
         return float(np.logaddexp(0.0, self.scene.stiffness_ratio - 1.0 - math.log(weakening)))
 
     def _misfit_without_path(self, scene: Scene, work_meter: WorkMeter) -> float:
-        """Return the sign of the misfit from a forward motion.
+        """Return the sign of the misfit, computed by integration forwards in time.
 
         The result is NaN for downward steps.
         """
@@ -114,8 +115,8 @@ class RateSteps(ShootingSteps):
     def _compute_max_size(self) -> float:
         """Return the largest size of the search.
 
-        The largest upward step leads to a load point velocity at the norm. The largest downward
-        step leads to the smallest load point velocity with steady sliding.
+        The largest upward step leads to a load point velocity at the instability norm. The largest
+        downward step leads to the smallest load point velocity with steady sliding.
         """
         if self.sign > 0:
             return self.scene.log_instability_rate
@@ -172,8 +173,8 @@ class DisplacementSteps(StepFamily):
 
         With inertia, the slider follows the critical path with a delay, which changes the critical
         size in two ways. The load point moves during the delay, and the state evolves less because
-        the slip rate is lower. The effect on the state is half of b times the delay in slip. See
-        the base class for the parameters.
+        the slip rate is lower. The effect on the state is b/2 times the delay in slip. See the base
+        class for the parameters.
         """
         scene = self.scene
         if not scene.has_mass:
@@ -229,9 +230,9 @@ class DisplacementSteps(StepFamily):
     def _compute_max_size(self) -> float:
         """Return the largest size of the search.
 
-        The largest upward step raises the slip rate to the norm immediately. With inertia, the
-        range is extended, because the slip rate rises with a delay while stress relaxes. The
-        largest downward step removes the shear stress or the normal stress.
+        The largest upward step raises the slip rate to the instability norm immediately. With
+        inertia, the range of step sizes is extended, because the slip rate rises with a delay while
+        stress relaxes. The largest downward step removes the shear stress or the normal stress.
         """
         scene = self.scene
         if max(0.0, scene.log_load_velocity) >= scene.log_instability_rate:
@@ -344,7 +345,7 @@ class NormalStressSteps(ShootingSteps):
         return scene.a * scene.stiffness_ratio / friction
 
     def _misfit_without_path(self, scene: Scene, work_meter: WorkMeter) -> float:
-        """Return the sign of the misfit from a forward motion.
+        """Return the sign of the misfit, computed by integration forwards in time.
 
         The result is NaN for increases of normal stress, or if the motion cannot continue.
         """
@@ -364,11 +365,11 @@ class NormalStressSteps(ShootingSteps):
     def _compute_max_size(self) -> float:
         """Return the largest size of the search.
 
-        The largest step raises the slip rate to the norm immediately. With inertia, the range is
-        extended, because the slip rate rises with a delay while stress relaxes. An increase of
-        normal stress raises the slip rate only if the effect on the state exceeds the effect on
-        friction. If the load point moves, the largest step is limited by the existence of steady
-        sliding after the step.
+        The largest step raises the slip rate to the instability norm immediately. With inertia, the
+        range of step sizes is extended, because the slip rate rises with a delay while stress
+        relaxes. An increase of normal stress raises the slip rate only if its effect on the state
+        exceeds its effect on friction. If the load point moves, the largest step is limited by the
+        existence of steady sliding after the step.
         """
         scene = self.scene
         if max(0.0, scene.log_load_velocity) >= scene.log_instability_rate:
@@ -397,7 +398,7 @@ class NormalStressSteps(ShootingSteps):
         return smaller
 
     def _max_log_stress_ratio(self) -> float:
-        """Return the largest size that leaves the normal stress positive.
+        """Return the largest step size after which the normal stress is positive.
 
         If normal stress depends on shear stress, sigma_3 must remain positive after a decrease. If
         sigma_3 were negative, friction would decrease with slip faster than spring stress, at any

@@ -25,10 +25,10 @@ class Triggered(Measure):
     r"""Flag that is 1 if the step of a scene triggers an instability.
 
     The flag is 1 if the motion after the step reaches the instability norm of the scene, and 0 if
-    the motion never reaches the norm. The motion is integrated until the result is certain. To find
-    the smallest step that triggers an instability, use ``CriticalStep``.
+    the motion never reaches the norm. The motion is integrated until the value of the flag is
+    certain. To find the smallest step that triggers an instability, use ``CriticalStep``.
 
-    The status is ``unverified`` if the result changes with ten times smaller tolerances, or if the
+    The status is ``unverified`` if the flag changes with ten times smaller tolerances, or if the
     relative difference between the stiffness and the critical stiffness is less than ten times the
     requested accuracy.
 

@@ -1,16 +1,16 @@
 """Limit cycle of stick-slip: recurrence interval, stress drops and slip rates.
 
 A cycle extends from one maximum of spring stress, at which V rises through V_0, to the next
-maximum. Spring stress and states at one maximum determine their values at the next maximum. The
-limit cycle is the fixed point of this return map.
+maximum. The return map computes spring stress and states at a maximum from their values at the
+previous maximum. The limit cycle is the fixed point of the return map.
 
 The motion is first integrated with a low accuracy until it approaches the limit cycle. The orbit is
 then refined until all unknowns repeat, first with the requested accuracy and then with smaller
 tolerances. The first cycle after the step is never accepted as the limit cycle.
 
 If the law or the fluid has several states, the motion may repeat only after 2, 4 or more cycles, or
-never. The results then describe the cycle with the highest slip rate, and the recorded orbit covers
-the whole period.
+never. In this case, the results describe the cycle with the highest slip rate, and the recorded
+orbit covers the whole period.
 """
 
 from __future__ import annotations
@@ -55,14 +55,15 @@ from rsfstudy.quantities import Output
 from rsfstudy.slider import Scene, linear_growth_rates
 from rsfstudy.status import Status
 
-#: Error that two runs may share by chance, as a fraction of the requested relative accuracy.
+#: Minimum error estimate, as a fraction of the requested relative accuracy, because two runs may
+#: have the same error by chance.
 _ERROR_FLOOR_OVER_RTOL = 0.06
 #: Displacement of the load point that starts a motion if the scene has no step, in units of D_c.
 INITIAL_PERTURBATION_DISPLACEMENT = 0.1
-#: Number of points of an orbit that consists only of its ends and needs no recording.
+#: Number of recorded points if only the two ends of an orbit are stored.
 _MAX_POINTS_WITHOUT_RECORDING = 2
-#: Relative accuracy of the search for the limit cycle. The orbit is then closed with the requested
-#: accuracy.
+#: Relative accuracy of the search for the limit cycle. After the search, the orbit is refined to
+#: the requested accuracy.
 _CYCLE_SEARCH_RTOL = 1e-4
 
 _PRIMARY_OUTPUT_NAMES = (
@@ -140,7 +141,7 @@ class LimitCycle(RecordingMeasure):
         Number of points of the orbit along ``phase``, distributed over the slow part and the
         rupture.
     events : int, default: 300
-        Largest number of events until the motion repeats.
+        Maximum number of events until the motion repeats.
 
     Raises
     ------
@@ -175,7 +176,7 @@ class LimitCycle(RecordingMeasure):
     outputs = _OUTPUTS
 
     def __post_init__(self) -> None:
-        """Check the fields."""
+        """Check the fields of the measure."""
         super().__post_init__()
         if isinstance(self.events, bool) or not self.events >= 1 or self.events % 1:
             raise InvalidValue("events", self.events, "must be a whole number from 1")
@@ -361,7 +362,7 @@ def outcome_of_aperiodic_motion(scene: Scene, sequence: StickSlipSequence, remed
     ----------
     scene : Scene
         Scene of the motion.
-    sequence : EventSequence
+    sequence : StickSlipSequence
         Events of the motion.
     remedy : str
         Advice for the message if the motion may still reach a periodic orbit.
@@ -397,7 +398,7 @@ def status_from_output_errors(
     ----------
     accuracy : Accuracy
         Requested accuracy.
-    orbit : Orbit
+    orbit : PeriodicOrbit
         Orbit with the main results.
     output_errors : ndarray
         Error estimates of the main results.
@@ -407,7 +408,7 @@ def status_from_output_errors(
     Returns
     -------
     status : Status
-        OK, or ``unverified`` if an error is too large.
+        Status ``unverified`` if an error is too large, and otherwise ``ok``.
     message : str
         Largest relative error, or an empty string.
     """
@@ -441,9 +442,9 @@ def estimate_primary_output_errors(
     ----------
     accuracy : Accuracy
         Requested accuracy.
-    orbit : Orbit
+    orbit : PeriodicOrbit
         Orbit of the first run.
-    refined_orbit : Orbit
+    refined_orbit : PeriodicOrbit
         Orbit of the refined run.
 
     Returns
@@ -463,7 +464,7 @@ def estimate_primary_output_errors(
 
 
 def _additional_cycle_outputs(scene: Scene, cycle: Cycle) -> dict[str, float]:
-    """Return additional properties of a cycle."""
+    """Return the additional results for a cycle."""
     return {
         "healing_exponent": _healing_exponent(scene, cycle),
         "residual_friction": cycle.friction_at_peak,

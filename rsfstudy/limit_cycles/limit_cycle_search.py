@@ -1,9 +1,9 @@
 r"""Convergence of a motion to its limit cycle.
 
 If a scene has one state, use ``LimitCycleSearch``. The spring stress at a rise of V through V_0
-determines the subsequent motion, so two successive cycles determine the derivative of the return
-map. If the cycles converge slowly, the search leaps to a fixed point that is extrapolated from the
-derivative.
+determines the subsequent motion, so two successive cycles are sufficient to compute the derivative
+of the return map. If the cycles converge slowly, the search leaps to a fixed point that is
+extrapolated from the derivative.
 
 If a scene has several states, use ``follow_to_periodic_orbit``. The function follows the motion
 cycle by cycle, and compares the cycles to find the number of cycles after which the motion repeats.
@@ -12,8 +12,8 @@ Notes
 -----
 The section of a motion at a rise of V through V_0 is :math:`s = (f, \Psi)`, with the spring stress
 :math:`f` and the state :math:`\Psi`. The image :math:`P(s)` contains the section one cycle later,
-followed by the main results of the cycle. The derivative :math:`P'` has a column :math:`b` for
-:math:`f` and a column :math:`c` for :math:`\Psi`.
+followed by the main results of the cycle. The derivative :math:`P'` of the image has a column
+:math:`b` for :math:`f` and a column :math:`c` for :math:`\Psi`.
 
 Spring stress has a maximum at a section, so the motion passes the section in the direction
 :math:`(0, d\Psi/dt)`. If the motion starts a time :math:`dt` later, the cycle is shorter by
@@ -60,16 +60,16 @@ from rsfstudy.status import Status
 #: leaps if the ratio is above the first limit, and does not converge if the ratio is above the
 #: second limit.
 _MIN_CONTRACTION_TO_LEAP, _MAX_CONTRACTION = 0.03, 0.98
-#: Largest leap, as a fraction of the range of ln V.
+#: Maximum length of a leap to the extrapolated fixed point, as a fraction of the range of ln V.
 _MAX_LEAP_OVER_LOG_RATE_RANGE = 0.1
-#: Largest number of cycles in a period.
+#: Maximum number of cycles after which a periodic motion repeats.
 MAX_PERIOD_IN_CYCLES = 16
 #: Largest relative accuracy with which orbits are closed, because finite differences lose digits.
 _MAX_ORBIT_CLOSURE_RTOL = 1e-7
-#: Number of cycles after which a motion is first tested for a period.
+#: Number of cycles after which a motion is first tested for periodicity.
 _MIN_CYCLES_BEFORE_RECURRENCE_TEST = 8
-#: Absolute value of a Floquet multiplier above which an orbit certainly repels, and largest
-#: difference between cycles that repeat, relative to a times the range of ln V.
+#: Absolute value of a Floquet multiplier above which an orbit is certainly repelling, and maximum
+#: difference between two cycles that are considered equal, relative to a times the range of ln V.
 _REPELLING_MULTIPLIER, _MAX_RECURRENCE_MISFIT = 1.01, 0.02
 #: Relative difference from the critical stiffness below which oscillations grow or decay so slowly
 #: that the search cannot converge.
@@ -111,9 +111,9 @@ class LimitCycleSearch:
         #: previous image.
         self._section, self._image = (0.0, 0.0), [0.0] * (2 + PRIMARY_OUTPUT_COUNT_PER_CYCLE)
         self._image_change = self._image
-        #: Vector from s to the fixed point, and the resulting change of the image.
+        #: Vector from the section s to the fixed point, and the resulting change of the image P(s).
         self._correction, self._image_correction = self._section, self._image
-        #: Change of spring stress over the cycle before the last leap.
+        #: Change of spring stress over the cycle before the last leap to a fixed point.
         self._distance_at_leap = np.inf
 
     def follow_until_converged(self, max_cycles: int) -> bool:
@@ -165,7 +165,7 @@ class LimitCycleSearch:
     def _critical_stiffness_text(self) -> str:
         """Explanation for the message if the stiffness is nearly critical.
 
-        The text is empty if the stiffness is not close to critical.
+        The explanation is an empty string if the stiffness is not close to critical.
         """
         critical = critical_stiffness(self._scene, self._scene.log_load_velocity)
         off = abs(self._scene.stiffness / critical - 1.0) if critical else math.inf
@@ -175,7 +175,7 @@ class LimitCycleSearch:
 
     @property
     def orbit(self) -> PeriodicOrbit:
-        """Last cycle, with its correction to the limit cycle."""
+        """Periodic orbit that consists of the last cycle, corrected to the limit cycle."""
         last, slopes = self.cycles[-1:], np.array(self._derivatives).T
         return PeriodicOrbit(
             tuple(last), (slopes,), np.array(self._correction), self._accuracy, self._work
@@ -183,7 +183,7 @@ class LimitCycleSearch:
 
     @property
     def _contraction_ratio_per_cycle(self) -> float:
-        """Trace of the derivative A of the map.
+        """Trace of the derivative A of the return map.
 
         The trace is the ratio of successive distances to the limit cycle. The other eigenvalue of A
         is zero, because a displacement of the section along the motion has no effect on the next
@@ -192,10 +192,11 @@ class LimitCycleSearch:
         return self._derivatives[0][0] + self._derivatives[1][1]
 
     def _update_map_derivatives(self) -> None:
-        """Update the derivatives and the vector to the fixed point.
+        """Update the return map derivatives and the vector to the fixed point.
 
-        The derivatives follow from the last two cycles, unless numerical errors dominate the
-        difference between the cycles. The module docstring contains the formulas.
+        The derivatives of the return map are computed from the last two cycles, unless numerical
+        errors dominate the difference between the cycles. The module docstring contains the
+        formulas.
         """
         last = self.cycles[-1]
         begin, end = last.start_point, last.end_point
@@ -269,9 +270,10 @@ class LimitCycleSearch:
     def _should_leap_to_fixed_point(self) -> bool:
         """Return True if the motion should leap to the fixed point.
 
-        A leap is useless if the next cycle would come equally close to the fixed point. A long leap
-        is avoided, because the motion may settle to steady sliding after a long leap. A leap that
-        does not halve the distance is not repeated, because repeated leaps may form a loop.
+        A leap to the extrapolated fixed point is useless if the next cycle would come equally close
+        to the fixed point. A long leap is avoided, because the motion may settle to steady sliding
+        after a long leap. A leap that does not halve the distance is not repeated, because repeated
+        leaps may form a loop.
         """
         cycle = self.cycles[-1]
         left = abs(cycle.end_point.spring_stress - cycle.start_point.spring_stress)
@@ -299,7 +301,7 @@ class StickSlipSequence:
     ----------
     cycles : list of Cycle
         Cycles of the motion. A cycle is an event in the results of ``LimitCycle``.
-    orbit : Orbit or None
+    orbit : PeriodicOrbit or None
         Periodic orbit that the motion approaches, or None if no orbit was found.
     may_still_converge : bool
         True if the motion may still approach a periodic orbit.
@@ -335,7 +337,7 @@ def follow_to_periodic_orbit(
 
     Returns
     -------
-    EventSequence or None
+    StickSlipSequence or None
         Cycles and orbit, or None if the motion settles to steady sliding.
     """
     seen, orbit, repels = list[Cycle](), None, False
@@ -386,8 +388,8 @@ def _state_index_sets_to_compare(scene: Scene) -> tuple[tuple[int, ...], ...]:
     """Return the sets of states for the detection of a period.
 
     The first set contains the states used for the distance from steady sliding. The second set
-    contains only the states of the law, because a slow unknown of the fluid may converge long after
-    the states of the law.
+    contains only the states of the friction law, because a slow unknown of the fluid may converge
+    long after the states of the law.
     """
     of_law = tuple(range(scene.parts.law.state_count))
     return tuple(
@@ -417,7 +419,8 @@ def find_recurrence_period(
     Returns
     -------
     period : int
-        Smallest n with a difference of at most twice the smallest difference.
+        Smallest number of cycles n for which the difference is at most twice the smallest
+        difference.
     off : float
         Difference after ``period`` cycles, or infinity if there are too few cycles.
 

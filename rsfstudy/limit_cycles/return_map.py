@@ -3,14 +3,15 @@ r"""Periodic orbits, computed as fixed points of a return map.
 The main methods are ``ReturnMap.find_periodic_orbit``, which searches for an orbit, and
 ``ReturnMap.refine_orbit``, which computes a known orbit with another accuracy.
 
-A cycle extends from one rise of V through V_0 to the next. The slip rate is known at a rise, so
-spring stress and the states determine the motion. With inertia, the spring stress also includes the
-stress that accelerates the slider. The motion is therefore a map of spring stress and states from
-one section to the next, and an orbit of n cycles is a fixed point of the n-th power of this map.
+A cycle extends from one rise of V through V_0 to the next rise. At a rise, the slip rate is known,
+so the motion is determined by spring stress and the states. With inertia, the spring stress also
+includes the stress that accelerates the slider. The motion therefore defines a return map of spring
+stress and states from one section (rise of V through V_0) to the next, and an orbit of n cycles is
+a fixed point of the n-th power of the return map.
 
-The eigenvalues of the derivative of this map are the Floquet multipliers, the factors by which
-small perturbations grow during one orbit. The orbit repels if the absolute value of a multiplier
-exceeds 1. At a multiplier of -1, an orbit with twice the number of cycles branches off.
+The eigenvalues of the derivative of the return map are the Floquet multipliers, the factors by
+which small perturbations grow during one orbit. The orbit repels if the absolute value of a
+multiplier exceeds 1. At a multiplier of -1, an orbit with twice the number of cycles branches off.
 
 If the effect of inertia is small, a perturbation along the motion only shifts the time. The number
 of independent perturbations is therefore one less than the number of unknowns of a section. A
@@ -59,12 +60,12 @@ from rsfstudy.motion import (
 from rsfstudy.slider import MotionPoint, Numbers, Scene, equations_without_mass
 from rsfstudy.status import Status
 
-#: Step of the finite differences of the map, relative to a times the range of ln V. The derivatives
-#: of the map change over a hundredth of this range.
+#: Step of the finite differences of the return map, relative to a times the range of ln V. The
+#: derivatives of the return map vary on a scale of a hundredth of a times this range.
 DIFFERENCE_STEP_OVER_LOG_RATE_RANGE = 1e-4
 _DIFFERENCE_WEIGHTS = ((1, 2.0 / 3.0), (2, -1.0 / 12.0))
-#: Largest distance of an orbit from the starting point of the search, relative to a times the range
-#: of ln V, and largest number of Newton steps.
+#: Maximum distance of an orbit from the starting point of the search, relative to a times the range
+#: of ln V, and maximum number of Newton steps.
 _MAX_ORBIT_DISTANCE, _MAX_ITERATIONS = 0.1, 12
 #: Largest closure error of an orbit, relative to the requested accuracy. The results are corrected
 #: for the closure error to first order.
@@ -84,7 +85,8 @@ class PeriodicOrbit:
         section at the end of the cycle and the main results. The columns are the section at the
         beginning of the cycle.
     start_section_correction : ndarray, shape (1 + states,)
-        Vector from the section at which the cycles begin to the section of the closed orbit.
+        Vector from the section at which the computed cycles begin to the corresponding section of
+        the closed orbit.
     accuracy : Accuracy
         Accuracy with which the cycles were computed.
     evaluation_count : int
@@ -156,11 +158,11 @@ class PeriodicOrbit:
 
 
 def section_vector_at(point: MotionPoint) -> np.ndarray:
-    """Return the section at a point.
+    """Return the section vector (spring stress and states) of a point.
 
     Parameters
     ----------
-    point : Point
+    point : MotionPoint
         Point of a motion.
 
     Returns
@@ -172,7 +174,7 @@ def section_vector_at(point: MotionPoint) -> np.ndarray:
 
 
 def section_and_outputs_after(cycle: Cycle) -> np.ndarray:
-    """Return the image of the section at which a cycle begins.
+    """Return the section at the end of a cycle, and the main results of the cycle.
 
     Parameters
     ----------
@@ -190,7 +192,7 @@ def section_and_outputs_after(cycle: Cycle) -> np.ndarray:
 
 
 def multiply_cycle_derivatives(cycle_derivatives: Sequence[np.ndarray]) -> np.ndarray:
-    """Return the derivative of the section over several successive cycles.
+    """Compute the derivative of the return map over several successive cycles.
 
     Parameters
     ----------
@@ -249,11 +251,11 @@ class ReturnMap:
             if counted is None
             else counted
         )
-        #: Indices of the unknowns of a section that contribute to the distance.
+        #: Indices of the section components that contribute to the distance between sections.
         self._compared_unknowns = [0, *(1 + place for place in places)]
 
     def point_at_section(self, section: np.ndarray) -> MotionPoint:
-        """Return the point of the slider at a section.
+        """Return the point of the motion at a section.
 
         The point is on the slow manifold, unless inertia is important. If inertia is important, the
         slip rate of the point is V_0.
@@ -265,7 +267,7 @@ class ReturnMap:
 
         Returns
         -------
-        Point
+        MotionPoint
             Point at which a motion can start.
 
         Raises
@@ -379,22 +381,23 @@ class ReturnMap:
     def compute_motion_direction_and_image_change(
         self, point: MotionPoint
     ) -> tuple[Numbers, Numbers]:
-        """Return the direction of the motion at a section.
+        """Compute the direction of the motion at a section, and its effect on the image.
 
-        The function also returns the effect of a displacement in this direction. If the effect of
-        inertia is small, a displacement along the motion changes only the duration of the cycle.
+        The effect is the change of the image due to a displacement of the section along the motion.
+        If the effect of inertia is small, a displacement along the motion changes only the duration
+        of the cycle.
 
         Parameters
         ----------
-        point : Point
+        point : MotionPoint
             Point of the slider at the section.
 
         Returns
         -------
         way : tuple of float
-            Rates of change of the section.
+            Rates of change of the section components along the motion.
         passed : tuple of float
-            Corresponding change of the image.
+            Corresponding change of the image (next section and main results).
         """
         scene, states = self.scene, len(point.psis)
         spring_stress = point.frictional_stress + scene.dynamics.radiated_stress(
@@ -456,8 +459,8 @@ class ReturnMap:
 
         Returns
         -------
-        Orbit or None
-            The orbit, or None if no orbit is found.
+        PeriodicOrbit or None
+            The periodic orbit, or None if no orbit is found.
         """
         scale = self.scene.a * log_slip_rate_range
         slopes = self.compute_cycle_derivatives(start_section, cycle_count, scale)
@@ -478,16 +481,16 @@ class ReturnMap:
         )
 
     def refine_orbit(self, orbit: PeriodicOrbit) -> PeriodicOrbit | None:
-        """Compute a known orbit with the accuracy of this map.
+        """Compute a known periodic orbit again with the accuracy of this return map.
 
         Parameters
         ----------
-        orbit : Orbit
+        orbit : PeriodicOrbit
             Orbit that was computed with any accuracy.
 
         Returns
         -------
-        Orbit or None
+        PeriodicOrbit or None
             The refined orbit, or None if the orbit does not close.
         """
         if orbit.accuracy == self.accuracy:
@@ -512,7 +515,7 @@ class ReturnMap:
 
         Returns
         -------
-        Orbit or None
+        PeriodicOrbit or None
             The orbit, or None if there is no orbit within ``max_distance`` of the section.
 
         Notes

@@ -36,8 +36,8 @@ from rsfstudy.slider import RUPTURE_REGIME, MotionPoint, Scene
 LN10 = math.log(10.0)
 #: Number of main results of a cycle.
 PRIMARY_OUTPUT_COUNT_PER_CYCLE = 5
-#: Kinds of events. Module variables avoid the attribute lookup, which would take as long as the
-#: rest of the work per event.
+#: Kinds of events. Module variables avoid attribute lookups, which would take as long as all other
+#: operations for each event.
 _START, _RISE, _FALL = EventKind.START, EventKind.RISE, EventKind.FALL
 _SEGMENT, _SETTLED = EventKind.SEGMENT, EventKind.SETTLED
 _get_log_slip_rate, _get_spring_stress = attrgetter("log_slip_rate"), attrgetter("spring_stress")
@@ -67,17 +67,17 @@ class Cycle(NamedTuple):
     friction_at_peak : float
         Friction coefficient at the peak slip rate.
     min_log_slip_rate : float
-        Smallest ln(V/V_*).
+        Smallest value of ln(V/V_*) during the cycle.
     max_log_slip_rate : float
-        Largest ln(V/V_*).
-    slip_arrest_point : Point
+        Largest value of ln(V/V_*) during the cycle.
+    slip_arrest_point : MotionPoint
         First point after the rupture at which V is below V_0 and friction balances the spring. If
         there is no such point, the point with the lowest slip rate.
-    slowest_point : Point
+    slowest_point : MotionPoint
         Point with the lowest slip rate.
-    start_point : Point
+    start_point : MotionPoint
         Maximum of spring stress at which the cycle begins.
-    end_point : Point
+    end_point : MotionPoint
         Maximum of spring stress at which the cycle ends.
     """
 
@@ -95,7 +95,7 @@ class Cycle(NamedTuple):
 
     @property
     def log_slip_rate_range(self) -> float:
-        """Range of ln V."""
+        """Range of ln V during the cycle."""
         return self.max_log_slip_rate - self.min_log_slip_rate
 
     def primary_output_values(self) -> tuple[float, ...]:
@@ -139,7 +139,7 @@ def iterate_cycles(
         Requested accuracy.
     work_meter : WorkMeter
         Counter of right-hand-side evaluations.
-    start_point : Point or None
+    start_point : MotionPoint or None
         Point at which the motion starts. If None, the motion starts with the step of the scene, and
         the part of the motion before the first maximum of spring stress is skipped.
     recording : Recording, optional
@@ -148,8 +148,7 @@ def iterate_cycles(
     Yields
     ------
     Cycle or None
-        The next cycle. None is the last item, and means that the motion has settled to steady
-        sliding.
+        The next cycle. If the last item is None, the motion has settled to steady sliding.
     """
     begin, begun, fallen, seen = None, 0.0, start_point is None, list[Event]()
     ahead = 0 if start_point else scene.parts.loading.reported_segment_count
@@ -186,7 +185,7 @@ def iterate_cycles(
 
 
 def suggest_raising_event_limit(event_count: int, option_name: str = "events") -> str:
-    """Return the advice to allow more events, for use in a message.
+    """Return advice to allow more events, for use in a message.
 
     Parameters
     ----------
@@ -206,7 +205,7 @@ def suggest_raising_event_limit(event_count: int, option_name: str = "events") -
 def recorded_rows_of_cycles(
     scene: Scene, cycles: Sequence[Cycle], recording: Recording | None
 ) -> np.ndarray:
-    """Return the record of successive cycles.
+    """Return the recorded samples of successive cycles.
 
     Parameters
     ----------
@@ -221,7 +220,7 @@ def recorded_rows_of_cycles(
     Returns
     -------
     ndarray, shape (n, columns)
-        Recorded samples. The columns are documented in ``Recording.table``.
+        Recorded samples. The columns are documented in ``Recording.as_table``.
 
     Notes
     -----

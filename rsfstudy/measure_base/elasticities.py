@@ -38,15 +38,16 @@ _REMEDY_FOR_RIG_QUANTITY_ELASTICITIES = (
 )
 #: Largest step of ln p. The finite-difference formula spans four steps.
 _MAX_LOG_PARAMETER_STEP = 0.05
-#: Points of the finite-difference formula in units of the step, and weights of the fourth
-#: difference.
+#: Evaluation points of the finite-difference formula in units of the step, and weights of the
+#: fourth difference.
 _STENCIL, _FOURTH_DIFFERENCE_WEIGHTS = (-2.0, -1.0, 1.0, 2.0), (1.0, -4.0, 6.0, -4.0, 1.0)
 #: Truncation error as a fraction of the difference between the fourth-order and the second-order
 #: formula. In random scenes, the largest fraction is 0.14, for the largest steps.
 _TRUNCATION_ERROR_OVER_FORMULA_DIFFERENCE = 0.25
-#: Fractions of the step that are tried in turn if the result does not exist on one side, or if the
-#: relative error of the derivative exceeds the second number. The third number limits the work of
-#: an evaluation with a shorter step, relative to the work at the scene itself.
+#: Constants of the step selection. The first item contains the fractions of the step that are tried
+#: in turn if the result does not exist on one side, or if the relative error of the derivative
+#: exceeds the second item. The third item limits the number of right-hand-side evaluations with a
+#: shorter step, relative to the number at the unchanged scene.
 _STEP_FRACTIONS, _MAX_RELATIVE_ERROR, _MAX_EVALUATION_RATIO = (
     (1.0, 0.125, 0.125**2, 0.125**3),
     0.1,
@@ -176,7 +177,7 @@ class Elasticities(Measure):
 
     @property
     def inner_coordinates(self) -> Mapping[str, np.ndarray]:
-        """Parameter names, which are the coordinate values."""
+        """Parameter names, which are the coordinate values of ``parameter``."""
         return {"parameter": np.array(self.parameters, dtype=object)}
 
     @property
@@ -193,7 +194,7 @@ class Elasticities(Measure):
 
     @property
     def work_by_digits(self) -> Mapping[float, float]:
-        """Relative work of the inner measure by number of digits."""
+        """Relative number of evaluations of the inner measure for each number of digits."""
         return self.measure.work_by_digits
 
     def describe(self) -> dict[str, Any]:
@@ -276,8 +277,8 @@ class Elasticities(Measure):
             Scene at which the derivative is computed.
         parameter_name : str
             Name of the parameter.
-        central_value : _LogValue
-            Value at the scene itself.
+        central_value : _LogValueWithError
+            Value of ``ln|y|`` at the unchanged scene.
         log_step : float
             Largest step of ln p.
         accuracies_of_step_fractions : sequence of Accuracy
@@ -340,7 +341,7 @@ class Elasticities(Measure):
 
         Returns
         -------
-        _LogValue or None
+        _LogValueWithError or None
             None if the changed scene is invalid or has no numerical result.
 
         Raises
@@ -365,7 +366,7 @@ class Elasticities(Measure):
 
         Returns
         -------
-        _LogValue or None
+        _LogValueWithError or None
             None if the outcome has no main result, or if the main result is zero.
         """
         y = float(outcome.values[self.primary_output]) if outcome.status is Status.OK else 0.0
@@ -389,9 +390,9 @@ def _central_difference(
 
     Parameters
     ----------
-    central_value : _LogValue
-        Value at the scene itself.
-    neighbouring_values : sequence of _LogValue or None
+    central_value : _LogValueWithError
+        Value of ``ln|y|`` at the unchanged scene.
+    neighbouring_values : sequence of _LogValueWithError or None
         Values at the points of ``_STENCIL``, or None for missing values.
     log_step : float
         Step of ln p.

@@ -1,8 +1,8 @@
 """Base class of measures, and the outcome of a measure.
 
 A measure computes named results of one scene. Each result has a unit, and may have an error
-estimate. The class ``Measure`` runs the computation, checks the results, and counts the work. To
-define a measure, derive a frozen dataclass from ``Measure``.
+estimate. The class ``Measure`` runs the computation, checks the results, and counts the
+right-hand-side evaluations. To define a measure, derive a frozen dataclass from ``Measure``.
 
 Instances of measures are picklable, so Dask can send them to its workers. A measure also converts
 itself to plain data, so that a NetCDF file can store the definition of the measure. Fields that
@@ -106,7 +106,7 @@ class Measure(CheckedKeywords):
     ``rsfstudy.simulate(scene, accuracy=accuracy, meter=meter)``. To use the results of another
     measure, call the ``run_nested`` method of that measure.
 
-    Override ``error_scales`` to report a cell as ``unverified`` if its error estimates are far too
+    Override ``error_scales`` to set the status to ``unverified`` if the error estimates are far too
     large::
 
         error_scales(self, scene, values) -> Mapping[str, float]
@@ -138,7 +138,8 @@ class Measure(CheckedKeywords):
     #: Meanings of inner dimensions and fields that are not in the common vocabulary.
     dimensions: ClassVar[Sequence[Quantity]] = ()
     #: Variants of the equations that are compiled before the first cell is computed: True for
-    #: motions with time, False for motions without time. Empty without motions.
+    #: motions with time, False for motions without time. The value is empty if the measure does not
+    #: integrate motions.
     needs_time: ClassVar[tuple[bool, ...]] = (True,)
 
     def __init_subclass__(cls) -> None:
@@ -168,7 +169,7 @@ class Measure(CheckedKeywords):
     def optional_outputs(self) -> Sequence[str]:
         """Names of the results that a successful outcome may omit.
 
-        If such a result is missing, the message of the outcome contains the reason.
+        If an optional result is missing, the message of the outcome contains the reason.
         """
         return tuple(about.name for about in self.outputs if about.optional)
 
@@ -212,13 +213,13 @@ class Measure(CheckedKeywords):
     def typical_work(self) -> int:
         """Typical number of right-hand-side evaluations per cell.
 
-        The number applies to the default accuracy.
+        The typical number is valid for the default accuracy.
         """
         raise TypeError(f"{type(self).__name__} states no typical work")
 
     @property
     def work_by_digits(self) -> Mapping[float, float]:
-        """Relative number of right-hand-side evaluations by number of digits.
+        """Relative number of right-hand-side evaluations for each number of digits.
 
         The number of digits is ``-log10(rtol)``, and the work is relative to the work at the
         default accuracy. The default values were measured for limit cycles, the most demanding
@@ -237,7 +238,7 @@ class Measure(CheckedKeywords):
         Returns
         -------
         float
-            The typical work, scaled to the given accuracy.
+            The typical number of evaluations, scaled to the accuracy.
         """
         return self.typical_work * relative_work_at_rtol(accuracy.rtol, self.work_by_digits)
 
@@ -381,7 +382,7 @@ class Measure(CheckedKeywords):
     def run_nested(self, scene: Scene, accuracy: Accuracy, meter: WorkMeter) -> Outcome:
         """Compute the results for use in another measure.
 
-        The work is added to the meter of the other measure.
+        The right-hand-side evaluations are added to the meter of the other measure.
 
         Parameters
         ----------

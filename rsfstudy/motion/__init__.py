@@ -3,8 +3,9 @@
 ``Accuracy`` defines the tolerances, the work budget and the engine. ``integrate_events`` integrates
 a scene through its loading segments and regimes, and yields events. A ``Recording`` also stores the
 samples of the motion. To read the implementation, start with ``event_integration``, followed by
-``motion_driver`` and ``motion_loop``. The engines are SciPy, Python and the compiled engine.
-The package never interprets a motion: measures, in ``rsfstudy.measures``, do that.
+``motion_driver`` and ``motion_loop``. The engines are SciPy, Python and the compiled engine. The
+package never interprets a motion. The measures in ``rsfstudy.measures`` compute results from
+motions.
 """
 
 from __future__ import annotations

@@ -12,19 +12,19 @@ from rsfstudy.error_boundary import guard_methods
 from rsfstudy.errors import InvalidValue
 from rsfstudy.motion.engines import SCIPY, engine_name
 
-#: Default value and limits of ``rtol``.
+#: Default value and limits of the relative tolerance ``Accuracy.rtol``.
 DEFAULT_RTOL = 1e-7
 MIN_RTOL, MAX_RTOL = 1e-11, 1e-2
-#: Default value of ``budget``.
+#: Default value of ``Accuracy.budget``.
 DEFAULT_EVALUATION_BUDGET = 500_000
-#: Upper limit of ``budget``. Files can store this integer exactly.
+#: Upper limit of ``Accuracy.budget``. Files can store this integer exactly.
 MAX_EVALUATION_BUDGET = 10**15
-#: Upper limit of ``rtol`` in the thresholds of the slow manifold. The series in the inertia weight
-#: has a turning point at a change of ln V of 0.08, so a motion would never reach a larger
-#: threshold.
+#: Upper limit of ``rtol`` in the formulas for the slow-manifold thresholds. The series in the
+#: inertia weight has a turning point where inertia changes ln V by 0.08, so a motion would never
+#: reach a larger threshold.
 _MAX_REGIME_SWITCHING_RTOL = 2e-5
-#: Maximum ratio of an error estimate to ``rtol``. If the results of two runs differ by more, their
-#: difference is not a reliable error estimate.
+#: Maximum ratio of an error estimate to ``rtol``. If this ratio is exceeded, the difference between
+#: two runs is not a reliable error estimate.
 MAX_ERROR_OVER_RTOL = 100.0
 #: Relative error due to rounding.
 RELATIVE_ROUNDING_ERROR = 1e-13
@@ -50,7 +50,7 @@ class Accuracy:
         Engine that integrates motions, or a subclass of ``Stepper``. After a subclass has been
         passed once, its name is valid too.
     refinement : float, default: 1.0
-        Factor of all integration tolerances. See ``refined``.
+        Factor by which all integration tolerances are multiplied. See ``refined``.
 
     Raises
     ------
@@ -77,7 +77,7 @@ class Accuracy:
     refinement: float = 1.0
 
     def __post_init__(self) -> None:
-        """Check the values."""
+        """Check the values of the fields."""
         for name in ("rtol", "budget"):
             if isinstance(getattr(self, name), bool) or not isinstance(getattr(self, name), Real):
                 raise InvalidValue(name, getattr(self, name), "must be a number")
@@ -98,20 +98,20 @@ class Accuracy:
             raise InvalidValue("methods", self.methods, rule, remedy="Leave them out.")
 
     def refined(self) -> Accuracy:
-        """Return the accuracy of a second run, for an error estimate.
+        """Return the accuracy for a second run, which yields an error estimate.
 
-        All tolerances are ten times smaller. With a method of order eight, the second run costs
-        about a third more than the first run.
+        All tolerances of the second run are ten times smaller. With a method of order eight, the
+        second run costs about a third more than the first run.
 
         Returns
         -------
         Accuracy
-            Accuracy with a smaller ``refinement``.
+            Copy of the accuracy with a smaller ``refinement``.
 
         Notes
         -----
-        The errors of both runs differ by about a factor of ten, so their difference is an estimate
-        of the first error. The runs share no intermediate results.
+        The errors of the two runs differ by about a factor of ten, so the difference between the
+        results estimates the error of the first run. The runs share no intermediate results.
         """
         return _cached_copy_with_tolerances(self, self.rtol, 0.1 * self.refinement)
 
@@ -132,9 +132,10 @@ class Accuracy:
 
     @property
     def local_tolerance(self) -> float:
-        """Local error tolerance of a step.
+        """Local error tolerance of an integration step.
 
-        The tolerance is smaller than ``rtol`` because local errors accumulate during a motion.
+        The local tolerance is smaller than ``rtol`` because local errors accumulate during a
+        motion.
         """
         return 0.07 * self.rtol * self.refinement
 
@@ -142,19 +143,21 @@ class Accuracy:
     def max_inertia_weight(self) -> float:
         """Maximum inertia weight :math:`(K/a) w^2` on the slow manifold.
 
-        The slow manifold is of second order in the weight :math:`W`. If the slip rate has its
-        maximum at the weight :math:`W`, the error of ln V is :math:`1.6 W^3`. In random scenes, the
-        error of the stress drop is up to :math:`0.4 W^3`. The test suite measures the first factor.
+        The slow-manifold approximation is of second order in the inertia weight :math:`W`. If the
+        inertia weight is :math:`W` at the maximum slip rate, the error of ln V is :math:`1.6 W^3`.
+        In random scenes, the error of the stress drop is up to :math:`0.4 W^3`. The test suite
+        measures the factor 1.6.
         """
         return math.cbrt(0.75 * min(self.rtol, _MAX_REGIME_SWITCHING_RTOL) * self.refinement)
 
     @property
     def max_inertia_correction(self) -> float:
-        """Maximum change of ln V by inertia on the slow manifold.
+        """Maximum change of ln V due to inertia on the slow manifold.
 
-        This limit is reached before ``max_inertia_weight`` if friction weakens strongly with slip.
-        For the limit :math:`d`, the error of a cycle is up to :math:`0.07 d^3` in random scenes,
-        and :math:`0.0014 d^3` for the slider of the paper. The test suite measures these errors.
+        A motion reaches this limit before ``max_inertia_weight`` if friction weakens strongly with
+        slip. If the limit is :math:`d`, the error of a limit cycle is up to :math:`0.07 d^3` in
+        random scenes, and :math:`0.0014 d^3` for the slider of the published study. The test suite
+        measures both coefficients.
         """
         return math.cbrt(15.0 * min(self.rtol, _MAX_REGIME_SWITCHING_RTOL) * self.refinement)
 
@@ -166,9 +169,9 @@ class Accuracy:
 
 @lru_cache(maxsize=256)
 def _cached_copy_with_tolerances(accuracy: Accuracy, rtol: float, refinement: float) -> Accuracy:
-    """Return a copy with other tolerances.
+    """Return a copy of an accuracy with other tolerances.
 
-    The copy is cached, so all cells of a study share it.
+    The copy is cached, so all computations of a study share the same object.
     """
     return replace(accuracy, rtol=rtol, refinement=refinement)
 
@@ -188,11 +191,11 @@ def estimate_error(
     refined_value : float
         Result of the refined run. See ``Accuracy.refined``.
     relative_error_floor : float
-        Relative error that remains if both runs agree by chance. It is a small fraction of the
-        requested accuracy, and the study ``coverage`` measures it.
+        Relative error that the estimate includes even if both runs agree by chance. The floor is a
+        small fraction of the requested accuracy, and was measured in the study ``coverage``.
     error_scale : float, optional
-        Value that relative errors refer to. The default is ``value``. Pass a scale if the value may
-        be close to zero.
+        Reference value by which relative errors are multiplied. The default is ``value``. Pass a
+        scale if ``value`` may be close to zero.
 
     Returns
     -------
@@ -201,9 +204,9 @@ def estimate_error(
 
     Notes
     -----
-    The estimate is three times the difference of the results, plus the error floor and the rounding
-    error. Three times the difference is an upper bound of the first error if the second error is at
-    most two thirds of the first error.
+    The estimate is three times the difference between the two results, plus the error floor and the
+    rounding error. Three times the difference is an upper bound of the error of the first run if
+    the error of the refined run is at most two thirds of the error of the first run.
     """
     value = float(value)
     hidden = (relative_error_floor + RELATIVE_ROUNDING_ERROR) * abs(

@@ -1,9 +1,9 @@
-"""Layout of the arrays of the event loop.
+"""Layout of the arrays that the event loop reads and writes.
 
-The module defines the state of a motion and the columns of the tables. A kink is a boundary between
-two loading segments at which the loading rate changes and the stress does not jump. The fields of
-``MOTION_STATE_DTYPE`` are written by the following functions. Functions without a module name
-belong to ``motion_loop``.
+The module defines the fields of the motion state and the columns of the tables. A kink is a
+boundary between two loading segments at which the loading rate changes and the stress does not
+jump. The fields of ``MOTION_STATE_DTYPE`` are written by the following functions. Functions without
+a module name belong to ``motion_loop``.
 
 ========================================  =====================================================
 Fields                                    Written by
@@ -24,30 +24,30 @@ regime                                    enter_initial_regime (at the start and
                                           advance_motion (at changes of regime)
 pending_start                             MotionDriver (START_CODE), advance_motion
                                           (REGIME_CODE), start_next_segment (KINK_CODE),
-                                          follow_regime (cleared after the first step)
-regime_start_time                         follow_regime (at the end of a regime),
+                                          integrate_one_regime (cleared after the first step)
+regime_start_time                         integrate_one_regime (at the end of a regime),
                                           start_next_segment (set to 0)
 clock                                     stepper (set to 0 at the start of a regime),
                                           advance_to_step_end
 end, step_length                          stepper (each step),
                                           step_integration.truncate_step_at_clock (end only)
-next_step_length                          stepper, step_integration.halve_unresolved_step,
-                                          advance_motion and start_next_segment (set to 0)
-time_per_step                             stepper (each step), follow_regime (set to 0)
+next_step_length                          stepper, advance_motion and start_next_segment (set to 0),
+                                          step_integration.halve_step_until_dense_output_is_accurate
+time_per_step                             stepper (each step), integrate_one_regime (set to 0)
 is_dense                                  steppers.order_eight (cleared by each step, set by the
                                           first interpolation)
-dense_output_limit                        follow_regime (at the start of a regime),
-                                          step_integration.halve_unresolved_step
+dense_output_limit                        integrate_one_regime (at the start of a regime),
+                                          step_integration.halve_step_until_dense_output_is_accurate
 steps                                     step_integration.take_step
 evaluations_slow, evaluations_fast        workspace.count_evaluations, steppers.scipy
 jacobians                                 steppers.scipy
-target_time                               truncate_step_at_regime_or_time_end,
+target_time                               truncate_step_at_end_of_regime_or_segment,
                                           step_events.record_requested_samples
 event_rows, recorded_rows                 step_events.append_event_row,
                                           step_events.append_recorded_row,
                                           advance_motion (set to 0 in each call)
 samples_taken                             step_events.record_requested_samples
-must_report                               follow_regime (at a kink), advance_motion (cleared)
+must_report                               integrate_one_regime (at a kink), advance_motion (cleared)
 termination, final_normal_stress          is_step_end_valid (if may_terminate is set)
 ========================================  =====================================================
 """
@@ -58,8 +58,9 @@ import struct
 
 import numpy as np
 
-#: State of a motion, which persists between calls of the loop. The first fields are the arguments
-#: of the motion (``MOTION_STATE_FIELDS_SET_BY_CALLER``), and the next fields are the counters.
+#: Fields of the motion state, which persists between calls of the loop. The first fields are the
+#: arguments of the motion (``MOTION_STATE_FIELDS_SET_BY_CALLER``), and the next fields are the
+#: counters.
 MOTION_STATE_DTYPE = np.dtype(
     [
         ("end_time", "f8"),  # duration of the loading segment
@@ -107,12 +108,14 @@ MOTION_STATE_DTYPE = np.dtype(
         ("unknowns_behind_fluid", "i8"),  # number of fluid unknowns, which are last
     ]
 )
-#: Formats of the arguments and the counters. Packing bytes is much faster than record fields.
+#: Byte formats of the argument fields and the counter fields of the motion state. Packing bytes is
+#: much faster than assigning record fields.
 CALL_FORMAT, COUNTER_FORMAT = struct.Struct("=7d4q"), struct.Struct("=6q")
 MOTION_STATE_FIELDS_SET_BY_CALLER = (MOTION_STATE_DTYPE.names or ())[:11]
-#: Rows of the function table: slow manifold and ruptures.
+#: Row indices of the function table: slow manifold, and full equations in ruptures.
 SLOW_REGIME, FAST_REGIME = 0, 1
-#: Number of functions in each row, in the order of ``in_place_functions.InPlaceFunctions``.
+#: Number of functions in each row of the function table. The functions are in the order of
+#: ``in_place_functions.InPlaceFunctions``.
 FUNCTION_COUNT_PER_REGIME = 4
 
 #: Columns of the table of event specifications.
@@ -125,23 +128,25 @@ EVENT_SPECIFICATION_COLUMNS = (
     SPEC_MAX_DISTANCE,
     SPEC_MAX_FRICTION_DISTANCE,
 ) = 0, 1, 2, 3, 4, 5, 6
-#: Values of the column SPEC_KIND.
+#: Codes of event kinds in the column SPEC_KIND.
 MAXIMUM, MINIMUM, RISE, FALL, SETTLED = range(5)
 
-#: Recording modes: never, at even intervals within each step, or at requested slips or times.
+#: Recording modes: no recording, samples at even intervals within each step, or samples at
+#: requested slips or times.
 RECORD_NEVER, RECORD_WITHIN_STEPS, RECORD_AT_CLOCKS, RECORD_AT_TIMES = range(4)
 
 
-#: Columns of the event table. The columns of the point begin at EVENT_POINT.
+#: Columns of the event table. The columns from EVENT_POINT onwards contain the point of the motion
+#: (slip rate, stresses and states) at the event.
 EVENT_CODE, EVENT_REGIME, EVENT_CLOCK, EVENT_TIME, EVENT_SLIP, EVENT_EVALUATIONS, EVENT_POINT = (
     range(7)
 )
-#: Codes of events that are always reported. The code of a requested event is the index of its
+#: Codes of events that are always reported. If an event was requested, its code is the index of its
 #: specification.
 START_CODE, REGIME_CODE, END_CODE, SAMPLED_CODE, KINK_CODE = -1, -2, -3, -4, -5
 
-#: Columns of a point, in the order of the fields of ``MotionPoint``. The states are the last
-#: columns.
+#: Array columns of a point of the motion, in the order of the fields of ``MotionPoint``. The last
+#: columns contain the state variables.
 (
     LOG_SLIP_RATE,
     LOG_SLIP_RATE_GROWTH,
@@ -156,10 +161,10 @@ START_CODE, REGIME_CODE, END_CODE, SAMPLED_CODE, KINK_CODE = -1, -2, -3, -4, -5
 ) = range(10)
 APPARENT_FRICTION, APPARENT_FRICTION_RATE, FIRST_STATE = 10, 11, 12
 
-#: Return codes of the loop and of its functions. After PAUSED, the caller reads the tables and
-#: calls the loop again. TERMINATED means that the motion cannot continue, for example because
-#: normal stress has vanished. The codes REGIME_ENDED and SEGMENT_ENDED are used within the loop
-#: only.
+#: Return codes of the event loop and of the functions that it calls. After PAUSED, the caller reads
+#: the tables and calls the loop again. TERMINATED means that the motion cannot continue, for
+#: example because normal stress has vanished. The codes REGIME_ENDED and SEGMENT_ENDED are only
+#: used within the loop.
 (
     PAUSED,
     MOTION_ENDED,

@@ -1,15 +1,15 @@
 """Array operations of the event loop in plain Python.
 
-The arrays are memory views, and the equations are functions that fill arrays. In compiled code,
-arrays are pointers and functions are addresses, so the functions of ``compiled.array_operations``
-replace the functions of this module.
+In plain Python, the arrays are memory views, and the equations are functions that fill arrays. In
+compiled code, arrays are represented by pointers and functions by addresses, so
+``compiled.array_operations`` provides replacements for the functions of this module.
 """
 
 from __future__ import annotations
 
 
 def evaluate_function_into_array(function, y, rates, parameters, result):
-    """Call a function that fills an array.
+    """Call a function that fills an output array.
 
     Parameters
     ----------
@@ -24,7 +24,7 @@ def evaluate_function_into_array(function, y, rates, parameters, result):
 
 
 def array_as_pointer(array):
-    """Return an array in the form that ``advance_pointer_by_items`` accepts.
+    """Return an array as an argument for ``advance_pointer_by_items``.
 
     Parameters
     ----------
@@ -40,7 +40,7 @@ def array_as_pointer(array):
 
 
 def advance_pointer_by_items(array, item_count):
-    """Return the part of an array that begins at an index.
+    """Return a view of an array that begins at a given index.
 
     Parameters
     ----------

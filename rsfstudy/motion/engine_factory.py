@@ -108,7 +108,7 @@ def import_compiled_engine() -> Any:
 def call_array_function_by_engine(
     function: Callable[..., None], engine_name: str, *arrays: np.ndarray
 ) -> None:
-    """Call a function of arrays in plain Python or compiled.
+    """Call an array function in plain Python, or compile and call it.
 
     Parameters
     ----------

@@ -1,7 +1,7 @@
 """Names of the engines that integrate motions: SciPy, Python and compiled.
 
-A user-defined stepper is an additional engine. The module ``engine_factory`` creates the classes
-and functions of the engines.
+A user-defined stepper (ODE integrator) is an additional engine. The module ``engine_factory``
+creates steppers and loads the compiled engine.
 """
 
 from __future__ import annotations
@@ -86,7 +86,8 @@ def find_user_stepper(stepper_name: str) -> tuple[type, ...]:
 def register_user_steppers(steppers: Iterable[type]) -> None:
     """Register user-defined steppers without checks.
 
-    Worker processes call the function. A stepper replaces an earlier stepper with the same name.
+    Worker processes call this function. A stepper replaces a previously registered stepper with the
+    same name.
 
     Parameters
     ----------
@@ -100,7 +101,7 @@ def register_user_steppers(steppers: Iterable[type]) -> None:
 def _qualified_name_of_stepper(stepper: type) -> tuple[str, str]:
     """Return the module and the name of a stepper class.
 
-    They do not change if a class is defined again, for example in a notebook.
+    The module and the name do not change if a class is defined again, for example in a notebook.
     """
     return stepper.__module__, stepper.__qualname__
 
@@ -127,7 +128,7 @@ def unknown_engine_error(engine: Any) -> InvalidValue:
 class CompilationLog:
     """Record of compilations in this process.
 
-    Programs that were loaded from the cache are not counted.
+    Compiled programs that were loaded from the cache are not counted.
 
     Parameters
     ----------
@@ -136,8 +137,9 @@ class CompilationLog:
     total_compilation_seconds : float, default: 0.0
         Total compilation time in seconds.
     create_context_while_compiling : callable, optional
-        Function that returns a context manager for the compilation. A time limit or a timer can
-        exclude the compilation with it. By default, the context manager does nothing.
+        Function that returns a context manager for the compilation. With this context manager, a
+        time limit or a timer can exclude the compilation time. By default, the context manager does
+        nothing.
     """
 
     compiled_program_count: int = 0
@@ -153,7 +155,7 @@ compilation_log = CompilationLog()
 def is_engine_installed(engine: str) -> bool:
     """Return True if the packages of an engine are installed.
 
-    The function does not import the packages.
+    The function checks the installation without importing the packages.
 
     Parameters
     ----------

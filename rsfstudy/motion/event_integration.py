@@ -1,8 +1,8 @@
-"""Integration of a scene through its loading segments, as events.
+"""Integration of a scene through its loading segments, as a series of events.
 
-``integrate_events`` is the main function. Consecutive segments without a jump in stress form a
-chain. The driver of the event loop integrates each chain, and ``integrate_events`` handles the
-jumps between the chains.
+``integrate_events`` is the main function. Consecutive loading segments without a jump in stress
+form a chain. The driver of the event loop integrates each chain, and ``integrate_events`` handles
+the jumps between the chains.
 """
 
 from __future__ import annotations
@@ -48,7 +48,7 @@ def integrate_events(
     until: float = math.inf,
     resume_from: Event | None = None,
 ) -> Iterator[Event]:
-    """Integrate a scene from the instant after its first step.
+    """Integrate a scene, starting immediately after its first loading step.
 
     Parameters
     ----------
@@ -65,7 +65,7 @@ def integrate_events(
         segment, from steady sliding at V_* or from the initial stress and state of the scene.
     with_time : bool, default: False
         If True, time is one of the unknowns. Otherwise, times and slips of events may be NaN, and
-        the integration needs less work.
+        the integration needs fewer evaluations.
     recording : Recording, optional
         Object that records the motion.
     until : float, default: inf
@@ -159,7 +159,7 @@ def integrate_events(
 def _find_remaining_segment_chains(
     scene: Scene, resume_from: Event
 ) -> tuple[Sequence[tuple[Scene, np.ndarray]], MotionPoint]:
-    """Return the chains after the end of a motion, and the initial point.
+    """Return the segment chains after the end of a motion, and the initial point.
 
     If the motion ended at a jump, the initial point is the point after the jump.
     """
@@ -179,7 +179,7 @@ def _find_remaining_segment_chains(
 
 
 def _truncate_segments_at(segment_table: np.ndarray, end_time: float) -> np.ndarray:
-    """Return the segments of a chain up to an end time."""
+    """Return the loading segments of a chain up to an end time."""
     if end_time == math.inf or segment_table[-1, SEGMENT_END] <= end_time:
         return segment_table
     count = max(int(np.searchsorted(segment_table[:, SEGMENT_START], end_time)), 1)
@@ -194,9 +194,10 @@ def _iterate_segment_start_events(
     segment_scene: Scene,
     event_specs: Sequence[EventSpecification],
 ) -> Iterator[Event]:
-    """Yield the events at the start of a later chain.
+    """Yield the events at the start of any segment chain after the first.
 
-    The first event is the start of the segment. Requested events that occur at the jump follow.
+    The first event is the start of the loading segment. The following events are requested events
+    that occur at the jump in stress.
     """
     yield event._replace(kind=EventKind.SEGMENT)
     for spec, point in find_events_at_jump(
@@ -220,5 +221,5 @@ def _steady_sliding_may_be_stable(scene: Scene, event_specs: Sequence[EventSpeci
 
 
 def _without_settling_events(event_specs: Sequence[EventSpecification]) -> list[EventSpecification]:
-    """Return the event specifications without settling events."""
+    """Remove the settling events from a sequence of event specifications."""
     return [spec for spec in event_specs if spec.kind is not EventKind.SETTLED]

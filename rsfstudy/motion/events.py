@@ -1,7 +1,8 @@
-"""Kinds of events of a motion, and the rows of the event table.
+"""Events of a motion: kinds of events, and specifications of requested events.
 
-The module ``step_events`` detects and locates the events. The table lists the events in order,
-each with its time, slip and point. A measure can request the following events:
+The module ``step_events`` detects and locates the events. The event table lists the events in the
+order of time, with the slip and the point of the motion (slip rate, stresses and states) at each
+event. A measure can request the following events:
 
     maximum(quantity), minimum(quantity)
                                 extremum of a quantity
@@ -14,14 +15,15 @@ each with its time, slip and point. A measure can request the following events:
                                 checked. The event is not reported if normal stress still changes
                                 or if steady sliding is unstable.
 
-Each requested event may end the motion. The available quantities are the attributes of a
-``MotionPoint``. The attribute ``apparent_friction`` is the friction coefficient that a rig
-measures. Extrema are available for ``log_slip_rate``, ``spring_stress`` and ``apparent_friction``.
+A requested event ends the motion if it is specified with ``terminal=True``. The available
+quantities are the attributes of a ``MotionPoint``. The attribute ``apparent_friction`` is the
+friction coefficient that a rig measures. Extrema are available for ``log_slip_rate``,
+``spring_stress`` and ``apparent_friction``.
 
 In addition to the requested events, the table lists the start of the motion, each change of regime,
-the beginning of each segment of loading, the end of the motion, and the end of the step in which
-the last requested sample was recorded. An event at the transition between two regimes or segments
-is reported at the beginning of the later regime or segment. If a motion cannot continue, the
+the beginning of each loading segment, the end of the motion, and the end of the step in which the
+last requested sample was recorded. An event at the transition between two regimes or segments is
+reported at the beginning of the later regime or segment. If a motion cannot continue, the
 integration raises ``MotionStopped`` with the reason.
 """
 
@@ -40,7 +42,7 @@ from rsfstudy.slider import MotionPoint
 
 
 class EventKind(StrEnum):
-    """Kinds of events."""
+    """Kinds of events of a motion."""
 
     START = "start"
     MAXIMUM = "maximum"
@@ -71,7 +73,8 @@ class EventSpecification(NamedTuple):
     quantity : str, default: ""
         Attribute of ``MotionPoint``. Settling events have no quantity.
     level : float, default: 0.0
-        Level of a crossing, or fraction of a settling event.
+        Level of a crossing, or, for a settling event, fraction of the largest distance from steady
+        sliding.
     terminal : bool, default: False
         If True, the motion ends at the event.
     may_defer : bool, default: False
@@ -90,7 +93,7 @@ class EventSpecification(NamedTuple):
 def maximum(
     quantity: str, *, terminal: bool = False, may_defer: bool = False
 ) -> EventSpecification:
-    """Create the specification of a maximum.
+    """Create an event specification for the maxima of a quantity.
 
     Parameters
     ----------
@@ -99,7 +102,8 @@ def maximum(
     terminal : bool, default: False
         If True, the motion ends at the first maximum.
     may_defer : bool, default: False
-        If True, the engine may report the event later. See ``EventSpecification``.
+        If True, the engine may report the event later, together with other events. See
+        ``EventSpecification``.
 
     Returns
     -------
@@ -115,7 +119,7 @@ def maximum(
 def minimum(
     quantity: str, *, terminal: bool = False, may_defer: bool = False
 ) -> EventSpecification:
-    """Create the specification of a minimum.
+    """Create an event specification for the minima of a quantity.
 
     Parameters
     ----------
@@ -124,7 +128,8 @@ def minimum(
     terminal : bool, default: False
         If True, the motion ends at the first minimum.
     may_defer : bool, default: False
-        If True, the engine may report the event later. See ``EventSpecification``.
+        If True, the engine may report the event later, together with other events. See
+        ``EventSpecification``.
 
     Returns
     -------
@@ -140,7 +145,7 @@ def minimum(
 def rise(
     quantity: str, level: float, *, terminal: bool = False, may_defer: bool = False
 ) -> EventSpecification:
-    """Create the specification of an upward crossing of a level.
+    """Create an event specification for upward crossings of a level.
 
     Parameters
     ----------
@@ -151,7 +156,8 @@ def rise(
     terminal : bool, default: False
         If True, the motion ends at the first crossing.
     may_defer : bool, default: False
-        If True, the engine may report the event later. See ``EventSpecification``.
+        If True, the engine may report the event later, together with other events. See
+        ``EventSpecification``.
 
     Returns
     -------
@@ -167,7 +173,7 @@ def rise(
 def fall(
     quantity: str, level: float, *, terminal: bool = False, may_defer: bool = False
 ) -> EventSpecification:
-    """Create the specification of a downward crossing of a level.
+    """Create an event specification for downward crossings of a level.
 
     Parameters
     ----------
@@ -178,7 +184,8 @@ def fall(
     terminal : bool, default: False
         If True, the motion ends at the first crossing.
     may_defer : bool, default: False
-        If True, the engine may report the event later. See ``EventSpecification``.
+        If True, the engine may report the event later, together with other events. See
+        ``EventSpecification``.
 
     Returns
     -------
@@ -193,7 +200,7 @@ def fall(
 def _specify_quantity_event(
     kind: EventKind, quantity: str, level: float = 0.0, *, terminal: bool, may_defer: bool
 ) -> EventSpecification:
-    """Create an event specification. The quantity may have its former name."""
+    """Create an event specification, and accept former names of quantities."""
     return EventSpecification(
         kind, renamed_value(MotionPoint, quantity), level, terminal, may_defer
     )
@@ -201,16 +208,16 @@ def _specify_quantity_event(
 
 @renamed_keywords
 def approach_to_steady_state(fraction: float, *, terminal: bool = False) -> EventSpecification:
-    """Create the specification of the approach to steady sliding.
+    """Create an event specification for the approach to steady sliding.
 
     The event occurs if the distance from steady sliding falls below a fraction of the largest
     distance so far. The distance is measured in ln V and in each state divided by b. Unknowns
-    listed in the attribute ``excluded_from_distance`` of a part are ignored.
+    listed in the attribute ``excluded_from_distance`` of a scene part are ignored.
 
     Parameters
     ----------
     fraction : float
-        Fraction of the largest distance.
+        Fraction of the largest distance from steady sliding so far.
     terminal : bool, default: False
         If True, the motion ends at the event.
 
@@ -231,20 +238,20 @@ class Event(NamedTuple):
     kind : EventKind
         Kind of the event.
     specification : EventSpecification or None
-        Specification of a requested event. It is None for other events.
+        Specification of the event if it was requested, and otherwise None.
     time : float
-        Time since the start, in D_c/V_*. It is NaN if time is not an unknown of the motion.
+        Time since the start, in D_c/V_*. The value is NaN if time is not an unknown of the motion.
     slip : float
-        Slip since the start, in D_c. For most sliders it is NaN if time is not an unknown.
+        Slip since the start, in D_c. For most sliders, the slip is NaN if time is not an unknown.
     point : MotionPoint
-        Point of the motion at the event.
+        Point of the motion (slip rate, stresses, states and their derivatives) at the event.
     regime : str
         Name of the regime.
     evaluation_count : int
         Number of right-hand side evaluations so far.
     clock : float
-        Independent variable of the equations, measured from the start of the regime. It is the
-        length along the path, or the slip of a rigid slider.
+        Independent variable of the equations, measured from the start of the regime. The
+        independent variable is the path length, or the slip of a rigid slider.
     """
 
     kind: EventKind

@@ -1,9 +1,9 @@
-"""Conversion of equations to functions that fill arrays.
+"""Conversion of equations of motion to functions that fill arrays.
 
-The event loop calls the equations through these functions. ``build_in_place_functions`` converts
-the functions of ``slider.equations.Equations``, which take and return tuples of floats. Compiled
-functions cannot raise exceptions. If the equations raise an exception in compiled code, the results
-are NaN, because the functions first assign NaN.
+The event loop calls the equations through functions that fill arrays. ``build_in_place_functions``
+converts the functions of ``slider.equations.Equations``, which take and return tuples of floats.
+Compiled functions cannot raise exceptions. Each function therefore first fills its results with
+NaN, which remain if the equations raise an exception in compiled code.
 """
 
 from __future__ import annotations
@@ -19,22 +19,22 @@ from rsfstudy.slider import Equations, Function, Numbers
 
 
 class InPlaceFunctions(NamedTuple):
-    """Functions that fill arrays, in the order of the function table.
+    """Functions of a system of equations, in the order of the function table.
 
-    The arguments of a function are ``(y, rates, p, result)``. The arguments of ``attempt_step`` are
-    ``(y, stages, p, step)``.
+    Each function has the arguments ``(y, rates, p, result)``, and fills the array ``result``. The
+    exception is ``attempt_step``, which has the arguments ``(y, stages, p, step)``.
 
     Parameters
     ----------
     fill_rates : callable
         Function that fills in the derivatives of the unknowns.
     fill_point : callable
-        Function that fills in the columns of a point.
+        Function that fills in the array columns of a point of the motion.
     attempt_step : callable
         Function that attempts one step. See ``steppers.unrolled_step``.
     fill_balance : callable or None
-        Function that fills in ln(V/V_*) and friction on the slow manifold. It is None for the
-        equations in ruptures.
+        Function that fills in ln(V/V_*) and friction on the slow manifold. The value is None for
+        the equations in ruptures.
     """
 
     fill_rates: Function
@@ -44,7 +44,7 @@ class InPlaceFunctions(NamedTuple):
 
 
 def build_in_place_functions(equations: Equations) -> InPlaceFunctions:
-    """Convert the functions of equations to functions that fill arrays.
+    """Convert the functions of a system of equations to functions that fill arrays.
 
     Parameters
     ----------
@@ -54,7 +54,8 @@ def build_in_place_functions(equations: Equations) -> InPlaceFunctions:
     Returns
     -------
     InPlaceFunctions
-        Functions that fill arrays. All scenes with the same parts share them.
+        Functions that fill arrays. All scenes with the same combination of parts share these
+        functions.
     """
     rate, point, balance = (
         equations.rate_function,
@@ -80,7 +81,7 @@ def _build_in_place_functions_cached(
     state_count: int,
     parameter_count: int,
 ) -> InPlaceFunctions:
-    """Convert functions, once for each combination of parts."""
+    """Convert the functions of equations once for each combination of scene parts."""
     of_unknowns, numbers = (
         build_array_unpacking_function(unknown_count),
         build_array_unpacking_function(parameter_count),
@@ -139,12 +140,12 @@ def build_fill_point_function(
     unpack_parameters: Function,
     state_count: int,
 ) -> Function:
-    """Build the function that fills in the columns of a point.
+    """Build the function that fills in the array columns of a point of the motion.
 
     Parameters
     ----------
     point_function : callable
-        Function that returns the point for unknowns and their derivatives.
+        Function that returns a ``MotionPoint`` for the unknowns and their derivatives.
     unpack_unknowns, unpack_parameters : callable
         Functions that convert arrays to tuples.
     state_count : int
@@ -183,8 +184,8 @@ def build_fill_balance_function(
     Returns
     -------
     callable
-        Function ``fill_balance(y, rates, p, result)``. It fills in ln(V/V_*) and friction for the
-        spring stress and the states in ``y``.
+        Function ``fill_balance(y, rates, p, result)``. The function fills in ln(V/V_*) and friction
+        for the spring stress and the states in ``y``.
     """
 
     def fill_balance(y, rates, p, result):  # type: ignore[no-untyped-def]

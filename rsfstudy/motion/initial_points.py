@@ -1,6 +1,7 @@
-"""Initial points of motions, at the start and after jumps of the loading.
+"""Initial points of motions, at the start and after jumps in the loading.
 
-The event loop chooses the regime of an initial point. The criteria are in ``regime_switching``.
+The event loop chooses the regime of an initial point. The module ``regime_switching`` contains the
+criteria for this choice.
 """
 
 from __future__ import annotations
@@ -27,16 +28,16 @@ _NAN_FOR_UNEVALUATED_POINT_FIELDS = (math.nan,) * len(MotionPoint._fields[5:-1])
 
 
 def initial_point(scene: Scene) -> MotionPoint:
-    """Return the initial point of a motion, immediately after its first step.
+    """Return the initial point of a motion, immediately after the loading step.
 
-    Before the step, the slider slides steadily at V_*, or it has the initial stress and state of
-    the scene. The step changes the spring stress and the imposed normal stress. With inertia, the
-    slip rate does not jump and changes within the inertial time.
+    Before the loading step, the slider slides steadily at V_*, or has the initial stress and state
+    of the scene. The loading step changes the spring stress and the imposed normal stress. With
+    inertia, the slip rate does not jump, but adjusts within the inertial time.
 
     Parameters
     ----------
     scene : Scene
-        Scene during its first loading segment.
+        Scene with the parameters of its first loading segment.
 
     Returns
     -------
@@ -46,7 +47,7 @@ def initial_point(scene: Scene) -> MotionPoint:
     Raises
     ------
     MotionStopped
-        If normal stress vanishes or shear stress reverses in the step.
+        If normal stress vanishes or shear stress changes sign in the loading step.
     """
     check_forward_slip_is_possible_at_start(scene)
     psis, log_slip_rate = compute_steady_states(scene, 0.0, 0.0), 0.0
@@ -59,12 +60,12 @@ def initial_point(scene: Scene) -> MotionPoint:
 
 
 def point_before_start(scene: Scene) -> MotionPoint:
-    """Return the point of a motion before its first step.
+    """Return the point of a motion before its first loading step.
 
     Parameters
     ----------
     scene : Scene
-        Scene during its first loading segment.
+        Scene with the parameters of its first loading segment.
 
     Returns
     -------
@@ -85,7 +86,7 @@ def point_without_derived_values(
     log_slip_rate: float = math.nan,
     frictional_stress: float = math.nan,
 ) -> MotionPoint:
-    r"""Return a point that contains only the initial values of a motion.
+    r"""Return a point with the initial values of a motion and no derived values.
 
     Parameters
     ----------
@@ -94,17 +95,17 @@ def point_without_derived_values(
     spring_stress : float
         Spring stress :math:`f`, in sigma_*.
     states : tuple of float
-        States of the law, followed by the unknowns of the loading and the fluid.
+        States of the friction law, followed by the unknowns of the loading and the fluid.
     log_slip_rate : float, default: nan
-        Value of :math:`\ln(V/V_*)`. Only motions with inertia need it.
+        Value of :math:`\ln(V/V_*)`. The value is only needed for motions with inertia.
     frictional_stress : float, default: nan
-        Frictional stress :math:`g`, in sigma_*. Only motions with inertia need it.
+        Frictional stress :math:`g`, in sigma_*. The value is only needed for motions with inertia.
 
     Returns
     -------
     MotionPoint
-        Point with the given values. All other fields are NaN. The first event of the motion
-        contains their values.
+        Point of the motion. All fields that are not arguments are NaN. The first event of the
+        motion contains the values of these fields.
     """
     psi = scene.equation_functions.friction_functions.state_sum(states)
     known = log_slip_rate, math.nan, spring_stress, frictional_stress, psi
@@ -112,7 +113,7 @@ def point_without_derived_values(
 
 
 def compute_restart_point(scene: Scene, spring_stress: float, states: Numbers) -> MotionPoint:
-    """Return a point on the slow manifold, from which a motion can restart.
+    """Return a point on the slow manifold from which a motion can restart.
 
     Parameters
     ----------
@@ -121,7 +122,7 @@ def compute_restart_point(scene: Scene, spring_stress: float, states: Numbers) -
     spring_stress : float
         Spring stress :math:`f`, in sigma_*.
     states : tuple of float
-        States of the law, followed by the unknowns of the loading and the fluid.
+        States of the friction law, followed by the unknowns of the loading and the fluid.
 
     Returns
     -------
@@ -144,8 +145,8 @@ def compute_restart_point(scene: Scene, spring_stress: float, states: Numbers) -
 def _reset_loading_unknowns(scene: Scene, states: Numbers) -> Numbers:
     """Replace the unknowns of the loading by their initial values.
 
-    The unknowns of the loading follow the states of the law. Unknowns of an earlier loading are
-    removed.
+    The unknowns of the loading follow the states of the friction law. Unknowns of the previous
+    loading are removed.
     """
     begun, of_law = scene.parts.loading.initial_unknowns(scene), scene.parts.law.state_count
     return (*states[:of_law], *begun, *states[of_law + len(begun) : scene.state_count])
@@ -170,10 +171,11 @@ def _find_specified_initial_states(scene: Scene, steady_states: Numbers) -> tupl
 
 
 def point_after_loading_jump(scene: Scene, point: MotionPoint) -> MotionPoint:
-    """Return the point of a motion immediately after a jump of the loading.
+    """Return the point of a motion immediately after a jump in the loading.
 
     A jump is a step of the load point, a step of imposed normal stress, or the beginning or end of
-    an oscillation. The states do not change. With inertia, the slip rate does not change either.
+    an oscillation. The states of the friction law do not change in a jump. With inertia, the slip
+    rate does not change either.
 
     Parameters
     ----------
@@ -190,7 +192,7 @@ def point_after_loading_jump(scene: Scene, point: MotionPoint) -> MotionPoint:
     Raises
     ------
     MotionStopped
-        If normal stress vanishes or shear stress reverses in the jump.
+        If normal stress vanishes or shear stress changes sign in the jump.
     """
     psis = _reset_loading_unknowns(scene, point.psis)
     after = point._replace(spring_stress=point.spring_stress + scene.spring_stress_step, psis=psis)
@@ -199,7 +201,7 @@ def point_after_loading_jump(scene: Scene, point: MotionPoint) -> MotionPoint:
 
 
 def point_with_slip_rate(scene: Scene, point: MotionPoint, log_slip_rate: float) -> MotionPoint:
-    r"""Return a point with another slip rate and the corresponding friction.
+    r"""Return a copy of a point with another slip rate and the matching friction.
 
     Parameters
     ----------
@@ -237,7 +239,7 @@ def slow_manifold_point(scene: Scene, spring_stress: float, states: Numbers) -> 
     spring_stress : float
         Spring stress :math:`f`, in sigma_*.
     states : tuple of float
-        States of the law, followed by the unknowns of the loading and the fluid.
+        States of the friction law, followed by the unknowns of the loading and the fluid.
 
     Returns
     -------
@@ -252,20 +254,20 @@ def slow_manifold_point(scene: Scene, spring_stress: float, states: Numbers) -> 
 def check_forward_slip_is_possible_at_start(
     scene: Scene, start_point: MotionPoint | None = None
 ) -> None:
-    """Raise MotionStopped if a step makes forward slip impossible.
+    """Raise MotionStopped if the loading step makes forward slip impossible.
 
     Parameters
     ----------
     scene : Scene
-        Scene after the step.
+        Scene after the loading step.
     start_point : MotionPoint, optional
-        Point after the step. By default, the step from the initial stress is checked.
+        Point after the step. By default, the loading step from the initial stress is checked.
 
     Raises
     ------
     MotionStopped
-        If normal stress vanishes, or if shear stress reverses and the law is not regularised or the
-        load point is at rest.
+        If normal stress vanishes. Also if shear stress changes sign, and the friction law is not
+        regularised or the load point is at rest.
     """
     slider = scene.parts.slider
     begins = slider.initial_stress + scene.spring_stress_step

@@ -2,27 +2,27 @@
 
 from __future__ import annotations
 
-#: Upper limit of all step sizes. Otherwise, the step size would overflow if the motion is at rest.
+#: Upper limit of all step sizes, which prevents overflow if the slider is at rest.
 MAX_STEP_LENGTH = 1e9
-#: Maximum step size along the path, in units of slip by D_c. A longer step may skip a rapid change
-#: of the motion between two stages. During stationary contact, no rapid changes occur until ln V
-#: has increased to a few units below its steady-state value. The maximum step size therefore
-#: increases with the difference between ln V_0 and ln V. The second constant is the scale of this
-#: difference.
+#: Maximum step size in path length, in units of D_c. A longer step may skip a rapid change of the
+#: motion between two Runge-Kutta stages. During stationary contact, no rapid changes occur until ln
+#: V has increased to a few units below its steady-state value. The maximum step size therefore
+#: increases with the difference between ln V_0 and ln V. The second constant is the scale of the
+#: difference ln V_0 - ln V.
 LONGEST_PATH_STEP, STATIONARY_LOG_RATE_SCALE = 3.0, 10.0
 
 
 def compute_max_step_length(
     log_slip_rate: float, normal_stress: float, log_load_velocity: float
 ) -> float:
-    r"""Compute the maximum step size along the path.
+    r"""Compute the maximum step size in path length.
 
     Parameters
     ----------
     log_slip_rate : float
         Natural logarithm of the slip rate, :math:`\ln(V/V_*)`.
     normal_stress : float
-        Normal stress in sigma_*. The step size is proportional to normal stress above 1.
+        Normal stress in sigma_*. Above 1, the step size is proportional to the normal stress.
     log_load_velocity : float
         Natural logarithm of the load point velocity, :math:`\ln(V_0/V_*)`.
 

@@ -1,4 +1,4 @@
-"""Driver of the event loop, which converts its tables into events.
+"""Driver that calls the event loop and converts its output tables to events.
 
 ``get_motion_driver`` returns the driver of a scene. ``MotionDriver.iterate_events`` allocates the
 arrays of a motion, calls ``motion_loop.advance_motion`` until the motion ends, and yields the
@@ -60,11 +60,12 @@ _EVENT_KIND_CODES = {
     for kind in EventKind
     if kind.name in array_layout.__dict__
 }
-#: Column of each attribute of a point. The empty name is mapped to the first column.
+#: Array column of each attribute of ``MotionPoint``. The empty name is mapped to the first column.
 _POINT_COLUMN_BY_QUANTITY = {
     name: column for column, name in enumerate(MotionPoint._fields[:-1])
 } | {"": 0}
-#: Events that the table always contains. Their negative codes are list indices from the end.
+#: Kinds of events that are reported without a request. The negative event codes are indices from
+#: the end of this list.
 _KINDS_AND_SPECS_OF_UNREQUESTED_EVENTS = [
     (k, None)
     for k in (
@@ -75,7 +76,7 @@ _KINDS_AND_SPECS_OF_UNREQUESTED_EVENTS = [
         EventKind.START,
     )
 ]
-#: Constructor of named tuples that takes half the time of a call of the class.
+#: Constructor of named tuples that takes half the time of a normal constructor call.
 _make_named_tuple_without_checks = tuple.__new__
 _STEP_TOO_SHORT_TEXT = "a step would be shorter than the spacing of numbers around the clock"
 _EMPTY_RECORDING_TABLES = array_layout.RECORD_NEVER, np.empty(0), np.empty((0, FIRST_STATE_COLUMN))
@@ -94,7 +95,7 @@ class PythonBackend:
         Parameters
         ----------
         field_values : tuple of (str, float)
-            Names and values of the fields that are not 0.
+            Names and values of the fields with nonzero initial values.
 
         Returns
         -------
@@ -127,7 +128,7 @@ class PythonBackend:
         return PythonMotionState(**{**initial_state, **dict(called)})
 
     def build_function_table(self, equations_by_regime: tuple[Equations, ...]) -> np.ndarray:
-        """Build the function table of the loop.
+        """Build the function table of the event loop.
 
         Parameters
         ----------
@@ -137,8 +138,8 @@ class PythonBackend:
         Returns
         -------
         ndarray of shape (2, FUNCTIONS_PER_REGIME)
-            Functions that fill arrays, one row per regime. Both rows contain the force balance
-            function of the slow manifold.
+            Functions that fill arrays, one row per regime. Both rows of the table contain the force
+            balance function of the slow manifold.
         """
         rows = np.zeros((2, array_layout.FUNCTION_COUNT_PER_REGIME), dtype=object)
         for row, system in zip(rows, equations_by_regime, strict=False):
@@ -147,7 +148,7 @@ class PythonBackend:
         return rows
 
     def as_loop_arguments(self, *arrays: np.ndarray) -> Sequence[memoryview]:
-        """Convert arrays to arguments of the loop.
+        """Convert arrays to arguments of the event loop.
 
         Parameters
         ----------
@@ -157,12 +158,13 @@ class PythonBackend:
         Returns
         -------
         list of memoryview
-            Memory views of the arrays. Python reads their items faster than array items.
+            Memory views of the arrays. In Python, reading items of a memory view is faster than
+            reading items of an array.
         """
         return [memoryview(array) for array in arrays]  # type: ignore[arg-type]
 
     def as_loop_parameters(self, parameters: Sequence[float]) -> Any:
-        """Convert the parameters of a scene to an argument of the loop.
+        """Convert the parameters of a scene to an argument of the event loop.
 
         Parameters
         ----------
@@ -189,15 +191,15 @@ class PythonBackend:
 
 @partial(renamed_members, writable=True)
 class PythonMotionState(SimpleNamespace):
-    """State of a motion with the fields of ``MOTION_STATE_DTYPE``."""
+    """State of a motion as a Python object with the fields of ``MOTION_STATE_DTYPE``."""
 
     @property
     def memory(self) -> list[PythonMotionState]:
-        """Argument ``motion_memory`` of the loop."""
+        """Argument ``motion_memory`` of the event loop."""
         return [self]
 
     def work_and_row_counters(self) -> tuple[int, ...]:
-        """Return the counters of work and of table rows.
+        """Return the counters of evaluations, steps and table rows.
 
         Returns
         -------
@@ -211,7 +213,7 @@ class PythonMotionState(SimpleNamespace):
         )
 
     def get_state_field(self, field_name: str) -> float:
-        """Return the value of a field.
+        """Return the value of a field of the motion state.
 
         Parameters
         ----------
@@ -227,7 +229,7 @@ class PythonMotionState(SimpleNamespace):
 
 
 class MotionDriver:
-    """Integrator of motions that have the same equations.
+    """Driver that integrates motions with the same equations.
 
     The motions may differ in their initial points and parameters.
 
@@ -240,7 +242,7 @@ class MotionDriver:
     engine : str
         Name of the engine.
     **fields : float
-        Initial values of fields of the motion state. See ``array_layout.MOTION_STATE_DTYPE``.
+        Initial values of motion state fields. See ``array_layout.MOTION_STATE_DTYPE``.
     """
 
     def __init__(
@@ -301,10 +303,10 @@ class MotionDriver:
         Parameters
         ----------
         start_point_or_unknowns : MotionPoint or tuple of float
-            Initial point, or initial unknowns of the slow regime. The loop chooses the regime of an
-            initial point.
+            Initial point, or initial unknowns of the slow regime. If a point is passed, the loop
+            chooses the initial regime.
         work_meter : WorkMeter
-            Counter of the work of the motion.
+            Counter of right-hand side evaluations.
         event_specs : sequence of EventSpecification
             Requested events.
         tolerance : float
@@ -319,22 +321,22 @@ class MotionDriver:
             Thresholds for changes between the regimes. A motion without inertia does not need them.
         evaluation_budget : float, default: inf
             Maximum number of right-hand side evaluations. The remaining budget of the work meter is
-            a second limit.
+            an additional limit.
         recording : Recording, optional
             Object that receives the recorded rows.
         kinks_and_reported_count : tuple of (ndarray, int), optional
-            Rows of the segment table after the first segment, and the number of segments whose
-            start is reported. The reported segments are the last segments.
+            Rows of the segment table after the first segment, and the number n of reported
+            segments. The starts of the last n segments are reported as events.
         initial_imposed_stress : float, optional
             Initial value of the last unknown, if the load point oscillates. The imposed shear
-            stress is the difference of this unknown from its initial value. The unknown
-            ``spring_stress`` excludes the imposed stress, but events and recordings include it.
+            stress is the last unknown minus its initial value. The unknown ``spring_stress``
+            excludes the imposed stress, but events and recordings include it.
 
         Yields
         ------
         Event
-            Start of the motion, requested events, and the events of ``EventKind`` that are always
-            reported.
+            Start of the motion, requested events, and events that are reported without a request,
+            such as changes of regime.
 
         Raises
         ------
@@ -427,7 +429,7 @@ class MotionDriver:
 
 
 def _shift_stresses_of_point(point: MotionPoint, stress_change: float) -> MotionPoint:
-    """Return a point with another spring stress and frictional stress."""
+    """Return a point with a change of both spring stress and frictional stress."""
     return point._replace(
         spring_stress=point.spring_stress + stress_change,
         frictional_stress=point.frictional_stress + stress_change,
@@ -455,7 +457,7 @@ def iterate_events_of_equations(
     tolerance : float
         Local error tolerance of a step.
     work_meter : WorkMeter
-        Counter of the work of the motion.
+        Counter of right-hand side evaluations.
     event_specs : sequence of EventSpecification, default: ()
         Requested events.
     backward : bool, default: False
@@ -482,7 +484,7 @@ def get_motion_driver(scene: Scene, engine: str, *, with_time: bool) -> MotionDr
     Parameters
     ----------
     scene : Scene
-        Scene during its first loading segment.
+        Scene with the parameters of its first loading segment.
     engine : str
         Name of the engine.
     with_time : bool
@@ -491,7 +493,7 @@ def get_motion_driver(scene: Scene, engine: str, *, with_time: bool) -> MotionDr
     Returns
     -------
     MotionDriver
-        Driver of the scene. The scene caches it.
+        Driver of the scene. The driver is cached in the scene.
     """
     return MotionDriver(
         equations_between_ruptures(scene, with_time=with_time),
@@ -569,7 +571,7 @@ def find_events_at_jump(
 def _pack_event_specifications(
     event_specs: tuple[EventSpecification, ...],
 ) -> tuple[np.ndarray, list[tuple[EventKind, EventSpecification | None]]]:
-    """Return the table of event specifications and the meanings of codes."""
+    """Return the table of event specifications, and the event for each event code."""
     meanings = [
         *((spec.kind, spec) for spec in event_specs),
         *_KINDS_AND_SPECS_OF_UNREQUESTED_EVENTS,
@@ -586,7 +588,7 @@ def _pack_event_specifications(
 
 
 def _pack_point(point: MotionPoint) -> np.ndarray:
-    """Convert a point to the columns that the loop uses."""
+    """Convert a ``MotionPoint`` to an array with the columns of the event loop."""
     return np.array((*point[:-1], *point.psis))
 
 

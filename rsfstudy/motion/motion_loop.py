@@ -1,21 +1,21 @@
 """Event loop that integrates a motion through regimes and loading segments.
 
 ``motion_driver.MotionDriver.iterate_events`` calls ``advance_motion`` until the motion ends. The
-calls have this order::
+functions are called in the following order::
 
     advance_motion                     integrate until the motion ends or a table is full
         enter_initial_regime           choose the regime of the initial point
-        follow_regime                  integrate one regime within one loading segment
+        integrate_one_regime           integrate one regime within one loading segment
             begin_regime               let the stepper evaluate the first derivatives
             take_step                  attempt steps until the error of one step is small enough
-            halve_unresolved_step      improve the dense output of a recorded step
+            halve_step_until_dense_output_is_accurate  improve dense output of recorded steps
             is_step_end_valid          check for the end of the motion, e.g. vanishing normal stress
-            truncate_step_at_regime_or_time_end
+            truncate_step_at_end_of_regime_or_segment
             record_regime_start        first step only
             append_start_events        first step only
             record_step                append the samples of the step to ``recording_table``
             append_events_in_step      append the events of the step to ``event_table``
-            has_left_rupture           check the return to the slow manifold
+            has_rupture_regime_ended   check the return to the slow manifold
             advance_to_step_end        copy the end of the step to the beginning of the next step
         set_unknowns_of_regime         after a change of regime
         start_next_segment             after the end of a loading segment
@@ -23,17 +23,18 @@ calls have this order::
 
 The header of ``array_layout`` lists the functions that write each field of ``motion``. The class
 ``Workspace`` describes the arrays of a regime, and the header of ``workspace`` lists the functions
-that write them. Steppers only take steps. The loop detects and locates the events for all steppers.
+that write these arrays. Steppers only take steps. The loop detects and locates the events,
+whichever stepper is used.
 
-The module uses only Python that Numba can compile. To debug a rupture, simulate a scene with
-``inertia=True`` and ``engine="scipy"``, or ``engine="python"`` to debug the stages of a step. Set a
-breakpoint in ``truncate_step_at_end_of_regime_or_segment`` with the condition ``motion.regime ==
-1`` (``FAST_REGIME``). The debugger then stops once in every step of the rupture. The points at both
-ends of the step are ``workspace.point_at_begin`` and ``workspace.point_at_end``. Their columns are
-numbered by ``array_layout.LOG_SLIP_RATE`` and the following constants. To stop at the end of a
-rupture, set a breakpoint with the same condition at ``return REGIME_ENDED`` in
-``integrate_one_regime``. To stop at the beginning of a rupture, use the condition ``motion.regime
-== 0`` there.
+The code of this module is limited to Python features that Numba can compile. To debug a rupture,
+simulate a scene with ``inertia=True`` and ``engine="scipy"``, or ``engine="python"`` to debug the
+stages of a step. Set a breakpoint in ``truncate_step_at_end_of_regime_or_segment`` with the
+condition ``motion.regime == 1`` (``FAST_REGIME``). The debugger then stops once in every step of
+the rupture. The arrays ``workspace.point_at_begin`` and ``workspace.point_at_end`` contain the
+points of the motion at both ends of the step. The array columns are numbered by
+``array_layout.LOG_SLIP_RATE`` and the following constants. To stop at the end of a rupture, set a
+breakpoint with the same condition at ``return REGIME_ENDED`` in ``integrate_one_regime``. To stop
+at the beginning of a rupture, use the condition ``motion.regime == 0`` at this breakpoint.
 """
 
 from __future__ import annotations
@@ -120,10 +121,11 @@ from rsfstudy.parts import (
     SEGMENT_VELOCITY,
 )
 
-#: Number of corrections of the clock at which the last step of a loading segment ends.
+#: Number of iterations that correct the end of the last step of a loading segment.
 CORRECTION_COUNT_OF_SEGMENT_END_CLOCK = 2
-#: Change of ln V_0 at a kink above which the stepper selects a new initial step size. The path
-#: length depends on V + V_0, so the former step size would be rejected several times.
+#: Change of ln V_0 between two loading segments above which the stepper selects a new initial step
+#: size. The path length depends on V + V_0, so the former step size would be rejected several
+#: times.
 MAX_LOG_LOAD_RATE_CHANGE_KEEPING_STEP_SIZE = 3.0
 
 
@@ -149,12 +151,14 @@ def advance_motion(
     y : array of shape (2 * unknowns,)
         Unknowns, followed by their derivatives. The loop updates both in place.
     last_point : array of shape (FIRST_STATE + states,)
-        Last point of the previous regime. In the first call, it is the initial point.
+        Last point of the motion in the previous regime. In the first call, the initial point of the
+        motion.
     workspace_block : array
         Memory for the workspace of a regime. See ``workspace.workspace_size``.
     loop_constants : tuple
-        Scales of the unknowns of both regimes, function table with one row per regime, switch
-        thresholds, parameters of the scene, and memory for the parameters before the last kink.
+        Five items: the scales of the unknowns of both regimes, the function table with one row per
+        regime, the switch thresholds, the parameters of the scene, and memory for the parameters
+        before the last kink.
     event_specs : array of shape (specifications * 7,)
         Event specifications. The columns are ``array_layout.EVENT_SPECIFICATION_COLUMNS``.
     kinks : array of shape (segments, 6)
@@ -229,7 +233,7 @@ def advance_motion(
 
 
 def are_tables_full(motion, event_spec_count, event_table, recording_table):
-    """Return True if the tables may be too small for one more step."""
+    """Return True if the output tables may be too small for one more step."""
     full = len(event_table) - motion.event_rows < 2 * event_spec_count + 4
     return full or (
         len(recording_table) > 0
@@ -279,7 +283,7 @@ def start_next_segment(motion, workspace, last_point, kinks, recording_table):
 def enter_initial_regime(
     motion, y, last_point, functions, slow_manifold_values, switch_thresholds, parameters
 ):
-    """Choose the regime of a point, and set the unknowns of this regime.
+    """Choose the regime at the initial point, and set the unknowns of this regime.
 
     The function uses ``slow_manifold_values`` as memory for the values on the slow manifold.
     """
@@ -304,10 +308,10 @@ def enter_initial_regime(
 
 
 def set_unknowns_of_regime(motion, y, last_point):
-    """Set the unknowns of a regime from the last point before it.
+    """Set the unknowns of a regime from the last point of the previous regime.
 
     Spring stress, states and time are continuous. If the new regime is the slow manifold, ln V and
-    friction are computed from these unknowns, so they may jump.
+    friction may jump, because they are computed from spring stress and states.
     """
     y[0] = last_point[SPRING_STRESS]
     if motion.regime == FAST_REGIME:
@@ -324,7 +328,7 @@ def set_unknowns_of_regime(motion, y, last_point):
 def integrate_one_regime(
     motion, workspace, last_point, requested_samples, event_table, recording_table
 ):
-    """Integrate one regime, and return a code for the reason of its end."""
+    """Integrate one regime, and return a code for the reason why it ended."""
     if motion.pending_start:
         motion.time_per_step = 0.0
         begin_regime(motion, workspace)
@@ -404,7 +408,8 @@ def integrate_one_regime(
 def is_step_end_valid(motion, workspace):
     """Return True if the motion is valid during at least part of the step.
 
-    If the motion terminates within the step, the function truncates the step at the termination.
+    If the motion terminates within the step, the function truncates the step at the time of
+    termination.
     """
     columns, velocity = workspace.point_at_end, workspace.parameters[LOAD_VELOCITY]
     motion.final_normal_stress = columns[NORMAL_STRESS_RATIO]
@@ -470,9 +475,9 @@ def truncate_step_at_end_of_regime_or_segment(motion, workspace):
 def end_step_at_end_time(motion, workspace, clock):
     """Repeat the step so that it ends at the end time of the segment.
 
-    The argument ``clock`` is an estimate from dense output. If stability limits the step size,
-    dense output is much less accurate than the end of the step. The function therefore corrects the
-    clock by the remaining time and repeats the step.
+    The argument ``clock`` is an estimate of the end of the step from dense output. If stability
+    limits the step size, dense output is much less accurate than the end of the step. The function
+    therefore corrects the estimate by the remaining time and repeats the step.
     """
     for _ in range(CORRECTION_COUNT_OF_SEGMENT_END_CLOCK):
         retake_step(motion, workspace, clock)

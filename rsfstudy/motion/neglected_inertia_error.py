@@ -1,7 +1,7 @@
 """Error estimate of the slow manifold approximation along a recorded motion.
 
-The comparison of two runs with different tolerances does not reveal this error, because both runs
-use the same approximation on the slow manifold.
+A comparison of two runs with different tolerances does not reveal the error of the slow-manifold
+approximation, because both runs use the same approximation.
 """
 
 from __future__ import annotations
@@ -38,8 +38,8 @@ from rsfstudy.slider import (
     build_equations_against_displacement,
 )
 
-#: Safety factor of the estimate. In random scenes with thresholds three to ten times larger than
-#: usual, the error of friction is up to 1.4 times the estimate without this factor.
+#: Safety factor of the error estimate. In random scenes with thresholds three to ten times larger
+#: than usual, the error of friction is up to 1.4 times the estimate without the safety factor.
 _ERROR_SAFETY_FACTOR = 2.0
 _SLIP_COLUMN, _SLIP_RATE_COLUMN = (
     MOTION_VARIABLES.index("slip"),
@@ -59,7 +59,7 @@ def estimate_neglected_inertia_error(
     recorded_rows : ndarray
         Rows of a recording, from ``Recording.as_table``.
     slow_regime_number : int
-        Index of the slow-manifold regime in these rows.
+        Index of the slow-manifold regime in ``recorded_rows``.
     initial_log_slip_rate : float
         Value of :math:`\ln(V/V_*)` before the first row.
 
@@ -71,7 +71,7 @@ def estimate_neglected_inertia_error(
 
     Notes
     -----
-    The estimate is the sum of two contributions:
+    The error estimate is the sum of two contributions:
 
     - The residual of the full equation of motion on the slow manifold. Let :math:`W` be the inertia
       weight and :math:`s` the sum of slip and load point displacement. Friction is smaller than
@@ -113,8 +113,8 @@ def _bound_log_rate_changes_by_residuals(
 ) -> np.ndarray:
     """Compute an upper bound of the change of ln V due to residuals.
 
-    The bound for each row is the smaller of the integrated residual and the largest residual so
-    far.
+    The upper bound for each row is the integrated residual or the largest residual so far,
+    whichever is smaller.
     """
     residuals = np.array(
         list(_iterate_equation_of_motion_residuals(scene, recorded_rows, slip_rate_norms))
@@ -160,7 +160,7 @@ def _compute_force_balance_residual(
 ) -> float:
     """Compute the residual of the equation of motion at a row, divided by a.
 
-    The row must be on the slow manifold.
+    The recorded row must belong to the slow-manifold regime.
     """
     equations = build_equations_against_displacement(segment_scene)
     state = (

@@ -1,4 +1,4 @@
-"""Readings of a rig along a recorded motion, and resampling of motions."""
+"""Quantities that a rig measures along a motion, and resampling of motions."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from rsfstudy.motion.recording import (
 )
 from rsfstudy.slider import Scene
 
-#: Columns of a recorded motion that define its path length.
+#: Columns of a recorded motion from which its path length is computed.
 _COLUMNS_DEFINING_PATH_LENGTH = tuple(
     MOTION_VARIABLES.index(name) for name in ("time", "log10_slip_rate", "shear_stress")
 )
@@ -42,8 +42,8 @@ def recorded_friction_coefficient(motion_table: np.ndarray) -> np.ndarray:
 def recorded_load_point_displacement(scene: Scene, motion_table: np.ndarray) -> np.ndarray:
     """Compute the load point displacement along a recorded motion.
 
-    The displacement is the sum of the slip and the elongation of the spring. It is measured from
-    the point before the first step.
+    The displacement is the sum of the slip and the elongation of the spring. The displacement is
+    zero before the first loading step.
 
     Parameters
     ----------
@@ -71,9 +71,9 @@ def resample_motion_along_path(
 ) -> dict[str, np.ndarray]:
     """Resample a recorded motion at points along its path.
 
-    Half of the points are distributed evenly by path length in time, ln V and stress. The other
-    half follow the integration steps, which are short if the path bends. Each extremum of slip rate
-    and of stress is one of the points.
+    Half of the points are spaced evenly in path length, computed from time, ln V and stress. The
+    other half are distributed like the integration steps, which are short if the path bends. Each
+    extremum of slip rate and of stress is one of the points.
 
     Parameters
     ----------
@@ -82,7 +82,7 @@ def resample_motion_along_path(
     point_count : int
         Number of points.
     variable_names : sequence of str, default: MOTION_VARIABLES
-        Names of the returned variables. They must be the first columns of the table.
+        Names of the returned variables. The variables must be the first columns of the table.
     engine : str, default: "scipy"
         Name of the engine that runs the resampling loop.
 

@@ -1,8 +1,8 @@
 """Recording of a motion as a table of samples.
 
 The event loop fills blocks of rows, which ``motion_driver`` appends to a ``Recording``.
-``Recording.as_table`` converts the blocks to a table. ``resample_along_path`` resamples the table
-for plots and files.
+``Recording.as_table`` converts the blocks to a table. ``resample_along_path`` reduces the table to
+a fixed number of points for plots and files.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from scipy.optimize import brentq
 from rsfstudy.motion.events import Event
 from rsfstudy.slider import MotionPoint, Scene
 
-#: Names of the first recorded columns.
+#: Names of the first columns of a recorded motion.
 MOTION_VARIABLES = (
     "time",
     "slip",
@@ -28,7 +28,7 @@ MOTION_VARIABLES = (
     "normal_stress_ratio",
     "state_variable",
 )
-#: Columns of the spring stress and the frictional stress.
+#: Columns of the spring stress and the frictional stress in a recorded motion.
 SHEAR_STRESS_COLUMNS = slice(
     MOTION_VARIABLES.index("shear_stress"), MOTION_VARIABLES.index("frictional_stress") + 1
 )
@@ -40,7 +40,8 @@ RECORDED_VARIABLES = (*MOTION_VARIABLES, "friction_coefficient")
 REGIME_COLUMN, SAMPLE_COLUMN, FIRST_STATE_COLUMN = range(
     len(RECORDED_VARIABLES), len(RECORDED_VARIABLES) + 3
 )
-#: Number of samples per integration step. The polynomial through them is smooth in plots.
+#: Number of samples per integration step. In plots, the interpolating polynomial through the
+#: samples looks smooth.
 SAMPLES_PER_STEP = 6
 
 
@@ -53,8 +54,8 @@ class Recording:
     regime_names : list of str, optional
         Names of the regimes in the order of their first occurrence.
     sample_times : ndarray, optional
-        Requested times in D_c/V_*, or requested slips of a rigid slider in D_c, in increasing
-        order. If a loading segment begins at a requested time, the end of the previous segment is
+        Requested times in D_c/V_* in increasing order. For a rigid slider, requested slips in D_c.
+        If a loading segment begins at a requested time, the end of the previous segment is
         recorded. By default, the motion is recorded at even intervals within each step.
     """
 
@@ -74,7 +75,7 @@ class Recording:
         Returns
         -------
         int
-            Index in ``regime_names``.
+            Index of the regime in ``regime_names``.
         """
         if regime_name not in self.regime_names:
             self.regime_names.append(regime_name)
@@ -97,7 +98,7 @@ class Recording:
         Parameters
         ----------
         rows : ndarray
-            Rows of the table. The method may change them in place.
+            Rows of the recording table. The method may change the array in place.
         regime_names : sequence of str
             Names of the regimes in the order of their numbers in ``rows``.
         """
@@ -111,12 +112,12 @@ class Recording:
         self._row_blocks.append(rows)
 
     def clip_recorded_times(self, max_time: float) -> None:
-        """Limit the recorded times of a chain of segments to its end time.
+        """Limit the recorded times of a segment chain to the end time of the chain.
 
         Parameters
         ----------
         max_time : float
-            End time of the chain. The method also assigns it to the last row.
+            End time of the chain, which is also assigned to the last row.
         """
         if self.sample_times is not None:
             return
@@ -156,7 +157,7 @@ class Recording:
         return convert_to_recorded_units(scene, table)
 
     def table_up_to_row(self, scene: Scene, last_row: np.ndarray) -> np.ndarray:
-        """Return the recorded motion up to a row within a step.
+        """Return the recorded motion up to a row within an integration step.
 
         Parameters
         ----------
@@ -174,9 +175,10 @@ class Recording:
 
 
 def convert_to_recorded_units(scene: Scene, rows: np.ndarray) -> np.ndarray:
-    """Convert rows of the event loop to recorded units, in place.
+    """Convert recorded rows from event loop units to output units, in place.
 
-    Slip rates become decimal logarithms, and the stress deviations become total stresses.
+    Natural logarithms of slip rates are converted to decimal logarithms, and stress deviations are
+    converted to total stresses.
 
     Parameters
     ----------
@@ -198,7 +200,7 @@ def convert_to_recorded_units(scene: Scene, rows: np.ndarray) -> np.ndarray:
 def pack_recorded_row(
     time: float, slip: float, point: MotionPoint, regime_number: int
 ) -> tuple[float, ...]:
-    """Pack a point into a row of the recording table.
+    """Convert a point of the motion to a row of the recording table.
 
     Parameters
     ----------
@@ -224,7 +226,7 @@ def pack_recorded_row(
 def recorded_row(
     scene: Scene, time: float, slip: float, point: MotionPoint, regime: int
 ) -> np.ndarray:
-    """Return a point as a row of ``Recording.as_table``.
+    """Convert a point of the motion to a row of ``Recording.as_table``.
 
     Parameters
     ----------
@@ -246,7 +248,7 @@ def recorded_row(
 
 
 def truncate_recording_at_row(motion_table: np.ndarray, last_row: np.ndarray) -> np.ndarray:
-    """Truncate a recorded motion at a row within a step.
+    """Truncate a recorded motion at a row within an integration step.
 
     The samples of the truncated step are replaced by evenly spaced samples up to the last row. The
     position of the last row within the step is computed from its time.
@@ -298,8 +300,9 @@ def resample_along_path(  # type: ignore[no-untyped-def]
 ):
     """Resample a recorded motion at points along its path.
 
-    The path length depends half on the changes of time, ln V and stress, and half on the number of
-    rows. Extrema of slip rate and stress replace the nearest points.
+    Half of the path length is due to changes of time, ln V and stress, and the other half is
+    proportional to the number of rows. The points closest to extrema of slip rate and stress are
+    moved to the extrema.
 
     Parameters
     ----------
@@ -316,7 +319,7 @@ def resample_along_path(  # type: ignore[no-untyped-def]
     work_array : array of shape (SAMPLES_PER_STEP + 1,)
         Memory for intermediate results.
     result : array of shape (result columns, points)
-        Output array of the first columns at the points.
+        Output array, with one row of resampled values for each of the first columns.
     """
     last, points, total = len(path_lengths) - 1, len(row_positions), 0.0
     for values in (time, log_slip_rate, stress):
@@ -384,7 +387,8 @@ def find_extreme_position(
 ) -> float:
     """Find the fractional row number of an extremum.
 
-    The extremum of the interpolation polynomial of a step is found by Newton's method.
+    The extremum of the polynomial that interpolates the samples of a step is found by Newton's
+    method.
 
     Parameters
     ----------
@@ -434,8 +438,8 @@ def interpolate_rows(columns: np.ndarray, row_positions: np.ndarray, result: np.
     """Interpolate columns at fractional row numbers.
 
     Within a step, the function evaluates the polynomial through the samples of the step. Between
-    two regimes, it interpolates linearly. The compiler replaces this function by
-    ``compiled.array_operations.interpolate_rows``.
+    two regimes, it interpolates linearly. In compiled code,
+    ``compiled.array_operations.interpolate_rows`` replaces this function.
 
     Parameters
     ----------
@@ -444,7 +448,7 @@ def interpolate_rows(columns: np.ndarray, row_positions: np.ndarray, result: np.
     row_positions : array of shape (points,)
         Fractional row numbers.
     result : array of shape (result columns, points)
-        Output array of the first columns at the row numbers.
+        Output array, with one row of interpolated values for each of the first columns.
     """
     columns, row_positions, result = map(np.asarray, (columns, row_positions, result))
     after = np.ceil(row_positions).astype(int)
@@ -463,9 +467,9 @@ def interpolate_rows(columns: np.ndarray, row_positions: np.ndarray, result: np.
     result[:, jumps] = (1.0 - share) * columns[:, line] + share * columns[:, line + 1]
 
 
-#: Interpolation within a step. The variable of the polynomial is -1 at the beginning of the step
-#: and 1 at its end. ``INTERPOLATION_COEFFICIENTS[power][k]`` is the contribution of sample ``k`` to
-#: the coefficient of ``power``.
+#: Coefficients of the interpolation within a step. The variable of the polynomial is -1 at the
+#: beginning of the step and 1 at its end. ``INTERPOLATION_COEFFICIENTS[power][k]`` is the
+#: contribution of sample ``k`` to the coefficient of ``power``.
 HALF_SAMPLES, _SAMPLE_INDICES = 0.5 * SAMPLES_PER_STEP, np.arange(SAMPLES_PER_STEP + 1)
 _INVERSE_VANDERMONDE = np.linalg.inv(
     np.vander(np.linspace(-1.0, 1.0, SAMPLES_PER_STEP + 1), increasing=True)
@@ -474,7 +478,7 @@ INTERPOLATION_COEFFICIENTS = tuple(tuple(row) for row in _INVERSE_VANDERMONDE.to
 
 
 def _evaluate_polynomial(x: float, coefficients: Sequence[float]) -> float:
-    """Evaluate a polynomial with coefficients of increasing powers."""
+    """Evaluate a polynomial. Coefficients are in the order of increasing powers."""
     value = 0.0
     for coefficient in reversed(coefficients):
         value = coefficient + x * value
@@ -482,7 +486,7 @@ def _evaluate_polynomial(x: float, coefficients: Sequence[float]) -> float:
 
 
 def _interpolation_weights(step_positions: np.ndarray) -> np.ndarray:
-    """Compute the weights of the samples of a step, one row per sample."""
+    """Compute the interpolation weights of the samples of a step, one row per sample."""
     return np.asarray(
         _INVERSE_VANDERMONDE.T @ (step_positions / HALF_SAMPLES - 1.0) ** _SAMPLE_INDICES[:, None]
     )

@@ -2,8 +2,8 @@
 
 With inertia, a motion alternates between the slow manifold and the full equations. The slow
 manifold approximates the effect of inertia by a series in the inertia weight :math:`(K/a) w^2`,
-with the slip rate norm :math:`w`. The loop uses the full equations in ruptures. Most criteria are
-functions of floats, which all engines call.
+with the slip rate norm :math:`w`. The event loop uses the full equations in ruptures. Most criteria
+are functions of floats, so all engines can call them.
 """
 
 from __future__ import annotations
@@ -25,27 +25,27 @@ from rsfstudy.status import Status
 #: Limits of the normal stress, in sigma_*. The fault is open below the first limit and locked above
 #: the second limit.
 MIN_NORMAL_STRESS, MAX_NORMAL_STRESS = 1e-9, 1e6
-#: Lower bound of the normal stress, in sigma_*, before a logarithm is taken.
+#: Lower bound that is applied to the normal stress, in sigma_*, before its logarithm is computed.
 MIN_POSITIVE_NORMAL_STRESS = 1e-300
 #: Upper limit of ln(V/V_*) without inertia. The slip rate is unbounded above 10^120 V_*.
 MAX_LOG_SLIP_RATE_WITHOUT_INERTIA = 120.0 * math.log(10.0)
-#: Termination status of a motion.
+#: Codes for the termination status of a motion.
 CONTINUES, NORMAL_STRESS_VANISHED, NORMAL_STRESS_UNBOUNDED, SLIP_STOPPED, SLIP_RATE_UNBOUNDED = (
     range(5)
 )
 
 
 class SwitchThresholds(NamedTuple):
-    r"""Thresholds for changes between slow manifold and full equations.
+    r"""Thresholds for changes between the slow manifold and the full equations.
 
     Parameters
     ----------
     max_slip_rate_norm : float
         Maximum slip rate norm :math:`w` on the slow manifold.
     max_inertia_correction : float
-        Maximum change of ln V by inertia on the slow manifold.
+        Maximum change of ln V due to inertia on the slow manifold.
     max_remaining_slip : float
-        Maximum slip of a transition to the slow manifold, in D_c.
+        Maximum slip during a transition to the slow manifold, in D_c.
     stiffness_over_a : float
         Ratio :math:`K/a`.
     a : float
@@ -96,7 +96,7 @@ def compute_switch_thresholds(scene: Scene, accuracy: Accuracy) -> SwitchThresho
 
 
 def compute_slip_rate_norm(log_slip_rate: float, switch_thresholds: SwitchThresholds) -> float:
-    r"""Compute the slip rate norm.
+    r"""Compute the dimensionless slip rate norm.
 
     Parameters
     ----------
@@ -116,7 +116,7 @@ def compute_slip_rate_norm(log_slip_rate: float, switch_thresholds: SwitchThresh
 def compute_inertia_effect_over_limit(
     log_slip_rate: float, inertial_stress: float, switch_thresholds: SwitchThresholds
 ) -> float:
-    r"""Compute the effect of inertia relative to its limit.
+    r"""Compute the effect of inertia, divided by its limit on the slow manifold.
 
     Parameters
     ----------
@@ -130,8 +130,9 @@ def compute_inertia_effect_over_limit(
     Returns
     -------
     float
-        Larger of two ratios: the slip rate norm and the change of ln V by inertia, each divided by
-        its threshold. The motion must leave the slow manifold if the result is 1 or larger.
+        Larger of two ratios: the slip rate norm divided by its threshold, and the change of ln V
+        due to inertia divided by its threshold. The motion must leave the slow manifold if the
+        result is 1 or larger.
     """
     correction = (
         abs(inertial_stress) / switch_thresholds.a / switch_thresholds.max_inertia_correction
@@ -185,12 +186,12 @@ def slip_during_transition(
     Returns
     -------
     float
-        Slip in D_c, multiplied by the change of ln V. It is an upper bound because :math:`w` is the
-        larger slip rate norm.
+        Slip in D_c, multiplied by the change of ln V. The result is an upper bound, because the
+        formula contains the larger of the two slip rate norms.
 
     Notes
     -----
-    The slip is :math:`(K/a) w^2` in D_c.
+    The slip is :math:`(K/a) w^2` in D_c, with the larger slip rate norm :math:`w`.
     """
     norm = max(
         compute_slip_rate_norm(initial_log_slip_rate, switch_thresholds),
@@ -253,8 +254,8 @@ def is_slip_slow_enough_for_slow_manifold(
 ) -> bool:
     r"""Return True if the slip rate is small enough for the slow manifold.
 
-    The limit is half of the slip rate at which the motion leaves the slow manifold. The lower
-    limit prevents repeated changes between the regimes.
+    The limit is half of the slip rate at which the motion leaves the slow manifold. The factor of
+    two prevents repeated changes between the regimes.
 
     Parameters
     ----------
@@ -281,7 +282,7 @@ def should_switch_back_to_slow_manifold(
     inertial_stress: float,
     switch_thresholds: SwitchThresholds,
 ) -> bool:
-    r"""Return True if a motion can return to the slow manifold.
+    r"""Return True if a motion in a rupture can return to the slow manifold.
 
     Parameters
     ----------
@@ -304,8 +305,8 @@ def should_switch_back_to_slow_manifold(
 
     Notes
     -----
-    The slip rate still changes from :math:`x` to :math:`x_s`. During this change the slider slips
-    by about
+    If the motion returns to the slow manifold, ln V changes from :math:`x` to :math:`x_s`. During
+    this change the slider slips by about
 
     .. math:: \frac{K}{2a} w^2 \min(1, |x - x_s|)
 
@@ -316,8 +317,8 @@ def should_switch_back_to_slow_manifold(
     rises and friction exceeds spring stress, the slip rate on the slow manifold falls. The slip
     rate then has a maximum before it meets the slow manifold, after a slip of several :math:`(K/a)
     w^2` D_c. If the slip rate falls and spring stress exceeds friction, the slip rate on the slow
-    manifold rises. The slip rate then has a minimum above the present :math:`x_s`. The difference
-    is several times the inertial stress divided by :math:`a`.
+    manifold rises. The slip rate then has a minimum above the present :math:`x_s`. The minimum lies
+    above :math:`x_s` by several times the inertial stress divided by :math:`a`.
     """
     norm = max(
         compute_slip_rate_norm(log_slip_rate, switch_thresholds),
@@ -355,8 +356,8 @@ def find_termination_status(
 ) -> int:
     r"""Find the termination status of a motion.
 
-    Shear stress may change sign when a rupture overshoots. The equations remain valid, so the
-    motion does not terminate.
+    A change of sign of the shear stress, when a rupture overshoots, does not terminate the motion,
+    because the equations remain valid.
 
     Parameters
     ----------
@@ -365,7 +366,8 @@ def find_termination_status(
     normal_stress : float
         Normal stress in sigma_*.
     load_velocity : float
-        Load point velocity in V_*. If it is 0, the motion terminates when slip stops.
+        Load point velocity in V_*. If the load point velocity is 0, the motion terminates when slip
+        stops.
 
     Returns
     -------
@@ -401,8 +403,8 @@ def compute_margin_to_termination(
     Returns
     -------
     float
-        Smallest distance between a logarithm and its limit. The margin is positive if the motion
-        continues.
+        Smallest distance of ln V, or of the logarithm of normal stress, from its limit. The margin
+        is positive if the motion continues.
     """
     stress = math.log(max(normal_stress, MIN_POSITIVE_NORMAL_STRESS))
     left = min(

@@ -15,7 +15,7 @@ def build_root_finder(function: Function) -> Function:
     Parameters
     ----------
     function : callable
-        Function ``function(x, given)`` of a float and of additional arguments.
+        Function ``function(x, given)`` of a float ``x`` and of additional arguments ``given``.
 
     Returns
     -------
@@ -64,10 +64,10 @@ def build_root_finder(function: Function) -> Function:
 def root_interpolation_step(
     previous: float, best: float, other: float, at_previous: float, at_best: float, at_other: float
 ) -> float:
-    """Compute the distance from the best estimate to the next estimate.
+    """Compute the distance from the best estimate of a root to the next estimate.
 
-    Linear interpolation is used if there are two distinct points, and inverse quadratic
-    interpolation if there are three.
+    Linear interpolation is used if two of the three points are distinct, and inverse quadratic
+    interpolation if all three points are distinct.
 
     Parameters
     ----------

@@ -1,9 +1,9 @@
 """Detection of events within a step, and recording of samples.
 
 ``append_events_in_step`` and ``record_step`` are called by ``motion_loop.integrate_one_regime``
-after each step. An event occurs at a root of its quantity. The root is bracketed by the ends of the
-step and is located with dense output. Samples are recorded at even intervals within each step, or
-at requested times or slips.
+after each step. Each event occurs at a root of a quantity, such as a derivative of ln V. If the
+quantity changes sign between the ends of the step, the root is located with dense output. Samples
+are recorded at even intervals within each step, or at requested times or slips.
 """
 
 from __future__ import annotations
@@ -75,19 +75,20 @@ from rsfstudy.parts import LOAD_VELOCITY, LOG_LOAD_VELOCITY, STIFFNESS, B
 #: regime, a target time, and the termination of the motion. The values are floats because Numba
 #: would compile a separate function for each integer literal.
 SWITCH_CONDITION, TIME_CONDITION, TERMINATION_CONDITION = -1.0, -2.0, -3.0
-#: Factor of the level of SETTLED events for the slip rate and the sum of the states. The level
-#: without this factor applies to all unknowns. Both conditions must be met. Otherwise, the decrease
-#: of one initially very large unknown would end the motion although the slip rate still changes.
+#: Factor by which the level of a SETTLED event is multiplied for the slip rate and the sum of the
+#: states. The level without this factor applies to all unknowns. Both conditions must be met. With
+#: only one condition, the decrease of one initially very large unknown could end the motion
+#: although the slip rate still changes.
 SETTLED_LEVEL_FACTOR_FOR_RATE_AND_STATES = 10.0
-#: Results of ``find_jump_side_of_event``.
+#: Return values of ``find_jump_side_of_event``.
 NO_EVENT, BEFORE_JUMP, AFTER_JUMP = range(3)
 
 
 def evaluate_event_quantity(event_spec, point_columns, parameters):
     """Return the quantity that changes sign at an event.
 
-    The quantity of an extremum is a derivative. The quantity of a crossing is the difference from
-    the level.
+    For an extremum, the result is the derivative of the requested quantity. For a crossing, the
+    result is the difference between the requested quantity and the level.
     """
     if event_spec[SPEC_KIND] == MAXIMUM or event_spec[SPEC_KIND] == MINIMUM:
         if event_spec[SPEC_QUANTITY] == LOG_SLIP_RATE:
@@ -99,14 +100,14 @@ def evaluate_event_quantity(event_spec, point_columns, parameters):
 
 
 def get_event_specification(workspace, spec_index):
-    """Return the row of an event specification."""
+    """Return the table row of an event specification."""
     return advance_pointer_by_items(
         workspace.event_specs, len(EVENT_SPECIFICATION_COLUMNS) * spec_index
     )
 
 
 def has_deferrable_event(workspace):
-    """Return True if any requested event may be reported later."""
+    """Return True if the report of any requested event may be deferred."""
     found = False
     for w in range(workspace.event_spec_count):
         found = found or get_event_specification(workspace, w)[SPEC_MAY_DEFER] != 0.0
@@ -114,7 +115,7 @@ def has_deferrable_event(workspace):
 
 
 def compute_excess_over_switch_threshold(motion, workspace, point_columns):
-    """Return the excess of the effect of inertia over its limit.
+    """Return the excess of the inertia effect over the slow-manifold limit.
 
     The excess is at least zero if the motion must leave the slow manifold. In ruptures, and for
     motions without inertia, the function returns -1.
@@ -131,7 +132,7 @@ def compute_excess_over_switch_threshold(motion, workspace, point_columns):
 
 
 def has_event_occurred(event_spec, quantity_before, quantity_after, clock_direction):
-    """Return True if a quantity changes sign in the event direction."""
+    """Return True if a quantity changes sign in the direction of an event."""
     upwards = event_spec[SPEC_KIND] == RISE or event_spec[SPEC_KIND] == MINIMUM
     # If the integration runs backward, derivatives change sign in the opposite direction.
     if clock_direction < 0.0 and (
@@ -177,7 +178,8 @@ _find_clock_where_condition_is_zero = build_root_finder(evaluate_condition_at_cl
 def locate_sign_change(condition, value_at_begin, value_at_end, motion, workspace):
     """Locate the root of a condition within the step.
 
-    The tolerance is 1e-13 of the step size. For ``TIME_CONDITION`` it is 1e-15 of the step size.
+    The tolerance of the root is 1e-15 of the step size for ``TIME_CONDITION``, and 1e-13 of the
+    step size for all other conditions.
     """
     width = abs(motion.end - motion.clock)
     finest, relative = (
@@ -239,8 +241,8 @@ def append_start_events(motion, workspace, last_point, event_table):
     """Append the events at the start of a regime or segment.
 
     The first event is the start of the regime or segment, unless the start of the segment is not
-    reported. Requested events follow if they occur at the jump from the last point of the previous
-    regime or segment. Return True if one of these events ends the motion.
+    reported. The function also appends requested events that occur at the jump between the previous
+    and the new regime or segment. The function returns True if an appended event ends the motion.
     """
     p, passed = workspace.parameters, time_at_step_begin(motion, workspace)
     p_before = workspace.parameters_before if motion.pending_start == KINK_CODE else p
@@ -311,7 +313,8 @@ def find_jump_side_of_event(
 def locate_events_in_step(motion, workspace):
     """Locate all requested events within the step, and return their number.
 
-    The function fills in ``workspace.event_clocks``. The value is NaN if an event does not occur.
+    The function fills ``workspace.event_clocks`` with the values of the independent variable at the
+    events, or NaN for events that do not occur.
     """
     count, p = 0, workspace.parameters
     for w in range(workspace.event_spec_count):
@@ -426,7 +429,7 @@ def is_step_recorded(motion, workspace, requested_samples):
 
 
 def record_step(motion, workspace, recording_table, requested_samples, is_motion_over):
-    """Record the step, and return True after the last requested sample.
+    """Record samples of the step, and return True after the last requested sample.
 
     If ``is_motion_over`` is true, requested times up to ``motion.end_time`` are recorded in spite
     of rounding errors.
@@ -502,7 +505,7 @@ def record_requested_samples(motion, workspace, recording_table, requested_sampl
 
 
 def record_at_clock(motion, workspace, recording_table, clock):
-    """Record a sample within the step."""
+    """Record a sample at a value of the independent variable within the step."""
     evaluate_point_at_clock(motion, workspace, clock)
     passed = motion.regime_start_time + time_since_regime_start(
         motion, workspace, workspace.y_within
@@ -513,9 +516,9 @@ def record_at_clock(motion, workspace, recording_table, clock):
 
 
 def append_recorded_row(motion, recording_table, clock, time, point_columns, parameters):
-    """Append a point to the recording table.
+    """Append a point of the motion to the recording table.
 
-    The columns are in the order of ``recording.pack_recorded_row``.
+    The columns of the new row are in the order of ``recording.pack_recorded_row``.
     """
     n = motion.recorded_rows
     recording_table[n, 0] = motion.time + (motion.end_time if time > motion.end_time else time)

@@ -1,7 +1,7 @@
 """Integration, refinement and truncation of a single step.
 
 ``take_step`` is the first call of the event loop in each step. The other functions evaluate the
-slider within the step or change the end of the step.
+motion within the step, or change the end of the step.
 """
 
 from __future__ import annotations
@@ -29,10 +29,11 @@ from rsfstudy.motion.steppers import (
 from rsfstudy.motion.workspace import count_evaluations, evaluate_rates_by_step_clock
 from rsfstudy.parts import LOG_LOAD_VELOCITY
 
-#: Constants of ``halve_step_until_dense_output_is_accurate``: maximum error of the derivative of
-#: dense output, multiplied by the step size, in local tolerances; maximum number of halvings of a
-#: step; growth factor of the step size limit after a resolved step; and spacing of finite
-#: differences of dense output, as a fraction of the step size.
+#: Constants of ``halve_step_until_dense_output_is_accurate``: maximum error of the dense-output
+#: derivative, multiplied by the step size and divided by the local tolerance; maximum number of
+#: times that a step is halved; growth factor of the step size limit after a step with accurate
+#: dense output; and spacing of the finite differences of dense output, as a fraction of the step
+#: size.
 MAX_SLOPE_ERROR, MAX_HALVINGS, GROWTH_FACTOR, SLOPE_SPACING = 300.0, 6, 1.3, 5e-3
 
 
@@ -48,12 +49,12 @@ def time_since_regime_start(motion, workspace, y):
 
 
 def time_at_step_begin(motion, workspace):
-    """Return the time at the beginning of the step, from the segment start."""
+    """Return the time at the beginning of the step, since the segment start."""
     return motion.regime_start_time + time_since_regime_start(motion, workspace, workspace.y)
 
 
 def time_at_step_end(motion, workspace):
-    """Return the time at the end of the step, from the segment start."""
+    """Return the time at the end of the step, since the segment start."""
     return motion.regime_start_time + time_since_regime_start(motion, workspace, workspace.y_end)
 
 
@@ -95,7 +96,7 @@ def take_step(motion, workspace):
 
 
 def take_step_to_next_loading_kink(motion, workspace, max_length):
-    """Take a step to the next kink, and return its length.
+    """Take a step to the next kink of the loading, and return the step size.
 
     Return 0 if the kink is farther away than ``max_length``, or if the stepper cannot take this
     step.
@@ -108,8 +109,8 @@ def take_step_to_next_loading_kink(motion, workspace, max_length):
 def halve_step_until_dense_output_is_accurate(motion, workspace):
     """Halve the step until its dense output is accurate.
 
-    The event loop calls the function if the step is recorded. If stability limits the step size,
-    dense output is much less accurate than the end of the step.
+    The event loop calls this function for steps that are recorded. If stability limits the step
+    size, dense output is much less accurate than the end of the step.
     """
     for _ in range(MAX_HALVINGS):
         if is_dense_output_accurate(motion, workspace):
@@ -152,7 +153,7 @@ def is_dense_output_accurate(motion, workspace):
 
 
 def evaluate_point_at_clock(motion, workspace, clock):
-    """Fill in ``workspace.point_within`` at a clock within the step."""
+    """Evaluate ``workspace.point_within`` at an independent variable in the step."""
     interpolate_unknowns(motion, workspace, clock)
     count_evaluations(motion, 1)
     evaluate_function_into_array(
@@ -172,7 +173,7 @@ def evaluate_point_at_clock(motion, workspace, clock):
 
 
 def truncate_step_at_clock(motion, workspace, clock):
-    """Truncate the step at a clock within the step."""
+    """Truncate the step at a value of the independent variable within the step."""
     if clock != motion.end:
         evaluate_point_at_clock(motion, workspace, clock)
         copy_values(workspace.point_within, workspace.point_at_end, FIRST_STATE + motion.states)

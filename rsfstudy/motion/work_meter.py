@@ -11,10 +11,11 @@ from rsfstudy.errors import RsfStudyError
 from rsfstudy.motion.engines import SCIPY
 from rsfstudy.status import Status
 
-#: Local tolerance for which the maximum step sizes are specified. For other tolerances, the maximum
-#: step size is proportional to the eighth root of the tolerance.
+#: Reference local tolerance for the maximum step size, which is proportional to the eighth root of
+#: the local tolerance.
 TOLERANCE_FOR_SPECIFIED_MAX_STEP_LENGTHS = 1e-7
-#: Minimum local tolerance. Rounding errors dominate below this limit, and SciPy issues a warning.
+#: Minimum local tolerance. Below this tolerance, rounding errors dominate, and SciPy issues a
+#: warning.
 MIN_LOCAL_TOLERANCE = 5e-14
 
 
@@ -29,13 +30,13 @@ def suggest_raising_budget(budget: int) -> str:
     Returns
     -------
     str
-        Text with four times the budget.
+        Advice to use four times the budget.
     """
     return f"; --budget {4 * budget} (budget=) allows more"
 
 
 class MotionStopped(RsfStudyError):
-    """Raised if a motion cannot continue.
+    """Exception raised if a motion cannot continue.
 
     Parameters
     ----------
@@ -53,7 +54,7 @@ class MotionStopped(RsfStudyError):
 @renamed_members
 @dataclass
 class WorkMeter:
-    """Counter of the work of a measurement.
+    """Counter of right-hand side evaluations of a measurement, with a budget.
 
     Parameters
     ----------
@@ -70,7 +71,7 @@ class WorkMeter:
     steps : int, default: 0
         Number of integration steps.
     jacobians : int, default: 0
-        Number of Jacobians.
+        Number of Jacobian evaluations.
     """
 
     budget: int
@@ -131,7 +132,7 @@ class WorkMeter:
     def charge_new_work(
         self, regime_names: Sequence[str], work_before: Sequence[int], work_now: Sequence[int]
     ) -> int:
-        """Add the work of a motion since its last report.
+        """Add the evaluations and steps of a motion since the previous call.
 
         Parameters
         ----------
@@ -139,8 +140,8 @@ class WorkMeter:
             Name of the slow regime, followed by the name of the fast regime if there are two
             regimes.
         work_before, work_now : sequence of int
-            Cumulative work of the motion at the last report and now. The items are evaluations in
-            the slow and in the fast regime, steps and Jacobians.
+            Cumulative counts of the motion at the previous call and now. The four counts are
+            evaluations in the slow regime, evaluations in the fast regime, steps, and Jacobians.
 
         Returns
         -------

@@ -1,4 +1,4 @@
-"""Workspace of a regime: arrays, functions and constants.
+"""Workspace of a regime: arrays, functions and constants for its integration.
 
 ``motion_loop.advance_motion`` creates a workspace for each regime, and steppers receive it as an
 argument. The arrays are written by the following functions. Functions without a module name belong
@@ -14,13 +14,13 @@ y_end, rates_at_end                        stepper (each step),
                                            step_integration.truncate_step_at_clock (y_end only)
 stage_rates, order_eight_step_block,       steppers.order_eight
 dense_output_rows
-y_within                                   stepper (each interpolation), has_left_rupture
+y_within                                   stepper (each interpolation), has_rupture_regime_ended
 rates_within, point_within                 step_integration.evaluate_point_at_clock,
-                                           step_integration.is_step_resolved (rates_within),
-                                           has_left_rupture (point_within)
-dense_slopes                               step_integration.is_step_resolved
-point_at_begin                             follow_regime (at its start), advance_to_step_end
-point_at_end                               follow_regime (each step), end_step_at_end_time,
+                                           step_integration.is_dense_output_accurate (rates_within),
+                                           has_rupture_regime_ended (point_within)
+dense_slopes                               step_integration.is_dense_output_accurate
+point_at_begin                             integrate_one_regime (at its start), advance_to_step_end
+point_at_end                               integrate_one_regime (each step), end_step_at_end_time,
                                            step_integration.truncate_step_at_clock
 event_clocks, event_specs                  step_events.locate_events_in_step
 parameters, parameters_before              start_next_segment
@@ -47,7 +47,7 @@ from rsfstudy.motion.steppers.unrolled_step import (
 )
 
 Array = Any
-#: Positive number that replaces a zero derivative of time, so that no division by zero occurs.
+#: Positive number that replaces a zero derivative of time, to avoid a division by zero.
 REPLACEMENT_OF_ZERO_TIME_DERIVATIVE = 1e-300
 
 
@@ -55,7 +55,7 @@ REPLACEMENT_OF_ZERO_TIME_DERIVATIVE = 1e-300
 class Workspace(NamedTuple):
     """Arrays, functions and constants of one regime.
 
-    In compiled code, the arrays are pointers, so they support indexing only.
+    In compiled code, the arrays are represented by pointers, which only support indexing.
 
     Parameters
     ----------
@@ -80,10 +80,11 @@ class Workspace(NamedTuple):
     dense_slopes : array of shape (unknown_count,)
         Derivatives of the dense output.
     point_at_begin, point_at_end, point_within : array
-        Columns of the points at the beginning of the step, at its end, and within the step.
+        Points of the motion at the beginning of the step, at the end of the step, and within the
+        step. See the column indices in ``array_layout``.
     event_clocks : array of shape (event_spec_count,)
-        Values of the independent variable at the events of the step. The value is NaN if an event
-        does not occur.
+        Values of the independent variable at the events of the step, or NaN for events that do not
+        occur.
     fill_rates, fill_point, attempt_step, fill_balance : function
         Functions of the equations. See ``in_place_functions.InPlaceFunctions``.
     event_specs : array
@@ -179,7 +180,7 @@ def create_workspace(
     functions : sequence
         Row of the function table.
     members_shared_by_regimes : tuple
-        Last six fields of the workspace, which both regimes share.
+        Last six fields of the workspace, which are the same for both regimes.
 
     Returns
     -------
@@ -219,7 +220,7 @@ def create_workspace(
 
 
 def evaluate_rates_by_step_clock(motion, workspace, y, result):
-    """Fill in derivatives with respect to the clock of the step.
+    """Evaluate the derivatives with respect to the step's independent variable.
 
     Parameters
     ----------

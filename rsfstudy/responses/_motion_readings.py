@@ -13,7 +13,8 @@ from rsfstudy.slider import (
     displacement_per_path_length,
 )
 
-#: Smallest square of a direction cosine of the path in a rupture, where ln V changes at once.
+#: Lower bound of the squared direction cosine of the path, which vanishes if ln V changes suddenly
+#: in a rupture.
 MIN_SQUARED_DIRECTION_COSINE_OF_PATH = 1e-12
 
 
@@ -45,8 +46,8 @@ def distance_from_steady_sliding(scene: Scene, point: MotionPoint, load_velocity
 def growth_rate_along_path(scene: Scene, event: Event, load_velocity: float) -> float:
     """Compute the growth rate of ln V at an event with respect to path length.
 
-    During a rupture the clock is the path length in inertial time. The growth rate is converted to
-    the unit of path length that is used between ruptures.
+    During a rupture, the independent variable is the path length computed with the inertial time.
+    The growth rate is converted to the unit of path length that is used between ruptures.
 
     Parameters
     ----------
@@ -80,7 +81,7 @@ def growth_rate_along_path(scene: Scene, event: Event, load_velocity: float) -> 
 
 
 def choose_friction_quantity_for_events(scene: Scene) -> tuple[str, float]:
-    """Return the quantity at whose extrema and levels friction events are located.
+    """Return the quantity whose events represent events of the friction coefficient.
 
     If normal stress is constant and the law is not regularised, events of the friction coefficient
     coincide with events of the spring stress.

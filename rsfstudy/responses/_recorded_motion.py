@@ -1,4 +1,4 @@
-"""Records of motions, and errors of results that are read from them at an instant."""
+"""Recorded motions, and errors of results that are read at single instants."""
 
 from __future__ import annotations
 
@@ -25,11 +25,13 @@ from rsfstudy.motion import (
 )
 from rsfstudy.slider import Scene, largest_linear_growth_rate
 
-#: Part of the accuracy asked for to which the errors of two runs may agree by chance.
+#: Minimum error estimate, as a fraction of the requested relative accuracy, because two runs may
+#: have the same error by chance.
 ERROR_FLOOR_OVER_RTOL = 0.01
-#: Part of the same, times a, by which the friction coefficient of two runs may agree by chance at
-#: an instant: of 7,071 numbers of random holds 22 err by up to 22 times their estimates without it,
-#: and four by up to 1.7 times with it (study coverage).
+#: Minimum error estimate of the friction coefficient at a single instant, as a fraction of a times
+#: the requested relative accuracy. Without this minimum, 22 of 7,071 results of random holds have
+#: errors of up to 22 times their estimates. With the minimum, four results have errors of up to 1.7
+#: times their estimates (study ``coverage``).
 _FRICTION_ERROR_FLOOR_OVER_A_AND_RTOL = 0.1
 
 
@@ -39,11 +41,11 @@ class RecordedMotion(NamedTuple):
     Parameters
     ----------
     segment_start_events : list of Event
-        Beginnings of this segment and of all later segments.
+        Events at the beginning of the first recorded loading segment and of all later segments.
     friction_before_segments : list of float
-        Friction coefficient immediately before each beginning. With inertia, the motion approaches
-        the slow manifold after a beginning within the inertial time, and the value immediately
-        after the beginning is the value on the slow manifold.
+        Friction coefficient immediately before the beginning of each segment. With inertia, the
+        motion approaches the slow manifold after a beginning within the inertial time, and the
+        value immediately after the beginning is the value on the slow manifold.
     peak_event : Event or None
         Requested extremum, or None if the motion has no extremum.
     last_event : Event
@@ -64,7 +66,7 @@ class RecordedMotion(NamedTuple):
 
     @property
     def start_event(self) -> Event:
-        """Beginning of the record."""
+        """Event at the beginning of the record."""
         return self.segment_start_events[0]
 
     def neglected_error_until(self, time: float) -> float:
@@ -175,7 +177,7 @@ def path_relative_to_start(
     Parameters
     ----------
     start_event : Event
-        Beginning of the record.
+        Event at the beginning of the record.
     path_variables : mapping of str to ndarray
         Quantities along the record.
 

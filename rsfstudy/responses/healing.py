@@ -82,9 +82,9 @@ class Healing(RecordingMeasure):
     the peak, in units of D_c. The results are not corrected for the stiffness of the machine.
 
     If the hold does not begin in steady sliding, the message of the outcome reports the distance
-    from steady sliding. If the peak exceeds friction at the end of the record by less than its
-    error, the status is ``not_applicable``. The record begins with the hold and has the shape
-    (phases,). Times are in units of D_c/V_*.
+    from steady sliding. If the peak friction exceeds the friction at the end of the record by less
+    than the error of the peak, the status is ``not_applicable``. The record begins with the hold
+    and has the shape (phases,). Times are in units of D_c/V_*.
 
     Parameters
     ----------
@@ -135,7 +135,7 @@ class Healing(RecordingMeasure):
     outputs = _OUTPUTS
 
     def __post_init__(self) -> None:
-        """Check the fields."""
+        """Check the fields of the measure."""
         super().__post_init__()
         if not 0.0 < self.record < math.inf:
             raise InvalidValue("record", self.record, "must be positive and finite")
@@ -255,7 +255,7 @@ class Healing(RecordingMeasure):
     def _compute_outputs_along_record(
         self, scene: Scene, record: RecordedMotion
     ) -> dict[str, np.ndarray]:
-        """Return the quantities along the record, beginning with the hold."""
+        """Return the recorded quantities along ``phase``, from the hold onwards."""
         path = resample_motion_along_path(record.recorded_rows, self.phases, RECORDED_VARIABLES)
         moved = recorded_load_point_displacement(scene, np.column_stack([*path.values()]))
         return {
@@ -270,8 +270,8 @@ def _find_first_hold_segment(scene: Scene) -> int:
     Raises
     ------
     MotionStopped
-        If there is no such segment, if the load point does not move forward after the hold, or if a
-        displacement step or a normal stress step occurs at an end of the hold.
+        If no loading segment has a held load point, if the load point does not move forward after
+        the hold, or if a displacement step or a normal stress step occurs at an end of the hold.
     """
     history = scene.parts.loading.segments
     holds = [n for n, segment in enumerate(history[:-1]) if segment.load_velocity == 0.0]

@@ -118,7 +118,7 @@ class LinearStability(Measure):
     def compute(self, scene: Scene, accuracy: Accuracy, meter: WorkMeter) -> Outcome:
         """Compute the critical stiffness from friction and from growth rates.
 
-        The error estimate is the difference between the two results.
+        The error estimate is the difference between the critical stiffnesses from both methods.
 
         Parameters
         ----------
@@ -249,7 +249,7 @@ def max_growth_rate(jacobian: np.ndarray) -> float:
     Parameters
     ----------
     jacobian : ndarray, shape (n, n)
-        Jacobian of the rates.
+        Jacobian of the right-hand side of the equations of motion.
 
     Returns
     -------
@@ -260,7 +260,7 @@ def max_growth_rate(jacobian: np.ndarray) -> float:
 
 
 def compute_jacobian(equations: Equations, unknowns: tuple[float, ...]) -> np.ndarray:
-    """Compute the Jacobian of the rates by central differences.
+    """Compute the Jacobian of the right-hand side by central differences.
 
     Parameters
     ----------
@@ -272,7 +272,7 @@ def compute_jacobian(equations: Equations, unknowns: tuple[float, ...]) -> np.nd
     Returns
     -------
     ndarray, shape (n, n)
-        Derivatives of the rates (rows) with respect to the unknowns (columns).
+        Derivatives of the right-hand side (rows) with respect to the unknowns (columns).
     """
     columns = []
     for number, scale in enumerate(equations.unknown_scales):

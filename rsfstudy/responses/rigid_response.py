@@ -38,7 +38,7 @@ from rsfstudy.status import Status
 #: rounding errors.
 _MIN_FRICTION_EVOLUTION_OVER_A = 1e-9
 
-#: Names, scales and meanings of stress changes and of their ratios.
+#: Results of the measure for stress changes and their ratios, with scales and meanings.
 _STRESS_CHANGE_OUTPUTS = (
     ("direct_stress_change", "sigma_*", "stress change just after a rate step"),
     ("direct_asymmetry", "", "direct stress change of the step over that of its inverse, less 1"),
@@ -87,7 +87,7 @@ class RigidResponse(Measure):
     Parameters
     ----------
     slip : float, default: 10.0
-        Length of the response, in units of D_c.
+        Slip up to which the response is computed, in units of D_c.
     points : int, default: 201
         Number of points of the response, evenly spaced along ``slip``.
 
@@ -137,7 +137,7 @@ class RigidResponse(Measure):
     needs_time: ClassVar[tuple[bool, ...]] = ()
 
     def __post_init__(self) -> None:
-        """Check the fields."""
+        """Check the fields of the measure."""
         if not 1.0 <= self.slip < math.inf:
             raise InvalidValue("slip", self.slip, "must be at least 1 D_c")
         if self.points < 2:
@@ -246,7 +246,7 @@ class RigidResponse(Measure):
         Returns
         -------
         distance : float
-            Slip at which the stress passes ``stress_level``.
+            Slip at which the stress crosses ``stress_level``.
         stress_left : float
             Stress after a slip of D_c.
         rows : ndarray, shape (points, 3)

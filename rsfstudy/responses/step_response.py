@@ -67,8 +67,8 @@ class StepResponse(RecordingMeasure):
     ``peak_ratio`` is the height of the second peak divided by the height of the first peak. The
     height of a peak is the difference of ln V from the logarithm of the load point velocity. The
     ratio is 1 if oscillations repeat, as small oscillations do at the critical stiffness, and 0 if
-    there is no second peak. The path has the shape (phases,), and is in units of D_c, D_c/V_* and
-    sigma_*.
+    there is no second peak. The quantities along the path have the shape (phases,), and are in
+    units of D_c, D_c/V_* and sigma_*.
 
     Parameters
     ----------
@@ -118,14 +118,14 @@ class StepResponse(RecordingMeasure):
     dimensions = (Quantity("peak", "", "1", "number of the peak of slip rate after the step"),)
 
     def __post_init__(self) -> None:
-        """Check the fields."""
+        """Check the fields of the measure."""
         super().__post_init__()
         if self.peaks < 2:
             raise InvalidValue("peaks", self.peaks, "must be at least 2")
 
     @property
     def inner_coordinates(self) -> Mapping[str, np.ndarray]:
-        """Numbers of the peaks, from 1, and coordinate values of ``phase``."""
+        """Coordinate values of the peaks (numbers from 1) and of ``phase``."""
         return {"peak": np.arange(1, self.peaks + 1), **super().inner_coordinates}
 
     def error_scales(self, scene: Scene, values: Mapping[str, Any]) -> Mapping[str, float]:
@@ -221,8 +221,8 @@ class StepResponse(RecordingMeasure):
 def _slip_rate_peaks_at_start(scene: Scene, event: Event) -> bool:
     """Return True if the motion starts with a maximum of slip rate.
 
-    With inertia, the slip rate may rise within the inertial time after the step. If this rise is
-    not integrated, the start of the motion is a maximum.
+    With inertia, the slip rate may rise within the inertial time after the step. If the initial
+    rise is not integrated, the start of the motion is a maximum of slip rate.
     """
     return (
         _does_inertia_delay_initial_slip_rate_rise(scene)

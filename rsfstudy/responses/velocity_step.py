@@ -54,7 +54,7 @@ _SETTLING_WINDOW_FRACTION, _SETTLING_TOLERANCE = 0.1, 0.01
 #: Largest distance from steady sliding before the step, as a fraction of ln r.
 _MAX_STEADY_DISTANCE_OVER_LOG_RATIO = 1e-3
 
-#: Names, symbols, scales and meanings of the results.
+#: Results of the measure, with symbols, scales and meanings.
 _APPARENT_PARAMETER_OUTPUTS = (
     ("apparent_a", "$a$", "", "direct effect parameter as read off"),
     ("apparent_b", "$b$", "", "evolution effect parameter as read off"),
@@ -87,7 +87,7 @@ _OUTPUTS = (
 
 
 class _EvaluatedVelocityStep(NamedTuple):
-    """The velocity step that the measure evaluates.
+    """Velocity step that the measure evaluates.
 
     Velocities are in units of V_*, and times are in units of D_c/V_*.
     """
@@ -190,7 +190,7 @@ class VelocityStep(RecordingMeasure):
     outputs = _OUTPUTS
 
     def __post_init__(self) -> None:
-        """Check the fields."""
+        """Check the fields of the measure."""
         super().__post_init__()
         if self.step_number < 1:
             raise InvalidValue("step_number", self.step_number, "must be at least 1")

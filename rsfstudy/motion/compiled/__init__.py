@@ -1,7 +1,7 @@
 """Compilation of the event loop and the equations with Numba.
 
-``numba_backend`` is the entry point. It compiles the loop once and the equations once for each
-combination of parts. ``compile_cache`` stores the results on disk, ``array_operations`` contains
-functions that replace Python functions in compiled code, and ``compilation_errors`` creates error
-messages.
+``numba_backend`` is the entry point. It compiles the event loop once, and the equations once for
+each combination of scene parts (friction law, loading, fluid and so on). ``compile_cache`` stores
+the compiled functions on disk, ``array_operations`` contains functions that replace Python
+functions in compiled code, and ``compilation_errors`` creates error messages.
 """

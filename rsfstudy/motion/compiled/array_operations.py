@@ -1,8 +1,8 @@
 """Functions that replace Python functions of the event loop in compiled code.
 
 The compiled loop uses pointers instead of arrays, and calls the equations through their addresses.
-The loop is therefore compiled only once for all equations. Pointers are also faster, because Numba
-would pass an array to a function as ten words and count its references.
+The loop is therefore compiled only once for all systems of equations. Pointers are also faster,
+because Numba would pass each array as ten machine words and count references to it.
 """
 
 from __future__ import annotations
@@ -27,7 +27,8 @@ from rsfstudy.motion.recording import (
 from rsfstudy.motion.steppers import order_eight
 
 _NUMBA_FLOAT_POINTER_TYPE = types.CPointer(types.float64)
-#: Type of ``function(y, rates, p, result)``. All arguments are pointers to floats.
+#: Numba type of the function ``function(y, rates, p, result)``, whose arguments are pointers to
+#: floats.
 _LLVM_DOUBLE_POINTER_TYPE = ir.DoubleType().as_pointer()
 _LLVM_FUNCTION_TYPE = ir.FunctionType(ir.VoidType(), [_LLVM_DOUBLE_POINTER_TYPE] * 4)
 
@@ -68,7 +69,7 @@ def _pointer_moved_by(_context: Any, pointer: Any, item_count: Any) -> Any:
 
 
 def evaluate_function_into_array(function, y, rates, parameters, result):
-    """Call a function that fills an array.
+    """Call a function that fills an output array.
 
     Parameters
     ----------
@@ -133,7 +134,7 @@ def copy_values(source, target, item_count):
 def interpolate_rows(columns, row_positions, result):
     """Interpolate columns at fractional row numbers.
 
-    The function is equivalent to ``recording.interpolate_rows``.
+    The result is the same as the result of ``recording.interpolate_rows``.
 
     Parameters
     ----------
@@ -142,7 +143,7 @@ def interpolate_rows(columns, row_positions, result):
     row_positions : array of shape (points,)
         Fractional row numbers.
     result : array of shape (result columns, points)
-        Output array of the first columns at the row numbers.
+        Output array, with one row of interpolated values for each of the first columns.
     """
     last, weights = columns.shape[1] - 1, np.empty(SAMPLES_PER_STEP + 1)
     for i in range(len(row_positions)):
@@ -172,7 +173,7 @@ def interpolate_rows(columns, row_positions, result):
                 result[c, i] += weights[k] * columns[c, min(begin + k, last)]
 
 
-#: Compiled replacements of Python functions.
+#: Replacement of each Python function in compiled code.
 COMPILED_REPLACEMENT_BY_PYTHON_FUNCTION: Mapping[Any, Any] = {
     array_operations.evaluate_function_into_array: evaluate_function_into_array,
     array_operations.array_as_pointer: array_as_pointer,

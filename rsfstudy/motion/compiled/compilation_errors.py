@@ -1,6 +1,6 @@
 """Error messages for equations that cannot be compiled.
 
-The messages name the part and the source line that cause the error.
+The messages name the user-defined part of the scene and the source line that cause the error.
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ def check_function_never_raises(
     function : callable
         Function to check.
     already_checked_functions : set of callable, optional
-        Functions that were already checked. The function adds new items.
+        Functions that were already checked. Newly checked functions are added to the set.
 
     Raises
     ------
@@ -63,17 +63,17 @@ def check_function_never_raises(
 
 
 def compilation_error(error: Exception) -> InvalidValue:
-    """Convert an error of Numba to an error that names the part and the line.
+    """Convert a Numba error to an error that names the part and the source line.
 
     Parameters
     ----------
     error : Exception
-        Error of Numba. Its message begins with the innermost function.
+        Numba error, whose message begins with the innermost function.
 
     Returns
     -------
     InvalidValue
-        Error for the user.
+        Error with a message for the user.
     """
     text, what, where = str(error), _EQUATIONS_PHRASE_FOR_ERROR_MESSAGES, ""
     places = list(_NUMBA_ERROR_LOCATION_PATTERN.finditer(text))
@@ -95,7 +95,7 @@ def compilation_error(error: Exception) -> InvalidValue:
 
 
 def _describe_parts_defined_in_file(source_file: str) -> str:
-    """Describe the parts that a source file defines, for error messages."""
+    """Describe the scene parts defined in a source file, for error messages."""
     names = [
         part.name
         for part in _iterate_named_part_subclasses()
@@ -105,7 +105,7 @@ def _describe_parts_defined_in_file(source_file: str) -> str:
 
 
 def _iterate_named_part_subclasses(base_class: type[Part] = Part) -> Iterator[type[Part]]:
-    """Yield all part classes of this process, the latest definition first."""
+    """Yield all scene part classes defined in this process, latest first."""
     for part in reversed(base_class.__subclasses__()):
         yield from _iterate_named_part_subclasses(part)
         if "name" in vars(part):

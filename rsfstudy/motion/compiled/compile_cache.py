@@ -1,13 +1,13 @@
 """Compilation of functions with Numba, and a cache of the results on disk.
 
 ``compile_function`` and ``compile_cfunc_addresses`` are the main functions. They copy a function
-and all functions that it calls, replace some of them (``COMPILED_REPLACEMENT_BY_PYTHON_FUNCTION``),
-and compile the copy.
+and all functions that it calls, replace the functions listed in
+``COMPILED_REPLACEMENT_BY_PYTHON_FUNCTION``, and compile the copy.
 
-Each result is stored in a folder named by a digest of the functions, the compiler and the
-processor. The folder is written under a temporary name, renamed when it is complete, and never
-changed. The cache contains machine code that this process executes. Folders that other users can
-write to are therefore neither read nor written.
+Each compiled function is stored in a folder whose name contains a digest of the source functions,
+the compiler and the processor. The folder is written under a temporary name, renamed when it is
+complete, and never changed. The cache contains machine code that this process executes. Folders
+that other users can write to are therefore neither read nor written.
 """
 
 from __future__ import annotations
@@ -41,17 +41,19 @@ from rsfstudy.motion.compiled.array_operations import COMPILED_REPLACEMENT_BY_PY
 from rsfstudy.motion.engines import compilation_log
 
 _CACHE_ENTRY_FILE_NAME = "motion.py"
-#: Modules whose content is identified by their version or by the version of Python.
+#: Modules that a digest identifies by their version, or by the version of Python, instead of their
+#: code.
 _PACKAGES_IDENTIFIED_BY_VERSION_ONLY = {*sys.stdlib_module_names, "numpy", "numba"}
 #: The fast-math flags permit reciprocals instead of divisions, and fused multiply-add operations.
-#: The compiler can then compute reciprocals of the parameters once per step.
+#: With these flags, the compiler can compute reciprocals of the parameters once per step.
 _COMPILER_OPTIONS: Mapping[str, Any] = {
     "error_model": "numpy",
     "nogil": True,
     "fastmath": {"arcp", "contract", "nsz"},
 }
 _CFUNC_SIGNATURE = numba.types.void(*[numba.types.CPointer(numba.types.float64)] * 4)
-#: Version of the layout and the names of the cache. Increment it if either of them changes.
+#: Version of the cache format. Increment the version if the folder layout or the file names of the
+#: cache change.
 _CACHE_FORMAT_VERSION = 4
 #: Compiled functions that must not be deleted because their addresses are in use.
 _CFUNCS_KEPT_ALIVE: list[Any] = []
@@ -59,7 +61,7 @@ _logger = logging.getLogger(__name__)
 
 
 def compile_cache_folder() -> Path:
-    """Return the folder of compiled functions.
+    """Return the folder in which compiled functions are stored.
 
     Returns
     -------
@@ -78,12 +80,12 @@ def compute_code_digest(signature: Any, *functions: Callable[..., Any]) -> str:
     signature : object
         Numba signature of the functions.
     *functions : callable
-        Functions to digest. The functions that they call are included.
+        Functions to digest. Functions called by these functions are included.
 
     Returns
     -------
     str
-        Hexadecimal digest. It also depends on the version of the compiler and on the processor.
+        Hexadecimal digest. The digest also depends on the compiler version and on the processor.
     """
     content = _ContentDigest()
     content.add_value((signature, functions))
@@ -112,7 +114,7 @@ class _ContentDigest:
         self._function_numbers: dict[int, int] = {}
 
     def add_value(self, value: Any) -> None:
-        """Add a value and all values that it refers to."""
+        """Add a value, and all values that it refers to, to the digest."""
         if isinstance(value, types.FunctionType):
             known = id(value) in self._function_numbers
             number = self._function_numbers.setdefault(id(value), len(self._function_numbers))
@@ -136,7 +138,7 @@ class _ContentDigest:
             self._add_text(repr(value))
 
     def _add_code(self, code: types.CodeType, global_values: Mapping[str, Any]) -> None:
-        """Add a code object and the globals that it reads."""
+        """Add a code object, and the globals that it reads, to the digest."""
         self.sha256_hash.update(code.co_code)
         self.add_value(code.co_varnames)
         for constant in code.co_consts:
@@ -154,7 +156,7 @@ class _ContentDigest:
                 self.add_value([getattr(value, read, None) for read in code.co_names])
 
     def _add_text(self, text: str) -> None:
-        """Add a text, with a separator."""
+        """Add a string and a separator to the digest."""
         self.sha256_hash.update(text.encode() + b"\0")
 
 
@@ -186,7 +188,7 @@ def compile_function(function: Callable[..., Any], signature: Any) -> Any:
 
 
 def compile_cfunc_addresses(functions: Sequence[Callable[..., Any]]) -> tuple[int, ...]:
-    """Compile functions of pointers, or load them from the cache.
+    """Compile functions with pointer arguments, or load them from the cache.
 
     Parameters
     ----------
@@ -196,7 +198,7 @@ def compile_cfunc_addresses(functions: Sequence[Callable[..., Any]]) -> tuple[in
     Returns
     -------
     tuple of int
-        Addresses of the compiled functions. They are valid until the process ends.
+        Addresses of the compiled functions. The addresses are valid until the process ends.
     """
 
     def compile_for(entry: str) -> list[Any]:
@@ -211,19 +213,20 @@ def compile_cfunc_addresses(functions: Sequence[Callable[..., Any]]) -> tuple[in
 
 
 class _ContentKeyedCache(FunctionCache):  # type: ignore[misc]
-    """Numba cache of a function with a content digest in its file name.
+    """Numba cache of a function, with a content digest in the file name.
 
-    The cache of Numba also uses the values of a closure as a key. These values include compiled
-    functions, which differ between processes, so Numba would never find a cached function again.
+    By default, Numba includes the closure values of a function in the cache key. Closure values
+    include compiled functions, which differ between processes, so Numba would never find a cached
+    function again.
     """
 
     def _index_key(self, signature: Any, codegen: Any) -> tuple[Any, ...]:
-        """Return a key that does not contain the values of the closure."""
+        """Return a cache key that does not depend on the values of the closure."""
         return signature, codegen.magic_tuple()
 
 
 def _compile_cfunc(function: Any, *, use_cache: bool) -> Any:
-    """Compile a function of pointers, with or without the cache."""
+    """Compile a function with pointer arguments, with or without the cache."""
     compiled = CFunc(
         function, normalize_signature(_CFUNC_SIGNATURE), locals={}, options=dict(_COMPILER_OPTIONS)
     )
@@ -260,9 +263,9 @@ def _load_or_compile(entry_name: str, compile_with_cache_path: Callable[[str], A
 
 
 def _cache_entry_folder(entry_name: str) -> Path | None:
-    """Return the cache folder of an entry, or None if it is not private.
+    """Return the cache folder of an entry, or None if others can write to it.
 
-    The result is also None if the folder cannot be created.
+    The function also returns None if the folder cannot be created.
     """
     try:
         cache = compile_cache_folder()
@@ -280,7 +283,7 @@ def _cache_entry_folder(entry_name: str) -> Path | None:
 
 @functools.cache
 def _warn_folder_not_private(folder: Path) -> None:
-    """Log a warning, once per folder, that a folder is not private."""
+    """Log a warning, once per folder, that other users can write to a folder."""
     _logger.warning(
         "%s: others own it or may write to it, and nothing compiled is kept there or taken from "
         "it. Remove it, or choose another place (XDG_CACHE_HOME).",
@@ -300,7 +303,7 @@ def _is_private_folder(folder: Path) -> bool:
 def _compile_in_temporary_folder(
     folder: Path, compile_with_cache_path: Callable[[str], Any]
 ) -> Any:
-    """Compile in a temporary folder, and rename the complete folder."""
+    """Compile functions in a temporary folder, and rename the folder at the end."""
     aside = Path(tempfile.mkdtemp(prefix=f"{folder.name}.", dir=folder.parent))
     try:
         entry = aside / _CACHE_ENTRY_FILE_NAME
@@ -315,7 +318,7 @@ def _compile_in_temporary_folder(
 
 
 def _copy_with_compiled_globals(function: Any, cache_entry_path: str = "") -> Any:
-    """Copy a function, with compiled functions in place of its callees.
+    """Copy a function, and replace its callees by compiled functions.
 
     The qualified name of the copy contains a digest of its content. A linker treats functions with
     equal names as the same function, and the numbers that Numba adds to names differ between
@@ -349,7 +352,7 @@ def _copy_with_compiled_globals(function: Any, cache_entry_path: str = "") -> An
 def _global_names_read_by(code: types.CodeType) -> tuple[str, ...]:
     """Return the names of the globals that a function reads.
 
-    Names of attributes are not included.
+    The returned names do not include attribute names.
     """
     reads = (i.argval for i in dis.get_instructions(code) if i.opname == "LOAD_GLOBAL")
     return tuple(dict.fromkeys(reads))
@@ -361,7 +364,7 @@ def _is_function(value: Any) -> bool:
 
 
 def _compiled_replacement_of(value: Any) -> Any:
-    """Return the compiled replacement of a function, or the value itself."""
+    """Return the compiled replacement of a function, or any other value as it is."""
     return (
         COMPILED_REPLACEMENT_BY_PYTHON_FUNCTION.get(value, value) if _is_function(value) else value
     )
@@ -370,7 +373,7 @@ def _compiled_replacement_of(value: Any) -> Any:
 def _jit_compile_callee(function: Any) -> Any:
     """Compile a function that only compiled functions call.
 
-    Functions that several equations call are compiled only once.
+    A function that several systems of equations call is compiled only once.
     """
     return _jit_compile_callee_cached(_compiled_replacement_of(function))
 

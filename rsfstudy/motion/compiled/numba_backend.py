@@ -43,7 +43,8 @@ _NUMBA_TYPE_OF_LOOP_CONSTANTS = types.Tuple(
 )
 
 
-#: Without this call, garbage collection of the objects of Numba delays exit by a third of a second.
+#: Without this call, garbage collection of Numba objects delays the exit of Python by a third of a
+#: second.
 atexit.register(gc.freeze)
 
 
@@ -54,7 +55,7 @@ class NumbaBackend:
     """
 
     def initial_state_values(self, field_values: tuple[tuple[str, float], ...]) -> bytes:
-        """Return the initial values of all fields as bytes.
+        """Return the initial values of all motion state fields as bytes.
 
         See ``motion_driver.PythonBackend``.
         """
@@ -120,7 +121,7 @@ class NumbaMotionState:
         self.memory = np.frombuffer(self._bytes, array_layout.MOTION_STATE_DTYPE)
 
     def work_and_row_counters(self) -> tuple[int, ...]:
-        """Return the counters of work and of table rows.
+        """Return the counters of evaluations, steps and table rows.
 
         Returns
         -------
@@ -131,7 +132,7 @@ class NumbaMotionState:
         return array_layout.COUNTER_FORMAT.unpack_from(self._bytes, array_layout.CALL_FORMAT.size)
 
     def get_state_field(self, field_name: str) -> float:
-        """Return the value of a field.
+        """Return the value of a field of the motion state.
 
         Parameters
         ----------
@@ -154,8 +155,8 @@ def compile_equations_of_scene(scene: Scene, *, with_time: bool) -> None:
     scene : Scene
         Scene of the motions.
     with_time : bool
-        If True, time is one of the unknowns. If False, the equations without inertia are compiled
-        too, because some paths use them.
+        If True, the equations include time as an unknown. If False, the equations without inertia
+        are also compiled, because closed orbits are integrated with these equations.
 
     Raises
     ------
@@ -172,9 +173,9 @@ def compile_equations_of_scene(scene: Scene, *, with_time: bool) -> None:
 
 @lru_cache(maxsize=256)
 def _pack_initial_state_bytes(field_values: tuple[tuple[str, float], ...]) -> bytes:
-    """Pack the initial state of motions into bytes.
+    """Pack the initial values of the motion state into bytes.
 
-    Copies of bytes are faster than copies of records, which NumPy copies field by field.
+    Copying bytes is faster than copying a NumPy record, which is copied field by field.
     """
     memory = np.zeros(1, array_layout.MOTION_STATE_DTYPE)
     for name, value in field_values:
@@ -188,7 +189,7 @@ def _build_function_table(
 ) -> np.ndarray:
     """Build the table of function addresses.
 
-    Both rows contain the force balance function of the slow manifold.
+    Both rows of the table contain the force balance function of the slow manifold.
     """
     rows = np.zeros((2, array_layout.FUNCTION_COUNT_PER_REGIME), dtype=np.int64)
     (
@@ -217,7 +218,7 @@ def get_compiled_loop() -> Any:
 
 
 def compile_scalar_function(function: Function, *arguments: float | Numbers) -> Any:
-    """Compile a function of floats and of tuples of floats.
+    """Compile a function whose arguments are floats or tuples of floats.
 
     Parameters
     ----------
@@ -243,7 +244,7 @@ def compile_scalar_function(function: Function, *arguments: float | Numbers) -> 
 
 @cache
 def _compile_scalar_function_cached(function: Function, *argument_lengths: int) -> Any:
-    """Compile a function for argument lengths, where 0 represents a float."""
+    """Compile a function of floats (length 0) and tuples of floats (length > 0)."""
     check_function_never_raises(function)
     floats = (types.UniTuple(types.float64, n) if n else types.float64 for n in argument_lengths)
     try:
@@ -254,7 +255,7 @@ def _compile_scalar_function_cached(function: Function, *argument_lengths: int) 
 
 @cache
 def compile_array_function(function: Function, *argument_dimensions: int) -> Any:
-    """Compile a function of arrays.
+    """Compile a function whose arguments are arrays.
 
     Parameters
     ----------
@@ -273,7 +274,7 @@ def compile_array_function(function: Function, *argument_dimensions: int) -> Any
 
 
 def compiled_function_addresses(equations: Equations) -> tuple[int, ...]:
-    """Return the addresses of the compiled functions of equations.
+    """Return the addresses of the compiled functions of a system of equations.
 
     Parameters
     ----------
@@ -301,7 +302,7 @@ _COMPILED_ADDRESS_CACHE: dict[tuple[Any, ...], tuple[int, ...]] = {}
 def _compile_or_reuse_addresses(
     functions: tuple[Any, ...], equations: Equations
 ) -> tuple[int, ...]:
-    """Compile functions that fill arrays, or reuse the compiled functions."""
+    """Compile functions that fill arrays, unless they are already compiled."""
     if functions not in _COMPILED_ADDRESS_CACHE:
         for function in (equations.rate_function, equations.point_function):
             check_function_never_raises(function)

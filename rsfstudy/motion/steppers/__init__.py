@@ -1,9 +1,9 @@
 """Steppers of the event loop, and the base class of user-defined steppers.
 
-The loop calls the functions of this module, which call the methods of the stepper of the motion. In
+The event loop calls the functions of this module, which call the methods of the stepper object. In
 the compiled loop, the functions of ``order_eight`` replace the functions of this module. For each
 regime, the loop first calls ``begin_regime``. In each step, it calls ``attempt_step`` once, or
-``step_to_segment_end`` if a loading segment ends in the step. It may then call
+``step_to_segment_end`` if a loading segment ends in the step. After each step, the loop may call
 ``interpolate_unknowns`` and ``retake_step`` any number of times.
 """
 
@@ -34,7 +34,8 @@ class Stepper(ABC):
     systems : tuple of Equations
         Equations of each regime, indexed by ``motion.regime``.
     methods : mapping of str to str
-        Names of integration methods for regimes. A stepper with a single method ignores them.
+        Names of integration methods for regimes. A stepper with a single method ignores this
+        argument.
 
     Attributes
     ----------
@@ -46,7 +47,7 @@ class Stepper(ABC):
     name: ClassVar[str]
 
     def __init_subclass__(cls) -> None:
-        """Give the methods of the subclass their former names too."""
+        """Add the former names of renamed methods to the subclass."""
         super().__init_subclass__()
         adopt_former_members(cls)
 
@@ -59,7 +60,8 @@ class Stepper(ABC):
 
         The method reads the initial unknowns ``workspace.y`` and must fill in their derivatives
         ``workspace.rates``. The independent variable ``motion.clock`` is 0. After a kink of the
-        loading, ``motion.next_step_length`` is the proposed step size. Otherwise it is 0.
+        loading, ``motion.next_step_length`` is the proposed step size. Otherwise,
+        ``motion.next_step_length`` is 0.
 
         Parameters
         ----------

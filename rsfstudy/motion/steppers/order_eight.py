@@ -25,9 +25,10 @@ from rsfstudy.motion.steppers.unrolled_step import (
 )
 from rsfstudy.motion.workspace import count_evaluations, evaluate_rates_by_step_clock
 
-#: Weights of the additional stages of dense output, and of all stages in its coefficients.
+#: Runge-Kutta weights for dense output: weights that define its additional stages, and weights of
+#: all stages in its coefficients.
 _EXTRA_WEIGHTS, _DENSE_WEIGHTS = (tuple(x.ravel().tolist()) for x in (DOP853.A_EXTRA, DOP853.D))
-#: Weights of the stages. The last row belongs to the end of the step.
+#: Runge-Kutta weights of each stage. The last row contains the weights for the end of the step.
 _RUNGE_KUTTA_STAGE_WEIGHTS = tuple(
     map(tuple, [*DOP853.A[:STAGE_COUNT, :STAGE_COUNT].tolist(), DOP853.B.tolist()])
 )
@@ -97,10 +98,11 @@ def take_step_without_error_test(motion, workspace):
 def step_to_segment_end(motion, workspace, approximate_length):
     """Take one step to the end of the loading segment.
 
-    Time is an unknown, so the end of the segment is a known value of the last unknown. The function
-    therefore integrates this step with an independent variable that is proportional to time. Both
-    independent variables advance at the same speed at the beginning of the step. The function
-    returns 0 if the error of the step exceeds the tolerance. See ``Stepper.step_to_segment_end``.
+    Time is the last unknown, and its value at the end of the segment is known. The function
+    therefore integrates this step with an independent variable that is proportional to time. At the
+    beginning of the step, the new independent variable advances at the same rate as the usual
+    independent variable. The function returns 0 if the error of the step exceeds the tolerance. See
+    ``Stepper.step_to_segment_end``.
     """
     motion.time_per_step, motion.step_length = (
         workspace.rates[workspace.unknown_count - 1],
@@ -183,7 +185,7 @@ def increase_step_length(length, error_over_tolerance, was_rejected_before):
     error_over_tolerance : float
         Local error of the accepted step, divided by the tolerance.
     was_rejected_before : bool
-        True if a longer attempt was rejected. The step size then does not increase.
+        True if a longer attempt was rejected. In this case, the step size does not increase.
 
     Returns
     -------
@@ -206,7 +208,7 @@ def reduce_step_length(length, error_over_tolerance):
     length : float
         Size of the rejected step.
     error_over_tolerance : float
-        Local error of the rejected step, divided by the tolerance. It may be NaN.
+        Local error of the rejected step, divided by the tolerance. The value may be NaN.
 
     Returns
     -------
@@ -220,7 +222,7 @@ def reduce_step_length(length, error_over_tolerance):
 def select_initial_step_length(workspace, clock_direction, tolerance):
     """Select the size of the first step of a regime.
 
-    The algorithm evaluates the right-hand side once.
+    The algorithm needs one evaluation of the right-hand side.
 
     Parameters
     ----------
@@ -335,7 +337,7 @@ def evaluate_dense_output(workspace, step_fraction):
 class OrderEightStepper(Stepper):
     """Explicit Runge-Kutta stepper of order eight in plain Python.
 
-    A debugger can follow every stage of a step.
+    The stepper is useful for debugging, because a debugger can follow every stage of a step.
 
     Parameters
     ----------

@@ -33,7 +33,7 @@ DEFAULT_METHOD = "DOP853"
 
 
 class _BudgetExceeded(Exception):
-    """Raised within a step if the evaluation budget is exceeded."""
+    """Exception raised within a step if the evaluation budget is exceeded."""
 
 
 def _build_interpolant_of_unknowns(dense_output: Any) -> Callable[[float], Iterable[float]]:
@@ -126,7 +126,7 @@ class SciPyStepper(Stepper):
     def step_to_segment_end(self, motion: Any, workspace: Any, approximate_length: float) -> float:
         """Take one step with the stepper of order eight.
 
-        Solvers other than DOP853 return 0. See the base class.
+        If the solver is not DOP853, the method returns 0. See the base class.
         """
         if not isinstance(self._solver, DOP853):
             return 0.0
@@ -215,8 +215,9 @@ class SciPyStepper(Stepper):
     def _take_solver_step(self, motion: Any, solver: OdeSolver) -> bool:
         """Take one solver step, and return False if it exceeds the budget.
 
-        Trial steps may leave the domain, so floating-point warnings are suppressed. The solver
-        rejects these steps, and the event loop checks the accepted steps.
+        Trial steps may leave the domain of the equations, so floating-point warnings are
+        suppressed. The solver rejects trial steps with invalid values, and the event loop checks
+        the accepted steps.
         """
         known, self._max_evaluations, self.failure = (
             solver.njev,
@@ -236,7 +237,7 @@ class SciPyStepper(Stepper):
     def _get_current_solver_rates(self) -> np.ndarray:
         """Return the derivatives at the current point of the solver.
 
-        Most solvers have already computed them.
+        Most solvers have already computed these derivatives.
         """
         known = getattr(self._solver, "f", None)
         if known is None:

@@ -1,13 +1,13 @@
 """Source code of a Runge-Kutta step, unrolled for a number of unknowns.
 
-The tableau is the tableau of SciPy's DOP853 (Hairer, Norsett and Wanner 1993). Loops over stages
-and unknowns would take as much time as the equations of a simple scene. In unrolled code with the
-equations inlined, the compiler can also share expressions between the stages.
+The Butcher tableau is the same as in SciPy's DOP853 (Hairer, Norsett and Wanner 1993). Loops over
+stages and unknowns would take as much time as the equations of a simple scene. If the code is
+unrolled and the equations are inlined, the compiler can also share expressions between the stages.
 ``build_step_attempt_function`` is the main function.
 
-The results of a step are stored in the stages and in one block. The block contains a header, the
-unknowns at the end of the step, the scales of the unknowns, and the coefficients of the dense
-output.
+The results of a step are stored in two arrays: the derivatives in all stages, and one block. The
+block contains a header, the unknowns at the end of the step, the scales of the unknowns, and the
+coefficients of the dense output.
 """
 
 from __future__ import annotations
@@ -22,20 +22,20 @@ from zlib import crc32
 import numpy as np
 from scipy.integrate import DOP853
 
-#: Number of stages of a step, of additional stages for dense output, and of rows of dense output
-#: coefficients.
+#: Number of stages of a step, number of additional stages for dense output, and number of rows of
+#: dense output coefficients.
 STAGE_COUNT, EXTRA_STAGE_COUNT, DENSE_ROW_COUNT = 12, 3, 7
 STAGE_COUNT_WITH_DENSE_OUTPUT = STAGE_COUNT + 1 + EXTRA_STAGE_COUNT
-#: Weights of the derivatives in each weighted sum: the stages, of which the last is the end of the
-#: step, and the error estimates of order five and three.
+#: Weights of the derivatives in each weighted sum. The sums are the stages, including the end of
+#: the step as the last stage, and the error estimates of order five and three.
 _DERIVATIVE_WEIGHTS_BY_SUM_NAME: Mapping[str, np.ndarray] = {
     **{f"stage_{s}": DOP853.A[s, :s] for s in range(1, STAGE_COUNT)},
     f"stage_{STAGE_COUNT}": DOP853.B,
     "error_of_fifth": DOP853.E5,
     "error_of_third": DOP853.E3,
 }
-#: Indices of the header of the block: step size, tolerance, and error divided by the tolerance. The
-#: last constant is the length of the header.
+#: Indices of the items in the block header: step size, tolerance, and error divided by the
+#: tolerance. The last constant is the length of the header.
 LENGTH_INDEX, TOLERANCE_INDEX, ERROR_INDEX, HEADER_SIZE = 0, 1, 2, 3
 
 Function = Callable[..., Any]
@@ -69,7 +69,7 @@ def build_step_attempt_function(
 
 @cache
 def _build_step_attempt_factory(unknown_count: int) -> Function:
-    """Compile a function that builds step functions for equations."""
+    """Compile a function that builds step functions from right-hand sides."""
     n, scales = range(unknown_count), HEADER_SIZE + unknown_count
     lines = [
         f"step[{ERROR_INDEX}] = math.nan",
@@ -119,18 +119,18 @@ def _compile_weighted_sum_functions() -> dict[str, Any]:
 
 
 def _sum_call_source(sum_name: str, unknown_index: int) -> str:
-    """Return the source of a weighted sum for one unknown."""
+    """Return the source code of a weighted sum for one unknown."""
     rates = _sum_argument_source(sum_name).split(", ")
     return f"{sum_name}({', '.join(f'{rate}_{unknown_index}' for rate in rates)})"
 
 
 def _sum_argument_source(sum_name: str) -> str:
-    """Return the source of the arguments of a weighted sum."""
+    """Return the source code of the argument list of a weighted sum."""
     return ", ".join(f"k{s}" for s in np.flatnonzero(_DERIVATIVE_WEIGHTS_BY_SUM_NAME[sum_name]))
 
 
 def _weighted_sum_source(sum_name: str) -> str:
-    """Return the source of the body of a weighted sum."""
+    """Return the source code of the expression of a weighted sum."""
     return " + ".join(
         f"{float(x)!r} * k{s}" for s, x in enumerate(_DERIVATIVE_WEIGHTS_BY_SUM_NAME[sum_name]) if x
     )
@@ -142,7 +142,7 @@ def _compile_function_source(
     body_lines: Sequence[str],
     global_values: Mapping[str, Any],
 ) -> Function:
-    """Compile a function from its source, which a debugger can display."""
+    """Compile a function from source code that a debugger can display."""
     made: dict[str, Any] = {**global_values, "__name__": __name__, "math": math}
     text = "\n    ".join([f"def {function_name}({argument_source}):", *body_lines])
     file = f"<{__name__}.{function_name} {crc32(text.encode()):08x}>"
