@@ -78,7 +78,9 @@ class DropCandidate(NamedTuple):
 class Detection(NamedTuple):
     """Result of the detection of stress drops in a record.
 
-    Parameters ---------- candidates : list of DropCandidate
+    Parameters
+    ----------
+    candidates : list of DropCandidate
         Detected drops in order of time.
     noise_sd : float
         Standard deviation of the noise.
@@ -340,7 +342,9 @@ class _WindowMeanDifferences:
     ) -> list[tuple[int, int]]:
         """Find drops with a higher score for this window length than for longer ones.
 
-        Parameters ---------- longer_windows : list of _WindowMeanDifferences
+        Parameters
+        ----------
+        longer_windows : list of _WindowMeanDifferences
             Differences of window means for longer windows. Drops with a clearly higher score for a
             longer window are skipped.
 

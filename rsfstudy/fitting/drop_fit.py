@@ -147,7 +147,7 @@ def fit_drop(
 
     Returns
     -------
-    Drop
+    FittedStressDrop
         Start, end and stresses of the drop, with their errors.
     """
     rows = _select_rows_around_drop(time, candidate, neighbour_limits)

@@ -80,7 +80,9 @@ def read_drops(
     check_slip : bool
         If True, check that the displacement is fault slip, and not load point displacement.
 
-    Returns ------- DropMeasurements
+    Returns
+    -------
+    DropMeasurements
         Properties of the drops, in the units of the arguments. Errors are half widths of 95 %
         confidence intervals.
 

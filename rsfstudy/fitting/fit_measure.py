@@ -132,8 +132,10 @@ class Fit(Measure):
     InvalidValue
         If an option is invalid, or if emcee is required and not installed.
 
-    Notes ----- The model is the simulated friction of the scene under the recorded loading, plus a
-    trend in powers of the load point displacement :math:`x` since the step:
+    Notes
+    -----
+    The model is the simulated friction of the scene under the recorded loading, plus a trend in
+    powers of the load point displacement :math:`x` since the step:
 
     .. math::
 

@@ -411,7 +411,7 @@ class FitProblem:
             noise.degrees_of_freedom_of_slow_noise * free_of / count, _MIN_DEGREES_OF_FREEDOM
         )
         finer = self.model.model_friction(values, refined=True) - curve
-        with np.errstate(invalid="ignore"):  # The inverse matrix is infinite if a derivative is zero.
+        with np.errstate(invalid="ignore"):  # The inverse is infinite if a derivative is zero.
             off = np.abs(inverse @ whitened[:, :-1].T @ noise.whiten_columns(finer[:, None])[:, 0])
         slopes = [
             parameter_derivative_by_coordinate(name, values[name]) for name in self.free_parameters

@@ -68,8 +68,10 @@ class FitWindow:
         Numbers of the other steps in a joint fit that belong to the same record. If the number of
         the next step is included, the window ends before the window of the next step.
 
-    Notes ----- If friction before the step is not a linear function of time, the window begins
-    where friction becomes linear. The window of a hold includes the sliding after the hold.
+    Notes
+    -----
+    If friction before the step is not a linear function of time, the window begins where friction
+    becomes linear. The window of a hold includes the sliding after the hold.
 
     Examples
     --------

@@ -36,7 +36,9 @@ _MIN_DROP_OVER_ITS_ERROR = 1.0
 class FittedDropCandidate(NamedTuple):
     """Fitted stress drop and the corresponding detected drop.
 
-    Parameters ---------- drop : FittedStressDrop
+    Parameters
+    ----------
+    drop : FittedStressDrop
         Result of the fit.
     candidate : DropCandidate
         Detected drop.
@@ -57,7 +59,9 @@ def find_drops(time: np.ndarray, stress: np.ndarray) -> tuple[list[FittedDropCan
     time, stress : ndarray, shape (samples,)
         Times and shear stresses of the samples, in any units.
 
-    Returns ------- drops : list of FittedDropCandidate
+    Returns
+    -------
+    drops : list of FittedDropCandidate
         Drops in order of time.
     detection : Detection
         Result of the detection.

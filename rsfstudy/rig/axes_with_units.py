@@ -60,9 +60,11 @@ def make_axis_with_units(dimension: str, values: Any, units: str | Mapping[str, 
         If a value is not a quantity, if its units are incompatible, or if a rig quantity is not
         positive.
 
-    Notes ----- Two names on axes differ from the names in rigs and scenes. An axis of the rig's
-    normal stress is named ``sigma_star``. An axis of velocities with units is named without the
-    suffix ``_ratio``.
+    Notes
+    -----
+    Two names on axes differ from the names in rigs and scenes. An axis of the rig's normal stress
+    is named ``sigma_star``. An axis of velocities with units is named without the suffix
+    ``_ratio``.
     """
     if not is_variable_name(dimension):
         # The constructor raises an error that explains the rule for names.

@@ -333,12 +333,13 @@ def convert_dataset_by_unit_scales(
     DataError
         If no variable has a scale, or if the scale of an axis varies along another axis.
 
-    Notes ----- Each converted variable has the attribute ``units`` instead of the attribute
-    ``scale``. The suffix ``_ratio`` is removed from names, for example in ``critical_velocity``,
-    ``load_velocity`` and ``effective_normal_stress``. For each logarithm of a slip rate, the
-    function adds a variable with the slip rate. Variables without a scale do not change. A
-    dimensionless coordinate is removed if the dataset also contains the same quantity in physical
-    units.
+    Notes
+    -----
+    Each converted variable has the attribute ``units`` instead of the attribute ``scale``. The
+    suffix ``_ratio`` is removed from names, for example in ``critical_velocity``, ``load_velocity``
+    and ``effective_normal_stress``. For each logarithm of a slip rate, the function adds a variable
+    with the slip rate. Variables without a scale do not change. A dimensionless coordinate is
+    removed if the dataset also contains the same quantity in physical units.
     """
     beside = [
         n

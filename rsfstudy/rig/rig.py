@@ -91,9 +91,11 @@ class Rig(HtmlTableMixin):
         mass and period are given, if a mass is given without a stiffness, or if only one of shear
         modulus and density is given.
 
-    Notes ----- For a mass :math:`m` and a stiffness :math:`k`, the period is :math:`T = 2 \pi
-    \sqrt{m/k}`. The coefficient of radiation damping, :math:`\eta = \sqrt{G \rho}/2`, approximates
-    the inertia of the medium.
+    Notes
+    -----
+    For a mass :math:`m` and a stiffness :math:`k`, the period is :math:`T = 2 \pi \sqrt{m/k}`. The
+    coefficient of radiation damping, :math:`\eta = \sqrt{G \rho}/2`, approximates the inertia of
+    the medium.
 
     Examples
     --------

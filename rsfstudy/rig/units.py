@@ -343,7 +343,7 @@ def _parse_unit_powers(unit_text: str) -> list[tuple[str, int]] | None:
 
 
 def _multiply_known_units(units_and_powers: Iterable[tuple[str, int]]) -> SiFactorAndExponents:
-    """Return the product of unit powers, for units that need no pint."""
+    """Multiply powers of units that are known without pint."""
     scale, exponents = Fraction(1), [0, 0, 0]
     for name, power in units_and_powers:
         size, of = _KNOWN_UNITS[name]
