@@ -181,9 +181,8 @@ class FitWindow:
         def reached(distance: float) -> float:
             """Return the time in s at which the load point reaches a displacement.
 
-            The displacement in um is measured from the step.
-             If the load point does not reach the displacement, the function returns the current end
-             of the window.
+            The displacement in um is measured from the step. If the load point does not reach the
+            displacement, the function returns the current end of the window.
             """
             beyond = (moved > at + distance) & (record.time > step.start)
             return float(record.time[np.argmax(beyond)] if beyond.any() else last)
