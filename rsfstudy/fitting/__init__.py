@@ -1,9 +1,9 @@
-"""Fits of friction parameters to laboratory records.
+"""Estimation of friction parameters from laboratory records.
 
 The class ``Record`` contains the data of an experiment, and the measure ``Fit`` fits friction
 parameters to a record. Other modules detect load point steps and stress drops, model the noise, and
-compute confidence intervals. The package never reads files. Use ``rsfstudy.read_record`` to read a
-record, and ``rsfstudy.fit`` to fit a record.
+compute confidence intervals. The package ``rsfstudy.fitting`` never reads files. Use
+``rsfstudy.read_record`` to read a record, and ``rsfstudy.fit`` to fit a record.
 """
 
 from __future__ import annotations

@@ -5,19 +5,20 @@ from __future__ import annotations
 import numpy as np
 from scipy.linalg import cholesky_banded, solve_banded
 
-#: Variance added to the diagonal of the correlation matrix, so that frequencies without noise do
-#: not receive an infinite weight, and largest number of rows within an averaging time.
+#: The first value is added to the diagonal of the correlation matrix, so that frequencies without
+#: noise do not receive an infinite weight in the fit. The second value is the largest number of
+#: rows within an averaging time.
 _UNAVERAGED_NOISE_VARIANCE_FRACTION, _MAX_ROWS_PER_AVERAGING_TIME = 0.002, 200
 
 
 class AveragingCorrelation:
-    r"""Correlation matrix of rows with overlapping averaging times.
+    r"""Noise correlation matrix of rows with overlapping averaging times.
 
     Parameters
     ----------
     time : ndarray, shape (rows,)
-        Times in s. If the time does not increase from one row to the next, the following rows
-        belong to another window, and are not correlated with the previous rows.
+        Times in s. If the time does not increase from one row to the next, the next row begins
+        another window, and rows of different windows are not correlated.
     averaging_time : float
         Averaging time in s.
 
@@ -47,17 +48,17 @@ class AveragingCorrelation:
         self.row_count_per_independent_sample = float(1.0 + 2.0 * np.sum(band[1:]) / len(time))
 
     def whiten_columns(self, sample_columns: np.ndarray) -> np.ndarray:
-        """Remove the correlation from columns.
+        """Remove the noise correlation from the columns of an array.
 
         Parameters
         ----------
         sample_columns : ndarray, shape (rows, columns)
-            Columns with correlated rows.
+            Array with correlated rows.
 
         Returns
         -------
         ndarray, shape (rows, columns)
-            Columns multiplied by the inverse of the Cholesky factor.
+            Product of the inverse of the Cholesky factor and the array.
         """
         if not sample_columns.size:
             return sample_columns
@@ -74,24 +75,25 @@ class AveragingCorrelation:
 def apply_running_mean(
     time: np.ndarray, sample_columns: np.ndarray, averaging_time: float
 ) -> np.ndarray:
-    """Average columns over a time interval centred at each row.
+    """Compute the running mean of each column of an array.
 
-    The columns are interpolated linearly between the rows. Before the first row and after the last
-    row, the columns are constant.
+    The averaging time is centred at each row. The function interpolates the columns linearly
+    between the rows, and assumes that they are constant before the first row and after the last
+    row.
 
     Parameters
     ----------
     time : ndarray, shape (rows,)
         Times in s, in increasing order.
     sample_columns : ndarray, shape (rows, columns)
-        Columns to average.
+        Array whose columns are averaged.
     averaging_time : float
         Averaging time in s.
 
     Returns
     -------
     ndarray, shape (rows, columns)
-        Averaged columns.
+        Running mean of each column.
     """
     at = np.concatenate([[time[0] - averaging_time], time, [time[-1] + averaging_time]])
     padded = np.concatenate([sample_columns[:1], sample_columns, sample_columns[-1:]])

@@ -1,11 +1,11 @@
 """Confidence intervals of parameters from the profile likelihood.
 
-The profile likelihood of a parameter is the maximum likelihood with respect to all other
-parameters, at a fixed value of the parameter [1]_. The squared distance of a value is the resulting
-increase of the sum of squared whitened residuals, divided by the noise variance. At the ends of a
-confidence interval, the squared distance is :math:`t^2`, where :math:`t` is a quantile of Student's
-t distribution with the degrees of freedom of the fit. If the log-likelihood is nearly quadratic,
-the standard error determines the interval.
+The profile likelihood of a parameter is the likelihood at a fixed value of the parameter, maximised
+with respect to all other parameters [1]_. The squared distance between the fixed value and the best
+value is the increase of the sum of squared whitened residuals, divided by the noise variance. At
+the ends of a confidence interval, the squared distance is :math:`t^2`, where :math:`t` is a
+quantile of Student's t distribution with the degrees of freedom of the fit. If the log-likelihood
+is nearly quadratic, the interval is computed from the standard error.
 
 References
 ----------
@@ -23,10 +23,10 @@ from scipy.stats import t as student
 from rsfstudy.fitting.fit_problem import FitProblem, FitSolution
 from rsfstudy.fitting.window_model import coordinate_to_parameter
 
-#: Confidence level, relative deviation from a quadratic log-likelihood above which the profile
-#: likelihood is computed, largest number of iterations for an end of an interval, relative
-#: tolerance of the squared distance at an end, and tolerance of the minimum sum of squares in noise
-#: variances.
+#: Settings of confidence intervals: the confidence level, the relative deviation from a quadratic
+#: log-likelihood above which the profile likelihood is computed, the largest number of iterations
+#: for each end of an interval, the relative tolerance of the squared distance at the ends, and the
+#: tolerance of the minimum sum of squares divided by the noise variance.
 (
     CONFIDENCE_LEVEL,
     _MAX_DEVIATION_FROM_PARABOLA,
@@ -43,7 +43,7 @@ from rsfstudy.fitting.window_model import coordinate_to_parameter
 
 
 def student_t_multiplier(solution: FitSolution, confidence_level: float) -> float:
-    """Return the half width of confidence intervals in standard errors.
+    """Compute the half width of a confidence interval in standard errors.
 
     Parameters
     ----------
@@ -65,8 +65,9 @@ def confidence_interval(
 ) -> tuple[float, float]:
     """Compute the 95 % confidence interval of a parameter.
 
-    The interval follows from the profile likelihood, and is limited to the bounds of the search.
-    Noise of load point displacement widens the interval by the same factor as the standard error.
+    The interval is computed from the profile likelihood, and does not extend beyond the bounds of
+    the search. Noise in the load point displacement widens the interval by the same factor as the
+    standard error.
 
     Parameters
     ----------
@@ -104,7 +105,7 @@ def confidence_interval(
 class LikelihoodProfile:
     """Profile likelihood of a parameter.
 
-    The noise model of the fit is not changed.
+    The noise model of the fit is used at all values of the parameter.
 
     Parameters
     ----------
@@ -118,11 +119,11 @@ class LikelihoodProfile:
     Attributes
     ----------
     best_coordinates : ndarray, shape (parameters,)
-        Coordinates of all free parameters at the maximum of the likelihood.
+        Coordinates of all free parameters at which the likelihood is highest.
     stderr_from_noise : float
-        Standard error of the coordinate due to friction noise.
+        Contribution of the friction noise to the standard error of the coordinate.
     coordinate_change_ratios : ndarray, shape (parameters,)
-        Changes of all coordinates per unit change of the coordinate of the parameter.
+        Change of each coordinate per unit change of the coordinate of parameter ``parameter_name``.
     """
 
     def __init__(self, problem: FitProblem, solution: FitSolution, parameter_name: str) -> None:
@@ -141,19 +142,19 @@ class LikelihoodProfile:
         )
 
     def find_interval_end(self, direction_sign: float, stderr_count: float) -> float:
-        """Find the coordinate with a given squared distance.
+        """Find an end of a confidence interval.
 
         Parameters
         ----------
         direction_sign : float
             Direction of the search: -1 for the lower end and 1 for the upper end.
         stderr_count : float
-            Square root of the squared distance, in standard errors.
+            Distance between the best value and the end of the interval, in standard errors.
 
         Returns
         -------
         float
-            Coordinate, limited to the bounds of the search.
+            Coordinate of the end of the interval, limited to the bounds of the search.
         """
         bound = (self.problem.lower_bounds if direction_sign < 0.0 else self.problem.upper_bounds)[
             self.parameter_index
@@ -176,11 +177,11 @@ class LikelihoodProfile:
         return float(self.best_coordinates[self.parameter_index] + direction_sign * at)
 
     def scaled_likelihood_decrease(self, coordinate: float) -> float:
-        """Compute the squared distance of a value of the parameter.
+        """Compute the squared distance between a coordinate and the best coordinate.
 
-        The squared distance is twice the decrease of the log-likelihood, which equals the increase
-        of the sum of squares in noise variances. If the log-likelihood is nearly quadratic, the
-        function returns the quadratic approximation.
+        The squared distance is twice the decrease of the log-likelihood. It equals the increase of
+        the sum of squares divided by the noise variance. If the log-likelihood is nearly quadratic,
+        the method returns the quadratic approximation.
 
         Parameters
         ----------
@@ -190,7 +191,7 @@ class LikelihoodProfile:
         Returns
         -------
         float
-            Squared distance, or infinity if the motion fails.
+            Squared distance, or infinity if the simulation of the motion fails.
         """
         moved = coordinate - self.best_coordinates[self.parameter_index]
         parabola = float(moved / self.stderr_from_noise) ** 2
@@ -232,9 +233,9 @@ class LikelihoodProfile:
         return self._compute_excess_squares(left)
 
     def _whitened_residuals(self, coordinates: np.ndarray) -> np.ndarray:
-        """Compute whitened residuals in standard deviations of the noise.
+        """Compute whitened residuals divided by the noise standard deviation.
 
-        The residuals are NaN if the motion fails.
+        If the simulation of the motion fails, the residuals are NaN.
         """
         left = self.problem.residuals(
             self.problem.coordinates_to_values(coordinates), require_stable=True
@@ -248,9 +249,10 @@ class LikelihoodProfile:
         return float(residuals @ residuals - np.square(self.solution.whitened_residuals).sum())
 
     def _compute_linearised_excess_squares(self, coordinates: np.ndarray) -> float:
-        """Compute the excess sum of squares with a linearised model.
+        """Compute the sum of squares minus its minimum with a linearised model.
 
-        The other parameters minimise the sum of squares of the linearised model.
+        The sum of squares is minimised with respect to all parameters except the profiled
+        parameter.
         """
         left = self._whitened_residuals(coordinates)
         if not np.isfinite(left).all():

@@ -1,13 +1,14 @@
 """Detection of drops of shear stress in a noisy record.
 
 The function ``detect_drops`` compares the mean stress in a window before each sample with the mean
-stress in a window after the sample. The windows are 4, 8, 16 and more sampling intervals long. The
-scaled difference is the difference between the two means, divided by its standard deviation. Peaks
-of the scaled difference that exceed a threshold are drops (see ``scipy.signal.find_peaks``).
+stress in a window after the sample. The window lengths are 4, 8, 16 and so on, in sampling
+intervals. The scaled difference is the difference between the two means, divided by the standard
+deviation of such differences. Each peak of the scaled difference above a threshold is a drop (see
+``scipy.signal.find_peaks``).
 
-The standard deviation is estimated from the most frequent differences [1]_, because the most
-frequent differences occur during loading. The estimate is valid if drops occupy at most a third of
-the record.
+The standard deviation of the differences is estimated from the most frequent differences [1]_,
+which occur during loading. The estimate is valid if stress drops occupy at most a third of the
+record.
 
 References
 ----------
@@ -23,30 +24,32 @@ import numpy as np
 from scipy.signal import find_peaks
 from scipy.stats import norm
 
-#: Probability of a false detection in a record of Gaussian noise.
+#: Probability that at least one drop is detected in a record of Gaussian noise.
 FALSE_DETECTION_PROBABILITY = 1e-4
-#: Length of the shortest window in samples, and smallest ratio of the record length to the length
-#: of the longest window.
+#: Length of the shortest window in samples, and smallest ratio of the record length to the longest
+#: window length.
 MIN_WINDOW_SAMPLES, MIN_RECORD_OVER_WINDOW_LENGTH = 4, 100
 #: Smallest number of samples in a record.
 MIN_SAMPLES = MIN_WINDOW_SAMPLES * MIN_RECORD_OVER_WINDOW_LENGTH
-#: Number of standard deviations above the threshold at which a drop is missed with a probability of
-#: 0.001.
+#: Distance of a drop from the detection threshold at which the drop is missed with a probability of
+#: 0.001, in standard deviations.
 DETECTION_MARGIN_IN_STANDARD_DEVIATIONS = 3.1
-#: Scaled difference at which a drop ends on both sides of its peak, in standard deviations.
+#: Scaled difference that marks the start and the end of a drop on both sides of its peak, in
+#: standard deviations.
 _DROP_EXTENT_THRESHOLD_SIGMAS = 2.0
-#: Fraction of the values in the shortest interval from which the noise is estimated.
+#: Fraction of the values from which the noise is estimated. The values are in the shortest interval
+#: that contains this fraction.
 _FRACTION_OF_VALUES_IN_MODE = 0.4
 #: Ratio of the standard deviation to the median absolute deviation for Gaussian noise.
 _STANDARD_DEVIATION_PER_MAD = 1.4826
 #: Ratio of the longest to the shortest sampling interval above which a record is resampled.
 _MAX_SAMPLING_INTERVAL_RATIO = 3.0
-#: Ratio of scores that shows that a window covers only a part of a drop. The score of the window is
-#: compared with the scores of windows that are twice and four times as long.
+#: Ratio of detection scores above which a window is too short for a drop. The score of the window
+#: is compared with the scores of windows that are twice and four times as long.
 _MIN_SCORE_RATIO_OF_LONGER_WINDOW = 1.4
 #: Index of the shortest window, 16 samples long, from which the noise correlation is estimated.
 _SHORTEST_CORRELATION_WINDOW_INDEX = 2
-#: Smallest prominence of a separate peak, relative to its height.
+#: Smallest prominence of a separate peak, relative to the height of the peak.
 _MIN_RELATIVE_PROMINENCE = 0.5
 
 
@@ -56,9 +59,9 @@ class DropCandidate(NamedTuple):
     Parameters
     ----------
     start_time, end_time : float
-        Times between which stress decreases, at the resolution of the window.
+        Times at which the stress decrease begins and ends, at the resolution of the window.
     window_duration : float
-        Length of the window in units of time.
+        Duration of the window, in the unit of the times.
     mean_difference_stderr : float
         Standard error of the difference between two window means.
     correlation_factor : float
@@ -77,12 +80,12 @@ class Detection(NamedTuple):
 
     Parameters
     ----------
-    candidates : list of Candidate
+    candidates : list of DropCandidate
         Detected drops in order of time.
     noise_sd : float
         Standard deviation of the noise.
     detectable_drop : float
-        Size of a drop that is missed with a probability of 0.001.
+        Smallest detectable drop. A drop of this size is missed with a probability of 0.001.
     max_decrease : float
         Largest decrease of the moving average of stress.
 
@@ -143,8 +146,8 @@ def estimate_mean_and_sd_of_mode(values: np.ndarray) -> tuple[float, float]:
     """Estimate the mean and standard deviation of the most frequent values.
 
     The function finds the shortest interval that contains 40 % of the values. The mean and the
-    standard deviation follow from a Gaussian distribution with its central 40 % in this interval.
-    Values outside the interval have little effect on the estimate.
+    standard deviation are computed from the Gaussian distribution whose central 40 % lies in the
+    shortest interval. Values outside the interval have little effect on the estimates.
 
     Parameters
     ----------
@@ -169,7 +172,7 @@ def estimate_mean_and_sd_of_mode(values: np.ndarray) -> tuple[float, float]:
 
 
 def window_mean_decreases(values: np.ndarray, window_samples: int) -> np.ndarray:
-    """Compute the decrease of the window mean at each sample.
+    """Compute the difference of the window means before and after each sample.
 
     Parameters
     ----------
@@ -181,7 +184,7 @@ def window_mean_decreases(values: np.ndarray, window_samples: int) -> np.ndarray
     Returns
     -------
     ndarray, shape (samples - 2 * window + 1,)
-        Mean of the window before a sample minus the mean of the window from this sample on.
+        Mean of the samples before each sample minus the mean of the samples from that sample on.
     """
     sums = np.concatenate([[0.0], np.cumsum(values - values.mean())])
     fallen = (
@@ -203,7 +206,7 @@ def detect_drops(time: np.ndarray, stress: np.ndarray) -> Detection:
     Returns
     -------
     Detection
-        Detected drops, with properties of the noise.
+        Detected drops and noise properties.
     """
     t, s = _resample_evenly(time, stress)
     apart = float(t[-1] - t[0]) / (len(t) - 1)
@@ -237,8 +240,9 @@ def detect_drops(time: np.ndarray, stress: np.ndarray) -> Detection:
 def _resample_evenly(time: np.ndarray, stress: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Resample a record if its sampling intervals vary strongly.
 
-    The new sampling interval is the median sampling interval, weighted by duration. Samples within
-    a new interval are averaged. Values for empty intervals are interpolated.
+    The new sampling interval is the median sampling interval, weighted by duration. The function
+    averages the samples within each new interval, and interpolates the values of intervals without
+    samples.
     """
     gaps = np.diff(time)
     if gaps.max() < _MAX_SAMPLING_INTERVAL_RATIO * gaps.min():
@@ -260,7 +264,7 @@ def _resample_evenly(time: np.ndarray, stress: np.ndarray) -> tuple[np.ndarray, 
 
 
 class _WindowMeanDifferences:
-    """Differences of window means for one window length.
+    """Differences between the mean stresses of successive windows.
 
     Parameters
     ----------
@@ -272,7 +276,7 @@ class _WindowMeanDifferences:
         Detection threshold in standard deviations, which accounts for the number of tested windows
         and samples.
     quantum : float
-        Resolution of stress.
+        Resolution of the recorded stress.
     """
 
     def __init__(
@@ -310,7 +314,7 @@ class _WindowMeanDifferences:
         self.noise_correlation_factor = min(max(ratio, 1.0), math.sqrt(window_samples))
 
     def compute_detection_scores(self, sample_indices: np.ndarray) -> np.ndarray:
-        """Compute the score of samples.
+        """Compute the detection scores of samples.
 
         The score is the scaled difference divided by the square root of the window length.
 
@@ -336,13 +340,13 @@ class _WindowMeanDifferences:
     def find_drops_best_seen_in_window(
         self, longer_windows: list[_WindowMeanDifferences]
     ) -> list[tuple[int, int]]:
-        """Find the drops that are detected best with this window length.
+        """Find drops with a higher score for this window length than for longer ones.
 
         Parameters
         ----------
-        longer_windows : list of _WindowScale
-            Differences for longer windows. Drops with a clearly higher score for a longer window
-            are skipped.
+        longer_windows : list of _WindowMeanDifferences
+            Differences of window means for longer windows. Drops with a clearly higher score for a
+            longer window are skipped.
 
         Returns
         -------

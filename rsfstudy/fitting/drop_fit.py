@@ -1,13 +1,14 @@
 """Sizes and times of stress drops, with confidence intervals.
 
-The function ``fit_drop`` models the stress around a drop by three connected lines: before, during
-and after the drop. The lines meet at the times at which the drop begins and ends. For each pair of
-times, the lines are fitted by least squares. The pair of times with the smallest sum of squares
-determines the drop. The size of the drop is the difference between the highest and the lowest
-stress.
+The function ``fit_drop`` models the stress before, during and after a drop by three connected
+straight lines. The lines meet at the times at which the drop begins and ends. For each pair of
+start time and end time, the lines are fitted by least squares. The fit with the smallest sum of
+squares determines the drop. The size of the drop is the difference between the highest and the
+lowest stress.
 
-The confidence intervals of the times contain all pairs of times with a sum of squares close to the
-minimum. The largest difference is a fixed multiple of the noise variance [1]_.
+The confidence intervals of the start time and the end time contain all pairs of times with a sum of
+squares close to the minimum. The largest difference from the minimum is a fixed multiple of the
+noise variance [1]_.
 
 References
 ----------
@@ -22,8 +23,8 @@ import numpy as np
 
 from rsfstudy.fitting.drop_detection import DropCandidate
 
-#: Extent of the fit on each side of the drop, in windows and in durations of the drop, and smallest
-#: and largest number of samples on each side.
+#: Number of samples to fit on each side of a drop: the factors for the window length and for the
+#: duration of the drop, the smallest number of samples, and the largest number of samples.
 _SIDE_LENGTH_IN_WINDOWS, _SIDE_LENGTH_IN_DROP_DURATIONS, _MIN_SIDE_SAMPLES, _MAX_SIDE_SAMPLES = (
     3.0,
     1.0,
@@ -32,24 +33,24 @@ _SIDE_LENGTH_IN_WINDOWS, _SIDE_LENGTH_IN_DROP_DURATIONS, _MIN_SIDE_SAMPLES, _MAX
 )
 #: Largest number of samples in a fit. If there are more samples, blocks of samples are averaged.
 _MAX_SAMPLES_IN_FIT = 300
-#: Number of windows around the candidate in which the drop may begin or end.
+#: Longest time between a detected drop and the fitted start or end of the drop, in windows.
 _SEARCH_MARGIN_IN_WINDOWS = 2.0
 #: Number of start times and of end times in each grid, and number of grid refinements.
 _SEARCH_GRID_SIZE, _SEARCH_GRID_REFINEMENTS = 16, 3
-#: Largest rate of decrease before and after the drop, relative to the rate during the drop.
+#: Largest rate of stress decrease before and after a drop, relative to the rate during the drop.
 _MAX_SIDE_OVER_DROP_SLOPE = 0.3
-#: Largest excess decrease on one side compared with the slope of the other side, relative to the
-#: drop.
+#: Largest stress decrease before or after a drop that exceeds the decrease expected from the slope
+#: on the other side, relative to the size of the drop.
 _MAX_SIDE_FALL_OVER_DROP = 0.5
-#: Excess of the sum of squares at the ends of 95 % confidence intervals, in noise variances. The
-#: first value, -2 ln 0.0253, applies to the time of a sudden change, and the second value applies
-#: to a parameter.
+#: Difference between the sum of squares at the ends of a 95 % confidence interval and the minimum
+#: sum of squares, in noise variances. The first value, -2 ln 0.0253, applies to the time of a
+#: sudden change. The second value applies to all other parameters.
 _TIME_INTERVAL_EXCESS_SQUARES, _SIZE_INTERVAL_EXCESS_SQUARES = 7.4, 3.84
 #: Half width of a 95 % confidence interval in standard errors.
 STDERRS_PER_95_PERCENT_HALF_WIDTH = 1.96
-#: Error of a time between two samples, relative to the sampling interval.
+#: Error of a time that lies between two samples, relative to the sampling interval.
 _TIME_ERROR_OVER_SAMPLING_INTERVAL = 0.55
-#: Fewest samples next to a drop that determine the stress before or after the drop.
+#: Smallest number of samples before or after a drop for estimating the stress there.
 _MIN_SAMPLES_BESIDE_DROP = 3
 
 
@@ -61,13 +62,13 @@ class FittedStressDrop(NamedTuple):
     Parameters
     ----------
     start_time, end_time : float
-        Times at which stress is highest and lowest.
+        Start and end of the drop, when the stress is highest and lowest.
     stress_before, stress_after : float
         Highest and lowest stress.
     start_error, end_error : float
-        Errors of the times.
+        Errors of ``start_time`` and ``end_time``.
     stress_before_error, stress_after_error : float
-        Errors of the stresses.
+        Errors of ``stress_before`` and ``stress_after``.
     drop_error : float
         Error of the drop ``stress_before - stress_after``.
     residual_sd : float
@@ -91,14 +92,14 @@ class FittedStressDrop(NamedTuple):
 
 
 class _ThreeLineFits(NamedTuple):
-    """Least-squares fits of three connected lines, one for each pair of times.
+    """Least-squares fits of three connected lines to stress.
 
     Parameters
     ----------
     corner_time_pairs : ndarray, shape (pairs, 2)
-        Times at which the lines meet.
+        Pairs of times at which the lines meet.
     coefficients : ndarray, shape (pairs, 4)
-        Coefficients (see ``_fit_three_lines``).
+        Coefficients of the lines (see ``_fit_three_lines``).
     inverse_normal_matrix : ndarray, shape (pairs, 4, 4)
         Inverse of the normal matrix.
     residual_sums_of_squares : ndarray, shape (pairs,)
@@ -112,9 +113,10 @@ class _ThreeLineFits(NamedTuple):
 
     @property
     def best_pair_index(self) -> int:
-        """Index of the first pair with the smallest sum of squares.
+        """Index of the pair of times with the smallest sum of squares.
 
-        Differences due to rounding errors are ignored.
+        If several sums of squares are equal within rounding errors, the property contains the index
+        of the first pair.
         """
         return int(
             np.argmax(
@@ -136,7 +138,7 @@ def fit_drop(
     ----------
     time, stress : ndarray, shape (samples,)
         Times and shear stresses of the samples, in any units.
-    candidate : Candidate
+    candidate : DropCandidate
         Detected drop.
     neighbour_limits : (float, float)
         End of the previous drop, and start of the next drop.
@@ -145,8 +147,8 @@ def fit_drop(
 
     Returns
     -------
-    Drop
-        Times and stresses of the drop with errors.
+    FittedStressDrop
+        Start, end and stresses of the drop, with their errors.
     """
     rows = _select_rows_around_drop(time, candidate, neighbour_limits)
     every = -(-len(rows) // _MAX_SAMPLES_IN_FIT)
@@ -233,8 +235,8 @@ def _search_drop_times(
 ) -> _ThreeLineFits:
     """Search for the times at which the drop begins and ends.
 
-    The search evaluates a grid of pairs of times. The grid is then refined several times around the
-    best pair of times.
+    The search evaluates pairs of times on a grid, and refines the grid several times around the
+    best pair.
     """
     reach = max(_SEARCH_MARGIN_IN_WINDOWS * window_duration, end_candidates - start_candidates)
     halves = np.sort(np.concatenate([time, 0.5 * (time[1:] + time[:-1])]))
@@ -265,7 +267,7 @@ def _search_drop_times(
 
 
 def _select_evenly_spaced_times(times: np.ndarray) -> list[float]:
-    """Select an evenly spaced subset of the times."""
+    """Select an evenly spaced subset of the given times."""
     places = np.unique(np.linspace(0, len(times) - 1, _SEARCH_GRID_SIZE).round().astype(int))
     return [float(times[place]) for place in places] if len(times) else []
 
@@ -293,11 +295,11 @@ def _fit_three_lines(
 ) -> _ThreeLineFits:
     """Fit three connected lines for each pair of times.
 
-    The coefficients are the stresses at both times, and the slopes before and after the drop. A
-    pair of times is rejected if it covers only a part of a longer drop. This is the case if the
-    rate of decrease outside the drop exceeds 0.3 times the rate during the drop. It is also the
-    case if the decrease on one side is larger than expected from the slope on the other side, and
-    the difference exceeds half of the drop.
+    The coefficients of a fit are the stresses at the start and the end of the drop, and the slopes
+    before and after the drop. A pair of times is rejected if it covers only a fraction of a longer
+    drop. A pair is therefore rejected if the rate of stress decrease outside the drop exceeds 0.3
+    times the rate during the drop. A pair is also rejected if the stress decrease on one side
+    exceeds the decrease expected from the slope on the other side by more than half of the drop.
     """
     t0, t1 = corner_time_pairs[:, :1], corner_time_pairs[:, 1:]
     share = np.clip((time - t0) / (t1 - t0), 0.0, 1.0)

@@ -1,6 +1,7 @@
-"""Properties of stress drops in a record: times, stresses and slip.
+"""Times, stresses and slip of the stress drops in a record.
 
-The function ``read_drops`` finds the drops, and computes the properties of each drop with errors.
+The function ``read_drops`` finds the stress drops in a record, and computes the properties of each
+drop with their errors.
 """
 
 from __future__ import annotations
@@ -23,8 +24,8 @@ from rsfstudy.fitting.drop_detection import (
 from rsfstudy.fitting.drop_fit import STDERRS_PER_95_PERCENT_HALF_WIDTH
 from rsfstudy.fitting.stress_drop_fits import EventNumbers, FittedDropCandidate, find_drops
 
-#: Smallest excess of slip during the drops, in standard deviations and as a fraction of the
-#: displacement around the drops.
+#: Smallest difference between the displacement during the drops and the displacement in equally
+#: long intervals around the drops, in standard deviations and relative to the latter displacement.
 _MIN_EXCESS_SLIP_SIGMAS, _MIN_EXCESS_SLIP_FRACTION = 3.0, 0.1
 
 
@@ -38,7 +39,7 @@ class DropSampleIndices(NamedTuple):
     end_index : int
         Index of the first sample after the drop.
     window_sample_count : int
-        Number of samples before and after the drop that are averaged.
+        Number of samples to average before and after the drop.
     """
 
     start_index: int
@@ -56,7 +57,8 @@ class DropMeasurements(NamedTuple):
     detection : Detection
         Result of the detection.
     displacement_shows_slip : bool
-        False if the displacement was checked, and is not faster during the drops than around them.
+        False if the displacement was checked and is not faster during the drops than before and
+        after the drops.
     """
 
     event_rows: list[EventNumbers]
@@ -67,20 +69,20 @@ class DropMeasurements(NamedTuple):
 def read_drops(
     times: np.ndarray, stress: np.ndarray, displacement: np.ndarray | None, *, check_slip: bool
 ) -> DropMeasurements:
-    """Find the stress drops in a record, and compute their properties.
+    """Find stress drops in a record and compute their properties.
 
     Parameters
     ----------
     times, stress : ndarray, shape (samples,)
         Times and shear stresses of the samples.
     displacement : ndarray, shape (samples,), or None
-        Displacement of the samples. If None, slip and slip rate are not computed.
+        Displacements of the samples. If the value is None, slip and slip rate are not computed.
     check_slip : bool
         If True, check that the displacement is fault slip, and not load point displacement.
 
     Returns
     -------
-    DropReadings
+    DropMeasurements
         Properties of the drops, in the units of the arguments. Errors are half widths of 95 %
         confidence intervals.
 
@@ -113,22 +115,23 @@ def read_drops(
 def displacement_follows_drops(
     times: np.ndarray, displacement: np.ndarray, drop_sample_indices: Sequence[DropSampleIndices]
 ) -> bool:
-    """Return True if displacement is faster during drops than around them.
+    """Return True if the displacement accelerates during stress drops.
 
-    The displacement during each drop is compared with the displacement over the same duration
-    before and after the drop.
+    The displacement during each drop is compared with the displacements in intervals of the same
+    duration before and after the drop.
 
     Parameters
     ----------
     times, displacement : ndarray, shape (samples,)
         Times and displacements of the samples.
-    drop_sample_indices : sequence of DropIndices
+    drop_sample_indices : sequence of DropSampleIndices
         Locations of the drops.
 
     Returns
     -------
     bool
-        True if the excess displacement during the drops is significant.
+        True if the displacement during the drops is significantly larger than before and after the
+        drops.
     """
     excess = usual = variance = 0.0
     quantum = find_smallest_value_step(displacement)
@@ -159,13 +162,14 @@ def locate_drop(
 ) -> DropSampleIndices:
     """Locate a drop among the samples.
 
-    The window is shortened if it would overlap a neighbouring drop or extend beyond the record.
+    The averaging window is shortened if it would overlap a neighbouring drop or extend beyond the
+    record.
 
     Parameters
     ----------
     times : ndarray, shape (samples,)
         Times of the samples.
-    fitted_candidate : FittedCandidate
+    fitted_candidate : FittedDropCandidate
         Fitted drop.
     neighbour_limits : (float, float)
         End of the previous drop, and start of the next drop.
@@ -173,7 +177,7 @@ def locate_drop(
     Returns
     -------
     DropIndices
-        Indices of the drop, and length of the window.
+        Indices of the samples in the drop, and number of samples to average.
     """
     drop, candidate = fitted_candidate
     begin = int(np.searchsorted(times, drop.start_time, "right"))
@@ -200,10 +204,10 @@ def measure_drop(
     times, stress : ndarray, shape (samples,)
         Times and shear stresses of the samples.
     displacement : ndarray, shape (samples,), or None
-        Displacement of the samples. If None, slip and slip rate are not computed.
-    fitted_candidate : FittedCandidate
+        Displacements of the samples. If the value is None, slip and slip rate are not computed.
+    fitted_candidate : FittedDropCandidate
         Fitted drop.
-    sample_indices : DropIndices
+    sample_indices : DropSampleIndices
         Location of the drop.
     neighbour_limits : (float, float)
         End of the previous drop, and start of the next drop.
@@ -211,10 +215,11 @@ def measure_drop(
     Returns
     -------
     row : dict of {str: (float, float)}
-        Pairs of a value and its error, which is the half width of a 95 % confidence interval.
+        Properties by name, as pairs of a value and its error. The error is the half width of a 95 %
+        confidence interval.
     cut : int
-        0 if the record contains the stress before and after the drop. Otherwise, the sum of 1 if
-        the record begins during the drop, and 2 if the record ends during the drop.
+        0 if the record contains the stress before and after the drop. The value is 1 if the record
+        begins during the drop, 2 if the record ends during the drop, and 3 if both are true.
     """
     drop = fitted_candidate.drop
     row = {
@@ -243,7 +248,7 @@ def _measure_slip_of_drop(
     sample_indices: DropSampleIndices,
     neighbour_limits: tuple[float, float],
 ) -> dict[str, tuple[float, float]]:
-    """Compute slip, peak slip rate and dynamic stress drop of an event.
+    """Compute the slip, peak slip rate and dynamic stress drop of a drop.
 
     Returns
     -------

@@ -1,9 +1,10 @@
 """Detection of friction that was filtered before it was recorded.
 
-A filter smooths the friction peak after a velocity step, and correlates the noise. A running mean
-over m rows also causes notches in the noise spectrum. The function ``detect_unspecified_filter``
-compares linearised models with and without a filter. If a filter improves the AIC and changes a
-parameter noticeably, friction was probably filtered.
+A filter smooths the friction peak after a velocity step, and introduces a correlation into the
+noise. A running mean over m rows also causes notches in the noise spectrum. The function
+``detect_unspecified_filter`` compares linearised models with and without a filter. If the model
+with a filter has a smaller AIC and noticeably different parameters, the friction was probably
+filtered.
 """
 
 from __future__ import annotations
@@ -18,20 +19,20 @@ from rsfstudy.fitting.averaged_noise_correlation import apply_running_mean
 from rsfstudy.fitting.filters import LOW_PASS_ORDERS, Filter
 from rsfstudy.fitting.fit_solution import FitSolution, compute_aic
 
-#: Number of rows of the running means that are tested, smallest decrease of the AIC, and smallest
-#: change of a parameter in standard errors.
+#: Lengths of the tested running means in rows, and criteria for detecting a filter: the smallest
+#: decrease of the AIC, and the smallest change of a parameter in standard errors.
 _TESTED_AVERAGE_LENGTHS_IN_ROWS, _MIN_AIC_GAIN_OF_RUNNING_MEAN, _MIN_PARAMETER_CHANGE_IN_STDERRS = (
     range(2, 21),
     20.0,
     0.5,
 )
-#: Smallest decrease of the AIC for low-pass filters. The value is larger than for running means
-#: because an inaccurate step time or stiffness has a similar effect.
+#: Smallest decrease of the AIC for low-pass filters. The limit is larger than the limit for running
+#: means, because an inaccurate step time or stiffness has a similar effect to a low-pass filter.
 _MIN_AIC_GAIN_OF_LOW_PASS = 60.0
 #: Corner frequencies of the low-pass filters that are tested, relative to the sampling rate.
 _TESTED_CORNER_OVER_SAMPLING_RATES = (0.3, 0.2, 0.13, 0.09, 0.06, 0.04, 0.025, 0.015)
-#: Largest number of rows that are tested, and number of alternating estimates of the noise and the
-#: parameters.
+#: Largest number of rows for the filter test, and number of times that the noise and the parameters
+#: are estimated in turn.
 _MAX_ROWS_FOR_FILTER_TEST, _NOISE_ESTIMATION_PASSES = 20_000, 2
 
 
@@ -55,8 +56,9 @@ def detect_unspecified_filter(
     Returns
     -------
     tuple of str
-        Reason why the standard errors are not valid, with the filter that describes the record
-        best. The tuple is empty if no filter describes the record better than unfiltered friction.
+        Reason why the standard errors are not valid, with the name of the filter that fits the
+        record best. The tuple is empty if no filter fits the record better than unfiltered
+        friction.
     """
     windows = np.split(np.arange(len(time)), np.flatnonzero(np.diff(time) <= 0.0) + 1)
     least = fit_solution.friction_rounding_quantum / math.sqrt(12.0)
@@ -70,9 +72,9 @@ def detect_unspecified_filter(
     free = len(fit_solution.coordinate_stderr)
 
     def describe(kind: str, size: float) -> tuple[float, float]:
-        """Return the AIC and the largest change of a parameter.
+        """Return the AIC and the largest parameter change of a model with a filter.
 
-        The change is relative to the standard error of the parameter.
+        The parameter change is divided by the standard error of the parameter.
         """
         parts = [
             _apply_filter_to_columns(kind, size, time[rows], columns[rows]) for rows in windows
@@ -117,7 +119,7 @@ def detect_unspecified_filter(
 def _iterate_candidate_filters(
     fit_solution: FitSolution, sampling_interval: float
 ) -> Iterator[tuple[str, float]]:
-    """Yield the kinds and sizes of the filters that are tested."""
+    """Iterate over the kinds and sizes of the filters to test."""
     for rows in _TESTED_AVERAGE_LENGTHS_IN_ROWS:
         yield "mean", rows * sampling_interval
     if fit_solution.noise_model.order:
@@ -129,7 +131,7 @@ def _iterate_candidate_filters(
 def _apply_filter_to_columns(
     filter_kind: str, filter_size: float, time: np.ndarray, columns: np.ndarray
 ) -> np.ndarray:
-    """Return the filtered columns of a window, with shape (rows, columns)."""
+    """Apply a filter to the columns of a window."""
     if not filter_kind:
         return columns
     if filter_kind == "mean":

@@ -1,8 +1,8 @@
-"""Filters that were applied to friction before it was recorded.
+"""Filters that a data logger applied to friction before recording.
 
-A fit applies the same filter to the friction of the model. A filter smooths the friction peak after
-a velocity step. If the model does not include the filter, the fitted direct effect is too small,
-and the fitted slip distance is too long.
+A fit applies the filter of the recorded friction to the friction of the model. A filter smooths the
+friction peak after a velocity step. If the model does not include the filter, the fitted direct
+effect is too small, and the fitted slip distance is too long.
 """
 
 from __future__ import annotations
@@ -21,9 +21,9 @@ MEAN, TRAILING_MEAN = "mean", "trailing_mean"
 LOW_PASS_ORDERS = {"first_order": 1, "butterworth_2": 2, "butterworth_4": 4}
 #: Names of all filters.
 FILTER_KINDS = (MEAN, TRAILING_MEAN, *LOW_PASS_ORDERS)
-#: Smallest number of points in a running mean, points per period of the corner frequency, number of
-#: periods after which a low-pass filter has settled, and largest number of points in the time grid
-#: of a low-pass filter.
+#: Number of points for evaluating filters: the smallest number of points in a running mean, the
+#: number of points per period of the corner frequency, the number of periods after which a low-pass
+#: filter has settled, and the largest number of points in the time grid of a low-pass filter.
 (
     _MIN_POINTS_OF_RUNNING_MEAN,
     _GRID_POINTS_PER_CORNER_PERIOD,
@@ -34,7 +34,7 @@ FILTER_KINDS = (MEAN, TRAILING_MEAN, *LOW_PASS_ORDERS)
 
 @dataclass(frozen=True)
 class Filter:
-    """Filter of friction.
+    """Running mean or low-pass filter of friction.
 
     Parameters
     ----------
@@ -47,7 +47,7 @@ class Filter:
     Raises
     ------
     InvalidValue
-        If the kind is unknown, or if the size is not positive and finite.
+        If the kind of filter is unknown, or if the size is not positive and finite.
 
     Examples
     --------
@@ -65,7 +65,7 @@ class Filter:
     size: float
 
     def __post_init__(self) -> None:
-        """Validate the kind and the size."""
+        """Validate the kind and the size of the filter."""
         if self.kind not in FILTER_KINDS:
             raise InvalidValue("filter", self.kind, "is unknown", choices=FILTER_KINDS)
         if not 0.0 < self.size < math.inf:
@@ -84,7 +84,7 @@ class Filter:
         Returns
         -------
         Filter or None
-            None if the string is empty.
+            Filter, or None if the string is empty.
 
         Raises
         ------
@@ -102,7 +102,7 @@ class Filter:
         return cls(kind, number)
 
     def sample_times(self, time: np.ndarray) -> np.ndarray:
-        """Return the times at which unfiltered friction is required.
+        """Return the times at which the filter needs unfiltered friction.
 
         Parameters
         ----------
@@ -119,7 +119,7 @@ class Filter:
         return np.unique(time[:, None] + self._running_mean_time_offsets(time))
 
     def apply(self, time: np.ndarray, samples: np.ndarray) -> np.ndarray:
-        """Apply the filter to samples of friction.
+        """Apply the filter to unfiltered friction.
 
         Parameters
         ----------
@@ -144,7 +144,7 @@ class Filter:
         return np.asarray(np.interp(time, at, sosfilt(sections, samples, zi=begin)[0]))
 
     def _running_mean_time_offsets(self, time: np.ndarray) -> np.ndarray:
-        """Return the offsets of the points in a running mean.
+        """Return the time offsets of the points in a running mean.
 
         Each offset is a time in s relative to the time of a row. If the averaging time is at least
         four sampling intervals, the points are one sampling interval apart.

@@ -1,7 +1,7 @@
-"""Fits of friction parameters to laboratory records.
+"""Measure that fits friction parameters to laboratory records.
 
-The measure ``Fit`` selects windows of records, runs the search of a ``FitProblem``, and computes
-confidence intervals. Users normally call ``rsfstudy.fit``.
+The measure ``Fit`` selects windows of records, estimates the parameters with a ``FitProblem``, and
+computes confidence intervals. Users normally call ``rsfstudy.fit``.
 """
 
 from __future__ import annotations
@@ -58,17 +58,20 @@ from rsfstudy.quantities import Output, Quantity
 from rsfstudy.slider import Scene
 from rsfstudy.status import Status
 
-#: Largest relative tolerance of a motion for which finite differences of motions are accurate.
+#: Largest relative tolerance of the integration for which finite differences of the solution are
+#: accurate.
 _RTOL_FOR_FINITE_DIFFERENCES = 1e-9
-#: Weight of the standard error in the scale of numerical errors. At the default accuracy of 1e-7, a
-#: numerical error of more than 1 % of the standard error is then reported as too large.
+#: Factor of the standard error in the scale that divides a numerical error. With this factor, a
+#: numerical error of more than 1 % of the standard error is reported as too large at the default
+#: accuracy of 1e-7.
 _NUMERICAL_ERROR_SCALE_PER_STDERR = 1000.0
-#: Fields of a scene that every fit determines.
+#: Scene fields whose values every fit determines.
 _SCENE_FIELDS_SET_BY_FIT = (
     *("a", "b_over_a", "b1_over_a", "b2_over_a", "length_ratio", "mu_star", "stiffness"),
     *("stiffness_ratio", "reference_rate", "load_velocity_ratio"),
 )
-#: Ratio of the direct effect to its lower bound below which the direct effect is at the bound.
+#: Ratio of the direct effect to its lower bound below which the direct effect counts as being at
+#: the bound.
 _AT_LOWER_BOUND_FACTOR = 1.001
 
 
@@ -77,28 +80,29 @@ _AT_LOWER_BOUND_FACTOR = 1.001
 class Fit(Measure):
     r"""Fit of friction parameters to a laboratory record by least squares.
 
-    The fit accounts for correlated noise, which is estimated from the residuals.
+    The fit accounts for correlated noise, whose correlation is estimated from the residuals.
 
     Parameters
     ----------
     records : tuple of Record
-        Records that may be fitted.
+        Records to choose from. The options ``record`` and ``together`` select the fitted records.
     free : tuple of str, default: ("a", "b", "slip_distance", "mu_star", "trend1")
         Names of the free parameters (see ``rsfstudy.fitting.PARAMETERS``). The other parameters
         have the values of the scene.
     slip_distance_guess : float, default: 10.0
-        Slip distance D_c in um, which is the unit of slip in the scene. If D_c is free, this value
-        is the initial guess.
+        Slip distance D_c in um, which is the unit of slip in the scene. If D_c is a free parameter,
+        this value is the initial guess.
     slip_distance_2_guess : float, default: 100.0
-        Slip distance in um of the second state, if the law has two states.
+        Initial guess of the slip distance of the second state variable in um, for friction laws
+        with two state variables.
     record : str, optional
         Name of the record to fit. By default, the first record is fitted.
     step : int, default: 1
         Number of the step to fit, starting from 1.
     together : tuple of (str, int), optional
-        Record names and step numbers of a joint fit, which replace ``record`` and ``step``. Each
-        step has its own friction before the step, trend and step time, with names such as
-        ``mu_star_1``.
+        Record names and step numbers of a joint fit, which replace ``record`` and ``step``. Three
+        parameters have a separate value for each step: the friction before the step (``mu_star_1``,
+        ``mu_star_2``, ...), the trend, and the step time.
     before, after : float, default: 0.0
         Load point displacements in um to fit before and after the step. If ``before`` is 0, the
         window begins halfway between the previous step and this step, or at the beginning of the
@@ -110,17 +114,18 @@ class Fit(Measure):
         Noise model: "white" for the usual formula of standard errors, "ar" for an autoregressive
         process with an automatic order, or "ar1", "ar2" and so on.
     loading : {"steps", "recorded"}, default: "steps"
-        Loading by steps with constant velocities between the steps, or loading by the recorded
-        rows. Recorded loading includes the normal stress, unless the normal stress of the scene is
-        constant.
+        Loading of the model. With "steps", the load point velocity is constant between the steps.
+        With "recorded", the model follows the recorded displacement, and the recorded normal stress
+        unless the normal stress of the scene is constant.
     filter : str, optional
         Filter that was applied to friction before it was recorded, such as "mean 1.0" (see
         ``rsfstudy.fitting.Filter``). By default, friction was not filtered.
     posterior : int, default: 0
         Number of draws from the posterior distribution.
     machine_stiffness : float, default: 0.0
-        Stiffness of the machine in Pa/um, which is divided by the normal stress before the step of
-        each window. If 0, all windows have the stiffness of the scene.
+        Stiffness of the machine in Pa/um. The stiffness of each window is the machine stiffness
+        divided by the normal stress before the step. If 0, all windows have the stiffness of the
+        scene.
 
     Raises
     ------
@@ -129,8 +134,8 @@ class Fit(Measure):
 
     Notes
     -----
-    The model is the motion of the scene under the loading of the record, plus a trend in powers of
-    the load point displacement :math:`x` from the step:
+    The model is the simulated friction of the scene under the recorded loading, plus a trend in
+    powers of the load point displacement :math:`x` since the step:
 
     .. math::
 
@@ -139,11 +144,12 @@ class Fit(Measure):
 
     where :math:`V_l` is the load point velocity, :math:`V_0` is the load point velocity before the
     step, :math:`k` is the stiffness divided by the normal stress, and :math:`\Theta` is the state
-    variable, which evolves by the friction law. The second equation describes the friction without
-    its trend, at constant normal stress and without inertia.
+    variable, which evolves by the friction law. The second equation applies to the friction without
+    the trend, at constant normal stress and without inertia.
 
-    Lengths are in um, times in s, and normal stresses in Pa. Outputs along the rows have the shape
-    (rows,). The outputs ``covariance`` and ``correlation`` have the shape (parameters, parameters).
+    Lengths are in um, times in s, and normal stresses in Pa. Outputs with one value per row of the
+    record have the shape (rows,). The outputs ``covariance`` and ``correlation`` have the shape
+    (parameters, parameters).
 
     For each parameter, ``<name>_stderr`` is the standard error, ``<name>_low`` and ``<name>_high``
     are the ends of the 95 % confidence interval, and ``<name>_error`` is the numerical error. If
@@ -234,7 +240,7 @@ class Fit(Measure):
 
     @property
     def solved_fields(self) -> tuple[str, ...]:
-        """Fields of the scene that the fit determines."""
+        """Names of the scene fields whose values the fit determines."""
         return (
             *_SCENE_FIELDS_SET_BY_FIT,
             *(name for name in ("alpha", "law_exponent") if name in self.free),
@@ -242,7 +248,7 @@ class Fit(Measure):
 
     @property
     def primary_output(self) -> str:
-        """Name of the first free parameter that all laws have."""
+        """Name of the first free parameter that occurs in all friction laws."""
         return next(
             (n for n in self.parameters if n not in PARAMETERS_OF_SOME_LAWS_ONLY),
             self.parameters[0],
@@ -260,7 +266,7 @@ class Fit(Measure):
 
     @cached_property
     def _windows(self) -> tuple[FitWindow, ...]:
-        """Windows of the steps to fit."""
+        """Windows of the records around the steps to fit."""
         by_name = {record.name: record for record in self.records}
         others = {name: {n for other, n in self.together if other == name} for name in by_name}
         ends = self.before, self.after, self.part
@@ -292,11 +298,11 @@ class Fit(Measure):
         return {"parameter": names, "other_parameter": names, "row": rows, **draws}
 
     def error_scales(self, scene: Scene, values: Mapping[str, Any]) -> Mapping[str, float]:
-        """Return the scale of the numerical error of each parameter.
+        """Return the scale that divides the numerical error of each parameter.
 
         The scale of a parameter is its absolute value plus a large multiple of its standard error.
-        For parameters that may be zero, the scale also contains a constant, because a record may
-        have no noise.
+        For parameters that may be zero, a constant is added to the scale, because the standard
+        error is zero in records without noise.
 
         Parameters
         ----------
@@ -329,7 +335,8 @@ class Fit(Measure):
         Returns
         -------
         dict
-            Name and options of the measure. Digests replace the data of the records.
+            Name and options of the measure. The description contains hashes of the records instead
+            of their data.
         """
         stated = {f.name: getattr(self, f.name) for f in fields(self)}
         records = {record.name: record.digest for record in self.records}
@@ -337,7 +344,7 @@ class Fit(Measure):
 
     @classmethod
     def fields_from_description(cls, described: dict[str, Any], path: str) -> dict[str, Any]:
-        """Raise ``InvalidValue``, because a file does not contain the records.
+        """Raise ``InvalidValue``, because result files do not contain the records.
 
         Parameters
         ----------
@@ -349,7 +356,7 @@ class Fit(Measure):
         Raises
         ------
         InvalidValue
-            Always, because the description contains only digests of the records.
+            Always, because the description contains only hashes of the records.
         """
         rule = "are fitted, and the file has no more than digests of them"
         remedy = "Fit them again: show FILE tells the command."
@@ -357,14 +364,14 @@ class Fit(Measure):
 
     @cached_property
     def _records_with_first_rows(self) -> dict[Record, int]:
-        """Index of the first row in the outputs for each fitted record."""
+        """Index of the first output row of each fitted record."""
         records = [*dict.fromkeys(window.record for window in self._windows)]
         return {record: sum(map(len, records[:n])) for n, record in enumerate(records)}
 
     def compute(self, scene: Scene, accuracy: Accuracy, meter: WorkMeter) -> Outcome:
         """Fit the parameters, and compute their confidence intervals.
 
-        Parameters that the friction law does not have are omitted.
+        Free parameters that do not occur in the friction law are not fitted.
 
         Parameters
         ----------
@@ -443,7 +450,7 @@ class Fit(Measure):
     def solve(
         self, scene: Scene, accuracy: Accuracy, meter: WorkMeter
     ) -> tuple[FitProblem, FitSolution]:
-        """Fit the windows with a friction law that has all free parameters.
+        """Fit the windows if all free parameters occur in the friction law.
 
         Parameters
         ----------
@@ -502,10 +509,10 @@ class Fit(Measure):
         Returns
         -------
         tuple of str
-            Reasons. The tuple is empty if the standard errors are valid.
+            Reasons why the standard errors are not valid. The tuple is empty if they are valid.
         """
         reasons = find_validity_problems(solution, problem.model.friction)
-        # With recorded loading, any filter would reduce the noise of the load point, so the test
+        # With recorded loading, any filter would reduce the effect of load point noise, so the test
         # for a filter would be misleading.
         is_recorded = self.loading == "recorded"
         is_exact = solution.noise_sd < MIN_STATISTICAL_NOISE_SD
@@ -520,7 +527,7 @@ class Fit(Measure):
         return (*detect_unspecified_filter(solution, problem.model.time, self.noise), *reasons)
 
     def _insert_nan_for_absent_parameters(self, output_values: Outcome) -> Outcome:
-        """Insert NaN for parameters that the friction law does not have."""
+        """Insert NaN for parameters that do not occur in the friction law."""
         values = dict(output_values.values)
         has = np.array([name in values for name in self.parameters])
         before = np.cumsum(has)[~has]
@@ -532,7 +539,7 @@ class Fit(Measure):
     def _collect_output_values(
         self, fit_solution: FitSolution, rows: np.ndarray, joint_model: JointModel
     ) -> dict[str, OutputValue]:
-        """Return the outputs of a fit except for confidence intervals."""
+        """Return all outputs of a fit except the confidence intervals."""
         values: dict[str, OutputValue] = {}
         for name in fit_solution.free_parameters:
             values[name], values[f"{name}_error"] = (

@@ -9,7 +9,7 @@ from rsfstudy.fitting.record import RECORD_COLUMNS
 from rsfstudy.fitting.window_model import PARAMETERS, PARAMETERS_OF_SOME_LAWS_ONLY
 from rsfstudy.quantities import Output
 
-#: Outputs of every fit that do not depend on the rows.
+#: Outputs of every fit that have a single value.
 _SCALAR_OUTPUTS = (
     Output("a_minus_b", "$a-b$", "1", "rate dependence of steady friction"),
     Output("a_minus_b_stderr", "", "1", "standard error of a - b"),
@@ -35,7 +35,7 @@ _SCALAR_OUTPUTS = (
         for name in ("covariance", "correlation")
     ),
 )
-#: Outputs with one value per row.
+#: Outputs with one value per row of the record.
 _OUTPUTS_PER_RECORD_ROW = tuple(
     Output(*about, dims=("row",))
     for about in (
@@ -47,7 +47,7 @@ _OUTPUTS_PER_RECORD_ROW = tuple(
         ("innovation", "", "1", "residual freed of correlation, over its standard deviation"),
     )
 )
-#: Suffixes of the outputs that each parameter has in addition to its value.
+#: Suffixes and descriptions of the outputs that belong to each parameter in addition to its value.
 _DESCRIPTIONS_BY_NAME_SUFFIX = {
     "stderr": "standard error",
     "low": "lower end of the 95 % interval",
@@ -69,14 +69,14 @@ _POSTERIOR_OUTPUTS = (
 def fit_outputs(
     parameter_names: Sequence[str], with_posterior: bool, window_count: int
 ) -> tuple[Output, ...]:
-    """Return the outputs of a fit.
+    """Describe the outputs of a fit.
 
     Parameters
     ----------
     parameter_names : sequence of str
         Names of the free parameters.
     with_posterior : bool
-        If True, include draws from the posterior.
+        If True, include the draws from the posterior distribution.
     window_count : int
         Number of windows in the fit. If there are several windows, the outputs include the normal
         stress before each step.
@@ -84,7 +84,8 @@ def fit_outputs(
     Returns
     -------
     tuple of Output
-        Outputs of the parameters, of the fit and of the rows.
+        Descriptions of the outputs for the parameters, for the whole fit, and for the rows of the
+        record.
     """
     found = [output for name in parameter_names for output in _parameter_outputs(name)]
     stresses = [
@@ -101,7 +102,7 @@ def fit_outputs(
 
 
 def _parameter_outputs(parameter_name: str) -> Iterator[Output]:
-    """Yield the outputs of a parameter and of its errors."""
+    """Describe the outputs of a parameter and of its errors."""
     about = PARAMETERS[strip_window_number(parameter_name)]
     optional = strip_window_number(parameter_name) in PARAMETERS_OF_SOME_LAWS_ONLY
     yield Output(

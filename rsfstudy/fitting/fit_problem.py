@@ -3,16 +3,16 @@ r"""Estimation of friction parameters by generalised least squares.
 The class ``FitProblem`` minimises :math:`|W (y - f(p))|^2` with respect to the parameters
 :math:`p`, where :math:`y` is the recorded friction and :math:`f` is the model [1]_. The matrix
 :math:`W` whitens the noise, so that :math:`W^T W` is the inverse of the correlation matrix
-:math:`R` of the noise. The parameters and the noise are estimated in turn. The covariance matrix of
-the parameters is
+:math:`R` of the noise. The algorithm estimates the parameters and the noise in turn. The covariance
+matrix of the parameters is
 
 .. math:: s^2 (J^T R^{-1} J)^{-1}, \qquad s^2 = \frac{|W (y - f)|^2}{n - p},
 
-with the derivatives :math:`J` of the model, for :math:`n` rows and :math:`p` parameters. Errors of
-the times and velocities of steps change the model by the columns of a matrix :math:`G` (see
-``load_point_errors``). These errors add :math:`A A^T` to the covariance matrix, with
-:math:`A = (J^T R^{-1} J)^{-1} J^T R^{-1} G`. The noise is estimated by restricted maximum
-likelihood [2]_.
+where :math:`J` is the Jacobian of the model, :math:`n` is the number of rows, and :math:`p` is the
+number of parameters. Errors of the step times and step velocities change the model by the columns
+of a matrix :math:`G` (see ``load_point_errors``). Step errors add :math:`A A^T` to the covariance
+matrix, with :math:`A = (J^T R^{-1} J)^{-1} J^T R^{-1} G`. The noise is estimated by restricted
+maximum likelihood [2]_.
 
 References
 ----------
@@ -47,7 +47,7 @@ from rsfstudy.fitting.window_model import (
 from rsfstudy.motion import MotionStopped
 from rsfstudy.status import Status
 
-#: Bounds of parameters.
+#: Lower and upper bounds of the fitted parameters.
 _PARAMETER_BOUNDS = {
     "a": (1e-4, 1.0),
     "b": (-1.0, 1.0),
@@ -56,20 +56,21 @@ _PARAMETER_BOUNDS = {
     "alpha": (0.0, 2.0),
     "law_exponent": (0.0, 1.0),
 }
-#: Largest difference between the logarithms of the stiffness and of its initial guess.
+#: Largest logarithm of the ratio between the stiffness and its initial guess.
 _MAX_LOG_STIFFNESS_OVER_GUESS = math.log(1e4)
-#: Largest slip distance relative to the displacement of the window. The smallest slip distance is
-#: the mean displacement between two rows.
+#: Upper bound of the slip distance, relative to the load point displacement of the window. The
+#: lower bound is the mean displacement between two rows.
 _MAX_SLIP_DISTANCE_OVER_RECORD_LENGTH = 10.0
-#: Difference between the logarithmic bounds of the first and the second slip distance.
+#: Difference between the bounds of the logarithms of the first and the second slip distance.
 _MIN_LOG_GAP_BETWEEN_SLIP_DISTANCES = 1e-6
-#: Initial slip distances that are tested, relative to the initial guess.
+#: Tested initial values of the slip distance, relative to the initial guess.
 _INITIAL_SLIP_DISTANCE_FACTORS = (0.1, 0.3, 1.0, 3.0, 10.0)
-#: Largest number of passes that estimate the noise and the parameters in turn, change of the
-#: parameters relative to their standard errors at which the passes end, largest number of model
-#: evaluations per pass, and relative tolerance of the search. The last two items limit the final
-#: Gauss-Newton steps. They are the smallest number of steps, the largest number of steps that do
-#: not shrink, the largest number of steps, and the ratio below which successive steps shrink.
+#: Settings of the search: the largest number of passes that estimate the noise and the parameters
+#: in turn, the parameter change in standard errors below which the passes end, the largest number
+#: of model evaluations per pass, and the relative tolerance of the search. The last two settings
+#: apply to the final Gauss-Newton steps. They are the smallest number of steps, the largest number
+#: of steps that do not shrink, the largest number of all steps, and the ratio of successive step
+#: lengths below which a step shrinks.
 (
     _MAX_NOISE_ESTIMATION_PASSES,
     _NOISE_PASS_TOLERANCE,
@@ -85,15 +86,16 @@ _LEAST_SQUARES_OPTIONS = {
     "gtol": 1e-12,
     "max_nfev": _MAX_MODEL_EVALUATIONS,
 }
-#: Largest final Gauss-Newton step, relative to the standard errors.
+#: Length of the last Gauss-Newton step below which the fit has converged, in standard errors.
 _NEWTON_STEP_TOLERANCE_IN_STDERRS = 1e-3
 #: Lower bound for the degrees of freedom of confidence intervals.
 _MIN_DEGREES_OF_FREEDOM = 3.0
-#: Largest standard error of an identified parameter, and smallest evolution effect in standard
-#: errors for which its slip distance is identified. The first limit applies to the logarithm of a
-#: parameter, or to a and b relative to the largest effect.
+#: Criteria for identified parameters: the largest standard error of a parameter, and the smallest
+#: evolution effect in standard errors for which the slip distance is identified. The first limit
+#: applies to the logarithm of a parameter, or to a, b, b1 and b2 divided by the largest of them.
 _MAX_STDERR_OF_IDENTIFIED_PARAMETER, _MIN_EVOLUTION_EFFECT_SIGMAS = 0.5, 2.0
-#: Smallest decrease of the AIC due to the response to the steps.
+#: Smallest difference of the AIC between models without and with a response to the steps. If the
+#: difference is smaller, the record shows no response.
 _MIN_AIC_GAIN_FROM_STEPS = 10.0
 
 
@@ -105,7 +107,7 @@ class FitProblem:
     model : JointModel
         Model of the windows.
     coordinates_to_values : mapping of str to float
-        Values of all parameters. The values of the free parameters are the initial guess.
+        Values of all parameters. The values of the free parameters are initial guesses.
     free_parameters : sequence of str
         Names of the free parameters.
     noise : str
@@ -116,7 +118,7 @@ class FitProblem:
     lower_bounds, upper_bounds : ndarray, shape (parameters,)
         Bounds of the coordinates of the free parameters.
     friction_rounding_quantum : float
-        Quantum to which friction is rounded, or 0 if friction is not rounded.
+        Rounding unit of the recorded friction, or 0 if friction is not rounded.
     has_converged : bool
         True if the last search converged.
     """
@@ -143,7 +145,7 @@ class FitProblem:
         ).T
 
     def _coordinate_bounds(self, parameter_name: str) -> tuple[float, float]:
-        """Return the bounds of the coordinate of a parameter."""
+        """Return the lower and upper bounds of a free parameter's coordinate."""
         if parameter_name.startswith("slip_distance"):
             moved = self.model.displacement
             extent = float(np.ptp(moved))
@@ -199,28 +201,28 @@ class FitProblem:
         )
 
     def residuals(self, values: ParameterValues, *, require_stable: bool = False) -> np.ndarray:
-        """Compute recorded friction minus model friction and trend.
+        """Compute the residuals: recorded friction minus model friction and trend.
 
         Parameters
         ----------
         coordinates_to_values : mapping of str to float
             Values of all parameters.
         require_stable : bool, default: False
-            If True, the motion is not computed if the stiffness is below the critical stiffness.
+            If True, the motion is computed only if the stiffness exceeds the critical stiffness.
 
         Returns
         -------
         ndarray, shape (rows,)
-            Residuals. The values of a window are NaN if its motion fails.
+            Residuals. If the simulation of a window fails, the residuals of the window are NaN.
         """
         curve = self.model.model_friction(values, require_stable=require_stable)
         return np.asarray(self.model.friction - curve - self.model.compute_friction_trend(values))
 
     def _jacobian(self, coordinates: np.ndarray, difference_scheme: DifferenceScheme) -> np.ndarray:
-        """Compute the Jacobian of the model.
+        """Compute the Jacobian matrix of the model friction.
 
         The Jacobian contains the derivatives with respect to the coordinates of the free
-        parameters. A derivative is set to 0 if one of the motions of its finite difference fails.
+        parameters. A derivative is set to 0 if a simulation for its finite difference fails.
         """
         found = self.model.jacobian(
             self.coordinates_to_values(coordinates), self.free_parameters, difference_scheme
@@ -238,8 +240,8 @@ class FitProblem:
         Raises
         ------
         MotionStopped
-            If no motion fits the record, if the work budget is exhausted, or if the search does not
-            converge although the record constrains all parameters.
+            If all simulations of the record fail, if the work budget is exhausted, or if the search
+            does not converge although the record constrains all parameters.
         """
         x, noise = self._initial_coordinates(), noises.white_noise(self.model.time)
         for number in range(
@@ -279,10 +281,11 @@ class FitProblem:
     def _initial_coordinates(self) -> np.ndarray:
         """Return the initial coordinates with the best slip distance.
 
-        Several initial slip distances are tested, and the slip distance with the smallest residuals
-        is used.
+        The method tests several initial slip distances, and selects the slip distance with the
+        smallest residuals.
         """
-        # Check the initial guess, because the search treats invalid parameters as failed motions.
+        # Check the initial guess, because the search treats invalid parameters like failed
+        # simulations.
         self.model.check_parameters(self.initial_values)
         scales = (
             _INITIAL_SLIP_DISTANCE_FACTORS if "slip_distance" in self.free_parameters else (1.0,)
@@ -310,7 +313,7 @@ class FitProblem:
     def minimise_weighted_squares(
         self, initial_coordinates: np.ndarray, noise: NoiseModel, rtol: float = _LEAST_SQUARES_XTOL
     ) -> tuple[np.ndarray, np.ndarray]:
-        """Minimise the sum of squares for given noise.
+        """Minimise the sum of squared whitened residuals for a fixed noise model.
 
         The search uses the trust-region method of ``scipy.optimize.least_squares`` within the
         bounds.
@@ -320,7 +323,7 @@ class FitProblem:
         initial_coordinates : ndarray, shape (parameters,)
             Initial coordinates.
         noise : NoiseModel
-            Noise that whitens the residuals.
+            Noise model that whitens the residuals.
         rtol : float, optional
             Relative tolerance of the sum of squares. The default is 1e-8.
 
@@ -329,7 +332,7 @@ class FitProblem:
         initial_coordinates : ndarray, shape (parameters,)
             Coordinates at the minimum.
         jacobian : ndarray, shape (rows, parameters)
-            Derivatives at the minimum.
+            Derivatives of the model at the minimum.
         """
         derivatives = {}
 
@@ -344,7 +347,7 @@ class FitProblem:
         scale = 1.0
         inner = np.clip(initial_coordinates, self.lower_bounds + 1e-9, self.upper_bounds - 1e-9)
         scale = math.sqrt(float(np.square(left(inner)).mean())) or 1.0
-        # The motion at the initial coordinates fails, so the search cannot improve them.
+        # The simulation at the initial coordinates fails, so the search cannot start.
         if not math.isfinite(scale):
             self.has_converged = True
             return initial_coordinates, self._jacobian(initial_coordinates, QUICK_DIFFERENCE_SCHEME)
@@ -359,8 +362,8 @@ class FitProblem:
         First, Gauss-Newton steps :math:`(J^T R^{-1} J)^{-1} J^T R^{-1} (y - f)` with accurate
         derivatives refine the parameters. The numerical error of a parameter is the last
         Gauss-Newton step plus three times the change due to a tenfold reduction of the integration
-        tolerances. The degrees of freedom are the degrees of freedom of the noise, multiplied by (n
-        - p)/n for p parameters and n rows.
+        tolerances. The degrees of freedom of the fit are the degrees of freedom of the noise,
+        multiplied by (n - p)/n for p parameters and n rows.
         """
         change = math.inf
         for number in range(_NEWTON_STEP_COUNT_LIMITS[2]):
@@ -384,7 +387,8 @@ class FitProblem:
                 moved, whitened, _NEWTON_STEP_TOLERANCE_IN_STDERRS
             ):
                 break
-            # Steps due to rounding errors do not shrink, but steps due to large residuals do.
+            # Gauss-Newton steps due to rounding errors do not shrink, but steps due to large
+            # residuals shrink.
             if (
                 number + 1 >= _NEWTON_STEP_COUNT_LIMITS[1]
                 and not change < _MAX_NEWTON_STEP_SHRINK_RATIO * before
@@ -446,8 +450,9 @@ class FitProblem:
     def _compute_aic_without_steps(self, jacobian: np.ndarray, noise: NoiseModel) -> float:
         """Compute the AIC of a model without a response to the steps.
 
-        The model contains only trends and has a = b = 0. The noise model of the fit is not changed,
-        because a new noise model would describe the response to the steps as predictable noise.
+        The model without a response contains only trends and has a = b = 0. It uses the noise model
+        of the fit, because a newly estimated noise model would describe the response to the steps
+        as correlated noise.
         """
         linear = [self.model.is_linear_in_parameter(name) for name in self.free_parameters]
         columns = np.column_stack([jacobian[:, linear], self.model.friction])
@@ -466,8 +471,8 @@ class FitProblem:
     ) -> tuple[str, ...]:
         """Return the free parameters that the record does not constrain.
 
-        If the record shows no response to the steps, only parameters with a linear effect on
-        friction can be constrained.
+        If the record shows no response to the steps, it can constrain only parameters with a linear
+        effect on friction.
         """
         spread = dict(zip(self.free_parameters, np.sqrt(np.diag(covariance)).tolist(), strict=True))
         bound = (coordinates - self.lower_bounds < 1e-6) | (self.upper_bounds - coordinates < 1e-6)
@@ -516,8 +521,8 @@ class FitProblem:
 def _solve_linear_least_squares(columns: np.ndarray) -> np.ndarray:
     """Solve a linear least-squares problem.
 
-    The last column is the right-hand side, and the result contains the coefficients of the other
-    columns.
+    The last column of the array is the right-hand side, and the result contains the coefficients of
+    the other columns.
     """
     return np.asarray(np.linalg.lstsq(columns[:, :-1], columns[:, -1])[0])
 
@@ -527,7 +532,7 @@ def _has_converged(
     whitened_jacobian: np.ndarray,
     tolerance: float = _NOISE_PASS_TOLERANCE,
 ) -> bool:
-    """Return True if the last change is small relative to the standard errors.
+    """Return True if the last parameter change is small compared with the errors.
 
     Parameters
     ----------
@@ -536,7 +541,7 @@ def _has_converged(
     whitened_jacobian : ndarray, shape (rows, parameters + 1)
         Whitened derivatives, followed by the whitened residuals.
     tolerance : float
-        Largest change, as a fraction of the standard error.
+        Largest change of a coordinate, as a fraction of its standard error.
     """
     size = np.linalg.norm(whitened_jacobian[:, -1]) / math.sqrt(len(whitened_jacobian))
     spread = size * np.sqrt(np.diag(_inverse_normal_matrix(whitened_jacobian[:, :-1])))
@@ -546,7 +551,7 @@ def _has_converged(
 def _inverse_normal_matrix(jacobian: np.ndarray) -> np.ndarray:
     """Compute the inverse of the normal matrix, :math:`(J^T J)^{-1}`.
 
-    All elements are infinite if a column is zero or not finite.
+    All elements of the result are infinite if a column of :math:`J` is zero or not finite.
     """
     sizes = np.linalg.norm(jacobian, axis=0)
     if not (np.isfinite(sizes).all() and (sizes > 0.0).all()):

@@ -15,8 +15,9 @@ from rsfstudy.fitting.window_model import parameter_derivative_by_coordinate
 class FitSolution:
     """Solution of a fit.
 
-    The coordinate of a slip distance or stiffness is the logarithm of the parameter. For all other
-    parameters, the coordinate is the parameter itself.
+    The search varies coordinates of the parameters. The coordinate of a slip distance or stiffness
+    is the logarithm of the parameter. For all other parameters, the coordinate is the parameter
+    itself.
 
     Parameters
     ----------
@@ -27,26 +28,27 @@ class FitSolution:
     coordinate_covariance : ndarray, shape (parameters, parameters)
         Covariance matrix of the coordinates of the free parameters.
     noise_caused_covariance : ndarray, shape (parameters, parameters)
-        Contribution of the friction noise to the covariance matrix. The noise of load point
-        displacement contributes the rest.
+        Contribution of the friction noise to the covariance matrix. The remainder is due to noise
+        in the load point displacement.
     numerical_errors : dict of {str: float}
         Numerical errors of the free parameters.
     noise_model : NoiseModel
-        Noise of the record.
+        Noise model of the record.
     noise_sd : float
         Standard deviation of the noise.
     degrees_of_freedom : float
         Degrees of freedom of the confidence intervals.
     model_friction : ndarray, shape (rows,)
-        Friction of the model, without the trend.
+        Friction of the model without the trend.
     residuals : ndarray, shape (rows,)
         Recorded friction minus fitted friction. The fitted friction includes the trend.
     whitened_residuals : ndarray, shape (kept rows,)
         Whitened residuals divided by their standard deviation.
     jacobian : ndarray, shape (rows, parameters)
-        Derivatives of the fitted friction with respect to the coordinates.
+        Derivatives of the fitted friction with respect to the parameter coordinates.
     loading_error_sensitivity : ndarray, shape (rows, errors)
-        Changes of friction by one standard error of the times and velocities of the steps.
+        Change of friction due to an error of one standard deviation, for each independent error of
+        the step times and velocities.
     aic : float
         Akaike information criterion of the fit, including the noise model. Smaller values are
         better.
@@ -55,7 +57,7 @@ class FitSolution:
     ols_residual_rms : float
         Root mean square of the residuals of the ordinary least-squares fit.
     friction_rounding_quantum : float
-        Quantum to which friction is rounded, or 0 if friction is not rounded.
+        Rounding unit of the recorded friction, or 0 if friction is not rounded.
     """
 
     parameter_values: dict[str, float]
@@ -147,7 +149,7 @@ def compute_aic(
     whitened_residuals : ndarray, shape (kept rows,)
         Whitened residuals without outliers.
     noise : NoiseModel
-        Noise that whitened the residuals.
+        Noise model that whitened the residuals.
     parameter_count : int
         Number of parameters of the model.
     row_count : int
@@ -156,7 +158,7 @@ def compute_aic(
     Returns
     -------
     float
-        Information criterion. Smaller values are better.
+        Corrected Akaike information criterion. Smaller values are better.
 
     Notes
     -----

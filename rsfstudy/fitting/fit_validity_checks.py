@@ -1,8 +1,8 @@
-"""Checks of the standard errors of a fit.
+"""Tests of whether the standard errors of a fit are valid.
 
 If the standard errors are not valid, the status of the fit is ``errors_not_valid``, but the
-parameter values can still be used. Each check returns a reason, which is a string without a final
-full stop. The reason describes the violated condition and a remedy.
+parameter values can still be used. If a check fails, it returns a string that describes the
+violated condition and a remedy. The string has no final full stop.
 """
 
 from __future__ import annotations
@@ -25,14 +25,15 @@ SLIP_DISTANCES = ("slip_distance", "slip_distance_2")
 SIGNIFICANCE_LEVEL = 0.01
 #: Standard deviation of friction below which the residuals are numerical errors rather than noise.
 MIN_STATISTICAL_NOISE_SD = 1e-7
-#: Largest ratio of the residuals to the residuals of an ordinary least-squares fit.
+#: Largest ratio of the root mean square residual to that of an ordinary least-squares fit.
 _MAX_RESIDUAL_SD_OVER_LEAST_SQUARES = 2.0
-#: Ratio of the noise to the quantum of friction below which rounding errors depend on friction, and
-#: largest fraction of rows that may be outliers.
+#: Ratio of the noise to the rounding unit of friction below which rounding errors depend on
+#: friction, and largest fraction of rows that may be outliers.
 _MIN_FRICTION_NOISE_PER_QUANTUM, _MAX_OUTLIER_FRACTION = 0.4, 0.05
-#: Fewest rows per slip distance for which confidence intervals are reliable.
+#: Smallest number of rows per slip distance for which confidence intervals are reliable.
 _MIN_ROWS_PER_SLIP_DISTANCE = 1.5
-#: Largest ratio of the two sides of a 95 % confidence interval of the logarithm of a parameter.
+#: Largest ratio between the longer side and the shorter side of a 95 % confidence interval, for the
+#: logarithm of a parameter.
 _MAX_CONFIDENCE_INTERVAL_ASYMMETRY = 3.0
 #: Largest number of outliers that a message lists.
 _MAX_LISTED_OUTLIERS = 10
@@ -51,7 +52,7 @@ def find_validity_problems(solution: FitSolution, recorded_friction: np.ndarray)
     Returns
     -------
     tuple of str
-        Reasons. The tuple is empty if the standard errors are valid.
+        Reasons why the standard errors are not valid. The tuple is empty if they are valid.
     """
     if solution.noise_sd < MIN_STATISTICAL_NOISE_SD:
         return ()
@@ -68,8 +69,9 @@ def describe_asymmetric_intervals(
 ) -> tuple[str, ...]:
     """Describe the parameters with very asymmetric confidence intervals.
 
-    If a record constrains a parameter on one side only, such as the stiffness of a very stiff
-    machine, the standard errors of all correlated parameters are too small.
+    A record may provide only a lower or an upper limit for a parameter, for example for the
+    stiffness of a very stiff machine. The standard errors of all parameters that are correlated
+    with this parameter are then too small.
 
     Parameters
     ----------
@@ -81,7 +83,7 @@ def describe_asymmetric_intervals(
     Returns
     -------
     tuple of str
-        Reasons why the standard errors are not valid, one for each of these parameters.
+        One reason for each parameter with a very asymmetric confidence interval.
     """
     reasons = []
     for name in (
@@ -107,7 +109,8 @@ def describe_outliers(outlier_rows: np.ndarray) -> str:
     Parameters
     ----------
     outlier_rows : ndarray of int
-        Indices of the outliers in the window. The remark numbers the rows from 1.
+        Row indices of the outliers in the window, starting from 0. The numbers in the remark start
+        from 1.
 
     Returns
     -------
@@ -124,7 +127,7 @@ def describe_outliers(outlier_rows: np.ndarray) -> str:
 
 
 def _check_misfit_is_small(solution: FitSolution, recorded_friction: np.ndarray) -> Iterator[str]:
-    """Yield a reason if the residuals are too large."""
+    """Yield a reason if the residuals of the fit are too large."""
     size = float(np.sqrt(np.mean(solution.noise_model.drop_outliers(solution.residuals) ** 2)))
     if not size < np.std(recorded_friction):
         yield (
@@ -153,7 +156,7 @@ def is_rounding_too_coarse(solution: FitSolution) -> bool:
     """Return True if the rounding of friction is too coarse.
 
     Rounding errors are random only if the standard deviation of the noise exceeds 0.4 times the
-    quantum of friction.
+    rounding unit of friction.
 
     Parameters
     ----------
@@ -172,7 +175,7 @@ def is_rounding_too_coarse(solution: FitSolution) -> bool:
 
 
 def _check_outlier_count(solution: FitSolution) -> Iterator[str]:
-    """Yield a reason if too many rows are outliers."""
+    """Yield a reason if too many rows of the record are outliers."""
     count, rows = len(solution.outlier_rows), len(solution.residuals)
     if count > _MAX_OUTLIER_FRACTION * rows:
         yield f"{count} of {rows} rows are outliers: remove them from the record, or check the law"
@@ -198,14 +201,14 @@ def describe_load_point_noise(
     solution : FitSolution
         Result of the fit.
     loading : {"steps", "recorded"}
-        Kind of loading.
+        Loading of the model (see ``rsfstudy.fitting.Fit``).
     displacement_noise_sd : float
         Standard deviation of the load point noise in um.
 
     Returns
     -------
     str
-        Remark, or an empty string if the noise has little effect on the parameters.
+        Remark, or an empty string if the displacement noise has little effect on the parameters.
     """
     if loading == "steps":
         moved = np.diag(solution.coordinate_covariance) > 2.0 * np.diag(
@@ -220,8 +223,8 @@ def describe_load_point_noise(
         return text if names else ""
     if "slip_distance" not in solution.free_parameters:
         return ""
-    # Displacement noise x changes ln V of a stiff slider by k x/a. The change of the slip
-    # distance is of second order.
+    # A displacement error x changes ln V of a stiff slider by k x/a. The resulting change of the
+    # fitted slip distance is of second order in x.
     shift = (
         0.5
         * (
@@ -248,19 +251,19 @@ def find_unidentified_parameters(
 ) -> tuple[str, ...]:
     """Return the parameters that the record does not constrain.
 
-    A slip distance is also unconstrained if the record has fewer than 1.5 rows per slip distance.
+    A record does not constrain a slip distance if it has fewer than 1.5 rows per slip distance.
 
     Parameters
     ----------
     solution : FitSolution
         Result of the fit.
     displacement_per_row : float
-        Load point displacement in um between rows after the step.
+        Load point displacement in um between successive rows after the step.
 
     Returns
     -------
     tuple of str
-        Names of the parameters.
+        Names of the unconstrained parameters.
     """
     sparse = [
         n
@@ -289,7 +292,7 @@ def describe_unidentified_parameters(
     parameter_names : tuple of str
         Names of the unconstrained parameters.
     displacement_per_row : float
-        Load point displacement in um between rows after the step.
+        Load point displacement in um between successive rows after the step.
     is_a_at_bound : bool
         True if the direct effect is at its lower bound.
 
@@ -315,7 +318,7 @@ def describe_whiteness(p_value: float, noise_order: int, rows: int) -> str:
     Parameters
     ----------
     p_value : float
-        Result of the test.
+        P-value of the autocorrelation test.
     noise_order : int
         Order of the autoregressive noise model.
     rows : int

@@ -1,7 +1,7 @@
 """Windows of a record around steps, with initial guesses of parameters.
 
-A ``FitWindow`` selects the rows around a step, and creates the model of the selected rows. The
-function ``guess_parameters`` estimates initial parameters from the recorded friction.
+A ``FitWindow`` selects the rows of a record around a step, and creates the model of the selected
+rows. The function ``guess_parameters`` estimates initial parameters from the recorded friction.
 """
 
 from __future__ import annotations
@@ -23,31 +23,31 @@ from rsfstudy.motion import Accuracy, MotionStopped, WorkMeter
 from rsfstudy.slider import Scene
 from rsfstudy.status import Status
 
-#: Fraction of the interval after the previous step that a window includes by default, and fewest
-#: rows per free parameter.
+#: Fraction of the interval between the previous step and the step at which a window begins by
+#: default, and smallest number of rows per free parameter.
 _WINDOW_START_BEFORE_STEP_FRACTION, _MIN_ROWS_PER_PARAMETER = 0.5, 3
-#: Largest delay of the loading, as a fraction of the duration of the window before the step.
+#: Largest delay of the loading, relative to the time between the start of the window and the step.
 _MAX_LOADING_DELAY_FRACTION = 0.2
-#: Smallest ratio of the actual extent of a window to its requested extent for which no remark is
-#: added.
+#: Ratio of the actual extent of a window to its requested extent below which a remark is added.
 _MIN_INCLUDED_WINDOW_FRACTION = 0.98
-#: Names of the kinds of loading.
+#: Allowed values of the option ``loading``.
 LOADING_KINDS = ("steps", "recorded")
-#: Number of rows in the running median that reduces the noise of normal stress, quantile of the
-#: deviations that is compared with the limit, and allowance for noise in standard deviations.
+#: Settings for comparing recorded and modelled normal stress: the number of rows in the running
+#: median that reduces noise, the quantile of the deviations that is compared with the limit, and
+#: the allowance for noise in standard deviations.
 _RUNNING_MEDIAN_ROWS_OF_STRESS, _STRESS_DEPARTURE_QUANTILE, _MAX_STRESS_DEPARTURE_NOISE_SIGMAS = (
     5,
     0.99,
     2.0,
 )
-#: Logarithm of the velocity ratio below which a step is too small for estimating the initial a and
-#: b.
+#: Logarithm of the velocity ratio below which a step is too small for estimating initial values of
+#: a and b.
 _MIN_LOG_VELOCITY_RATIO_FOR_GUESS = 0.02
 
 
 @dataclass(frozen=True)
 class FitWindow:
-    """Part of a record around a step.
+    """Window of a record around a step.
 
     Parameters
     ----------
@@ -65,13 +65,13 @@ class FitWindow:
     fraction_of_displacement_after : float, default: 1.0
         Fraction of the displacement after the step to include.
     other_fitted_step_numbers : collection of int, optional
-        Numbers of other steps of the record in a joint fit. The window ends before the window of
-        the next step if this step is in ``other_fitted_step_numbers``.
+        Numbers of the other steps in a joint fit that belong to the same record. If the number of
+        the next step is included, the window ends before the window of the next step.
 
     Notes
     -----
-    If friction before the step is not a linear function of time, the window begins later, with the
-    linear part. The window of a hold includes the sliding after the hold.
+    If friction before the step is not a linear function of time, the window begins where friction
+    becomes linear. The window of a hold includes the sliding after the hold.
 
     Examples
     --------
@@ -95,7 +95,7 @@ class FitWindow:
 
     @property
     def step(self) -> LoadingStep:
-        """Step of the window.
+        """Step of load point velocity or normal stress in the window.
 
         Raises
         ------
@@ -110,7 +110,7 @@ class FitWindow:
 
     @property
     def record_row_indices(self) -> np.ndarray:
-        """Indices of the rows of the record in the window."""
+        """Indices of the record rows in the window."""
         time = self.record.time
         return np.flatnonzero((time >= self._start_time(self.step)) & (time <= self._end_time()))
 
@@ -118,7 +118,7 @@ class FitWindow:
     def mean_normal_stress_before_step(self) -> float:
         """Mean normal stress in Pa in the window before the step.
 
-        The mean is NaN if the normal stress was not recorded.
+        The property is NaN if the normal stress was not recorded.
         """
         time, stress = self.record.time, self.record.columns.get("normal_stress")
         if stress is None:
@@ -128,7 +128,7 @@ class FitWindow:
 
     @property
     def window_properties(self) -> dict[str, float]:
-        """Velocities, limits, normal stress and noise of the window."""
+        """Step velocities, limits, normal stress and noise of the window."""
         record, rows = self.record, self.record_row_indices
         moved, time = record.columns["displacement"][rows], record.time[rows]
         return {
@@ -141,7 +141,7 @@ class FitWindow:
         }
 
     def with_machine_stiffness(self, scene: Scene, machine_stiffness: float) -> Scene:
-        """Return a scene with the stiffness of a machine.
+        """Return a scene with the stiffness of a testing machine.
 
         The stiffness of the scene is the stiffness of the machine divided by the normal stress
         before the step.
@@ -151,7 +151,8 @@ class FitWindow:
         scene : Scene
             Scene with any stiffness.
         machine_stiffness : float
-            Stiffness of the machine in Pa per slip distance. If 0, the scene is returned unchanged.
+            Stiffness of the machine, in Pa per slip distance of the scene. If 0, the scene is
+            returned unchanged.
 
         Returns
         -------
@@ -178,11 +179,10 @@ class FitWindow:
         at = np.interp(step.start, record.time, moved)
 
         def reached(distance: float) -> float:
-            """Return the time in s when the load point reaches a distance.
+            """Return the time in s at which the load point reaches a displacement.
 
-            The distance in um is measured from the step.
-             If the load point does not reach the distance, the function returns the current end of
-             the window.
+            The displacement in um is measured from the step. If the load point does not reach the
+            displacement, the function returns the current end of the window.
             """
             beyond = (moved > at + distance) & (record.time > step.start)
             return float(record.time[np.argmax(beyond)] if beyond.any() else last)
@@ -203,7 +203,7 @@ class FitWindow:
 
     @property
     def truncation_remarks(self) -> list[str]:
-        """Remarks about parts of the requested window that are left out."""
+        """Remarks about requested rows that the window does not include."""
         record, step, moved = self.record, self.step, self.record.columns["displacement"]
         nominal, begins, at, ends = np.interp(
             [self._earliest_start_time(step), self._start_time(step), step.start, self._end_time()],
@@ -235,7 +235,8 @@ class FitWindow:
     def _earliest_start_time(self, step: LoadingStep) -> float:
         """Return the earliest possible start of a window in s.
 
-        The window begins later if friction before the step is not linear.
+        If friction before the step is not linear, the window begins later than the earliest
+        possible start.
         """
         record = self.record
         earlier = [s.end for s in record.loading_steps if s.end < step.start]
@@ -259,7 +260,7 @@ class FitWindow:
     ) -> WindowModel:
         """Create the model of the window.
 
-        The displacement of the model is relative to the step.
+        The displacement in the model is zero at the step.
 
         Parameters
         ----------
@@ -268,7 +269,7 @@ class FitWindow:
         free_parameters : collection of str
             Names of the free parameters.
         loading_kind : {"steps", "recorded"}
-            Loading by the steps of the record, or by its rows.
+            Loading of the model (see ``rsfstudy.fitting.Fit``).
         accuracy : Accuracy
             Accuracy of the simulated motions.
         meter : WorkMeter
@@ -308,7 +309,8 @@ class FitWindow:
         begins, ends = self._start_time(step), self._end_time()
         pieces = loading_history(record, begins, ends, use_recorded_rows=loading_kind == "recorded")
         if scene.parts.normal_stress.name == "constant":
-            # The scene treats variations of the recorded normal stress as noise.
+            # If the normal stress of the scene is constant, variations of the recorded normal
+            # stress are noise.
             pieces[:, 2:] = 1.0, 0.0
         moves = (
             self._build_loadings_with_step_errors(begins, ends) if loading_kind == "steps" else []
@@ -327,7 +329,7 @@ class FitWindow:
     def _build_loadings_with_step_errors(
         self, start_time: float, end_time: float
     ) -> list[np.ndarray]:
-        """Return loading histories with steps shifted by their errors."""
+        """Return loading histories with shifted step times and velocities."""
         steps = find_steps_between(self.record, start_time, end_time)
         others = [step for step in steps if not step.changes_velocity]
         moved = shift_steps_by_their_errors(
@@ -338,10 +340,10 @@ class FitWindow:
     def _check_normal_stress_matches_loading(
         self, rows: np.ndarray, loading_segments: np.ndarray
     ) -> None:
-        """Raise ``MotionStopped`` if the modelled normal stress is wrong.
+        """Raise an error if recorded and modelled normal stress differ.
 
-        The recorded normal stress may differ from the modelled normal stress by up to 2 % in
-        addition to noise.
+        The recorded normal stress may differ from the modelled normal stress by up to 2 %, plus an
+        allowance for noise.
         """
         record = self.record
         if "normal_stress" not in record.columns:
@@ -377,8 +379,8 @@ class FitWindow:
 def compute_stiffness_factors(windows: Sequence[FitWindow]) -> tuple[float, ...]:
     """Compute the ratio of stiffness to normal stress in each window.
 
-    The stiffness of the machine is the same in all windows, and each ratio is relative to the ratio
-    in the first window.
+    The machine stiffness is the same in all windows, so the ratio depends only on the normal
+    stress. The result is relative to the ratio in the first window.
 
     Parameters
     ----------
@@ -388,7 +390,8 @@ def compute_stiffness_factors(windows: Sequence[FitWindow]) -> tuple[float, ...]
     Returns
     -------
     tuple of float
-        One ratio per window. The tuple is empty if the normal stress of a window is unknown.
+        One relative ratio per window. The tuple is empty if the normal stress of a window is
+        unknown.
     """
     stresses = np.array([window.mean_normal_stress_before_step for window in windows])
     known = bool(np.isfinite(stresses).all() and stresses.all())
@@ -410,12 +413,12 @@ def guess_parameters(
     model : WindowModel
         Model of a window.
     step : LoadingStep
-        Step of the window.
+        Step of load point velocity or normal stress in the window.
     free_parameters : sequence of str
         Names of the free parameters. The fixed parameters have the values of the scene.
     slip_distance_guesses : (float, float)
-        Slip distances in um of the first and the second state. The first slip distance is the unit
-        of slip in the scene.
+        Slip distances of the first and the second state variable in um. The first slip distance is
+        the unit of slip in the scene.
 
     Returns
     -------

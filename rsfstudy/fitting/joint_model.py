@@ -1,7 +1,8 @@
-"""Joint fits of several windows.
+"""Model of several windows that are fitted jointly.
 
-All windows of a joint fit share the parameters of the material. Each window has its own friction
-before the step, trend and step time, with names such as ``mu_star_1``.
+All windows of a joint fit share the parameters of the material. Three parameters have a separate
+value in each window: the friction before the step (``mu_star_1``, ``mu_star_2``, ...), the trend,
+and the step time.
 """
 
 from __future__ import annotations
@@ -34,7 +35,7 @@ _PER_WINDOW_PARAMETER_PREFIXES = ("mu_star", "step_time", "trend")
 
 
 def is_per_window_parameter(parameter_name: str) -> bool:
-    """Return True if each window has its own value of a parameter.
+    """Return True if a parameter has a separate value in each window.
 
     Parameters
     ----------
@@ -44,7 +45,7 @@ def is_per_window_parameter(parameter_name: str) -> bool:
     Returns
     -------
     bool
-        True for friction before the step, step time and trend.
+        True for the friction before the step, the step time and the trend coefficients.
     """
     return parameter_name.startswith(_PER_WINDOW_PARAMETER_PREFIXES)
 
@@ -73,7 +74,7 @@ def add_window_numbers(parameter_names: Sequence[str], window_count: int) -> tup
 
 
 def split_window_number(name: str) -> tuple[str, int]:
-    """Split the name of a parameter into a plain name and a window number.
+    """Split the name of a parameter into its base name and window number.
 
     Parameters
     ----------
@@ -136,8 +137,8 @@ def window_values(values: Mapping[str, T], number: int) -> dict[str, T]:
     Returns
     -------
     dict
-        Values of the shared parameters and of the parameters of the window, by names without window
-        numbers.
+        Values of the shared parameters and of the parameters of the window. The names do not
+        include window numbers.
 
     Examples
     --------
@@ -151,7 +152,7 @@ def window_values(values: Mapping[str, T], number: int) -> dict[str, T]:
 
 @dataclass(frozen=True)
 class JointModel:
-    """Model of one or several windows.
+    """Model of the friction in one or several windows.
 
     The class combines the rows of all windows, and has the same methods as ``WindowModel``.
 
@@ -160,8 +161,8 @@ class JointModel:
     models : tuple of WindowModel
         Models of the windows.
     stiffness_factors : tuple of float, optional
-        Ratio of stiffness to normal stress in each window, relative to the ratio in the first
-        window. By default, the ratio is the same in all windows.
+        Stiffness divided by normal stress for each window, relative to the first window. By
+        default, all factors are 1.
     """
 
     models: tuple[WindowModel, ...]
@@ -169,12 +170,12 @@ class JointModel:
 
     @cached_property
     def time(self) -> np.ndarray:
-        """Times of all rows in s, relative to the first row of each window."""
+        """Times of all rows in s, measured from the first row of each window."""
         return np.concatenate([part.time - part.time[0] for part in self.models])
 
     @cached_property
     def friction(self) -> np.ndarray:
-        """Recorded friction of all rows."""
+        """Recorded friction of all rows, as a single array."""
         return np.concatenate([part.friction for part in self.models])
 
     @property
@@ -190,13 +191,14 @@ class JointModel:
 
     @cached_property
     def displacement(self) -> np.ndarray:
-        """Displacements of all rows in um, relative to the step."""
+        """Load point displacements of all rows in um, measured from the step."""
         return np.concatenate([part.displacement for part in self.models])
 
     def is_linear_in_parameter(self, parameter_name: str) -> bool:
         """Return True if friction is a linear function of a parameter.
 
-        Friction must be linear in the parameter for all values of the other parameters.
+        The method returns True only if friction is linear in the parameter for all values of the
+        other parameters.
 
         Parameters
         ----------
@@ -213,7 +215,7 @@ class JointModel:
         )
 
     def max_loading_delay(self, parameter_name: str) -> float:
-        """Return the largest delay of the loading that the model supports.
+        """Return the largest loading delay that the model supports.
 
         Parameters
         ----------
@@ -228,7 +230,7 @@ class JointModel:
         return self.models[max(split_window_number(parameter_name)[1] - 1, 0)].max_loading_delay
 
     def check_parameters(self, values: ParameterValues) -> None:
-        """Raise ``MotionStopped`` if the parameters are invalid for the scene.
+        """Raise an error if the parameters do not define a valid scene.
 
         Parameters
         ----------
@@ -252,7 +254,7 @@ class JointModel:
     ) -> np.ndarray:
         """Compute the friction of the model at each row of all windows.
 
-        The trend is not included. See ``WindowModel.model_friction`` for details.
+        The friction does not include the trend. See ``WindowModel.model_friction`` for details.
 
         Parameters
         ----------
@@ -261,12 +263,13 @@ class JointModel:
         refined : bool, default: False
             If True, all tolerances are reduced by a factor of ten.
         require_stable : bool, default: False
-            If True, the motion is not computed if the stiffness is below the critical stiffness.
+            If True, the motion is computed only if the stiffness exceeds the critical stiffness.
 
         Returns
         -------
         ndarray, shape (rows,)
-            Friction of the model. The values of a window are NaN if its motion fails.
+            Friction of the model. If the simulation of a window fails, the friction of the window
+            is NaN.
         """
         told = {"refined": refined, "require_stable": require_stable}
         return np.concatenate(
@@ -313,8 +316,8 @@ class JointModel:
         Returns
         -------
         ndarray, shape (rows, parameters)
-            Derivatives. The derivative with respect to a parameter of one window is 0 in all other
-            windows.
+            Derivatives of friction. The derivative with respect to a parameter of one window is 0
+            in all other windows.
         """
         blocks = []
         places = {name: place for place, name in enumerate(free_parameters)}
@@ -336,8 +339,8 @@ class JointModel:
         Returns
         -------
         ndarray, shape (rows, errors)
-            Changes of friction by one standard error of each independent error. An error of the
-            loading changes friction in one window only.
+            Change of friction due to an error of one standard deviation, for each independent
+            error. An error of the loading changes friction in one window only.
         """
         return np.asarray(
             block_diag(
@@ -351,7 +354,7 @@ class JointModel:
     def _iterate_windows(
         self, values: ParameterValues
     ) -> Iterator[tuple[WindowModel, dict[str, float]]]:
-        """Iterate over the models and parameters of the windows."""
+        """Iterate over pairs of a window model and its parameter values."""
         factors = self.stiffness_factors or (1.0,) * len(self.models)
         for number, (part, factor) in enumerate(zip(self.models, factors, strict=True), start=1):
             own = window_values(values, number)
@@ -365,25 +368,25 @@ def fitted_fields(
     stiffness: float | None,
     velocity: float,
 ) -> dict[str, float]:
-    """Return the fields of the scene of the first window with the fitted parameters.
+    """Convert the fitted parameters of the first window to scene fields.
 
     Parameters
     ----------
     scene : Scene
-        Scene at which the fit started.
+        Scene with the initial values of the fit.
     distances : iterable of float
-        First guesses of the slip distances in um.
+        Initial guesses of the slip distances in um.
     found : mapping of str to float
         Values of the fitted parameters.
     stiffness : float or None
-        Stiffness of the window, if it was not fitted.
+        Stiffness of the window, or None if the stiffness was fitted.
     velocity : float
         Load point velocity before the step in um/s.
 
     Returns
     -------
     dict of str to float
-        Field values by name.
+        Values of the scene fields by name.
 
     Examples
     --------

@@ -1,4 +1,4 @@
-"""Selection of the rows before a step in which friction is linear."""
+"""Search for the interval before a step in which friction is linear in time."""
 
 from __future__ import annotations
 
@@ -11,17 +11,18 @@ from rsfstudy.fitting.outliers import find_non_outlier_mask, find_rounding_quant
 from rsfstudy.fitting.record import Record
 from rsfstudy.fitting.velocity_steps import RunningLineFitSums
 
-#: Largest number of block averages that are tested, fewest block averages on each side of a break,
-#: and fewest rows of a part that is tested.
+#: Size limits: the largest number of block averages of friction, the smallest number of block
+#: averages on each side of a break, and the smallest number of rows to test.
 _MAX_FITTED_ROW_MEANS, _MIN_ROW_MEANS_BESIDE_BREAK, _MIN_ROWS_OF_LINEAR_PORTION = 120, 6, 20
-#: Smallest decrease of the sum of squares by a second line, divided by the residual variance and by
-#: ln n for n block averages. The residual variance is increased if the residuals are correlated.
+#: Smallest decrease of the sum of squared residuals due to a second line, divided by the residual
+#: variance and by ln n for n block averages. The residual variance is increased if the residuals
+#: are correlated.
 _MIN_SQUARES_GAIN_OF_BREAK = 15.0
-#: Smallest deviation of friction from the line of the later part, as an absolute value and in
+#: Smallest deviation of friction from the line through the later rows, as an absolute value and in
 #: standard deviations of the residuals. For comparison, a tenfold velocity step changes friction by
 #: about 0.02.
 _MIN_FRICTION_DEPARTURE_FROM_LINE, _MIN_FRICTION_DEPARTURE_SIGMAS = 4e-4, 4.0
-#: Fraction of the rows from which the noise is estimated. These rows are next to the step.
+#: Fraction of the rows from which the noise is estimated. The rows closest to the step are used.
 _FRACTION_OF_ROWS_FOR_NOISE = 0.4
 #: Upper bound of the estimated correlation between successive block averages.
 _MAX_CORRELATION_OF_ROW_MEANS = 0.98
@@ -29,25 +30,26 @@ _MAX_CORRELATION_OF_ROW_MEANS = 0.98
 
 @lru_cache(maxsize=256)
 def find_start_of_linear_friction(record: Record, start_time: float, end_time: float) -> float:
-    """Find the start of the linear part of friction before a step.
+    """Find the time from which friction before a step is linear.
 
-    The earlier part of the rows is discarded if two conditions are met. First, two separate lines
-    must describe friction far better than a single line. The comparison accounts for the
-    correlation of the residuals. Second, friction in the earlier part must differ noticeably from
-    the line through the later part. The test is repeated with the remaining rows. Before the test,
-    outliers are replaced by interpolated values.
+    The earlier rows are discarded if two conditions are met. First, two separate lines must fit
+    friction far better than a single line. The comparison of the two fits accounts for the
+    correlation of the residuals. Second, friction in the earlier rows must differ noticeably from
+    the line through the later rows. The test is repeated with the remaining rows until no rows are
+    discarded. Before the test, outliers are replaced by interpolated values.
 
     Parameters
     ----------
     record : Record
         Record with time and friction.
     start_time, end_time : float
-        Times in s between which friction is tested.
+        Start and end of the tested interval in s.
 
     Returns
     -------
     float
-        Time in s. The result is ``start_time`` if friction is linear in the whole interval.
+        Time in s at which the linear interval begins. The result is ``start_time`` if friction is
+        linear in the whole interval.
     """
     rows = np.flatnonzero((record.time >= start_time) & (record.time < end_time))
     time, friction = record.time[rows], record.columns["friction"][rows]
@@ -67,7 +69,7 @@ def find_start_of_linear_friction(record: Record, start_time: float, end_time: f
 
 
 def _find_slope_break(row_times: np.ndarray, friction: np.ndarray) -> int:
-    """Find the row at which a split into two lines fits friction best.
+    """Find the row at which two separate lines fit friction best.
 
     Returns
     -------
@@ -80,7 +82,7 @@ def _find_slope_break(row_times: np.ndarray, friction: np.ndarray) -> int:
     both = sums.line_residual_squares(0, places) + sums.line_residual_squares(places, count)
     place = int(places[np.argmin(both)])
     time, moved = row_times - row_times[0], friction - friction[0]
-    # Curvature in the earlier part is not noise, so the noise is estimated from the last rows.
+    # Curvature in the earlier rows is not noise, so the noise is estimated from the last rows.
     last = count - max(int(_FRACTION_OF_ROWS_FOR_NOISE * count), _MIN_ROW_MEANS_BESIDE_BREAK)
     (x0, v0), (x1, v1) = sums.fit_line(last, count), sums.fit_line(place, count)
     left = (moved - x0 - v0 * time)[last:]

@@ -1,8 +1,9 @@
-"""Errors of step times and velocities due to load point noise.
+"""Errors of step times and step velocities due to load point noise.
 
-The displacement is a straight line before the first step, and another straight line after each
-step. The covariance matrix of the step times and velocities is computed from the derivatives of
-this displacement and from the noise of its residuals, as in a fit of friction.
+The model of the load point displacement consists of a straight line before the first step and
+another straight line after each step. The covariance matrix of the step times and velocities is
+computed from the derivatives of the modelled displacement and from the noise of the residuals, as
+in a fit of friction.
 """
 
 from __future__ import annotations
@@ -21,21 +22,21 @@ from rsfstudy.fitting.window_model import STEP_SHIFT_IN_STANDARD_DEVIATIONS
 #: Largest number of block averages from which the noise is estimated. An autoregressive process of
 #: block averages also describes slow fluctuations of the load point around its set point.
 _MAX_ROW_MEANS_FOR_NOISE = 1000
-#: Smallest noise relative to the displacement of the record. Smaller noise is neglected.
+#: Ratio of the noise to the total displacement of the record below which the noise is neglected.
 _MIN_NOISE_OVER_DISPLACEMENT = 1e-7
-#: Ratio of the noise to the quantum of displacement below which rounding errors are not random, and
-#: number of random phases in the simulation of rounding errors.
+#: Ratio of the noise to the rounding unit of displacement below which rounding errors are not
+#: random, and number of random phases in the simulation of rounding errors.
 _MIN_DISPLACEMENT_NOISE_PER_QUANTUM, _ROUNDING_PHASE_DRAW_COUNT = 0.4, 200
 
 
 def shift_steps_by_their_errors(
     record: Record, steps: Sequence[LoadingStep]
 ) -> list[list[LoadingStep]]:
-    """Return copies of the steps that are shifted by their errors.
+    """Return copies of the steps with shifted times and velocities.
 
-    In each copy, the times and velocities are shifted by 1 % of one error. The errors are
-    statistically independent, and their combined covariance matrix equals the covariance matrix of
-    the step times and velocities.
+    The covariance matrix of the step times and velocities is the sum of contributions of
+    statistically independent errors. In each copy, the times and velocities are shifted by 1 % of
+    one independent error.
 
     Parameters
     ----------
@@ -73,9 +74,9 @@ def integrate_displacement(
 ) -> np.ndarray:
     """Integrate the load point velocity to obtain the displacement.
 
-    In contrast to the recorded displacement, the result has no noise. Noise of the recorded
-    displacement would bias the trend in generalised least squares, because this noise dominates the
-    differences between neighbouring rows.
+    In contrast to the recorded displacement, the computed displacement has no noise. Noise in the
+    recorded displacement would bias the trend in generalised least squares, because the noise
+    dominates the differences between neighbouring rows.
 
     Parameters
     ----------
@@ -85,12 +86,12 @@ def integrate_displacement(
     time : ndarray, shape (rows,)
         Times in s.
     zero_displacement_time : float
-        Time in s at which the displacement is zero.
+        Time in s at which the computed displacement is zero.
 
     Returns
     -------
     ndarray, shape (rows,)
-        Displacement in um.
+        Load point displacement in um.
     """
     begins, speeds = loading[:, 0], loading[:, 1]
     knots = np.concatenate([[0.0], np.cumsum(np.diff(begins) * speeds[:-1])])
@@ -105,13 +106,13 @@ def integrate_displacement(
 def _step_errors(
     record: Record, steps: Sequence[LoadingStep], velocities: np.ndarray
 ) -> list[tuple[np.ndarray, np.ndarray]]:
-    """Compute independent errors of the times and velocities of steps.
+    """Compute independent errors of the step times and velocities.
 
     Returns
     -------
     list of (ndarray, ndarray)
-        For each error, the shifts of the times in s, with shape (steps,), and the changes of the
-        velocities in um/s, with shape (steps + 1,).
+        Pair of arrays for each independent error: the shifts of the step times in s, with shape
+        (steps,), and the changes of the velocities in um/s, with shape (steps + 1,).
     """
     found, time = record.loading_steps, record.time
     begins = max((s.end for s in found if s.end < steps[0].start), default=time[0])
@@ -149,15 +150,15 @@ def _step_errors(
 
 
 def _covariance_root_from_noise(time: np.ndarray, displacement_columns: np.ndarray) -> np.ndarray:
-    """Compute a root of the covariance matrix for random noise.
+    """Compute a square root of the covariance matrix for random noise.
 
     Parameters
     ----------
     time : ndarray, shape (rows,)
         Times in s.
     displacement_columns : ndarray, shape (rows, parameters + 1)
-        Derivatives of displacement, followed by the residuals. The last derivative is with respect
-        to the initial displacement.
+        Derivatives of displacement with respect to the parameters, followed by the residuals. The
+        last parameter is the initial displacement.
 
     Returns
     -------
@@ -184,11 +185,11 @@ def _covariance_root_from_rounding(
     row_segments: np.ndarray,
     rounding_quantum: float,
 ) -> np.ndarray:
-    """Compute a root of the covariance matrix for rounded displacement.
+    """Compute a square root of the covariance matrix for rounded displacement.
 
-    At a constant velocity, the rounding errors repeat, and are not random. However, the phase of
-    the rounding errors is arbitrary in each straight segment. The function therefore fits lines to
-    rounding errors with random phases.
+    At a constant velocity, the rounding errors are periodic rather than random. However, the phase
+    of the rounding errors is arbitrary in each straight segment. The function therefore fits lines
+    to simulated rounding errors with random phases.
 
     Returns
     -------

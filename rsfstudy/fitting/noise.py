@@ -1,9 +1,9 @@
 r"""White and autoregressive models of the noise of a record.
 
 The function ``fit_noise`` estimates a ``NoiseModel`` from the residuals of a fit by restricted
-maximum likelihood (REML) [1]_. REML accounts for the noise that the fit absorbs. Let :math:`J` be
-the derivatives of the model, :math:`R` the correlation matrix of the noise, :math:`p` the number of
-parameters, and :math:`n` the number of rows. REML minimises
+maximum likelihood (REML) [1]_. REML accounts for the fraction of the noise that the fitted
+parameters absorb. Let :math:`J` be the Jacobian of the model, :math:`R` the correlation matrix of
+the noise, :math:`p` the number of parameters, and :math:`n` the number of rows. REML minimises
 
 .. math:: (n - p) \ln\frac{S}{n - p} + \ln|R| + \ln|J^T R^{-1} J|,
 
@@ -14,9 +14,9 @@ white noise :math:`w`. The process is stationary if all partial autocorrelations
 1, so the search varies the partial autocorrelations [2]_. The Burg method [3]_ provides the initial
 guess.
 
-Rows with different sampling intervals have different noise processes, each with its own standard
-deviation and correlation. If the sampling interval changes, the rows before the change are scaled
-by the ratio of the standard deviations, and still predict the rows after the change.
+Each sampling interval has a separate noise process, with its own standard deviation and
+correlation. Noise is predicted from earlier rows even if the sampling interval changes. The rows
+before the change are then scaled by the ratio of the two standard deviations.
 
 References
 ----------
@@ -51,13 +51,15 @@ from rsfstudy.fitting.whiteness_test import ljung_box_p_value as ljung_box_p_val
 
 #: Names of the noise models: white noise, and an autoregressive process with an automatic order.
 WHITE_NOISE_NAME, AUTOREGRESSIVE_NOISE_NAME = "white", "ar"
-#: Highest order of the autoregressive process, and fewest rows per coefficient.
+#: Highest order of the autoregressive process, and smallest number of rows per coefficient.
 MAX_AUTOREGRESSIVE_ORDER, _MIN_SAMPLES_PER_COEFFICIENT = 12, 10
-#: Largest partial autocorrelation, and gradient of the REML objective at which the search ends.
+#: Largest absolute value of a partial autocorrelation, and gradient of the REML objective below
+#: which the search ends.
 _MAX_PARTIAL_AUTOCORRELATION, _REML_GRADIENT_TOLERANCE = 0.999, 0.02
-#: Largest number of passes that refine the noise levels and the autoregressive process in turn.
+#: Largest number of passes that estimate the noise levels and the autoregressive process in turn.
 _NOISE_LEVEL_PASSES = 2
-#: Smallest standard deviation of a noise level, relative to the root mean square of the residuals.
+#: Smallest noise level, relative to the root mean square of the residuals. A noise level is the
+#: standard deviation of the noise in a segment of the record.
 _MIN_LEVEL_SD_OVER_TOTAL_SD = 1e-3
 #: Largest logarithm of the ratio of a noise level to the first noise level.
 _MAX_LOG_NOISE_LEVEL_RATIO = 30.0
@@ -91,22 +93,24 @@ def check_noise_name(noise_name: str) -> None:
 
 @dataclass(frozen=True)
 class NoiseModel:
-    """Noise of a record, with an autoregressive process per sampling interval.
+    """Noise model with an autoregressive process for each sampling interval.
 
-    The noise level, which is the standard deviation of the noise, may change along the record.
+    The noise level may change along the record. The noise level is the standard deviation of the
+    noise.
 
     Parameters
     ----------
     sampling_runs : tuple of SamplingRun
-        Runs of rows with the same process and noise level.
+        Runs of consecutive rows with the same noise process and noise level.
     partial_autocorrelations : ndarray, shape (processes, order)
-        Partial autocorrelations of each process.
+        Partial autocorrelations of each autoregressive process.
     noise_level_standard_deviations : ndarray, shape (levels,)
-        Standard deviation of each noise level, relative to the first level.
+        Noise levels relative to the first noise level.
     non_outlier_mask : ndarray of bool, shape (rows,), optional
-        Mask that is False for outliers, which are excluded. By default, all rows are kept.
+        Mask that is False for outliers. By default, no rows are outliers.
     averaging_correlation : AveragingCorrelation, optional
-        Correlation due to averaging, which is removed before the correlation of the process.
+        Correlation due to averaging by a data logger, which is removed before the autoregressive
+        correlation.
     """
 
     sampling_runs: tuple[SamplingRun, ...]
@@ -121,20 +125,20 @@ class NoiseModel:
         return int(self.partial_autocorrelations.shape[1])
 
     def whiten_columns(self, columns: np.ndarray) -> np.ndarray:
-        """Remove the correlation of the noise from columns.
+        """Remove the noise correlation from the columns of an array.
 
-        Each row is replaced by its prediction error, divided by the standard error of the
-        prediction from earlier rows.
+        Each value is replaced by its prediction error, divided by the standard deviation of the
+        prediction error. The prediction uses earlier rows.
 
         Parameters
         ----------
         columns : ndarray, shape (rows, columns)
-            Columns to whiten, including the rows of outliers.
+            Array to whiten, including the rows of outliers.
 
         Returns
         -------
         ndarray, shape (kept rows, columns)
-            Whitened columns without the rows of outliers.
+            Whitened array without the rows of outliers.
         """
         columns = self.drop_outliers(columns)
         columns = (
@@ -158,7 +162,7 @@ class NoiseModel:
         return found
 
     def drop_outliers(self, columns: np.ndarray) -> np.ndarray:
-        """Remove the rows of outliers from columns.
+        """Remove the rows of outliers from an array.
 
         Parameters
         ----------
@@ -174,9 +178,9 @@ class NoiseModel:
 
     @cached_property
     def prediction_coefficients_and_variances(self) -> list[tuple[list[list[float]], list[float]]]:
-        """Coefficients and variances of each process.
+        """Prediction coefficients and error variances of each noise process.
 
-        Each item is a result of ``_levinson_durbin``.
+        The property contains one result of ``_levinson_durbin`` per noise process.
         """
         return [*map(_levinson_durbin, self.partial_autocorrelations)]
 
@@ -200,8 +204,8 @@ class NoiseModel:
     def effective_sample_size(self) -> float:
         r"""Effective sample size for estimating a mean.
 
-        The effective sample size is the number of rows divided by the power at zero frequency,
-        relative to the variance:
+        The effective sample size is the number of rows :math:`n` divided by the ratio of the
+        spectral power at zero frequency to the variance. The ratio of power and variance is
 
         .. math:: \frac{(1 - k_1^2)(1 - k_2^2) \cdots}{(1 - c_1 - \dots - c_m)^2},
 
@@ -222,16 +226,16 @@ class NoiseModel:
 
     @property
     def _power_at_zero_frequency(self) -> list[float]:
-        """Power at zero frequency of each process, in units of variance."""
+        """Spectral power of each noise process at zero frequency, relative to variance."""
         told = ((c[-1], v[-1]) for c, v in self.prediction_coefficients_and_variances)
         return [left / (1.0 - math.fsum(last)) ** 2 for last, left in told]
 
     @property
     def degrees_of_freedom_of_slow_noise(self) -> float:
-        """Degrees of freedom of the estimated power at zero frequency.
+        """Degrees of freedom of the estimated spectral power at zero frequency.
 
         The power at zero frequency determines the standard errors of slow trends. The degrees of
-        freedom are 2 divided by the variance of the logarithm of the power. This variance includes
+        freedom are 2 divided by the variance of the logarithm of the power. The variance includes
         the uncertainty of the estimated coefficients.
         """
         total = 0.0
@@ -261,7 +265,7 @@ def white_noise(time: np.ndarray) -> NoiseModel:
     Returns
     -------
     NoiseModel
-        White noise, with the same standard deviation for all levels.
+        White noise model. The standard deviation is the same for all sampling intervals.
     """
     runs = find_sampling_runs(time)
     return NoiseModel(runs, np.zeros((count_processes(runs), 0)), np.ones(count_processes(runs)))
@@ -290,17 +294,17 @@ def fit_noise(
     jacobian : ndarray, shape (rows, parameters)
         Derivatives of the model with respect to the parameters.
     non_outlier_mask : ndarray of bool, shape (rows,), optional
-        Mask that is False for outliers. By default, all rows are kept.
+        Mask that is False for outliers. By default, no rows are outliers.
     min_noise_sd : float, default: 0.0
-        Lower bound of the standard deviation of a noise level, such as the rounding error.
+        Lower bound of the noise levels, for example the standard deviation of rounding errors.
     averaging_time : float, default: 0.0
         Averaging time of friction in s, or 0 if friction was not averaged.
 
     Returns
     -------
     NoiseModel
-        Noise with one process for each sampling interval, and one noise level for each segment of
-        the record.
+        Noise model with one process for each sampling interval, and one noise level for each
+        segment of the record.
     """
     begin, min_noise_sd = guess_noise_by_moments(
         noise_name, time, residuals, non_outlier_mask, min_noise_sd, averaging_time
@@ -344,7 +348,8 @@ def fit_noise(
     )
     if not math.isfinite(misfit(x)):  # All residuals are zero.
         return noise(x)
-    # The objective may be infinite at some points that the search evaluates.
+    # The objective function may be infinite for some partial autocorrelations that the search
+    # evaluates.
     with np.errstate(invalid="ignore", over="ignore"):
         found = minimize(misfit, x, method="BFGS", options={"gtol": _REML_GRADIENT_TOLERANCE})
     return noise(found.x if found.fun <= misfit(x) else x)
@@ -369,18 +374,18 @@ def guess_noise_by_moments(
     residuals : ndarray, shape (rows,)
         Residuals of the fit.
     non_outlier_mask : ndarray of bool, shape (rows,), optional
-        Mask that is False for outliers. By default, all rows are kept.
+        Mask that is False for outliers. By default, no rows are outliers.
     min_noise_sd : float, default: 0.0
-        Lower bound of the standard deviation of a noise level.
+        Lower bound of the noise levels.
     averaging_time : float, default: 0.0
         Averaging time of friction in s, or 0 if friction was not averaged.
 
     Returns
     -------
     noise : NoiseModel
-        Noise of the record.
+        Noise model of the record.
     min_noise_sd : float
-        Lower bound of the standard deviation of a noise level, relative to the first level.
+        Lower bound of the noise levels, relative to the first noise level.
     """
     if non_outlier_mask is not None:
         time, residuals = time[non_outlier_mask], residuals[non_outlier_mask]
@@ -406,14 +411,14 @@ def _estimate_noise_by_moments(
     residuals: np.ndarray,
     min_noise_sd: float,
 ) -> tuple[NoiseModel, float]:
-    """Estimate the noise and its levels by the method of moments.
+    """Estimate the noise model and the noise levels by the method of moments.
 
     Returns
     -------
     noise : NoiseModel
-        Noise with standard deviations relative to the first level.
+        Noise model with noise levels relative to the first noise level.
     first : float
-        Standard deviation of the first level.
+        First noise level.
     """
     stated, count = (
         noise_name.removeprefix(AUTOREGRESSIVE_NOISE_NAME),
@@ -456,15 +461,16 @@ def _estimate_noise_by_moments(
 
 
 class _LaggedProducts:
-    """Sums of products of lagged columns.
+    """Sums of products of each row with the preceding rows.
 
-    The sums determine the sum of squares of whitened columns for any autoregressive coefficients.
-    The cost of the search is therefore independent of the number of rows.
+    The sum of squares of whitened columns can be computed from the sums of products for any
+    autoregressive coefficients. The computing time of the search is therefore independent of the
+    number of rows.
 
     Parameters
     ----------
     runs : tuple of SamplingRun
-        Runs of rows with the same process and noise level.
+        Runs of consecutive rows with the same noise process and noise level.
     columns : ndarray, shape (rows, columns)
         Derivatives of the model, followed by the residuals.
     order : int
@@ -475,8 +481,8 @@ class _LaggedProducts:
         self, sampling_runs: Sequence[SamplingRun], columns: np.ndarray, autoregressive_order: int
     ) -> None:
         self.row_count, self.parameter_count = len(columns), columns.shape[1] - 1
-        # The derivatives may be almost linearly dependent. With an orthonormal basis of the same
-        # space, the objective function changes by a constant only.
+        # The derivatives may be almost linearly dependent, so they are replaced by an orthonormal
+        # basis. The replacement changes the objective function only by a constant.
         base, left = np.linalg.qr(columns[:, :-1])[0], columns[:, -1]
         left = left - base @ (base.T @ left)
         columns = np.column_stack([base, left / (np.linalg.norm(left) or 1.0)])
@@ -493,8 +499,9 @@ class _LaggedProducts:
                 width,
             )
         )
-        #: For each run, the first rows together with the earlier rows that predict them, the number
-        #: of earlier rows, the process of the run, and the noise levels of all these rows.
+        #: Properties of the first rows of each run: an array with the first rows and the earlier
+        #: rows from which they are predicted, the number of earlier rows, the index of the noise
+        #: process, and the noise levels of all rows in the array.
         self.initial_row_blocks: list[tuple[np.ndarray, int, int, np.ndarray]] = []
         levels = repeat_run_field_per_row(sampling_runs, "noise_level_index")
         for run in sampling_runs:
@@ -524,12 +531,12 @@ class _LaggedProducts:
                         sums[j, i] += found.T
 
     def reml_objective(self, noise: NoiseModel) -> float:
-        """Compute the REML objective up to a constant.
+        """Compute the REML objective function up to a constant.
 
         Parameters
         ----------
         noise : NoiseModel
-            Noise with the same runs and order.
+            Noise model with the same sampling runs and the same autoregressive order.
 
         Returns
         -------
@@ -572,7 +579,7 @@ def _select_autoregressive_order(residual_runs_per_process: Sequence[Sequence[np
 
 
 def _burg_coefficients(residual_runs: Sequence[np.ndarray], order: int) -> list[float]:
-    """Estimate partial autocorrelations by the Burg method."""
+    """Estimate partial autocorrelations with the Burg method."""
     forward, backward = [[p - p.mean() for p in residual_runs] for _ in range(2)]
     found = []
     for _ in range(order):
@@ -592,15 +599,15 @@ def _burg_coefficients(residual_runs: Sequence[np.ndarray], order: int) -> list[
 def _levinson_durbin(
     partial_autocorrelations: Sequence[float] | np.ndarray,
 ) -> tuple[list[list[float]], list[float]]:
-    """Compute prediction coefficients by the Levinson-Durbin recursion.
+    """Compute prediction coefficients with the Levinson-Durbin recursion.
 
     Returns
     -------
     coefficients : list of list of float
-        For each m from 0 to the order, the coefficients that predict a row from the m previous
-        rows, in order of increasing lag.
+        Coefficients for predicting a row from the m previous rows, in order of increasing lag. The
+        list contains one item for each m from 0 to the order.
     variances : list of float
-        Variance of each prediction error, relative to the variance of the process.
+        Variance of the prediction error for each m, relative to the variance of the process.
     """
     coefficients: list[list[float]] = [[]]
     variances = [1.0]
@@ -615,7 +622,7 @@ def _levinson_durbin(
 def _prediction_errors(
     columns: np.ndarray, coefficients: list[list[float]], variances: list[float]
 ) -> np.ndarray:
-    """Compute prediction errors divided by their standard errors."""
+    """Compute prediction errors divided by their standard deviations."""
     full = np.append(1.0, -np.array(coefficients[-1]))
     # The function ``lfilter`` rejects empty arrays.
     is_plain = len(full) == 1 or not columns.size

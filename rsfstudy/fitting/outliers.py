@@ -1,26 +1,28 @@
-"""Detection of outliers and of rounding in a record."""
+"""Detection of outliers and rounded values in a record."""
 
 from __future__ import annotations
 
 import numpy as np
 from scipy.ndimage import maximum_filter, rank_filter
 
-#: Number of neighbours on each side in the median that is compared with a row, and number of rows
-#: in a block with its own standard deviation.
+#: Number of neighbours on each side of a row from which the median is computed, and number of rows
+#: per block for estimating the local standard deviation.
 _NEIGHBOURS_PER_SIDE_FOR_MEDIAN, _ROWS_PER_RESIDUAL_SCALE_BLOCK = 3, 100
-#: Smallest deviation of an outlier in standard deviations, and relative to the same deviation of
-#: the model. The second condition excludes misfits at a peak of the model.
+#: Smallest deviation of an outlier from the median of its neighbours, in standard deviations and
+#: relative to the corresponding deviation of the model. The second limit excludes misfits at a peak
+#: of the model.
 _OUTLIER_SIGMAS, _MIN_OUTLIER_OVER_MODEL_DEPARTURE = 6.0, 2.0
 #: Ratio of the standard deviation to the median absolute deviation for Gaussian noise.
 _STANDARD_DEVIATION_PER_MAD = 1.4826
-#: Largest deviation of rounded values from multiples of the quantum, relative to the quantum.
+#: Largest deviation of rounded values from multiples of the rounding unit, relative to the rounding
+#: unit.
 _MAX_GRID_MISFIT_OVER_QUANTUM = 0.02
 
 
 def find_rounding_quantum(values: np.ndarray) -> float:
-    """Find the quantum to which values are rounded.
+    """Find the rounding unit of an array of values.
 
-    Values are rounded if they are multiples of a quantum, up to a constant offset.
+    Rounded values are integer multiples of the rounding unit, plus a constant offset.
 
     Parameters
     ----------
@@ -30,7 +32,7 @@ def find_rounding_quantum(values: np.ndarray) -> float:
     Returns
     -------
     float
-        Quantum, or 0 if the values are not rounded.
+        Rounding unit, or 0 if the values are not rounded.
     """
     distinct = np.unique(values)
     gaps = np.diff(distinct)
@@ -52,9 +54,10 @@ def find_non_outlier_mask(
 ) -> np.ndarray | None:
     """Find the rows that are not outliers.
 
-    Each residual is compared with the median of its neighbours. A row is an outlier if the
-    difference exceeds six local standard deviations. The difference must also exceed twice the
-    corresponding difference of the model, so that a peak of the model is not an outlier.
+    The function compares each residual with the median of the neighbouring residuals. A row is an
+    outlier if the difference exceeds six local standard deviations and twice the corresponding
+    difference of the model. The second condition is necessary because a misfit at a peak of the
+    model is not an outlier.
 
     Parameters
     ----------
@@ -63,7 +66,7 @@ def find_non_outlier_mask(
     model_friction : ndarray, shape (rows,)
         Fitted friction.
     rounding_quantum : float
-        Quantum to which friction is rounded.
+        Rounding unit of friction, or 0 if friction is not rounded.
 
     Returns
     -------
@@ -76,7 +79,8 @@ def find_non_outlier_mask(
         0.5 * rounding_quantum, 0.1 * _STANDARD_DEVIATION_PER_MAD * float(np.median(np.abs(off)))
     )
     scales = [max(_STANDARD_DEVIATION_PER_MAD * float(np.median(block)), least) for block in blocks]
-    # If the noise level changes within a block, a neighbouring block has the higher level.
+    # If the noise level changes within a block, one of the neighbouring blocks has the higher noise
+    # level.
     scale = np.repeat(maximum_filter(scales, 3), [len(block) for block in blocks])
     peaked = maximum_filter(
         np.abs(model_friction - _median_of_neighbours(model_friction)),
@@ -89,7 +93,7 @@ def find_non_outlier_mask(
 
 
 def _median_of_neighbours(values: np.ndarray) -> np.ndarray:
-    """Compute the median of the neighbours of each row, excluding the row."""
+    """Compute the median of the neighbours of each row, without the row itself."""
     around = np.ones(2 * _NEIGHBOURS_PER_SIDE_FOR_MEDIAN + 1, dtype=bool)
     around[_NEIGHBOURS_PER_SIDE_FOR_MEDIAN] = False
     lower, upper = (

@@ -1,8 +1,8 @@
 """Posterior sampling of the parameters of a fit with emcee.
 
-The sampler [1]_ uses the likelihood that the fit maximises, with the estimated noise. Priors are
-uniform between the bounds of the search. For slip distances and stiffness, priors are uniform in
-the logarithm.
+The sampler [1]_ uses the likelihood function of the fit, with the estimated noise model. The priors
+are uniform between the bounds of the search. For slip distances and stiffness, the prior of the
+logarithm is uniform.
 
 References
 ----------
@@ -25,17 +25,17 @@ from rsfstudy.motion import MotionStopped
 if TYPE_CHECKING:
     from rsfstudy.fitting.fit_problem import FitProblem, FitSolution
 
-#: Largest number of draws.
+#: Largest number of posterior draws.
 _MAX_DRAWS = 1_000_000
-#: Number of steps between two convergence checks, smallest length of a chain in autocorrelation
-#: times, and length of the burn-in in autocorrelation times.
+#: Settings of the sampler: the number of steps between two convergence checks, the smallest length
+#: of a chain in autocorrelation times, and the length of the burn-in in autocorrelation times.
 (
     _CHAIN_STEPS_PER_CONVERGENCE_CHECK,
     _MIN_CHAIN_AUTOCORRELATION_TIMES,
     _BURN_IN_AUTOCORRELATION_TIMES,
 ) = 100, 50.0, 5.0
-#: Degrees of freedom of the proposal distribution. The distribution has longer tails than the
-#: likelihood.
+#: Degrees of freedom of the proposal distribution. The proposal distribution should have longer
+#: tails than the likelihood.
 _PROPOSAL_DEGREES_OF_FREEDOM = 5.0
 
 
@@ -66,8 +66,8 @@ def sample_posterior_coordinates(
 ) -> tuple[np.ndarray, float]:
     """Sample the posterior distribution of the free parameters.
 
-    Half of the steps are stretch moves. The other half of the steps are independent proposals from
-    a multivariate t distribution with the covariance matrix of the fit. The sampler stops when the
+    Half of the sampling steps are stretch moves. The other half are independent proposals from a
+    multivariate t distribution with the covariance matrix of the fit. The sampler stops when the
     chain is longer than 50 autocorrelation times and the number of independent samples exceeds the
     number of draws.
 
@@ -80,7 +80,7 @@ def sample_posterior_coordinates(
     draw_count : int
         Number of draws.
     seed : int, default: 0
-        Seed of the random number generator.
+        Seed for the random number generator.
 
     Returns
     -------
@@ -150,7 +150,7 @@ def sample_posterior_coordinates(
 def sample_posterior_parameters(
     problem: FitProblem, solution: FitSolution, draw_count: int
 ) -> dict[str, Any]:
-    """Sample the posterior distribution, and return values of the parameters.
+    """Sample the posterior distribution and return parameter values.
 
     Parameters
     ----------
@@ -164,8 +164,8 @@ def sample_posterior_parameters(
     Returns
     -------
     dict
-        Dictionary with the draws ``posterior``, with shape (draws, parameters), and with
-        ``autocorrelation_time``. All values are NaN if a standard error is infinite.
+        Dictionary with the items ``posterior``, an array of draws with shape (draws, parameters),
+        and ``autocorrelation_time``. All values are NaN if a standard error is infinite.
 
     Raises
     ------

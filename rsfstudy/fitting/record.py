@@ -1,4 +1,4 @@
-"""Laboratory records with their steps and loading histories.
+"""Laboratory records, with their load point steps and loading histories.
 
 A ``Record`` validates its columns, and detects the steps of load point velocity and normal stress.
 The function ``loading_history`` converts the steps, or the recorded rows, to the loading of a
@@ -47,8 +47,8 @@ _STEP_COLUMNS = (
     Quantity("normal_stress_after", r"$\sigma$", "Pa", "normal stress after the step"),
 )
 
-#: Number of segments of constant velocity that approximate a ramp of the load point velocity. The
-#: displacement is exact at the end of each segment.
+#: Number of constant-velocity segments that approximate a ramp of the load point velocity. The load
+#: point displacement is exact at the end of each segment.
 _CONSTANT_VELOCITY_SEGMENTS_PER_RAMP = 16
 
 
@@ -127,9 +127,9 @@ class Record:
 
     @cached_property
     def digest(self) -> str:
-        """Hash of the columns and the specified steps.
+        """Hash of the columns and the user-specified steps.
 
-        Records with equal columns and equal specified steps have the same hash.
+        Records with equal columns and equal user-specified steps have the same hash.
         """
         told = hashlib.sha256(repr((sorted(self.columns), self.specified_steps)).encode())
         for name in sorted(self.columns):
@@ -141,26 +141,25 @@ class Record:
         return isinstance(other, Record) and (self.name, self.digest) == (other.name, other.digest)
 
     def __hash__(self) -> int:
-        """Return the hash of the digest."""
+        """Return a hash that is consistent with equality."""
         return hash(self.digest)
 
     def __len__(self) -> int:
-        """Return the number of rows."""
+        """Return the number of rows of the record."""
         return len(self.time)
 
     def window(self, start: float, end: float) -> Record:
-        """Return the part of the record between two times.
+        """Select the rows of the record between two times.
 
         Parameters
         ----------
         start, end : float
-            Times in s. The result contains the rows from ``start`` to ``end``, including both
-            times.
+            Times in s. The selection includes rows at ``start`` and at ``end``.
 
         Returns
         -------
         Record
-            Record with the selected rows, and with the same name and specified steps.
+            Record with the selected rows. The name and the specified steps are unchanged.
 
         Raises
         ------
@@ -184,15 +183,15 @@ class Record:
         Parameters
         ----------
         steps : sequence of (float, float, float, float) or sequence of six floats
-            For each step, the times in s at which the change begins and ends, and the load point
-            velocities in um/s before and after the step. If the normal stress changes, append the
+            Steps as sequences of four or six numbers: the times in s at which the step begins and
+            ends, the load point velocities in um/s before and after the step, and optionally the
             normal stresses in Pa before and after the step. By default, the normal stresses are
-            taken from the record.
+            computed from the record.
 
         Returns
         -------
         Record
-            Record with the same columns and the given steps.
+            Record with the same columns and the user-defined steps.
 
         Raises
         ------
@@ -263,13 +262,13 @@ class Record:
         )
 
     def _build_dataset_attributes(self, title: str) -> dict[str, str]:
-        """Return the global attributes for a dataset."""
+        """Return the global attributes of the dataset."""
         return {"title": f"{title}: {self.name}", "Conventions": "CF-1.11"}
 
 
 def _parse_loading_step(step_fields: Sequence[float]) -> LoadingStep:
-    """Validate the numbers of a step, and create a ``LoadingStep``."""
-    if isinstance(step_fields, LoadingStep):  # Steps of another record are valid.
+    """Validate the values of a user-defined step and create a ``LoadingStep``."""
+    if isinstance(step_fields, LoadingStep):  # Steps from another record are already valid.
         return step_fields
     rule = "is no step: begins, ends, velocity before and after, and, if it changes, "
     rule += "normal stress before and after"
@@ -290,7 +289,7 @@ def _parse_loading_step(step_fields: Sequence[float]) -> LoadingStep:
 def loading_history(
     record: Record, start_time: float, end_time: float, *, use_recorded_rows: bool
 ) -> np.ndarray:
-    """Return the loading history between two times.
+    """Return the loading history of a record between two times.
 
     Before the first segment, the slider slides steadily at the load point velocity before the first
     step.
@@ -302,15 +301,17 @@ def loading_history(
     start_time, end_time : float
         Times in s.
     use_recorded_rows : bool
-        If True, each row begins a segment, and the recorded displacement is replaced by the closest
-        displacement that never decreases. If False, the load point velocity and the normal stress
-        are constant between the steps, and change at a constant rate during a step.
+        If True, each row of the record begins a segment. The recorded displacement is first
+        replaced by the closest displacement that never decreases. If False, the load point velocity
+        and the normal stress are constant between the steps, and change at a constant rate during a
+        step.
 
     Returns
     -------
     ndarray, shape (segments, 4)
-        For each segment, its start in s, the load point velocity in um/s, the ratio of normal
-        stress to its initial value, and the rate of change of this ratio in 1/s.
+        Segments with four columns: the start time in s, the load point velocity in um/s, the ratio
+        of the normal stress to the initial normal stress, and the rate of change of the normal
+        stress ratio in 1/s.
 
     Raises
     ------
@@ -382,8 +383,8 @@ def _velocity_profile(step: LoadingStep) -> list[tuple[float, float]]:
     Returns
     -------
     list of (float, float)
-        For each segment of constant velocity, its start as a fraction of the duration of the step,
-        and its velocity in um/s. The list is empty if the step is immediate.
+        Constant-velocity segments of the step. Each segment is a pair of its start, as a fraction
+        of the step duration, and its velocity in um/s. The list is empty if the step is immediate.
     """
     lasts = step.end - step.start
     if not lasts > 0.0:
@@ -406,17 +407,17 @@ def _velocity_profile(step: LoadingStep) -> list[tuple[float, float]]:
 def _build_loading_from_rows(
     record: Record, initial_velocity: float, initial_normal_stress: float
 ) -> np.ndarray:
-    """Return a loading history with one segment per row.
+    """Return a loading history with one segment per row of the record.
 
     Parameters
     ----------
     record : Record
-        Part of a record.
+        Record with the rows of the loading history.
     initial_velocity : float
         Load point velocity of the first segment in um/s.
     initial_normal_stress : float
-        Normal stress in Pa before the first step, by which the normal stress is divided. If NaN,
-        the normal stress of the first row is used.
+        Normal stress in Pa that normalises the recorded normal stress. If NaN, the normal stress of
+        the first row is used.
 
     Returns
     -------
@@ -432,6 +433,6 @@ def _build_loading_from_rows(
     if "normal_stress" in record.columns:
         stress = record.columns["normal_stress"]
         table[:, 2] = stress / (initial_normal_stress if initial_normal_stress > 0.0 else stress[0])
-        table[0, 2] = 1.0  # The motion starts from steady sliding.
+        table[0, 2] = 1.0  # The simulated motion starts from steady sliding.
         table[:-1, 3] = np.diff(table[:, 2]) / lasts
     return table

@@ -26,21 +26,21 @@ EVENT_QUANTITIES = {
         "highest shear stress less that at peak slip rate",
     ),
 }
-#: Properties of an event as pairs of a value and its error, by name, and a flag for incomplete
-#: events.
+#: Properties of an event and a flag for incomplete events. The properties are pairs of a value and
+#: its error, by name.
 EventNumbers = tuple[dict[str, tuple[float, float]], int]
-#: Smallest drop, relative to half of the width of its 95 % confidence interval.
+#: Smallest accepted drop, relative to the half width of the 95 % confidence interval of its size.
 _MIN_DROP_OVER_ITS_ERROR = 1.0
 
 
 class FittedDropCandidate(NamedTuple):
-    """Fitted drop, and the candidate from which it was fitted.
+    """Fitted stress drop and the corresponding detected drop.
 
     Parameters
     ----------
-    drop : Drop
+    drop : FittedStressDrop
         Result of the fit.
-    candidate : Candidate
+    candidate : DropCandidate
         Detected drop.
     """
 
@@ -51,7 +51,8 @@ class FittedDropCandidate(NamedTuple):
 def find_drops(time: np.ndarray, stress: np.ndarray) -> tuple[list[FittedDropCandidate], Detection]:
     """Find and fit the drops of stress in a record.
 
-    If two fitted drops overlap, their candidates are merged and fitted again as a single drop.
+    If two fitted drops overlap, the two detected drops are merged and fitted again as a single
+    drop.
 
     Parameters
     ----------
@@ -60,7 +61,7 @@ def find_drops(time: np.ndarray, stress: np.ndarray) -> tuple[list[FittedDropCan
 
     Returns
     -------
-    drops : list of FittedCandidate
+    drops : list of FittedDropCandidate
         Drops in order of time.
     detection : Detection
         Result of the detection.
@@ -85,14 +86,14 @@ def find_drops(time: np.ndarray, stress: np.ndarray) -> tuple[list[FittedDropCan
 
 
 def _compute_drop_size(drop: FittedStressDrop) -> float:
-    """Return the size of a drop."""
+    """Return the decrease of stress in a drop."""
     return drop.stress_before - drop.stress_after
 
 
 def _fit_drop_candidates(
     time: np.ndarray, stress: np.ndarray, candidates: list[DropCandidate], detection: Detection
 ) -> list[FittedDropCandidate]:
-    """Fit each candidate within the interval between its neighbours."""
+    """Fit each detected drop within the interval between its neighbours."""
     ends = [float(time[0]), *(one.end_time for one in candidates)]
     begins = [*(one.start_time for one in candidates[1:]), float(time[-1])]
     return [
@@ -102,7 +103,7 @@ def _fit_drop_candidates(
 
 
 def _merge_overlapping(fitted_candidates: list[FittedDropCandidate]) -> list[DropCandidate]:
-    """Merge the candidates of overlapping drops."""
+    """Merge the detected drops whose fits overlap."""
     merged: list[DropCandidate] = []
     reached = -np.inf
     for drop, candidate in fitted_candidates:

@@ -1,11 +1,11 @@
 """Detection of normal stress steps in a record.
 
-A step is a change from one constant level of normal stress to another. The algorithm compares the
-mean normal stress in a window of rows with the mean in the previous window. A step is detected if
-the two means differ by at least 2 % and by far more than the typical difference. The typical
-difference includes correlated noise and a drift of the whole record. A ramp between two levels is a
-step with a finite duration. A drift that continues to the beginning or the end of the record is not
-a step.
+A step is a change from one constant normal stress to another constant normal stress. The algorithm
+compares the mean normal stress in a window of rows with the mean normal stress in the previous
+window. A step is detected if the two means differ by at least 2 % and by far more than the typical
+difference between successive windows. The typical difference includes the effects of correlated
+noise and of a drift of the whole record. A ramp between two constant normal stresses is a step with
+a finite duration. A drift that continues to the beginning or the end of the record is not a step.
 """
 
 from __future__ import annotations
@@ -20,30 +20,32 @@ from scipy.ndimage import find_objects, label
 
 from rsfstudy.fitting.velocity_steps import LoadingStep
 
-#: Smallest change of normal stress that is a step, relative to the normal stress and relative to
-#: the robust standard deviation of the differences.
+#: Smallest change of normal stress that is detected as a step, relative to the normal stress and
+#: relative to the robust standard deviation of the differences between windows.
 MIN_RELATIVE_NORMAL_STRESS_CHANGE, _MIN_NORMAL_STRESS_CHANGE_SIGMAS = 0.02, 6.0
-#: Largest difference between the levels in short and long windows, as a fraction of the change. If
-#: the difference is larger, the change is part of a longer ramp.
+#: Largest difference between the normal stresses in short and long windows next to a change, as a
+#: fraction of the change. If the difference is larger, the change is a fraction of a longer ramp.
 _MAX_STRESS_LEVEL_DRIFT_OVER_CHANGE = 0.25
-#: Fraction of the smallest detectable change above which a difference belongs to a step.
+#: Fraction of the smallest detectable change above which a difference between windows belongs to a
+#: step.
 _CHANGE_EXTENT_FRACTION = 0.4
-#: Largest number of rows that are searched, numbers of windows in a record, and fewest rows of a
-#: window. A longer record is averaged over blocks of rows first.
+#: Settings of the step detection: the largest number of rows, the numbers of windows per record,
+#: and the smallest number of rows per window. Longer records are first averaged over blocks of
+#: rows.
 _MAX_ROWS_FOR_STEP_DETECTION, _RECORD_PARTITION_COUNTS, _MIN_ROWS_PER_RECORD_PART = (
     20_000,
     (400, 100, 25),
     8,
 )
-#: Fractions of the change of level between which rows are used to fit a ramp, and fewest rows for
-#: the fit.
+#: Lower and upper limit of the rows that are used to fit a ramp, as fractions of the change of
+#: normal stress, and smallest number of rows for the fit.
 _RAMP_FIT_CHANGE_FRACTIONS, _MIN_RAMP_ROWS = (0.1, 0.9), 3
 #: Ratio of the standard deviation to the median absolute deviation for Gaussian noise.
 _STANDARD_DEVIATION_PER_MAD = 1.4826
 
 
 class StressStep(NamedTuple):
-    """Change of normal stress at a constant rate.
+    """Step of normal stress at a constant rate of change.
 
     Parameters
     ----------
@@ -70,7 +72,7 @@ def find_stress_steps(time: np.ndarray, normal_stress: np.ndarray) -> list[Stres
     Returns
     -------
     list of StressStep
-        Steps in order of time. Changes of less than 2 % are ignored.
+        Steps in order of time. Changes of normal stress by less than 2 % are ignored.
     """
     every = max(1, math.ceil(len(time) / _MAX_ROWS_FOR_STEP_DETECTION))
     count = len(time) // every * every
@@ -120,7 +122,8 @@ def _find_stress_level_changes(stress: np.ndarray, window_rows: int) -> list[sli
     Returns
     -------
     list of slice
-        Rows of each change, including one window of nearly constant stress on each side.
+        Row range of each change, including one window of nearly constant stress before and after
+        the change.
     """
     if len(stress) < 4 * window_rows:
         return []
@@ -144,7 +147,8 @@ def _find_stress_level_changes(stress: np.ndarray, window_rows: int) -> list[sli
             elif signed[rows].max() > least:
                 joined.append(rows)
         found += joined
-    # A change at the beginning or the end of the record has only one constant level.
+    # A change at the beginning or the end of the record does not connect two constant normal
+    # stresses.
     inside = [rows for rows in found if rows.start > 0 and rows.stop < len(change)]
     return [slice(rows.start, rows.stop - 1 + 2 * window_rows) for rows in inside]
 
@@ -171,7 +175,8 @@ def merge_stress_into_velocity_steps(
     Returns
     -------
     tuple of LoadingStep
-        Steps in order of time. The normal stresses of the steps are not set.
+        Steps in order of time. The fields for the normal stresses before and after the steps are
+        not set.
     """
     found = []
     for step in velocity_steps:
@@ -199,9 +204,9 @@ def set_stress_levels(
     time: np.ndarray,
     stress: np.ndarray,
 ) -> tuple[LoadingStep, ...]:
-    """Set the normal stresses of steps from the record.
+    """Set the normal stresses before and after each step from the record.
 
-    Normal stresses that the user specified are not changed.
+    The function does not change normal stresses that the user specified.
 
     Parameters
     ----------
@@ -250,7 +255,7 @@ def _fit_linear_stress_ramp(
 ) -> StressStep:
     """Fit a ramp between two levels of normal stress."""
     share = (stress - stress_before) / (stress_after - stress_before)
-    # This row is the best boundary between rows below and above half of the change.
+    # The row ``middle`` is the best boundary between rows below and above half of the change.
     middle = int(np.argmax(np.cumsum(0.5 - share)))
     first = int(np.flatnonzero(share[: middle + 1] <= _RAMP_FIT_CHANGE_FRACTIONS[0]).max(initial=0))
     reached = np.flatnonzero(share[middle:] >= _RAMP_FIT_CHANGE_FRACTIONS[1])

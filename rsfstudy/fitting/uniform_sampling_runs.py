@@ -1,6 +1,6 @@
 """Segmentation of a record into runs with uniform sampling and noise.
 
-The sampling intervals are classified by their running mean, so jitter of the clock does not affect
+The sampling intervals are classified by their running mean, so that timing jitter does not affect
 the classes. Changes of the noise level are detected by binary segmentation of the whitened
 residuals.
 """
@@ -17,12 +17,12 @@ from scipy.ndimage import uniform_filter1d
 
 #: Ratio of two sampling intervals above which the intervals belong to different classes.
 _MAX_SAMPLING_INTERVAL_RATIO = 2.0
-#: Number of rows in the running mean of the sampling intervals, fewest rows of a class with its own
-#: noise process, and fewest rows of a run.
+#: Number of rows in the running mean of the sampling intervals, smallest number of rows of a class
+#: with a separate noise process, and smallest number of rows of a run.
 _RUNNING_MEAN_ROWS, _MIN_ROWS_PER_NOISE_PROCESS, _MIN_ROWS_PER_SAMPLING_RUN = 15, 100, 30
-#: Criteria for a separate noise level: the fewest rows, the smallest fraction of the record, the
-#: smallest likelihood gain divided by ln n for n rows, and the largest number of changes of the
-#: level.
+#: Criteria for separate noise levels: the smallest number of rows, the smallest fraction of the
+#: record, the smallest likelihood gain divided by ln n for n rows, and the largest number of noise
+#: level changes.
 (
     _MIN_ROWS_PER_NOISE_LEVEL,
     _MIN_RECORD_FRACTION_PER_NOISE_LEVEL,
@@ -30,7 +30,7 @@ _RUNNING_MEAN_ROWS, _MIN_ROWS_PER_NOISE_PROCESS, _MIN_ROWS_PER_SAMPLING_RUN = 15
     _MAX_LEVEL_CHANGES,
 ) = 30, 0.08, 3.0, 7
 #: Variance of the logarithm of the absolute value of Gaussian noise, and lower bound of the
-#: differences between rows relative to their root mean square.
+#: differences between successive rows relative to their root mean square.
 _VARIANCE_OF_LOG_ABSOLUTE_GAUSSIAN, _MIN_ABSOLUTE_VALUE_OVER_RMS = math.pi**2 / 8.0, 0.01
 
 
@@ -44,7 +44,7 @@ class SamplingRun(NamedTuple):
     noise_process_index : int
         Index of the noise process.
     preceding_rows : int
-        Number of rows between the start of the clock and the start of the run.
+        Number of rows between the last restart of the clock and the start of the run.
     noise_level_index : int
         Index of the noise level.
     """
@@ -57,9 +57,9 @@ class SamplingRun(NamedTuple):
 
 
 def find_sampling_runs(time: np.ndarray) -> tuple[SamplingRun, ...]:
-    """Find runs of rows with the same sampling interval.
+    """Find runs of consecutive rows with the same sampling interval.
 
-    A new run also begins when the clock restarts, as between the windows of a joint fit.
+    A new run also begins when the clock restarts, for example between the windows of a joint fit.
 
     Parameters
     ----------
@@ -83,7 +83,7 @@ def find_sampling_runs(time: np.ndarray) -> tuple[SamplingRun, ...]:
 def split_runs_at_level_changes(
     runs: Sequence[SamplingRun], change_rows: Sequence[int]
 ) -> tuple[SamplingRun, ...]:
-    """Split runs at changes of the noise level.
+    """Split sampling runs at changes of the noise level.
 
     Parameters
     ----------
@@ -95,7 +95,7 @@ def split_runs_at_level_changes(
     Returns
     -------
     tuple of SamplingRun
-        Runs with a separate noise level for each noise process between two changes.
+        Runs of rows. Between two changes, each noise process has a separate noise level.
     """
     found: list[SamplingRun] = []
     levels: dict[tuple[int, int], int] = {}
@@ -123,7 +123,7 @@ def split_runs_at_level_changes(
 
 
 def count_processes(runs: Sequence[SamplingRun]) -> int:
-    """Return the number of noise processes.
+    """Return the number of noise processes in a sequence of runs.
 
     Parameters
     ----------
@@ -146,7 +146,7 @@ def repeat_run_field_per_row(runs: Sequence[SamplingRun], run_field_name: str) -
     runs : sequence of SamplingRun
         Runs that cover all rows.
     run_field_name : {"process", "level"}
-        Kind of index to return.
+        Name of the index to return: the index of the noise process, or of the noise level.
 
     Returns
     -------
@@ -164,9 +164,9 @@ def find_level_changes(
 ) -> list[int]:
     """Find the rows at which the standard deviation of the noise changes.
 
-    The function segments the logarithms of the absolute differences between successive rows. A
-    misfit of the model near a step is either smooth or short, so it affects only a few differences.
-    A change of the noise level affects all differences after the change.
+    The function segments the logarithms of the absolute differences between successive residuals. A
+    misfit of the model near a step is either smooth or short, so that the misfit affects only a few
+    differences. In contrast, a change of the noise level affects all differences after the change.
 
     Parameters
     ----------
@@ -221,8 +221,8 @@ def _refine_noise_level_change(
     squared_residuals : ndarray, shape (rows,)
         Squares of the whitened residuals.
     first_row, initial_row, last_row : int
-        First row of the segment before the change, estimated row of the change, and row after the
-        segment that follows the change.
+        First row of the segment before the change, estimated row of the change, and end (exclusive)
+        of the segment after the change.
 
     Returns
     -------
@@ -247,7 +247,7 @@ def _classify_intervals(time: np.ndarray) -> np.ndarray:
     Returns
     -------
     ndarray of int, shape (rows,)
-        Number of the class, starting from 0.
+        Class of the sampling interval of each row, numbered from 0.
     """
     gaps = np.diff(time)
     gaps[gaps <= 0.0] = np.median(gaps)
@@ -271,7 +271,8 @@ def _classify_intervals(time: np.ndarray) -> np.ndarray:
 def _refine_sampling_interval_change(log_sampling_intervals: np.ndarray, initial_row: int) -> int:
     """Refine the row at which the sampling interval changes.
 
-    The result minimises the sum of squared deviations from the means on both sides of the boundary.
+    The refined row minimises the sum of squared deviations of the sampling intervals from their
+    means before and after the row.
     """
     first, last = (
         max(initial_row - 1 - 2 * _RUNNING_MEAN_ROWS, 0),

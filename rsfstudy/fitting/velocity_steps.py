@@ -25,21 +25,21 @@ from scipy.ndimage import maximum_filter1d, median_filter
 
 from rsfstudy.error_boundary import guard_methods
 
-#: Largest number of rows that are segmented. A longer record is averaged over blocks of rows first.
+#: Largest number of rows that are segmented. Longer records are first averaged over blocks of rows.
 _MAX_ROWS_FOR_STEP_DETECTION = 20_000
-#: Criteria for separate segments: the fewest rows of a segment, the smallest change of velocity
-#: relative to the faster velocity, and the smallest displacement that the change causes, relative
-#: to the standard deviation of the residuals. The displacement criterion is necessary because a
-#: controlled load point fluctuates around its set point.
+#: Criteria for separate segments: the smallest number of rows of a segment, the smallest velocity
+#: change relative to the faster velocity, and the smallest displacement due to the velocity change
+#: relative to the standard deviation of the residuals. The displacement criterion is necessary
+#: because a servo-controlled load point fluctuates around its set point.
 _MIN_SEGMENT_ROWS, _MIN_RELATIVE_VELOCITY_CHANGE, _MIN_DISPLACEMENT_CHANGE_SIGMAS = 5, 0.2, 10.0
 #: Smallest reduction of the sum of squares by a split, divided by the noise variance and by ln n
 #: for n rows.
 _MIN_SQUARES_GAIN_OF_SEGMENT_SPLIT = 12.0
 #: Fraction of the highest velocity below which the load point is considered to be held.
 _MAX_HOLD_OVER_FASTER_VELOCITY = 0.01
-#: Limits for combining changes of velocity into a step: the longest duration relative to the
-#: segment before the step and to the rest of the record, and the number of rows below which a
-#: segment is too short for a fit.
+#: Limits for combining several velocity changes into a single step: the longest duration of the
+#: step relative to the preceding segment and to the rest of the record, and the number of rows
+#: below which a segment is too short for a fit.
 _MAX_RAMP_SEGMENT_OVER_NEIGHBOURS, _MAX_RAMP_SEGMENT_ROWS = 0.05, 15
 #: Number of rows from which the local noise is estimated, and ratio of the local noise to the
 #: typical noise above which the local noise is used.
@@ -50,26 +50,26 @@ _STANDARD_DEVIATION_PER_MAD = 1.4826
 
 #: Function that returns the sum of squared residuals of the rows i to j.
 ResidualSquaresFunction = Callable[[np.ndarray | int, np.ndarray | int], np.ndarray]
-#: Line of displacement against time: displacement at time 0, and velocity.
+#: Straight line of displacement against time, as the displacement at time 0 and the velocity.
 _InterceptAndSlope = tuple[float, float]
 
 
 @guard_methods
 class LoadingStep(NamedTuple):
-    """Change of load point velocity, of normal stress, or of both.
+    """Step of load point velocity, of normal stress, or of both.
 
     Parameters
     ----------
     start, end : float
-        Times in s at which the change begins and ends. The two times are equal if the change is
-        immediate.
+        Times in s at which the change begins and ends. ``start`` and ``end`` are equal if the
+        change is immediate.
     velocity_before, velocity_after : float
         Load point velocities in um/s. A velocity of 0 means that the load point is held.
     stress_before, stress_after : float, default: NaN
         Normal stresses in Pa, or NaN if the normal stress was not recorded.
     velocity_profile : tuple of (float, float), optional
-        Velocities during a step that overshoots. Each item contains a time in s after the start of
-        the step, and the velocity in um/s from this time on. By default, the velocity changes at a
+        Velocities during a step that overshoots, as pairs of a time in s since the start of the
+        step and the velocity in um/s from that time on. By default, the velocity changes at a
         constant rate.
 
     Examples
@@ -97,9 +97,9 @@ class LoadingStep(NamedTuple):
 
     @property
     def stress_ratio(self) -> float:
-        """Ratio of normal stress after the step to normal stress before it.
+        """Ratio of the normal stresses after and before the step.
 
-        The ratio is 1 if the normal stress was not recorded.
+        The property is 1 if the normal stress was not recorded.
         """
         ratio = self.stress_after / self.stress_before
         return ratio if math.isfinite(ratio) else 1.0
@@ -169,10 +169,11 @@ def detect_velocity_steps(time: np.ndarray, displacement: np.ndarray) -> tuple[L
 
 
 class RunningLineFitSums:
-    """Cumulative sums for fitting lines to ranges of rows in constant time.
+    """Cumulative sums for fitting lines to any range of rows.
 
-    In all methods, the range from ``i`` to ``j`` includes row ``i`` and excludes row ``j``. If
-    ``i`` or ``j`` is an array, the methods return one result for each range.
+    The computing time of a fit does not depend on the number of rows in the range. In all methods,
+    a range includes ``start_row`` and excludes ``stop_row``. If ``start_row`` or ``stop_row`` is an
+    array, the methods return one result for each range.
 
     Parameters
     ----------
@@ -203,13 +204,13 @@ class RunningLineFitSums:
         Parameters
         ----------
         start_row, stop_row : int or ndarray of int
-            First row of the range, and row after the last row.
+            First row of the range, and row after the last row of the range.
 
         Returns
         -------
         tuple of ndarray
-            Mean of t, mean of x, and the sums of squares and products about the means: tt, tx and
-            xx.
+            Five moments: the mean of t, the mean of x, and the sums of the products tt, tx and xx
+            of deviations from the means.
         """
         n, st, sx, stt, stx, sxx = (
             self.cumulative_sums[stop_row] - self.cumulative_sums[start_row]
@@ -225,7 +226,7 @@ class RunningLineFitSums:
         Parameters
         ----------
         start_row, stop_row : int or ndarray of int
-            First row of the range, and row after the last row.
+            First row of the range, and row after the last row of the range.
 
         Returns
         -------
@@ -243,7 +244,7 @@ class RunningLineFitSums:
         Parameters
         ----------
         start_row, stop_row : int or ndarray of int
-            First row of the range, and row after the last row.
+            First row of the range, and row after the last row of the range.
 
         Returns
         -------
@@ -258,7 +259,7 @@ class RunningLineFitSums:
         Parameters
         ----------
         start_row, stop_row : int
-            First row of the range, and row after the last row.
+            First row of the range, and row after the last row of the range.
 
         Returns
         -------
@@ -272,10 +273,10 @@ class RunningLineFitSums:
 
 
 def _deviations_from_neighbours(time: np.ndarray, displacement: np.ndarray) -> np.ndarray:
-    """Compute the deviation of each sample from a line through its neighbours.
+    """Compute the deviation of each sample from the line through its neighbours.
 
-    For white noise, the standard deviation of the deviations equals the standard deviation of the
-    noise.
+    The deviations are scaled so that white noise and its deviations have the same standard
+    deviation.
     """
     share = (time[1:-1] - time[:-2]) / (time[2:] - time[:-2])
     off = displacement[1:-1] - (1.0 - share) * displacement[:-2] - share * displacement[2:]
@@ -284,7 +285,7 @@ def _deviations_from_neighbours(time: np.ndarray, displacement: np.ndarray) -> n
 
 
 def _local_noise_over_global_noise(time: np.ndarray, displacement: np.ndarray) -> np.ndarray:
-    """Estimate the local noise of displacement relative to the typical noise.
+    """Estimate the local noise of the displacement, relative to the typical noise.
 
     Returns
     -------
@@ -352,22 +353,22 @@ def split_rows_into_segments(
 ) -> set[int]:
     """Split rows into segments by binary segmentation.
 
-    A segment is split if the split reduces the sum of squared residuals by far more than expected
-    by chance.
+    The function splits a segment if the split reduces the sum of squared residuals by far more than
+    expected by chance.
 
     Parameters
     ----------
     residual_squares : callable
         Function that returns the sum of squared residuals of the rows i to j.
     first_row, last_row : int
-        First row of the range that is split, and row after the last row.
+        First row of the range to split, and row after the last row of the range.
     variance_of_noise : float
-        Noise variance.
+        Variance of the noise.
 
     Returns
     -------
     set of int
-        First row of each segment, and ``last_row``.
+        First row of each segment, and the row ``last_row`` after the last segment.
     """
     open_parts, found = [(first_row, last_row)], {first_row, last_row}
     while open_parts:
@@ -432,10 +433,10 @@ def _line_intersection_time(
 ) -> float:
     r"""Compute the time at which two lines intersect.
 
-    The time is restricted to a neighbourhood of the boundary between the rows of the two lines.
-    Noise makes the boundary uncertain by about :math:`(s^2 h/\Delta V^2)^{1/3}`, where :math:`s^2`
-    is the noise variance, :math:`h` is the sampling interval, and :math:`\Delta V` is the change of
-    velocity.
+    The time of intersection is limited to a neighbourhood of the boundary between the rows of the
+    two lines. Because of noise, the boundary has an uncertainty of about :math:`(s^2 h/\Delta
+    V^2)^{1/3}`, where :math:`s^2` is the noise variance, :math:`h` is the sampling interval, and
+    :math:`\Delta V` is the change of velocity.
     """
     (last, first), change = boundary_times, second_line[1] - first_line[1]
     middle, gap = 0.5 * (last + first), first - last
@@ -451,9 +452,9 @@ def _refine_line_intersection_time(
     row_reach: int,
     variance_of_noise: float,
 ) -> float:
-    """Refine the intersection of two lines with all rows of the record.
+    """Compute the intersection of two lines again, from all rows of the record.
 
-    The refinement is necessary if rows were averaged for the segmentation.
+    The second computation is necessary if the segmentation used averages over blocks of rows.
     """
     middle = int(np.searchsorted(time, initial_time))
     i, j = max(middle - 20 * row_reach, 0), min(middle + 20 * row_reach, len(time))
@@ -472,7 +473,7 @@ def _group_velocity_changes(
     boundary_rows: list[int],
     end_times: tuple[float, float],
 ) -> Iterator[tuple[int, int]]:
-    """Group changes of velocity into steps.
+    """Group successive velocity changes into steps.
 
     A step may contain several changes of velocity if the segments between the changes are short or
     have few rows. For example, a ramp between two velocities is a single step, and a velocity that
@@ -481,7 +482,7 @@ def _group_velocity_changes(
     Yields
     ------
     first, last : int
-        Indices of the first and the last change of velocity of a step.
+        Indices of the first and the last velocity change of a step.
     """
     changes, n = np.sign(np.diff(velocities)), 0
 
@@ -535,7 +536,8 @@ def _noise_at_boundaries(
 ) -> np.ndarray:
     """Compute the relative noise at each boundary between segments.
 
-    The result is the larger of the mean relative noise levels of the two adjacent segments.
+    The function averages the relative noise in each of the two adjacent segments, and returns the
+    larger average.
     """
     local = np.array([relative_noise[i:j].mean() for i, j in row_segments])
     return np.asarray(np.maximum(local[1:], local[:-1]))

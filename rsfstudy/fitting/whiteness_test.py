@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from scipy.stats import chi2
 
-#: Number of lags in the test, in addition to the order of the noise model.
+#: Number of lags in the test minus the order of the noise model.
 LAG_COUNT = 20
 
 
@@ -17,8 +17,7 @@ def ljung_box_p_value(whitened_residuals: np.ndarray, autoregressive_order: int)
     whitened_residuals : ndarray, shape (rows,)
         Whitened residuals.
     autoregressive_order : int
-        Number of estimated autoregressive coefficients, which is subtracted from the degrees of
-        freedom.
+        Order of the autoregressive noise model, which reduces the degrees of freedom of the test.
 
     Returns
     -------

@@ -1,8 +1,8 @@
-"""Model of the friction in a window of a record.
+"""Model of friction in a window of a record.
 
 A ``WindowModel`` simulates the motion of a scene under the loading of a record. The method
-``model_friction`` returns friction at each row, and ``jacobian`` returns the derivatives of
-friction with respect to the parameters.
+``model_friction`` computes friction at each row, and the method ``jacobian`` computes the
+derivatives of friction with respect to the parameters.
 """
 
 from __future__ import annotations
@@ -28,9 +28,9 @@ from rsfstudy.quantities import Quantity
 from rsfstudy.slider import Scene, build_sampled_history_from_table, replace_field_values
 from rsfstudy.status import Status
 
-#: Values of parameters by name.
+#: Parameter values by name.
 ParameterValues = Mapping[str, float]
-#: Step size of a finite difference relative to the scale of the parameter, and order of the
+#: Step size of a finite difference relative to the scale of the parameter, and order of the finite
 #: difference (2 or 4).
 DifferenceScheme = tuple[float, int]
 
@@ -55,7 +55,7 @@ PARAMETERS = {
         ),
     )
 }
-#: Names of parameters in other programs, with the corresponding names in rsfstudy.
+#: Parameter names of other programs, and the corresponding names in rsfstudy.
 PARAMETER_SYNONYMS = {
     **dict.fromkeys(("Dc", "dc", "D_c", "d_c", "L", "dcrit"), "slip_distance"),
     **dict.fromkeys(("Dc1", "L1"), "slip_distance"),
@@ -69,28 +69,29 @@ PARAMETER_SYNONYMS = {
 }
 #: Parameters that only some friction laws have.
 PARAMETERS_OF_SOME_LAWS_ONLY = frozenset({"b", "b1", "b2", "slip_distance_2", "law_exponent"})
-#: Parameters for which the search varies the logarithm.
+#: Parameters whose logarithm is varied by the search.
 LOGARITHMIC_PARAMETERS = frozenset({"slip_distance", "slip_distance_2", "stiffness"})
-#: Finite differences for the search and for the final solution. Simulated friction is reproducible
-#: to 1e-11. The relative error of second-order differences is then 1e-5 if the motion is far from
-#: unstable, and the relative error of fourth-order differences is always less than 1e-6.
+#: Finite differences for the search and for the final solution. Because simulated friction is
+#: reproducible to 1e-11, the relative error of second-order differences is 1e-5 if the motion is
+#: far from unstable, and the relative error of fourth-order differences is always less than 1e-6.
 QUICK_DIFFERENCE_SCHEME, ACCURATE_DIFFERENCE_SCHEME = (3e-4, 2), (5e-3, 4)
-#: Largest relative difference between central differences with a single and a double step size, and
-#: largest number of step sizes that are tested. The relative error of the fourth-order difference
-#: is about the square of this tolerance.
+#: Largest relative difference between the central differences with step sizes h and 2 h, and
+#: largest number of tested step sizes. The relative error of the fourth-order difference is about
+#: the square of the first value.
 _DIFFERENCE_AGREEMENT_TOLERANCE, _MAX_DIFFERENCE_STEP_REDUCTIONS = 2e-4, 4
 #: Shift of a load point step in a finite difference, as a fraction of the standard error of the
 #: step.
 STEP_SHIFT_IN_STANDARD_DEVIATIONS = 0.01
-#: Domains of bounded parameters. Near the end of a domain, the finite differences are one-sided.
+#: Domains of bounded parameters. Near the ends of a domain, one-sided finite differences are used.
 _PARAMETER_DOMAINS = {"law_exponent": (0.0, 1.0), "alpha": (0.0, math.inf)}
-#: Scales of parameters for the step sizes of finite differences. The method
-#: ``WindowModel._parameter_scale`` computes the scales of the other parameters.
+#: Scales of some parameters for the step sizes of finite differences. The method
+#: ``WindowModel._parameter_scale`` computes the scales of all other parameters.
 _TYPICAL_PARAMETER_SIZES = {"mu_star": 0.6, "alpha": 0.5, "law_exponent": 1.0}
-#: Limits for the number of right-hand-side evaluations of a motion: a constant, an addition for
-#: each loading segment, and the largest addition for a stiff spring. A motion that fits a record
-#: needs a few thousand evaluations, and about 20 for each segment. A stiff spring needs about 2 k
-#: x/a evaluations for a displacement x of the window, and the limit is twice this number.
+#: The largest number of right-hand-side evaluations of a simulation is the sum of three terms: a
+#: constant, a number for each loading segment, and a number for a stiff spring, which has an upper
+#: limit. The simulation of a motion that fits a record needs a few thousand evaluations, and about
+#: 20 for each segment. A stiff spring needs about 2 k x/a evaluations for a displacement x of the
+#: window, and the third term is twice this number.
 _MAX_EVALUATIONS, _MAX_EVALUATIONS_PER_SEGMENT, _MAX_EVALUATIONS_FOR_STIFF_SPRING = (
     50_000,
     60,
@@ -129,7 +130,7 @@ def check_free_parameters(free: Sequence[str]) -> None:
 
 
 def parameters_of_law(scene: Scene, free: Sequence[str]) -> tuple[str, ...]:
-    """Select the parameters that the friction law of a scene uses.
+    """Select the parameters that occur in the friction law of a scene.
 
     Parameters
     ----------
@@ -141,8 +142,9 @@ def parameters_of_law(scene: Scene, free: Sequence[str]) -> tuple[str, ...]:
     Returns
     -------
     tuple of str
-        Names from ``free`` without the parameters of other laws. For example, a law with one state
-        has ``b``, and a law with two states has ``b1``, ``b2`` and ``slip_distance_2``.
+        Names from ``free`` without the parameters of other friction laws. For example, a law with
+        one state variable has ``b``, and a law with two state variables has ``b1``, ``b2`` and
+        ``slip_distance_2``.
 
     Examples
     --------
@@ -156,7 +158,7 @@ def parameters_of_law(scene: Scene, free: Sequence[str]) -> tuple[str, ...]:
 
 
 def check_fields_positive(instance: object, *field_names: str) -> None:
-    """Raise ``InvalidValue`` if attributes of an object are not positive.
+    """Raise ``InvalidValue`` if an attribute of an object is not positive.
 
     Parameters
     ----------
@@ -177,14 +179,14 @@ def check_fields_positive(instance: object, *field_names: str) -> None:
 
 @dataclass(frozen=True)
 class WindowModel:
-    """Model of a window of a record.
+    """Model of friction in a window of a record.
 
     Parameters
     ----------
     scene : Scene
-        Scene with the friction law and the parameters that are not fitted.
+        Scene with the friction law and the fixed parameters.
     time, displacement, friction : ndarray, shape (rows,)
-        Times of the rows in s, load point displacement from the first step in um, and recorded
+        Times of the rows in s, load point displacements since the first step in um, and recorded
         friction.
     loading_segments : ndarray, shape (segments, 4)
         Loading history (see ``rsfstudy.fitting.record.loading_history``).
@@ -193,7 +195,7 @@ class WindowModel:
     meter : WorkMeter
         Counter of right-hand-side evaluations.
     loadings_with_shifted_steps : sequence of ndarray, optional
-        Loading histories with shifted steps (see
+        Loading histories with shifted step times and velocities (see
         ``rsfstudy.fitting.load_point_noise.shift_steps_by_their_errors``).
     filter : Filter, optional
         Filter that was applied to friction before it was recorded.
@@ -222,7 +224,8 @@ class WindowModel:
     def is_linear_in_parameter(self, parameter_name: str) -> bool:
         """Return True if friction is a linear function of a parameter.
 
-        Friction must be linear in the parameter for all values of the other parameters.
+        The method returns True only if friction is linear in the parameter for all values of the
+        other parameters.
 
         Parameters
         ----------
@@ -232,7 +235,7 @@ class WindowModel:
         Returns
         -------
         bool
-            True for trends, and for ``mu_star`` if the normal stress is constant.
+            True for trend coefficients, and for ``mu_star`` if the normal stress is constant.
         """
         return parameter_name.startswith("trend") or (
             parameter_name == "mu_star" and not self.has_normal_stress_change
@@ -240,11 +243,11 @@ class WindowModel:
 
     @property
     def max_loading_delay(self) -> float:
-        """Largest delay of the loading in s that the model supports."""
+        """Largest loading delay in s that the model supports."""
         return float(self.time[0] - self.loading_segments[0, 0])
 
     def build_scene(self, values: ParameterValues) -> Scene:
-        """Build a scene from parameters of a record.
+        """Build the scene of the window from parameter values.
 
         Parameters
         ----------
@@ -254,7 +257,8 @@ class WindowModel:
         Returns
         -------
         Scene
-            Scene in units of the slip distance and the initial load point velocity.
+            Scene that is dimensionless with respect to the slip distance and the initial load point
+            velocity.
 
         Raises
         ------
@@ -278,9 +282,9 @@ class WindowModel:
     ) -> np.ndarray:
         """Compute the friction of the model at each row, without the trend.
 
-        The motion starts from steady sliding before the first step. Friction is the spring stress
-        divided by the normal stress, as measured in an experiment. If the loading is delayed by
-        ``step_time``, the motion is evaluated at correspondingly earlier times.
+        The motion starts from steady sliding before the first step. As in an experiment, friction
+        is the spring stress divided by the normal stress. If the loading is delayed by
+        ``step_time``, the simulated motion is evaluated at correspondingly earlier times.
 
         Parameters
         ----------
@@ -289,14 +293,14 @@ class WindowModel:
         refined : bool, default: False
             If True, all tolerances are reduced by a factor of ten.
         require_stable : bool, default: False
-            If True, the motion is not computed if the stiffness is below the critical stiffness, or
-            if the second slip distance is not the longer one.
+            If True, the motion is computed only if the stiffness exceeds the critical stiffness and
+            the second slip distance is longer than the first slip distance.
 
         Returns
         -------
         ndarray, shape (rows,)
-            Friction of the model. All values are NaN if the motion does not exist, or if the motion
-            requires far more evaluations than a motion that fits a record.
+            Friction of the model. All values are NaN if the simulation fails, or if it needs far
+            more evaluations than the simulation of a motion that fits a record.
 
         Raises
         ------
@@ -367,8 +371,8 @@ class WindowModel:
         Returns
         -------
         ndarray, shape (rows, errors)
-            Changes of friction by one standard error of each independent error of the steps. The
-            values are NaN if a motion does not exist.
+            Change of friction due to an error of one standard deviation, for each independent error
+            of the steps. The values are NaN if a simulation fails.
         """
         if not self.loadings_with_shifted_steps:
             return np.zeros((len(self.time), 0))
@@ -399,13 +403,14 @@ class WindowModel:
         free_parameters : sequence of str
             Names of the free parameters.
         difference_scheme : (float, int), optional
-            Step size relative to the scale of the parameter, and order of the finite difference.
-            The default is ``ACCURATE_DIFFERENCE_SCHEME``.
+            Relative step size and order of the finite difference. The default is
+            ``ACCURATE_DIFFERENCE_SCHEME``.
 
         Returns
         -------
         ndarray, shape (rows, parameters)
-            Derivatives. A column is NaN if a motion of its finite difference fails.
+            Derivatives of friction. A column is NaN if a simulation for its finite difference
+            fails.
 
         Notes
         -----
@@ -444,7 +449,7 @@ class WindowModel:
             )
             largest = float(np.abs(near).max()) or 1.0
             apart = float(np.abs(far - near).max()) / largest
-            if apart >= least:  # Rounding errors dominate the difference.
+            if apart >= least:  # Rounding errors dominate the finite difference.
                 break
             if math.isfinite(apart):
                 best, least = (4.0 * near - far) / 3.0, apart
@@ -468,8 +473,8 @@ class WindowModel:
     ) -> np.ndarray:
         """Compute a second-order finite difference.
 
-        The difference is one-sided if the parameter is within ``steps_from_domain_end`` steps of
-        the end of its domain.
+        The difference is one-sided if the distance of the parameter from an end of its domain is
+        less than ``steps_from_domain_end`` step sizes.
         """
         low, high = _PARAMETER_DOMAINS.get(parameter_name, (-math.inf, math.inf))
         weights = {1.0: 0.5, -1.0: -0.5}
@@ -487,7 +492,7 @@ class WindowModel:
         return found
 
     def _typical_parameter_size(self, parameter_name: str, values: ParameterValues) -> float:
-        """Return the scale of a parameter for finite differences."""
+        """Return the scale of a parameter for step sizes of finite differences."""
         if parameter_name in LOGARITHMIC_PARAMETERS:
             return 1.0
         if parameter_name == "a":
@@ -498,7 +503,7 @@ class WindowModel:
 
 
 def scene_to_parameters(scene: Scene, distance: float, distance_2: float) -> dict[str, float]:
-    """Convert the fields of a scene to parameters of a record.
+    """Convert dimensionless scene fields to fit parameters with units.
 
     Parameters
     ----------
@@ -507,7 +512,8 @@ def scene_to_parameters(scene: Scene, distance: float, distance_2: float) -> dic
     distance : float
         Slip distance of the scene in um.
     distance_2 : float
-        Slip distance of the second state in um. It is ignored if the law has one state.
+        Slip distance of the second state variable in um. If the friction law has one state
+        variable, the value is ignored.
 
     Returns
     -------
@@ -540,19 +546,19 @@ def scene_to_parameters(scene: Scene, distance: float, distance_2: float) -> dic
 
 
 def parameters_to_fields(values: ParameterValues, velocity: float) -> dict[str, float]:
-    """Convert parameters of a record to fields of a scene.
+    """Convert fit parameters with units to dimensionless scene fields.
 
     Parameters
     ----------
     values : mapping of str to float
         Values of the parameters, in the units of ``PARAMETERS``.
     velocity : float
-        Load point velocity in um/s that is the unit of velocity in the scene.
+        Load point velocity in um/s, which is the unit of velocity in the scene.
 
     Returns
     -------
     dict of {str: float}
-        Fields of a scene in units of its slip distance and of ``velocity``.
+        Scene fields, with the slip distance and ``velocity`` as units.
 
     Examples
     --------
@@ -603,7 +609,7 @@ def shift_parameter(
 
 
 def parameter_to_coordinate(parameter_name: str, parameter_value: float) -> float:
-    """Convert the value of a parameter to the coordinate of the search.
+    """Convert a parameter value to the coordinate that the search varies.
 
     Parameters
     ----------
@@ -624,14 +630,14 @@ def parameter_to_coordinate(parameter_name: str, parameter_value: float) -> floa
 
 
 def coordinate_to_parameter(parameter_name: str, coordinate: float) -> float:
-    """Convert a coordinate of the search to the value of a parameter.
+    """Convert a coordinate that the search varies to a parameter value.
 
     Parameters
     ----------
     parameter_name : str
         Name of the parameter.
     coordinate : float
-        Coordinate of the search.
+        Coordinate that the search varies.
 
     Returns
     -------

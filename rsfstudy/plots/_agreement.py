@@ -22,12 +22,12 @@ CurvePoints = Sequence[tuple[float, float]]
 
 @renamed_keywords
 def draw_agreement(digits: Mapping[str, CurvePoints], label: str, required_digits: float) -> Figure:
-    """Draw the number of digits that agree for each quantity.
+    """Draw the number of correct digits of each quantity.
 
     Parameters
     ----------
     digits : mapping of str to sequence of (float, float)
-        For each quantity, pairs of an x value and the number of digits that agree.
+        Pairs of an x value and the number of correct digits, for each quantity.
     label : str
         Label of the x axis. The first letter is capitalised.
     required_digits : float

@@ -1,7 +1,8 @@
 """Scales, ticks and colours for the axes of a lattice.
 
-The functions decide whether the points of an axis are numbers, whether the numbers need a log
-scale, and how the points are labelled.
+A lattice is the grid of all parameter combinations of a study, and the points of an axis are its
+parameter values. The functions in this module decide whether the points are numbers, whether the
+numbers need a log scale, and how the points are labelled.
 """
 
 from __future__ import annotations
@@ -32,15 +33,16 @@ from rsfstudy.plots._text import (
 from rsfstudy.study import read_quantities_not_in_vocabulary
 from rsfstudy.vocabulary import find_coverage_content_type, find_quantity
 
-#: Ratio of the largest value to the smallest value above which an axis has a log scale.
+#: Ratio of the largest to the smallest value above which an axis has a log scale.
 _MIN_RATIO_FOR_LOG_SCALE = 100.0
-#: Ratio of the axis limits below which a log axis has additional labels between decades.
+#: Ratio of the axis limits below which a log axis has additional tick labels between powers of ten.
 _MAX_RATIO_FOR_MINOR_LABELS = 50.0
-#: Maximum number of names along y, and maximum number of names along x.
+#: Maximum number of tick labels with names, along y and along x.
 _MAX_POINT_NAMES_ALONG_Y, _MAX_POINT_NAMES_ALONG_X = 45, 30
-#: Maximum number of horizontal names along x. If there are more names, the names are vertical.
+#: Maximum number of horizontal tick labels with names along x. If there are more names, the tick
+#: labels are vertical.
 _MAX_HORIZONTAL_NAMES_ALONG_X = 12
-#: Phrases that describe the points of some axes.
+#: Templates of phrases that describe the points of some axes, for example in titles.
 _POINT_PHRASE_TEMPLATE_BY_AXIS = {
     "law": "{} law",
     "normal_stress": "{} normal stress",
@@ -78,7 +80,8 @@ def is_numeric_variable(variable: xr.DataArray) -> bool:
     Returns
     -------
     bool
-        True for numbers and Boolean values. Variables with flags are not numeric.
+        True for numbers and Boolean values. The result is False for variables with flags, which
+        represent categories.
     """
     return variable.dtype.kind in "fiub" and "flag_values" not in variable.attrs
 
@@ -103,7 +106,7 @@ def read_flag_meanings_of_variable(variable: xr.DataArray) -> dict[float, str]:
 
 
 def measured_variables(dataset: xr.Dataset) -> list[str]:
-    """Return the names of the variables that the measure computed.
+    """Return the names of the measured variables of a study.
 
     Parameters
     ----------
@@ -115,9 +118,9 @@ def measured_variables(dataset: xr.Dataset) -> list[str]:
     -------
     list of str
         Names of the numeric variables that have the dimensions of the lattice and at least one
-        finite value. The order is the order of the dataset. The primary output is the first
-        variable. Error estimates, computational costs and variables with the suffix ``_stable`` or
-        ``_unstable`` are excluded.
+        finite value. The primary output is the first variable, and the order of the variables is
+        their order in the dataset. Error estimates, computational costs, and variables with the
+        suffix ``_stable`` or ``_unstable`` are excluded.
     """
     cells = set(dataset["status"].dims)
     values = {str(name): dataset[name] for name in dataset.data_vars}
@@ -134,7 +137,7 @@ def measured_variables(dataset: xr.Dataset) -> list[str]:
 
 
 def varying_variables(dataset: xr.Dataset) -> list[str]:
-    """Return the primary output and all measured variables that vary.
+    """Return the primary output and all measured variables that are not constant.
 
     Parameters
     ----------
@@ -144,8 +147,8 @@ def varying_variables(dataset: xr.Dataset) -> list[str]:
     Returns
     -------
     list of str
-        Name of the first measured variable, followed by the names of the other measured variables
-        that have at least two different values.
+        Name of the primary output, followed by the names of all other measured variables that have
+        at least two different values.
     """
     names = measured_variables(dataset)
     return names[:1] + [n for n in names[1:] if float(dataset[n].max()) > float(dataset[n].min())]
@@ -162,8 +165,8 @@ def are_log_spaced(points: np.ndarray) -> bool:
     Returns
     -------
     bool
-        True if there are at least three points, if the points are positive and span at least one
-        decade, and if the ratios of neighbouring points vary less than the differences.
+        True if there are at least three points, if all points are positive and span at least a
+        factor of ten, and if the ratios of neighbouring points vary less than their differences.
     """
     at = np.sort(points.astype(float))
     if at.size < 3 or at[0] <= 0.0 or at[-1] < 10.0 * at[0]:
@@ -173,7 +176,7 @@ def are_log_spaced(points: np.ndarray) -> bool:
 
 
 def are_positive_and_span_decades(values: np.ndarray) -> bool:
-    """Return True if all values are positive and span two decades.
+    """Return True if all values are positive and span a factor of 100.
 
     Parameters
     ----------
@@ -192,14 +195,14 @@ def are_positive_and_span_decades(values: np.ndarray) -> bool:
 
 
 def describe_point(cell: xr.Dataset | xr.DataArray, dimension: str) -> str:
-    """Describe the position of a cell along a dimension.
+    """Describe the value of a lattice cell along a dimension.
 
     Parameters
     ----------
     cell : xarray.Dataset or xarray.DataArray
-        One cell of a lattice, with a scalar coordinate for the dimension. If the coordinate has the
-        attributes ``long_name``, ``symbol`` and ``units``, these attributes override the vocabulary
-        of rsfstudy.
+        Results of one lattice cell, with a scalar coordinate for the dimension. If the coordinate
+        has the attributes ``long_name``, ``symbol`` and ``units``, these attributes override the
+        vocabulary of rsfstudy.
     dimension : str
         Name of the dimension.
 
@@ -233,7 +236,7 @@ def describe_point(cell: xr.Dataset | xr.DataArray, dimension: str) -> str:
 def set_x_axis_of_dimension(axes: Axes, dataset: xr.Dataset, dimension: str) -> np.ndarray:
     """Set up the x axis for the points of a dimension.
 
-    If the points are names, the names are written along the axis.
+    If the coordinate contains names instead of numbers, the names become tick labels.
 
     Parameters
     ----------
@@ -247,8 +250,8 @@ def set_x_axis_of_dimension(axes: Axes, dataset: xr.Dataset, dimension: str) -> 
     Returns
     -------
     ndarray, shape (n,)
-        Position of each point along x. The position of a number is its value, and the positions of
-        names are 0, 1, and so on.
+        Position of each point along x. Numbers are drawn at their values, and names are drawn at 0,
+        1, and so on.
     """
     points = dataset[dimension].values
     if has_numeric_points(dataset, dimension):
@@ -302,7 +305,7 @@ def set_ticks_with_point_names(
     max_line_characters: int,
     max_ticks: int = _MAX_POINT_NAMES_ALONG_Y,
 ) -> None:
-    """Label the positions 0, 1, 2, ... of an axis with names.
+    """Use names as tick labels at the positions 0, 1, 2, ... of an axis.
 
     Parameters
     ----------
@@ -322,14 +325,14 @@ def set_ticks_with_point_names(
 
 
 def label_rows(axes: Axes, names: list[str], width: int = 60) -> None:
-    """Label the rows of a figure with names, from top to bottom.
+    """Use names as y tick labels, from top to bottom.
 
-    The y axis is inverted, and its limits leave a margin of half a row at both ends.
+    The y axis is inverted, and its limits include a margin of half a row at both ends.
 
     Parameters
     ----------
     axes : matplotlib.axes.Axes
-        Axes whose rows are at y = 0, 1, 2, and so on.
+        Axes with rows at y = 0, 1, 2, and so on.
     names : list of str
         Names of the rows.
     width : int, default: 60
@@ -366,8 +369,8 @@ def point_colours(dataset: xr.Dataset, dimension: str) -> np.ndarray:
     Returns
     -------
     ndarray, shape (n, 4)
-        RGBA colour of each point. The colour scale is logarithmic if the points are spaced
-        logarithmically.
+        RGBA colour of each point. If the points are spaced logarithmically, the colour scale is
+        logarithmic.
     """
     points = dataset[dimension].values.astype(float)
     return np.asarray(_build_colour_scale(dataset, dimension).to_rgba(points))
@@ -383,7 +386,7 @@ def add_colour_bar(dataset: xr.Dataset, axes: Axes, dimension: str) -> None:
     dataset : xarray.Dataset
         Dataset with a numeric coordinate for the dimension.
     axes : matplotlib.axes.Axes
-        Axes of the panel. The colour bar is placed on the right.
+        Axes of the panel. The colour bar is placed to the right of the axes.
     dimension : str
         Name of the dimension.
     """

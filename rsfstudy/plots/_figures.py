@@ -1,8 +1,8 @@
 """Drawing and saving of the figures of study results.
 
-The function ``draw_figure`` draws the figure that a study declares, a generic figure of any
-lattice, or a user-defined figure. The function ``save_figure`` writes the figure of a study to a
-file. The style sheet ``rsfstudy.mplstyle`` defines the appearance of all figures.
+The function ``draw_figure`` draws the figure that a study declares, a generic figure that can
+display any study, or a user-defined figure. The function ``save_figure`` writes the figure of a
+study to a file. The style sheet ``rsfstudy.mplstyle`` defines the appearance of all figures.
 """
 
 from __future__ import annotations
@@ -51,22 +51,24 @@ from rsfstudy.study import Panel, Study, load_study, read_quantities_not_in_voca
 from rsfstudy.study import failed_cell_mask as failed_cell_mask
 from rsfstudy.vocabulary import FORMULAS_OF_DERIVED_COORDINATES, find_quantity
 
-#: Names of the figures that can display any lattice.
+#: Names of the generic figures that can display any study.
 _NAMES_OF_FIGURES_FOR_ANY_LATTICE = ("lines", "maps")
-#: Name of the figure of fits of records.
+#: Name of the figure that shows fits of records.
 _NAME_OF_FITS_FIGURE = "fits"
 #: Names of all figures, including the figures of the named studies.
 FIGURE_NAMES = (*_NAMES_OF_FIGURES_FOR_ANY_LATTICE, _NAME_OF_FITS_FIGURE, *study_names())
 
 #: Resolution of figures in notebooks, in dots per inch.
 _SCREEN_DPI = 150
-#: Metadata that remove the date from a file, so that two files of the same figure are identical.
+#: Metadata that remove the creation date from an image file, so that two files of the same figure
+#: are identical.
 _IMAGE_METADATA_WITHOUT_DATES: dict[str, dict[str, Any]] = {
     "pdf": {"CreationDate": None},
     "svg": {"Date": None},
 }
-#: Maximum number of points of additional axes for which the panels of a figure are repeated, and
-#: maximum number of repeated panels.
+#: The panels of a figure are repeated for each point of additional axes. The first value is the
+#: maximum number of such points, and the second value is the maximum number of panels after the
+#: repetition.
 _MAX_POINTS_OF_REPEATED_AXES, _MAX_PANELS_AFTER_REPEATING = 4, 12
 #: Height of a panel of a scatter matrix in mm.
 _SCATTER_PANEL_HEIGHT = 44.0
@@ -94,7 +96,7 @@ class NotebookFigure(Figure):
     def __init__(self, *args: Any, **options: Any) -> None:
         """Create the figure with a canvas that can render images."""
         super().__init__(*args, **options)
-        # The canvas keeps its renderer, which is used to measure the size of texts.
+        # The canvas keeps its renderer, which is used to measure the size of text.
         FigureCanvasAgg(self)
 
     def _repr_png_(self) -> bytes:
@@ -113,13 +115,13 @@ def draw_figure(
     Parameters
     ----------
     dataset : xarray.Dataset
-        Results of a study. The dataset needs the variable ``status`` along the dimensions of the
-        lattice, the variables that the figure displays, and the attributes that ``rsfstudy.run``
-        adds.
+        Results of a study. The dataset must contain the variable ``status`` along the dimensions of
+        the lattice, the variables that the figure displays, and the attributes that
+        ``rsfstudy.run`` adds.
     user_figure : callable, module, Figure or str, optional
         User-defined figure: a function ``draw(dataset, axes)``, a module with a function ``draw``,
-        or an ``rsfstudy.Figure``. A string selects a generic figure of maps or lines. The default
-        is the figure that the study declares.
+        or an ``rsfstudy.Figure``. A string is the name of a generic figure, ``"maps"`` or
+        ``"lines"``. The default is the figure that the study declares.
     variable : str, optional
         Name of a variable to draw instead of the declared figure. The variable is drawn as maps if
         the lattice has two numeric axes, and as lines otherwise.
@@ -139,15 +141,16 @@ def draw_figure(
         If the declaration of the study contains an unknown figure, if ``user_figure`` cannot draw,
         if the variable is missing or not numeric, or if a style is invalid.
     DataError
-        If the dataset has no declaration, or if x and y of a curve have different sizes.
+        If the dataset has no attribute with a declaration, or if x and y of a curve have different
+        sizes.
 
     Notes
     -----
-    Only the figures of rsfstudy can be selected by name. The function never imports another module
-    because of the contents of a file.
+    Only figures of rsfstudy can be selected by name. The function never imports a module that a
+    results file names.
 
-    If the results have more axes than the declared figure can display, the figure is replaced by a
-    generic figure of maps or lines.
+    If the results have more axes than the declared figure can display, the function draws a generic
+    figure of maps or lines instead.
 
     Examples
     --------
@@ -204,7 +207,7 @@ def draw_figure(
 
 
 def _missing_cells_note(dataset: xr.Dataset) -> str:
-    """Return a note in brackets about missing and failed cells.
+    """Return a note in brackets about missing and failed lattice cells.
 
     The note is empty if the results are complete.
     """
@@ -218,7 +221,7 @@ def _missing_cells_note(dataset: xr.Dataset) -> str:
 
 
 def _format_note_on_overrides(dataset: xr.Dataset, max_line_characters: int) -> str:
-    """Return a note about the values that differ from the declaration."""
+    """Return a note about settings that differ from the study declaration."""
     own = read_quantities_not_in_vocabulary(dataset)
     names = {n: quantity_symbol(find_quantity(n, own)) for n in read_declaration(dataset).overrides}
     values = {names[name]: value for name, value in read_declaration(dataset).overrides.items()}
@@ -237,7 +240,8 @@ def _choose_figure(
     """Choose the figure of a dataset and create all its panels.
 
     The function also returns the dataset with the axes that the figure expects. If the dataset has
-    more axes than the declared figure can display, a generic figure of maps or lines is chosen.
+    more axes than the declared figure can display, the function chooses a generic figure of maps or
+    lines.
     """
     name, sizes = read_declaration(dataset).plot, dataset["status"].sizes
     study = load_study(name) if name in study_names() else None
@@ -280,8 +284,8 @@ def _expand_panels_of_figure(
 ) -> list[Panel]:
     """Create the panels of a figure for all facets and additional axes.
 
-    Additional axes are axes that the figure does not name. The panels are repeated for each point
-    of the additional axes, and the titles describe the points.
+    Additional axes are axes that the declaration of the figure does not mention. The panels are
+    repeated for each point of the additional axes, and the titles describe the points.
     """
     found: list[Panel] = []
     for at in np.ndindex(*(dataset.sizes[dimension] for dimension in extra_dimensions)):
@@ -320,10 +324,10 @@ def _restore_dimensions_of_selected_axes(dataset: xr.Dataset, study: Study) -> x
 
 
 def _generic_figure(dataset: xr.Dataset, variable: str | None = None) -> Declared:
-    """Return a figure that can display any lattice.
+    """Return a generic figure that can display any study.
 
-    The figure is a scatter matrix for samples, a set of maps if there are two numeric axes, and a
-    line plot otherwise.
+    The figure is a scatter matrix for studies with samples, a set of maps if there are two numeric
+    axes, and a line plot otherwise.
     """
     from rsfstudy.plots import _axes, lines, maps, samples
 
@@ -356,7 +360,7 @@ def save_figure(
 ) -> None:
     """Write the figure of a study to a file.
 
-    If an error occurs, an existing file is not changed.
+    If an error occurs, an existing file with the same path is not changed.
 
     Parameters
     ----------
@@ -374,9 +378,9 @@ def save_figure(
     Raises
     ------
     InvalidValue
-        If the suffix of the file is unknown, or if the figure does not fit the results.
+        If the suffix of the file is unknown, or if the figure cannot display the results.
     DataError
-        If the dataset has no declaration.
+        If the dataset has no attribute with a declaration.
     OSError
         If the file cannot be written.
 
@@ -407,7 +411,7 @@ def save_figure(
         raise InvalidValue("figure", path.name, "needs an ending we write", choices=FIGURE_FORMATS)
     try:
         drawn = draw_figure(dataset, user_figure, variable=variable, style=style)
-        # The layout is final and must not be computed again when the figure is saved.
+        # The layout is final, so it must not be computed again when the figure is saved.
         drawn.set_layout_engine(None)
         with style_context(style):
             image = render_figure(drawn, form)
@@ -452,13 +456,13 @@ def render_figure(figure: Figure, image_format: str) -> bytes:
 def write_image(image: bytes, path: Path) -> None:
     """Write an image to a file atomically.
 
-    The image is written to a temporary file in the same directory. The temporary file then replaces
-    the existing file. Missing parent directories are created.
+    The function writes the image to a temporary file in the same directory, and renames the
+    temporary file. Missing parent directories are created.
 
     Parameters
     ----------
     image : bytes
-        Contents of the file.
+        Encoded image.
     path : Path
         Path of the file.
 

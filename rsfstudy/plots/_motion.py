@@ -1,7 +1,7 @@
 """Figure of a single motion or limit cycle.
 
-The function ``plot_motion`` draws friction and slip rate along the motion, and the path of the
-motion in the phase plane.
+The function ``plot_motion`` draws friction and slip rate against displacement or time, and the
+trajectory of the motion in the phase plane.
 """
 
 from __future__ import annotations
@@ -39,9 +39,9 @@ from rsfstudy.storage import read_scene_fields
 #: Height of a panel in mm.
 PANEL_HEIGHT_MM = 48.0
 NATURAL_LOG_OF_10 = math.log(10.0)
-#: Names of the variables that may be drawn along x.
+#: Variables that can be drawn along x.
 ABSCISSA_VARIABLES = ("load_point_displacement", "slip", "time")
-#: Relative change below which the load point displacement or the slip rate is considered constant.
+#: Relative change below which the load point displacement or the slip rate counts as constant.
 #: Smaller changes are due to rounding errors.
 _MAX_RELATIVE_CHANGE_OF_HELD_LOAD_POINT = 1e-6
 _FRICTION_LABEL = r"Friction coefficient, $\mu$"
@@ -60,22 +60,22 @@ def plot_motion(
         Motion from ``rsfstudy.simulate``, or limit cycle from ``rsfstudy.limit_cycle``. The
         required variables are ``slip``, ``log10_slip_rate``, ``frictional_stress``, the variable
         along x, and ``normal_stress_ratio`` or ``effective_normal_stress``. In addition, a motion
-        needs ``friction_coefficient``, and a limit cycle needs ``shear_stress``. All variables have
-        the dimensions of ``slip``. The attribute ``scene`` is also required.
+        needs ``friction_coefficient``, and a limit cycle needs ``shear_stress``. All variables must
+        have the dimensions of ``slip``. The attribute ``scene`` is also required.
     rig : Rig, optional
         Rig whose scales convert the axes to MPa, um and s. By default, the axes are in the units of
         the dataset.
     against : {"load_point_displacement", "slip", "time"}, optional
-        Variable along x. The default is the load point displacement. If the load point is
-        stationary, the default is the slip. For a limit cycle, the default is the time, because the
-        load point displacement is unknown.
+        Variable along x. The default is the load point displacement, or the slip if the load point
+        is stationary. For a limit cycle, the default is the time, because the load point
+        displacement is unknown.
 
     Returns
     -------
     matplotlib.figure.Figure
         Figure with three panels. The panels show the friction coefficient, the slip rate, and the
-        path in the phase plane with the line of steady sliding. For a limit cycle, the first panel
-        shows the shear stress.
+        trajectory in the phase plane with the steady-state friction. For a limit cycle, the first
+        panel shows the shear stress.
 
     Raises
     ------
@@ -132,8 +132,8 @@ def _check_motion(motion: xr.Dataset, abscissa: str | None) -> None:
     Raises
     ------
     DataError
-        If a variable is missing, is not numeric or has the wrong dimensions, or if a slip rate
-        exceeds the range of floating-point numbers.
+        If a variable is missing, if a variable is not numeric or has the wrong dimensions, or if a
+        slip rate exceeds the range of floating-point numbers.
     """
     stress = () if "friction_coefficient" in motion else ("shear_stress",)
     needed = ("slip", abscissa or "time", "frictional_stress", "log10_slip_rate", *stress)
@@ -159,9 +159,9 @@ def _find_normal_stress_name(motion: xr.Dataset) -> str:
 def _choose_abscissa(motion: xr.Dataset) -> str:
     """Choose the variable along x.
 
-    The result is the load point displacement, or the slip if the load point displacement is
-    constant apart from rounding errors. If the load point displacement is missing, the result is
-    the time.
+    The function chooses the load point displacement, or the slip if the load point displacement is
+    constant apart from rounding errors. If the dataset has no load point displacement, the function
+    chooses the time.
     """
     if "load_point_displacement" not in motion:
         return "time"
@@ -173,7 +173,7 @@ def _choose_abscissa(motion: xr.Dataset) -> str:
 
 
 def _motion_title(motion: xr.Dataset) -> str:
-    """Return the title of a motion, with its status if it ended early."""
+    """Return the title of a motion, with the status if the motion ended early."""
     status = motion.attrs.get("status", "ok")
     ending = "" if status == "ok" else f" [{status}: {motion.attrs.get('message', '')}]"
     title = motion.attrs.get("title", "Limit cycle of a spring-slider")
@@ -201,11 +201,12 @@ def _draw_slip_rate(displayed_motion: xr.Dataset, axes: Axes, abscissa: str) -> 
 
 
 def _draw_phase_plane(motion: xr.Dataset, displayed_motion: xr.Dataset, axes: Axes) -> None:
-    """Draw friction against slip rate, with the line of steady sliding."""
+    """Draw friction and steady-state friction against slip rate."""
     logs = motion["log10_slip_rate"]
     rates = displayed_motion.get("slip_rate", (10.0**logs).assign_attrs(units="$V_*$"))
     scale = float(rates[0]) / 10.0 ** float(logs[0])
-    # During ruptures, the spring stress also includes the stress that accelerates the mass.
+    # During ruptures, the spring stress is the sum of the frictional stress and the stress that
+    # accelerates the mass.
     friction = motion["frictional_stress"] / motion[_find_normal_stress_name(motion)]
     axes.plot(scale * 10.0**logs, friction, **cycle_style(0), label="motion")
     axes.plot(
@@ -224,10 +225,11 @@ def _draw_phase_plane(motion: xr.Dataset, displayed_motion: xr.Dataset, axes: Ax
 def _compute_steady_friction(
     scene_fields: dict[str, Any], log10_rates: np.ndarray
 ) -> np.ndarray | None:
-    """Compute the friction coefficient of steady sliding.
+    """Compute the steady-state friction coefficient.
 
-    The loading of the scene is ignored, because steady sliding does not depend on the loading. The
-    result is None if another part of the scene is unknown.
+    The loading of the scene is ignored, because steady-state friction does not depend on the
+    loading. The result is None if rsfstudy cannot build the scene, for example because of an
+    unknown friction law.
     """
     try:
         scene = Scene(

@@ -41,14 +41,14 @@ from rsfstudy.status import Status
 from rsfstudy.study import Panel, read_quantities_not_in_vocabulary
 from rsfstudy.vocabulary import find_quantity
 
-#: Line styles and marker fill styles for the points of the second axis of ``hue``.
+#: Line styles and marker fill styles for the points of the second lattice axis in ``hue``.
 _LINE_AND_FILL_STYLES_OF_SECOND_HUE = (
     ("-", "full"),
     ("--", "none"),
     (":", "none"),
     ("-.", "full"),
 )
-#: Number of points of a numeric axis above which a colour bar replaces legend entries, and number
+#: Number of points of a numeric axis above which the legend is replaced by a colour bar, and number
 #: of points of a curve above which markers are omitted.
 _MIN_POINTS_FOR_COLOUR_SCALE, _MAX_POINTS_WITH_MARKERS = 7, 60
 #: Maximum number of decimal places of a slope.
@@ -59,20 +59,20 @@ _ARRAY_OF_ONE_MISSING_VALUE = xr.DataArray(np.nan)
 
 
 def expand_facets(panel: Panel, dataset: xr.Dataset) -> list[Panel]:
-    """Create one panel for each point of the facet axes.
+    """Create one panel for each point of the lattice axes in ``facet``.
 
     Parameters
     ----------
     panel : Panel
-        Panel with the axes ``facet``.
+        Panel whose field ``facet`` names lattice axes.
     dataset : xarray.Dataset
         Results of a study, with the variables of the panel and the variable ``status``.
 
     Returns
     -------
     list of Panel
-        Panels without facets. Panels without data are omitted. The list is empty if the condition
-        of the panel is not met.
+        Panels without facets. Panels without data are omitted. The list is empty if the dataset
+        does not meet the condition of the panel.
     """
     if (
         isinstance(panel.y, str)
@@ -103,7 +103,7 @@ def _has_data(panel: Panel, dataset: xr.Dataset) -> bool:
 
 
 def _select_data_of_panel(panel: Panel, dataset: xr.Dataset) -> xr.Dataset:
-    """Select the part of a dataset that a panel displays."""
+    """Select the data that a panel displays."""
     at = {d: place for d, place in panel.isel.items() if d in dataset.dims}
     return dataset.isel(
         {d: _find_indices_of_selected_points(dataset[d], place) for d, place in at.items()}
@@ -122,12 +122,12 @@ def restrict_panel_to_point_of_extra_dims(
     point_indices : mapping of str to int
         Index of the point along each additional dimension.
     title_suffix : str
-        Description of the point, which is appended to the title.
+        Description of the point, which is appended to the title of the panel.
 
     Returns
     -------
     Panel
-        Copy of the panel without a condition.
+        Copy of the panel that is restricted to the point and has no condition.
     """
     own = {dimension: at for dimension, at in panel.isel.items() if dimension not in point_indices}
 
@@ -156,7 +156,7 @@ def draw_panel(panel: Panel, dataset: xr.Dataset, axes: Axes) -> None:
     Raises
     ------
     DataError
-        If x and y of a curve are not one-dimensional arrays of the same size.
+        If the x and y values of a curve are not one-dimensional arrays of the same size.
     """
     part = _select_data_of_panel(panel, dataset)
     places = "" if panel.is_custom else _describe_selected_points(part, panel.isel)
@@ -173,7 +173,8 @@ def draw_panel(panel: Panel, dataset: xr.Dataset, axes: Axes) -> None:
         if any(end is not None for end in limits):
             getattr(axes, f"set_{which}lim")(*limits)
         if which == "y" and limits[1] is None is not limits[0]:
-            # A margin above the highest point keeps the marker of this point inside the panel.
+            # A margin above the highest point keeps the marker of the highest point inside the
+            # panel.
             top = float(axes.dataLim.ymax)
             axes.set_ylim(top=max(axes.get_ylim()[1], top + 0.05 * (top - limits[0])))
     across, up = estimate_text_capacity_in_characters(axes)
@@ -192,15 +193,15 @@ def draw_panel(panel: Panel, dataset: xr.Dataset, axes: Axes) -> None:
 def finalize_scales_and_legends(panels: Sequence[Panel], axes_of_panels: Sequence[Axes]) -> None:
     """Apply common scales to the panels and add legends.
 
-    Panels with the same ``y_scale_group`` get the same y limits and the same colour limits. Custom
-    panels are not changed.
+    Panels with the same ``y_scale_group`` get the same y limits and the same colour limits. Panels
+    that are drawn by a user-defined function are not changed.
 
     Parameters
     ----------
     panels : sequence of Panel
         All panels of the figure.
     axes_of_panels : sequence of matplotlib.axes.Axes
-        Axes of the panels, in the same order.
+        Axes of the panels, in the order of ``panels``.
     """
     pairs = [(p, axes) for p, axes in zip(panels, axes_of_panels, strict=True) if not p.is_custom]
     for name in {panel.y_scale_group for panel, _axes in pairs if panel.y_scale_group}:
@@ -226,14 +227,14 @@ def iterate_curves_and_styles(
     Parameters
     ----------
     panel : Panel
-        Panel with the axes ``hue``.
+        Panel whose field ``hue`` names lattice axes.
     panel_data : xarray.Dataset
-        Part of the dataset that the panel displays.
+        Data that the panel displays.
 
     Yields
     ------
     row : xarray.Dataset
-        Part of the dataset that the curve displays.
+        Data that the curve displays.
     style : dict of str to object
         Properties of the curve, as for ``matplotlib.axes.Axes.plot``.
     """
@@ -256,7 +257,7 @@ def iterate_curves_and_styles(
 
 
 def _choose_style_of_second_hue_point(point_number: int) -> dict[str, str]:
-    """Return the line style and marker fill style for the second hue axis."""
+    """Return the line and marker fill style of a point of the second ``hue`` axis."""
     line, fill = _LINE_AND_FILL_STYLES_OF_SECOND_HUE[
         point_number % len(_LINE_AND_FILL_STYLES_OF_SECOND_HUE)
     ]
@@ -264,10 +265,10 @@ def _choose_style_of_second_hue_point(point_number: int) -> dict[str, str]:
 
 
 def _add_second_hue_legend(panel: Panel, panel_data: xr.Dataset, axes: Axes) -> None:
-    """Add the line styles of the second hue axis to the legend.
+    """Add the line styles of the second axis in ``hue`` to the legend.
 
-    The entries are grey. No entries are added if only one hue axis varies, if the first hue axis
-    has a colour scale, or if the panel defines its own curve labels.
+    The legend entries are grey. No entries are added if only one axis in ``hue`` varies, if the
+    first axis has a colour scale, or if the panel defines its own curve labels.
     """
     if panel.curve_label is None and len([d for d in panel.hue if panel_data.sizes[d] > 1]) > 1:
         second = panel.hue[1]
@@ -282,9 +283,9 @@ def _add_second_hue_legend(panel: Panel, panel_data: xr.Dataset, axes: Axes) -> 
 
 
 def _curve_colours(panel_data: xr.Dataset, dimension: str) -> np.ndarray | None:
-    """Return the colours of a long numeric axis.
+    """Return the colours of a numeric axis with many points.
 
-    The result is None if the axis is short or not numeric.
+    The result is None if the axis has few points or is not numeric.
     """
     long = panel_data.sizes[dimension] > _MIN_POINTS_FOR_COLOUR_SCALE and has_numeric_points(
         panel_data, dimension
@@ -295,7 +296,7 @@ def _curve_colours(panel_data: xr.Dataset, dimension: str) -> np.ndarray | None:
 def _format_curve_name(
     panel: Panel, curve_data: xr.Dataset, dimensions: Sequence[str]
 ) -> str | None:
-    """Return the legend label of a curve, with its slope if there is one."""
+    """Return the legend label of a curve, including its slope if available."""
     name = (
         to_mathtext(panel.curve_label(curve_data))
         if panel.curve_label
@@ -307,7 +308,7 @@ def _format_curve_name(
     slope = f"{symbol} = {format_slope(curve_data, panel.annotation, _SLOPE_DIGITS)}".removeprefix(
         " = "
     )
-    # A single formula cannot be broken at the equals sign when the label is wrapped.
+    # The equation is a single formula, so that a line break at the equals sign is impossible.
     return f"{name}: {slope.replace('$ = $', ' = ')}"
 
 
@@ -319,7 +320,7 @@ def _draw_curve(
     Raises
     ------
     DataError
-        If x and y are not one-dimensional arrays of the same size.
+        If the x and y values are not one-dimensional arrays of the same size.
     """
     values = (
         _evaluate_name_or_function(panel.x, curve_data),
@@ -348,7 +349,7 @@ def _draw_curve(
         panel.fit_line
         and np.isfinite(line := np.broadcast_arrays(*panel.fit_line(curve_data))).any()
     ):
-        # The line has no markers, but its legend entry shows the marker of the points.
+        # The line is drawn without markers, but its legend entry shows the marker of the points.
         axes.plot(*line, **style | {"linewidth": 0.9, "markevery": []})
     if panel.error_bars:
         bars = {"fmt": "none", "ecolor": style["color"], "elinewidth": 0.8, "capsize": 3}
@@ -357,7 +358,7 @@ def _draw_curve(
 
 
 def _evaluate_name_or_function(name_or_function: Any, curve_data: xr.Dataset) -> np.ndarray:
-    """Return the values of a variable or of a function of the dataset."""
+    """Return the values of a variable, or the result of a function."""
     return np.atleast_1d(
         np.asarray(
             name_or_function(curve_data)
@@ -368,10 +369,10 @@ def _evaluate_name_or_function(name_or_function: Any, curve_data: xr.Dataset) ->
 
 
 def _find_indices_of_selected_points(points: xr.DataArray, index_or_function: Any) -> Any:
-    """Convert a selection of points to indices without duplicates.
+    """Convert a selection of axis points to indices without duplicates.
 
-    If the selection is a function, such as ``min``, the function receives a list of all coordinate
-    values, and returns one value or a list of values.
+    The selection may be a function such as ``min``, which takes a list of all coordinate values and
+    returns one value or a list of values.
     """
     if callable(index_or_function):
         values, wanted = points.values.tolist(), index_or_function(points.values.tolist())
@@ -386,7 +387,7 @@ def _find_indices_of_selected_points(points: xr.DataArray, index_or_function: An
 
 
 def _set_axis_scales(panel: Panel, panel_data: xr.Dataset, axes: Axes, values: np.ndarray) -> None:
-    """Set the scales of a panel, label named points and add a colour bar."""
+    """Set the scales of a panel, set tick labels and add a colour bar."""
     named = isinstance(panel.x, str) and panel_data[panel.x].dtype.kind not in "fiu"
     if named:
         set_x_axis_of_dimension(axes, panel_data, str(panel.x))
@@ -408,7 +409,7 @@ def _set_axis_scales(panel: Panel, panel_data: xr.Dataset, axes: Axes, values: n
 def _axis_label(
     name_or_function: Any, declared_label: Any, panel_data: xr.Dataset, max_line_characters: int
 ) -> str:
-    """Return the label of an axis, wrapped to a given width."""
+    """Return the label of an axis, wrapped to the width of the panel."""
     if declared_label is not None:
         return wrap_text(
             _resolve_text_or_function(declared_label, panel_data, ""), max_line_characters
@@ -426,9 +427,9 @@ def _axis_label(
 def _resolve_text_or_function(
     text_or_function: Any, panel_data: xr.Dataset, default_text: str
 ) -> str:
-    """Return the text of a panel, or a default text if the text is None.
+    """Return a label or title of a panel, or the default if it is None.
 
-    If the text of the panel is a function, the function is called with the dataset.
+    If the label or title is a function, the function is called with the dataset.
     """
     if text_or_function is None:
         return default_text
@@ -436,7 +437,7 @@ def _resolve_text_or_function(
 
 
 def _describe_selected_points(panel_data: xr.Dataset, selected_indices: Mapping[str, Any]) -> str:
-    """Describe the selected points of a panel for its title."""
+    """Describe the selected axis points of a panel for its title."""
     return _join_and_capitalise_phrases(
         *(
             describe_point(panel_data, dimension)
@@ -449,7 +450,7 @@ def _describe_selected_points(panel_data: xr.Dataset, selected_indices: Mapping[
 def _join_and_capitalise_phrases(*phrases: str) -> str:
     """Join phrases with commas and capitalise the first letter.
 
-    Empty phrases are omitted.
+    The function omits empty phrases.
     """
     text = ", ".join(filter(None, phrases))
     return f"{text[:1].upper()}{text[1:]}"

@@ -1,8 +1,8 @@
 """Style sheet, legends and layout of figures.
 
-The context manager ``style_context`` applies the style sheet of rsfstudy. The other functions
-compute the size of a figure, cycle through colours and markers, place legends outside the data
-area, and finish the layout after all panels are drawn.
+The context manager ``style_context`` applies the style sheet of rsfstudy. The other functions in
+this module compute the size of a figure, cycle through colours and markers, place legends outside
+the data area, and compute the layout after all panels are drawn.
 """
 
 from __future__ import annotations
@@ -65,7 +65,7 @@ def style_context(user_styles: Any = None) -> Iterator[None]:
     ------
     InvalidValue
         If an argument is not a valid style, if a style contains an unknown setting, or if a figure
-        cannot be drawn in this style, for example because the style needs LaTeX and LaTeX is not
+        cannot be drawn in the style, for example because the style needs LaTeX and LaTeX is not
         installed.
 
     Examples
@@ -83,7 +83,7 @@ def style_context(user_styles: Any = None) -> Iterator[None]:
             yield
         except (RsfStudyError, OSError):
             raise
-        # Settings that are valid separately may be invalid in combination.
+        # Settings that are individually valid may be invalid in combination.
         except Exception as error:
             if not settings:
                 raise
@@ -97,7 +97,7 @@ def style_context(user_styles: Any = None) -> Iterator[None]:
 def _to_matplotlib_style(user_style: Any) -> str | dict[str, Any]:
     """Convert a style to an argument of ``matplotlib.style.use``.
 
-    The result is the name of a style or a dictionary of checked settings. Other arguments are
+    The result is the name of a style or a dictionary of checked settings. Other styles are
     rejected, because matplotlib would import a package for a dotted name, download a style sheet
     from a URL, or parse any text file with one warning per line.
     """
@@ -114,17 +114,17 @@ def _to_matplotlib_style(user_style: Any) -> str | dict[str, Any]:
 
 
 def _format_style_for_message(user_style: Any) -> Any:
-    """Return a style in a form that is readable in an error message."""
+    """Format a style for an error message."""
     return str(user_style) if isinstance(user_style, Path) else user_style
 
 
 def _validate_settings(settings: Mapping[Any, Any]) -> dict[str, Any]:
-    """Validate settings and convert the values as matplotlib does.
+    """Validate matplotlib settings and convert their values.
 
     Raises
     ------
     InvalidValue
-        If a name is unknown or a value is invalid.
+        If the name of a setting is unknown, or if a value is invalid.
     """
     checked: Any = RcParams()
     for name, value in settings.items():
@@ -189,8 +189,8 @@ def figure_size(
     Parameters
     ----------
     panel_columns : int
-        Number of columns of panels. A figure with one column of panels is as wide as one column of
-        a journal page, and any other figure is as wide as the page.
+        Number of columns of panels. A figure with one column of panels is as wide as a column of a
+        journal page. All other figures are as wide as the page.
     panel_rows : int
         Number of rows of panels.
     panel_height_mm : float, optional
@@ -216,7 +216,7 @@ def cycle_style(number: int) -> dict[str, Any]:
     Parameters
     ----------
     number : int
-        Index of the curve, starting at 0. The styles repeat after the last style of the cycle.
+        Index of the curve, starting at 0. The styles are repeated cyclically.
 
     Returns
     -------
@@ -241,7 +241,7 @@ def cycle_marker(number: int) -> str:
     Parameters
     ----------
     number : int
-        Index of the curve, starting at 0. The markers repeat after the tenth curve.
+        Index of the curve, starting at 0. The markers are repeated after ten curves.
 
     Returns
     -------
@@ -260,8 +260,8 @@ def cycle_marker(number: int) -> str:
 def add_panel_letters(panel_axes: Sequence[Axes]) -> None:
     """Label the panels of a figure with (a), (b), and so on.
 
-    The letters are placed to the left of the titles. If the figure has only one panel, no letter is
-    added.
+    The letters are placed to the left of the panel titles. If the figure has only one panel, no
+    letter is added.
 
     Parameters
     ----------
@@ -306,7 +306,7 @@ def add_legend(axes: Axes, legend_columns: int = 2, title: str | None = None) ->
     """Add a legend below the axes, outside the data area.
 
     Call this function after the x label is set, because the position of the legend depends on the
-    height of the label. If the axes have no labelled and visible data, no legend is added.
+    height of the x label. If the axes have no visible data with a label, no legend is added.
 
     Parameters
     ----------
@@ -324,7 +324,8 @@ def add_legend(axes: Axes, legend_columns: int = 2, title: str | None = None) ->
     lines = axes.get_xlabel().count("\n") + _estimate_tick_label_line_count(axes)
     drop = rcParams["font.size"] * (2.9 + 1.3 * lines)
     figure, (left, right) = cast(Figure, axes.figure), _horizontal_extent_in_figure(axes)
-    # A legend that extends below the colour bar would make the layout engine narrow the panel.
+    # If the legend extended below the colour bar, the layout engine would reduce the width of the
+    # panel.
     if getattr(axes, "_colorbars", ()):
         right -= _COLOUR_BAR_FRACTION_OF_PANEL * (right - left)
     below = offset_copy(axes.transAxes, figure, 0.0, -drop, "points")
@@ -349,7 +350,7 @@ def _estimate_tick_label_line_count(axes: Axes) -> float:
 
 
 def _legend_entries(axes: Axes) -> dict[str, Any]:
-    """Return a dictionary of the visible artists with their labels as keys."""
+    """Return a dictionary of the visible artists, keyed by their labels."""
     named: dict[str, Any] = {}
     for handle, label in zip(*axes.get_legend_handles_labels(), strict=True):
         if _is_visible(handle):
@@ -366,7 +367,7 @@ def _fit_legend_to_width(
     """Create a legend with as many columns as fit into a given width.
 
     The width is in pixels. Matplotlib fills the columns of a legend one after another, so the
-    entries are reordered to be read line by line.
+    function reorders the entries to be read line by line.
     """
     for beside in range(min(max_columns, len(handles_by_label)), 0, -1):
         texts = [
@@ -378,10 +379,10 @@ def _fit_legend_to_width(
 
 
 def add_grey_legend_entry(axes: Axes, name: str, style: Mapping[str, Any]) -> None:
-    """Add an entry in grey to the legend of the axes.
+    """Add a grey entry to the legend of the axes.
 
-    The entry explains a line style or a marker that is drawn in several colours. Call this function
-    before the legend is created.
+    A grey entry explains a line style or a marker that is drawn in several colours. Call this
+    function before the legend is created.
 
     Parameters
     ----------
@@ -394,7 +395,8 @@ def add_grey_legend_entry(axes: Axes, name: str, style: Mapping[str, Any]) -> No
 
     Notes
     -----
-    The entry belongs to a line outside the visible area of the axes.
+    The function draws a line outside the visible area of the axes, because a legend entry needs an
+    artist.
 
     Examples
     --------
@@ -410,7 +412,7 @@ def add_grey_legend_entry(axes: Axes, name: str, style: Mapping[str, Any]) -> No
 
 
 def _horizontal_extent_in_figure(axes: Axes) -> tuple[float, float]:
-    """Return the left and right limits of the space for a panel.
+    """Return the left and right limits of the space available to a panel.
 
     The limits are fractions of the figure width.
     """
@@ -422,7 +424,7 @@ def _horizontal_extent_in_figure(axes: Axes) -> tuple[float, float]:
 
 
 def _is_visible(handle: Any) -> bool:
-    """Return True if the artist of a legend entry has visible data."""
+    """Return True if an artist has visible data."""
     if isinstance(handle, ErrorbarContainer):
         handle = handle.lines[0]
     if isinstance(handle, Line2D):
@@ -434,7 +436,7 @@ def _is_visible(handle: Any) -> bool:
 
 
 def merge_common_legends(figure: Figure, panel_axes: Sequence[Axes]) -> None:
-    """Replace the legends of similar panels by one legend of the figure.
+    """Replace the legends of similar panels with a common figure legend.
 
     Panels are similar if one of their legends contains all entries of the other legends. The common
     legend is placed below the panels. The legends are only replaced if more than half of the
@@ -470,7 +472,8 @@ def merge_common_legends(figure: Figure, panel_axes: Sequence[Axes]) -> None:
 def enlarge_for_legends(figure: Figure, panel_rows: Sequence[Sequence[Axes]]) -> None:
     """Increase the figure height by the height of legends and tick labels.
 
-    As a result, legends and long tick labels do not reduce the height of the panels.
+    Because of the additional height, legends and long tick labels do not reduce the height of the
+    panels.
 
     Parameters
     ----------
@@ -499,7 +502,7 @@ def _legend_height(legend: Legend) -> float:
 
 
 def freeze_tick_label_size(axes: Axes) -> None:
-    """Set the size of the tick labels to the size in the current style.
+    """Set the font size of the tick labels to the size in the current style.
 
     Matplotlib may create ticks after the style context has ended. The explicit size ensures that
     later tick labels have the same size.
@@ -516,9 +519,9 @@ def freeze_tick_label_size(axes: Axes) -> None:
 def finalize_layout(figure: Figure) -> None:
     """Compute the final layout of a figure.
 
-    The layout engine is executed twice. The first execution creates the ticks and thereby moves the
-    panels. Long titles are then wrapped, and the second execution adjusts the layout to the wrapped
-    titles.
+    The function executes the layout engine twice. The first execution creates the ticks, which
+    moves the panels. Next, the function wraps long titles. The second execution adjusts the layout
+    to the wrapped titles.
 
     Parameters
     ----------
@@ -537,10 +540,10 @@ def finalize_layout(figure: Figure) -> None:
 
 
 def _wrap_title(axes: Axes) -> None:
-    """Wrap the title of a panel if the title is too long for one line.
+    """Wrap the title of a panel if it is too long for one line.
 
     A title must not extend beyond the figure or overlap the letter of the panel. The available
-    width depends on the other parts of the figure, because long y tick labels move the panel and a
+    width depends on other elements of the figure, because long y tick labels move the panel and a
     colour bar makes the panel narrower.
     """
     title, edges, panel = axes.title, cast(Figure, axes.figure).bbox, axes.get_window_extent()

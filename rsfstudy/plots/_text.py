@@ -16,10 +16,10 @@ _MATH_PARSER = MathTextParser("path")
 _MATHTEXT_PATTERN = re.compile(r"((?<!\\)\$(?:[^$\\]|\\.)*\$)")
 _NUMBER_PATTERN = re.compile(r"-?[\d.,]*\d")
 _WORD_PATTERN = re.compile(rf"(?:{_MATHTEXT_PATTERN.pattern[1:-1]}|\\\$|[^\s$])+")
-#: Space at which a line is never broken.
+#: Non-breaking space.
 _UNBREAKABLE_SPACE = r"$\ $"
 
-#: Patterns of symbols in results, and their replacements in mathtext.
+#: Patterns of symbols in datasets, and their replacements in mathtext.
 _SYMBOL_REPLACEMENTS: tuple[tuple[str, str], ...] = (
     (r"\bk_cr\(V_\*\)", r"$k_{cr}(V_*)$"),
     (r"\ba/\(b-a\)", r"$a/(b-a)$"),
@@ -37,7 +37,7 @@ _SYMBOL_REPLACEMENTS: tuple[tuple[str, str], ...] = (
 )
 
 
-#: Names for the labels of axes, which are shorter than the names in files.
+#: Short names of quantities for axis labels. The names in files are longer.
 _SHORT_AXIS_NAMES_OF_QUANTITIES = {
     "a_over_b_minus_a": "",
     "critical_displacement": "critical displacement",
@@ -66,10 +66,10 @@ _SHORT_AXIS_NAMES_OF_QUANTITIES = {
 
 
 def to_mathtext(text: Any) -> str:
-    """Convert the symbols in a text to mathtext.
+    """Convert the symbols in a string to mathtext.
 
     Underscores outside formulas are replaced by spaces. Formulas between dollar signs are not
-    changed. If the text is not valid mathtext, the dollar signs are displayed literally.
+    changed. If the string is not valid mathtext, the dollar signs are displayed literally.
 
     Parameters
     ----------
@@ -79,7 +79,7 @@ def to_mathtext(text: Any) -> str:
     Returns
     -------
     str
-        Text for a matplotlib label.
+        String for a matplotlib label.
     """
     parts = (
         _MATHTEXT_PATTERN.split(str(text))
@@ -103,7 +103,7 @@ def _replace_symbols(text: str) -> str:
 
 
 def _is_valid_mathtext(text: str) -> bool:
-    """Return True if matplotlib can display the text."""
+    """Return True if matplotlib can display a string."""
     if text.count("$") % 2:
         return False
     try:
@@ -114,21 +114,22 @@ def _is_valid_mathtext(text: str) -> bool:
 
 
 def wrap_text(text: str, max_line_characters: int) -> str:
-    """Wrap a text without breaking formulas.
+    """Wrap a string without breaking formulas.
 
-    Existing line breaks are kept. Assignments such as ``x = 2 y`` are kept on one line.
+    Existing line breaks are kept. An equation such as ``x = 2 y`` is never broken across lines.
 
     Parameters
     ----------
     text : str
-        Text, which may contain mathtext.
+        String, which may contain mathtext.
     max_line_characters : int
-        Maximum number of visible characters per line. A longer word or formula has its own line.
+        Maximum number of visible characters per line. Longer words and formulas are placed on
+        separate lines.
 
     Returns
     -------
     str
-        Text with line breaks.
+        String with line breaks.
     """
     if "\n" in text:
         return "\n".join(wrap_text(line, max_line_characters) for line in text.split("\n"))
@@ -149,12 +150,12 @@ def wrap_text(text: str, max_line_characters: int) -> str:
 
 
 def visible_length(text: str) -> int:
-    """Estimate the number of visible characters of a text.
+    """Estimate the number of visible characters of a string.
 
     Parameters
     ----------
     text : str
-        Text, which may contain mathtext.
+        String, which may contain mathtext.
 
     Returns
     -------
@@ -165,7 +166,7 @@ def visible_length(text: str) -> int:
 
 
 def format_quantity_axis_label(quantity: Quantity, max_line_characters: int = 45) -> str:
-    """Return the label of an axis with name, symbol and units of a quantity.
+    """Return an axis label with the name, symbol and units of a quantity.
 
     Parameters
     ----------
@@ -177,8 +178,8 @@ def format_quantity_axis_label(quantity: Quantity, max_line_characters: int = 45
     Returns
     -------
     str
-        Label in mathtext. If a quantity has neither units nor a symbol, its scale is used as the
-        unit.
+        Label in mathtext. If the quantity has neither units nor a symbol, the label contains the
+        scale instead of units.
     """
     words = _SHORT_AXIS_NAMES_OF_QUANTITIES.get(quantity.name, quantity.long_name.split(":")[0])
     text = ", ".join(filter(None, (f"{words[:1].upper()}{words[1:]}", quantity.symbol)))
@@ -206,7 +207,7 @@ def format_units(units: str) -> str:
     Returns
     -------
     str
-        Units with powers as superscripts.
+        Units in mathtext, with powers as superscripts.
     """
     powers = re.sub(r"(\b[a-zA-Z]+|\))(-?\d)\b", r"\1$^{\2}$", units)
     return to_mathtext(re.sub(r"\bum\b", r"$\\mu$m", powers))
@@ -229,7 +230,7 @@ def quantity_symbol(quantity: Quantity) -> str:
 
 
 def format_number(value: float, digits: int = 3) -> str:
-    """Format a number with a given number of significant digits.
+    """Format a number in mathtext with a fixed number of significant digits.
 
     Parameters
     ----------
@@ -260,7 +261,7 @@ def format_number(value: float, digits: int = 3) -> str:
 def format_with_error(value: float, error: float, max_decimals: int | None = None) -> str:
     r"""Format a value and its error, rounded to the first digit of the error.
 
-    At least one decimal place is written.
+    The formatted value has at least one decimal place.
 
     Parameters
     ----------
@@ -269,14 +270,13 @@ def format_with_error(value: float, error: float, max_decimals: int | None = Non
     error : float
         Error of the value, for example its standard error.
     max_decimals : int, optional
-        Maximum number of decimal places. If the error is too small for these decimal places, the
-        error is omitted. By default the error is always included.
+        Maximum number of decimal places. If the error would be rounded to zero, it is omitted. By
+        default, the error is always included.
 
     Returns
     -------
     str
-        Formula such as ``$0.66 \pm 0.02$``. The result is "unknown" if the value or the error is
-        not finite.
+        Formula such as ``$0.66 \pm 0.02$``, or "unknown" if the value or the error is not finite.
     """
     if not math.isfinite(value) or not math.isfinite(error):
         return "unknown"
@@ -301,13 +301,13 @@ def format_slope(row: xr.Dataset, name: str, max_decimals: int | None = None) ->
     name : str
         Name of the slope.
     max_decimals : int, optional
-        Maximum number of decimal places. If the error is too small for these decimal places, the
-        error is omitted. By default the error is always included.
+        Maximum number of decimal places. If the error would be rounded to zero, it is omitted. By
+        default, the error is always included.
 
     Returns
     -------
     str
-        Formula in mathtext. The result is "unknown" if the slope or its error is not finite.
+        Formula in mathtext, or "unknown" if the slope or its error is not finite.
 
     Examples
     --------

@@ -22,13 +22,13 @@ from rsfstudy.plots._axes import describe_point
 from rsfstudy.plots._style import add_grey_legend_entry, cycle_style
 from rsfstudy.study import Panel
 
-#: Maximum lag of the autocorrelation, minimum number of rows that remain when a long record is
-#: thinned, and maximum number of records with a panel.
+#: Maximum lag of the autocorrelation, minimum number of rows that remain after a long record is
+#: thinned, and maximum number of records that are shown in a panel.
 _MAX_AUTOCORRELATION_LAGS, _MAX_DRAWN_RECORD_ROWS, _MAX_RECORD_PANELS = 40, 20_000, 4
-#: Margin on both sides of the windows as a fraction of their extent, and width of the moving
-#: average of residuals as a fraction of a window.
+#: Margin on both sides of the fitted windows as a fraction of their total extent, and width of the
+#: moving average of residuals as a fraction of a window.
 _MARGIN_FRACTION_BESIDE_WINDOWS, _RESIDUAL_AVERAGING_FRACTION_OF_WINDOW = 0.15, 0.02
-#: Half width of the confidence band in standard errors.
+#: Half width of the confidence band of the fitted curve, in standard errors.
 _CONFIDENCE_BAND_HALF_WIDTH_IN_STDERRS = 2.0
 _LINE_STYLE_OF_RECORD_ROWS: dict[str, Any] = {
     "color": "0.7",
@@ -102,8 +102,8 @@ def _iterate_fits_with_law(
 ) -> Iterator[tuple[xr.Dataset, str, int]]:
     """Iterate over the fits of a record.
 
-    Each item contains the results of a fit, the description of the law, and the index of the law.
-    If ``only_first_step`` is True, only the fits of the first step are included.
+    Each item contains the results of a fit, the description of the friction law, and the index of
+    the friction law. If ``only_first_step`` is True, only the fits of the first step are included.
     """
     steps = range(1 if only_first_step else dataset.sizes.get("step", 1))
     for number in range(dataset.sizes["law"]):
@@ -117,9 +117,9 @@ def _iterate_fits_with_law(
 def _select_thinned_columns_of_fit(
     fit: xr.Dataset, column_names: Sequence[str]
 ) -> list[np.ndarray]:
-    """Return the columns of a fit without missing values.
+    """Return the columns of a fit without rows that have missing values.
 
-    Long columns are thinned by omitting rows.
+    If the columns are long, rows are omitted at regular intervals.
     """
     columns = np.array([fit[name].values for name in column_names])
     columns = columns[:, np.isfinite(columns).all(axis=0)]
@@ -131,8 +131,8 @@ def _iterate_columns_of_fit_windows(
 ) -> Iterator[list[np.ndarray]]:
     """Iterate over the windows of a fit.
 
-    Each item is a list of columns. A window consists of consecutive rows with values, in order of
-    increasing time.
+    Each item is a list with the columns of a window. A window is a series of consecutive rows with
+    values and with increasing times.
     """
     rows = np.flatnonzero(fit[column_names[-1]].notnull().values)
     late = np.diff(fit["record_time"].values[rows]) > 0.0
@@ -208,7 +208,7 @@ def _compute_autocorrelation(values: np.ndarray) -> np.ndarray:
 
 
 def _correlation_title(dataset: xr.Dataset) -> str:
-    """Return the title of the correlation panel with the names of the laws."""
+    """Return the title of the correlation panel with friction law names."""
     laws = [str(law) for law in dataset["law"].values]
     if len(laws) == 1:
         return f"Correlation: {describe_point(dataset.isel(law=0), 'law')}"
@@ -216,7 +216,7 @@ def _correlation_title(dataset: xr.Dataset) -> str:
 
 
 def _parameter_symbol(parameter_name: str) -> str:
-    """Return the symbol of a parameter, with its window number if any."""
+    """Return the symbol of a parameter, with the window number if it has one."""
     plain, number = split_window_number(parameter_name)
     symbol = PARAMETERS[plain].symbol
     return f"{symbol[:-1]}^{{({number})}}$" if number else symbol
@@ -225,8 +225,8 @@ def _parameter_symbol(parameter_name: str) -> str:
 def _draw_correlation(dataset: xr.Dataset, axes: Axes) -> None:
     """Draw the correlation matrix of the parameters.
 
-    The lower triangle shows the fit of the first law, and the upper triangle shows the fit of the
-    second law.
+    The lower triangle of the matrix shows the fit of the first friction law, and the upper triangle
+    shows the fit of the second friction law.
     """
     fits = [one for one, _name, _law in _iterate_fits_with_law(dataset, only_first_step=True)][:2]
     lower, upper = fits[0]["correlation"].values, fits[-1]["correlation"].values

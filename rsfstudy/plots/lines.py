@@ -1,7 +1,7 @@
-"""Line plots of the variables of any lattice.
+"""Line plots of the variables of any study.
 
-The function ``panels`` builds one panel per variable. Each panel shows the variable along one axis,
-with one line for each point of the other axes.
+The function ``panels`` builds one panel per variable. Each panel shows the variable against one
+axis of the study, with one line for each point of the other axes.
 """
 
 from __future__ import annotations
@@ -31,12 +31,12 @@ from rsfstudy.storage import read_declaration
 from rsfstudy.study import Panel, read_quantities_not_in_vocabulary
 from rsfstudy.vocabulary import find_quantity
 
-#: Maximum number of panels, maximum number of lines with a legend entry, and maximum number of
-#: points of a numeric axis without a colour scale.
+#: Maximum number of panels, maximum number of lines with a legend entry, and number of points of a
+#: numeric axis above which a colour scale is used.
 _MAX_PANELS, _MAX_LEGEND_LINES, _MAX_CYCLED_COLOURS = 4, 12, 6
-#: Maximum number of identical curves that are all named in the legend.
+#: Maximum number of identical curves whose names are all listed in the legend.
 _MAX_NAMED_IDENTICAL_CURVES = 3
-#: Maximum number of points of a line with markers.
+#: Number of points of a line above which markers are omitted.
 _MAX_POINTS_WITH_MARKERS = 60
 
 
@@ -54,8 +54,8 @@ def panels(dataset: xr.Dataset, variable: str | None = None) -> Sequence[Panel]:
     Returns
     -------
     list of Panel
-        One panel per variable, and at most four panels. The list is empty if the dataset does not
-        contain the given variable or if the variable is neither numeric nor a flag.
+        One panel per variable, for at most four variables. The list is empty if the dataset does
+        not contain ``variable``, or if the variable is neither numeric nor a flag.
     """
     if variable is None:
         names = varying_variables(dataset)[:_MAX_PANELS] or ["status"]
@@ -131,7 +131,8 @@ def _draw_lines(variable_name: str, x_dimension: str, dataset: xr.Dataset, axes:
 def _choose_x_dimension(dataset: xr.Dataset, variable: xr.DataArray) -> str:
     """Choose the dimension along x.
 
-    The result is the longest numeric dimension, or the last dimension if no dimension is numeric.
+    The function chooses the longest numeric dimension, or the last dimension if no dimension is
+    numeric.
     """
     names = [str(dimension) for dimension in variable.dims]
     numeric = [
@@ -143,10 +144,10 @@ def _choose_x_dimension(dataset: xr.Dataset, variable: xr.DataArray) -> str:
 def _choose_colour_dimension(
     dataset: xr.Dataset, variable: xr.DataArray, x_dimension: str
 ) -> str | None:
-    """Choose the dimension that a colour scale represents.
+    """Choose the dimension that is represented by a colour scale.
 
-    The result is the longest numeric dimension apart from the dimension along x. The result is None
-    if no numeric dimension has more than six points.
+    The function chooses the longest numeric dimension except the dimension along x. The result is
+    None if this dimension has at most six points.
     """
     numeric = [
         str(d) for d in variable.dims if d != x_dimension and has_numeric_points(dataset, str(d))
@@ -158,7 +159,7 @@ def _choose_colour_dimension(
 def _iterate_values_at_points(
     values: xr.DataArray, dimensions: Sequence[str]
 ) -> Iterator[xr.DataArray]:
-    """Iterate over the values at each point of some dimensions."""
+    """Iterate over all combinations of points of several dimensions."""
     for places in np.ndindex(*(values.sizes[d] for d in dimensions)):
         yield values.isel(dict(zip(dimensions, places, strict=True)))
 
@@ -186,9 +187,9 @@ def _describe_places_of_identical_curves(
 ) -> tuple[str, ...]:
     """Describe the points of a group of identical curves.
 
-    The description contains the coordinates that all curves share. If the curves share no
-    coordinate, the description lists all points. For a large group, the description contains only
-    the first point and the number of the other points.
+    The description contains the coordinates that are equal for all curves. If all coordinates
+    differ, the description lists all points. For a large group, the description contains only the
+    first point and the number of remaining points.
     """
     places = [
         list(dict.fromkeys(describe_point(group, d) for group in identical_curves))

@@ -1,7 +1,8 @@
-"""Maps of a variable over two numeric axes.
+"""Maps of a variable as a function of two numeric axes.
 
-The function ``panels`` builds one map for each point of the other axes. A map shows the values as
-colours with labelled contours. Cells without a value are hatched according to their status.
+The function ``panels`` builds one map for each point of the other axes of the study. A map shows
+the variable as colours with labelled contours. Lattice cells without a value are hatched according
+to their status.
 """
 
 from __future__ import annotations
@@ -37,14 +38,14 @@ from rsfstudy.vocabulary import find_quantity
 
 #: Minimum number of points of each axis of a map, and maximum number of maps.
 _MIN_POINTS_PER_MAP_AXIS, _MAX_MAPS = 3, 12
-#: Hatches of cells without a value, in the order of their status codes.
+#: Hatch patterns of cells without a value, in the order of the status codes.
 _HATCH_PATTERNS_OF_STATUSES = ("////", "\\\\\\\\", "....", "xxxx", "||||", "----", "++++", "oooo")
-#: Minimum distance of a contour label from the frame and from other contours, as a fraction of the
-#: panel size.
+#: Minimum distance of a contour label from the frame of the panel and from other contours, as a
+#: fraction of the panel size.
 _MIN_DISTANCE_AROUND_CONTOUR_LABEL = 0.06
-#: Minimum extent of a contour with a label, as a fraction of the panel size.
+#: Minimum extent of labelled contours, as a fraction of the panel size.
 _MIN_LENGTH_OF_LABELLED_CONTOUR = 0.2
-#: Minimum number of points of each axis for contours.
+#: Number of points of each axis below which contours are not drawn.
 _MIN_POINTS_FOR_CONTOURS = 6
 _STATUS_LABEL_BY_CODE = {int(status): status.label for status in Status}
 
@@ -63,8 +64,8 @@ def panels(dataset: xr.Dataset, variable: str | None = None) -> Sequence[Panel]:
     Returns
     -------
     list of Panel
-        One map per point of the other axes, and at most 12 maps. The list is empty if the dataset
-        does not contain the variable or if the variable does not have two numeric dimensions.
+        One map per point of the other axes, for at most 12 points. The list is empty if the dataset
+        does not contain the variable, or if the variable does not have two numeric dimensions.
     """
     names = measured_variables(dataset)[:1] if variable is None else [variable]
     if not names or names[0] not in dataset:
@@ -97,7 +98,7 @@ def _choose_map_dimensions(dataset: xr.Dataset, variable: xr.DataArray) -> tuple
     """Return the names of the y axis and the x axis of a map.
 
     The axes are the last two numeric dimensions with at least three points. The result is None if
-    the variable has fewer than two numeric dimensions.
+    the variable has fewer than two such dimensions.
     """
     numeric = [
         str(dimension)
@@ -124,11 +125,10 @@ def draw_map(
     map_dimensions : tuple of (str, str)
         Names of the y axis and the x axis.
     colour_scale : tuple of (matplotlib.colors.Normalize, sequence of float), or None
-        Colour scale and contour levels. For a variable with flags, the flag values replace the
-        contour levels. If the value is None, the scale is computed from the values of the map.
+        Colour scale and contour levels. For a variable with flags, pass the flag values instead of
+        contour levels. If the argument is None, the scale is computed from the values in the map.
     dataset : xarray.Dataset
-        Part of the results with the variable along the dimensions of the map. The dataset must also
-        contain the variable ``status``.
+        Results with the variable and the variable ``status`` along the dimensions of the map.
     axes : matplotlib.axes.Axes
         Axes to draw on.
     """
@@ -168,8 +168,8 @@ def draw_map(
 def _colour_scale(map_values: xr.DataArray) -> tuple[Normalize, Sequence[float]] | None:
     """Return the colour scale and the contour levels of a variable.
 
-    For a variable with flags, the flag values replace the contour levels. The result is None if the
-    variable has no finite value.
+    For a variable with flags, the function returns the flag values instead of contour levels. The
+    result is None if the variable has no finite value.
     """
     values = map_values.values.astype(float)
     if not np.isfinite(values).any():
@@ -188,9 +188,9 @@ def _colour_scale(map_values: xr.DataArray) -> tuple[Normalize, Sequence[float]]
 
 
 def _cell_edges(cell_centres: np.ndarray, is_log_scale: bool = False) -> np.ndarray:
-    """Compute the edges of cells from their centres.
+    """Compute the edges of lattice cells from their centres.
 
-    The edges are the midpoints between neighbouring centres, on a linear or logarithmic scale.
+    The edges are midpoints between neighbouring centres, on a linear or logarithmic scale.
     """
     if cell_centres.size < 2:
         return np.asarray(
@@ -233,9 +233,9 @@ def draw_contours(axes: Axes, values: xr.DataArray, contour_levels: Sequence[flo
 def _label_positions(axes: Axes, contour_set: QuadContourSet) -> list[tuple[float, float]]:
     """Choose the positions of the contour labels.
 
-    The label of a level is placed on its longest contour, at the point with the largest distance
-    from other levels and from the frame. A level has no label if the distance is too small or if
-    the contour is too short.
+    The label of a contour level is placed on the longest contour of the level, at the point with
+    the largest distance from other contour levels and from the frame. A level has no label if this
+    distance is too small, or if the contour is too short.
     """
     panel = axes.transData + axes.transAxes.inverted()
     levels = [
@@ -262,9 +262,9 @@ def _hatch_cells_without_value_by_status(
     status: np.ndarray,
     missing_mask: np.ndarray,
 ) -> None:
-    """Hatch the cells without a value, with a different hatch for each status.
+    """Hatch the cells without a value according to their status.
 
-    The name of the status becomes the label of the hatch in the legend.
+    Each status has a different hatch pattern, and the legend shows the name of the status.
 
     Parameters
     ----------
@@ -290,9 +290,9 @@ def _hatch_cells_without_value_by_status(
 
 
 def _find_horizontal_cell_runs(cell_mask: np.ndarray) -> list[tuple[int, int, int]]:
-    """Find runs of neighbouring True values in the rows of an array.
+    """Find runs of consecutive True values in the rows of an array.
 
-    Each run is a tuple of the row, the first column, and the column after the last column.
+    Each run is a tuple of its row, its first column, and the column after its last column.
     """
     change = np.diff(np.pad(cell_mask.astype(int), ((0, 0), (1, 1))), axis=1)
     first, last = np.argwhere(change == 1), np.argwhere(change == -1)
@@ -302,7 +302,7 @@ def _find_horizontal_cell_runs(cell_mask: np.ndarray) -> list[tuple[int, int, in
 def _outline_of_cell_run(
     cell_edges: tuple[np.ndarray, np.ndarray], row: int, first_column: int, stop_column: int
 ) -> list[tuple[Any, Any]]:
-    """Return the corners of a run of cells."""
+    """Return the corners of the rectangle that a run of cells covers."""
     (left, right), (low, high) = (
         cell_edges[0][[first_column, stop_column]],
         cell_edges[1][row : row + 2],

@@ -1,8 +1,8 @@
 """Histograms and scatter plots of samples and cases.
 
-The function ``panels`` builds a scatter matrix of the primary output and of the sampled fields. The
-diagonal of the matrix shows histograms. Points of the other axes of the study have different
-colours.
+The function ``panels`` builds a scatter matrix of the primary output and the sampled fields. The
+diagonal of the matrix shows histograms. Colours distinguish the points of the other axes of the
+study.
 """
 
 from __future__ import annotations
@@ -31,8 +31,8 @@ from rsfstudy.vocabulary import find_quantity
 #: Maximum number of quantities in the scatter matrix, including the measured variable, and maximum
 #: number of ticks per axis.
 _MAX_SCATTERED_QUANTITIES, _MAX_TICKS = 4, 3
-#: Style of the scatter points. The points are rasterised in vector graphics, because there may be
-#: 10^5 points.
+#: Style of the points in scatter plots. The points are rasterised in vector graphics, because there
+#: may be 10^5 points.
 _SCATTER_POINT_STYLE = {
     "marker": ".",
     "markersize": 2.0,
@@ -58,8 +58,8 @@ def panels(dataset: xr.Dataset, variable: str | None = None) -> Sequence[Panel]:
     -------
     list of Panel
         Panels of the matrix, row by row. The list is empty if the study has no axis with numbered
-        points, such as samples or cases. The list is also empty if the variable is not numeric or
-        does not vary along such an axis.
+        points, such as samples or cases. The list is also empty if the variable is not numeric, or
+        does not vary along an axis with numbered points.
     """
     fields = _sampled_fields(dataset)
     along = next((d for d in fields if variable is None or d in dataset[variable].dims), None)
@@ -89,7 +89,7 @@ def count_panels_per_side_of_scatter_matrix(panels: Sequence[Panel]) -> int:
 
 
 def _sampled_fields(dataset: xr.Dataset) -> dict[str, list[str]]:
-    """Return the fields of each axis with numbered points, by dimension."""
+    """Return the field names of each axis with numbered points, by dimension."""
     found: dict[str, list[str]] = {}
     for axis in map(build_axis_from_stored, read_declaration(dataset).axes):
         if axis.has_numbered_points and dataset.sizes.get(axis.dimension, 1) > 1:
@@ -100,7 +100,7 @@ def _sampled_fields(dataset: xr.Dataset) -> dict[str, list[str]]:
 def _build_panel(
     dataset: xr.Dataset, sample_dimension: str, x_variable: str, y_variable: str
 ) -> Panel:
-    """Build the panel of a pair of quantities.
+    """Build the panel for a pair of quantities.
 
     The panel is a histogram if both quantities are identical, and a scatter plot otherwise.
     """
@@ -135,8 +135,8 @@ def _build_panel(
 def _format_short_axis_label(dataset: xr.Dataset, variable_name: str) -> str:
     """Return an axis label with symbol and units in short lines.
 
-    The lines are short because the panels are small. In addition, the power of ten of the tick
-    labels is written next to the first line of the label.
+    The lines of the label are short because the panels are small. In addition, matplotlib writes
+    the power of ten of the tick labels next to the first line of the label.
     """
     about = find_quantity(
         variable_name.removesuffix("_error"), read_quantities_not_in_vocabulary(dataset)
@@ -147,9 +147,9 @@ def _format_short_axis_label(dataset: xr.Dataset, variable_name: str) -> str:
 
 
 def _limit_ticks(max_x_tick_count: int, _dataset: xr.Dataset, axes: Axes) -> None:
-    """Limit the number of ticks, so that the tick labels do not overlap.
+    """Limit the number of ticks so that the tick labels do not overlap.
 
-    The tick labels of error estimates are long, so fewer ticks are used along x.
+    Error estimates have long tick labels, so the x axis has fewer ticks for error estimates.
     """
     axes.xaxis.set_major_locator(MaxNLocator(max_x_tick_count))
     axes.yaxis.set_major_locator(MaxNLocator(_MAX_TICKS))
@@ -158,14 +158,14 @@ def _limit_ticks(max_x_tick_count: int, _dataset: xr.Dataset, axes: Axes) -> Non
 def draw_histogram(
     variable_name: str, colour_dimension: Sequence[str], dataset: xr.Dataset, axes: Axes
 ) -> None:
-    """Draw one histogram of a variable for each point of other axes.
+    """Draw histograms of a variable, one for each point of other axes.
 
     Parameters
     ----------
     variable_name : str
         Name of the variable.
     colour_dimension : sequence of str
-        Dimensions whose points have separate histograms.
+        Dimensions of the lattice. Each combination of their points has a separate histogram.
     dataset : xarray.Dataset
         Dataset with the variable and with coordinates for the dimensions ``colour_dimension``.
     axes : matplotlib.axes.Axes

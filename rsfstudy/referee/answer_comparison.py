@@ -1,7 +1,7 @@
 """Comparison of an answer with the known answer to a problem.
 
-The function ``compare_answers`` counts the digits that agree. If the answer does not pass, the
-function also tests whether another convention explains the difference.
+The function ``compare_answers`` counts the correct digits. If an answer has too few correct digits,
+the function also tests whether another convention explains the difference.
 """
 
 from __future__ import annotations
@@ -21,25 +21,25 @@ from rsfstudy.referee.problem_files import BenchmarkProblem
 from rsfstudy.referee.reference_answers import AnswerColumnByQuantity
 from rsfstudy.rig import read_table
 
-#: Default number of digits that is required to pass.
+#: Default number of correct digits that an answer needs to pass.
 DEFAULT_REQUIRED_DIGITS = 6
-#: Minimum number of digits that must agree if an explanation is correct, and minimum increase of
-#: the number of digits.
+#: Criteria for accepting an explanation of a difference: the minimum number of correct digits after
+#: the correction, and the minimum increase of the number of correct digits.
 _MIN_EXPLAINED_DIGITS, _MIN_DIGITS_GAINED = 3.0, 1.5
-#: Maximum difference of rounded values in units of the last decimal place. The code may contribute
-#: one unit, the rounding in the file half a unit, and the rounding of the known answer a small
-#: margin.
+#: Maximum difference between rounded values and the known answer, in units of the last decimal
+#: place. The limit allows an error of one unit in the other code, half a unit for rounding in the
+#: file, and a small margin for rounding of the known answer.
 _MAX_DIFFERENCE_IN_LAST_PLACE_UNITS = 1.51
-#: Quantities with differences relative to the largest value of the column, because they start at
-#: zero.
+#: Quantities that start at zero. Differences of these quantities are divided by the largest value
+#: of the column.
 _QUANTITIES_STARTING_AT_ZERO = ("slip", "pore_pressure")
-#: Conventions of radiation damping, and the corresponding factors of eta.
+#: Conventions for radiation damping, and the factors by which eta is multiplied.
 _RADIATION_DAMPING_CONVENTIONS = {
     "twice as much (G/c_s for G/(2 c_s))": 2.0,
     "half as much": 0.5,
     "left out": 0.0,
 }
-#: Common conversion factors of units, powers of ten, angles and logarithms.
+#: Common conversion factors between units, powers of ten, angles and logarithms.
 _COMMON_CONVERSION_FACTOR_BY_NAME = {
     "2": 2.0, "0.5": 0.5, "pi": math.pi, "1/pi": 1.0 / math.pi, "2 pi": 2.0 * math.pi,
     "1/(2 pi)": 0.5 / math.pi, "ln 10": math.log(10.0), "1/ln 10": 1.0 / math.log(10.0),
@@ -47,10 +47,11 @@ _COMMON_CONVERSION_FACTOR_BY_NAME = {
     **{f"1/{unit:g}": 1.0 / unit for unit in (60.0, 3600.0, 86400.0)},
     **{f"{10.0**power:g}": 10.0**power for power in range(-15, 16) if power},
 }  # fmt: skip
-#: Relative tolerances for common conversion factors, for several values and for a single value.
+#: Relative tolerances for recognising a conversion factor from several values and from a single
+#: value.
 _FACTOR_RTOL, _SINGLE_VALUE_FACTOR_RTOL = 1e-6, 1e-3
-#: Relative tolerances of the two answers to a user-defined problem, and relative tolerance of
-#: answers with other conventions.
+#: Relative tolerances of the two computed answers to a user-defined problem, and relative tolerance
+#: for computing answers with other conventions.
 _REFERENCE_RTOLS, _EXPLANATION_RTOL = (1e-9, 1e-11), 1e-8
 
 
@@ -63,15 +64,16 @@ class QuantityAgreement:
     quantity_name : str
         Name of the quantity.
     agreeing_digits : float
-        Number of digits to which all rows agree, limited to the digits of the known answer.
+        Smallest number of correct digits of all rows, limited to the digits of the known answer.
     least_agreeing_row : int
-        Index of the row with the largest difference.
+        Index of the row with the largest relative difference.
     first_failing_row : int or None
-        Index of the first row with fewer digits than required, or None if there is no such row.
+        Index of the first row with fewer correct digits than required, or None if all rows have
+        enough correct digits.
     agrees_to_written_digits : bool
         True if all rows agree within the rounding error of the written values.
     relative_differences : ndarray, shape (n,)
-        Relative difference of each row.
+        Relative difference between the answer and the known answer in each row.
     """
 
     quantity_name: str
@@ -89,11 +91,11 @@ class AnswerComparison:
     Parameters
     ----------
     problem : BenchmarkProblem
-        Problem that the answers belong to.
-    quantity_agreements : tuple of Agreement
+        Problem that both answers belong to.
+    quantity_agreements : tuple of QuantityAgreement
         Agreement of each quantity.
     required_digits : float
-        Number of digits that is required to pass.
+        Number of correct digits that the answer needs to pass.
     explanation_of_disagreement : str, default: ""
         Convention that explains the difference. The string is empty if the answer passes or if no
         explanation was found.
@@ -106,15 +108,14 @@ class AnswerComparison:
 
     @property
     def agreeing_digits(self) -> float:
-        """Number of digits to which all quantities agree."""
+        """Smallest number of correct digits of all quantities."""
         return min(agreement.agreeing_digits for agreement in self.quantity_agreements)
 
     @property
     def has_required_digits(self) -> bool:
-        """True if all quantities have the required number of digits.
+        """True if all quantities have the required number of correct digits.
 
-        If the known answer has fewer digits than required, agreement of all known digits is
-        sufficient.
+        If the known answer has fewer digits than required, all known digits must be correct.
         """
         return self.agreeing_digits >= min(self.required_digits, self.problem.digits)
 
@@ -124,8 +125,8 @@ class AnswerComparison:
         Returns
         -------
         list of str
-            One line per quantity. The line contains the number of digits, the row with the largest
-            difference, and the first row with fewer digits than required.
+            One line per quantity. Each line contains the number of correct digits, the row with the
+            largest difference, and the first row with fewer correct digits than required.
         """
         problem, lines = self.problem, []
         for agreement in self.quantity_agreements:
@@ -146,7 +147,7 @@ class AnswerComparison:
 
 
 def _format_answer_row(problem: BenchmarkProblem, row: int) -> str:
-    """Format the index value of a row with its units."""
+    """Format the value in the index column of a row, with units."""
     units = {"time": " s"}.get(problem.index_column, "")
     return f"{problem.index_column} = {problem.index_values[row]:g}{units}"
 
@@ -159,16 +160,17 @@ def known_answer(
     Parameters
     ----------
     problem : BenchmarkProblem
-        Problem to be answered.
+        Problem to solve.
     answer_path : Path or None
-        File of the known answer. If the value is None, rsfstudy computes the answer with two
+        File of the known answer. If the path is None, rsfstudy computes the answer with two
         tolerances.
 
     Returns
     -------
     problem : BenchmarkProblem
-        Problem whose field ``digits`` is the number of known digits. For a computed answer, this is
-        the number of digits to which the results with both tolerances agree.
+        Problem whose field ``digits`` is the number of known digits. The number of known digits of
+        a computed answer is the number of digits to which the answers with the two tolerances
+        agree.
     answer : dict of str to ndarray
         Columns of the answer in SI units.
 
@@ -197,21 +199,21 @@ def compare_answers(
     reported: Mapping[str, ReportedQuantity],
     required_digits: float,
 ) -> AnswerComparison:
-    r"""Compare an answer of another code with the known answer.
+    r"""Compare the answer of another code with the known answer.
 
-    If the answer does not pass, the function searches for a convention that explains the
-    difference.
+    If the answer has too few correct digits, the function searches for a convention that explains
+    the difference.
 
     Parameters
     ----------
     problem : BenchmarkProblem
-        Problem that the answers belong to.
+        Problem that both answers belong to.
     answer : mapping of str to ndarray
         Columns of the known answer in SI units.
     reported : mapping of str to ReportedQuantity
         Quantities that the other code reports.
     required_digits : float
-        Number of digits that is required to pass.
+        Number of correct digits that the answer needs to pass.
 
     Returns
     -------
@@ -228,8 +230,8 @@ def compare_answers(
 
     The rounding error :math:`r` is half a unit in the last digit of :math:`y`. The scale :math:`s`
     is :math:`|y|` for most quantities. For slip and pore pressure, which start at zero, the scale
-    is the largest value of :math:`|y|` in the column. The number of digits is :math:`-\log_{10}
-    \max \Delta`, limited to the digits of the known answer.
+    is the largest value of :math:`|y|` in the column. The number of correct digits is
+    :math:`-\log_{10} \max \Delta`, limited to the digits of the known answer.
     """
     values = {name: column.values for name, column in reported.items()}
     places = {name: column.last_place_unit for name, column in reported.items()}
@@ -251,7 +253,8 @@ def compare_answers(
 def round_digits_down(digits: float) -> float:
     """Round a number of digits down to one decimal place.
 
-    Rounding down ensures that a failed problem never displays enough digits to pass.
+    The number is rounded down, so that the displayed number of a failed answer is always less than
+    the required number.
 
     Parameters
     ----------
@@ -300,11 +303,11 @@ def _compute_quantity_agreements(
 def _relative_differences(
     quantity_name: str, reported: np.ndarray, reference: np.ndarray, known_digits: int
 ) -> np.ndarray:
-    """Compute the relative differences of a quantity from its reference.
+    """Compute the relative differences of a quantity from the known answer.
 
-    The rounding error of the reference, which is half a unit in its last digit, is subtracted from
-    each difference. The remaining difference is divided by the reference value. For quantities that
-    start at zero, the remaining difference is divided by the largest reference value.
+    The rounding error of the known answer, which is half a unit in the last digit, is subtracted
+    from each absolute difference. The remaining difference is divided by the known value. For
+    quantities that start at zero, the remaining difference is divided by the largest known value.
     """
     size = np.abs(reference)
     rounded = 0.5 * 10.0 ** (np.floor(np.log10(np.maximum(size, 1e-300))) + 1.0 - known_digits)
@@ -321,7 +324,8 @@ def _iterate_explanations_of_disagreement(
 ) -> Iterator[tuple[float, str]]:
     """Iterate over conventions that may explain a difference.
 
-    Each item contains the number of digits that agree under the convention, and a description.
+    Each item contains the number of correct digits under a convention, and a description of the
+    convention.
     """
     for words, table in _iterate_answers_in_other_conventions(problem, reported, answer):
         yield (
@@ -349,9 +353,9 @@ def _iterate_explanations_of_disagreement(
 def _iterate_answers_in_other_conventions(
     problem: BenchmarkProblem, reported: AnswerColumnByQuantity, answer: AnswerColumnByQuantity
 ) -> Iterator[tuple[str, AnswerColumnByQuantity]]:
-    """Iterate over answers that are converted from other conventions.
+    """Iterate over copies of an answer, converted from other conventions.
 
-    Each item contains a description of the convention, and the converted columns.
+    Each item contains a description of a convention, and the columns of the converted answer.
     """
     shift, stress = sum(problem.b) * math.log(2.0), problem.rig.normal_stress
     if "friction" in reported:
@@ -367,7 +371,7 @@ def _iterate_answers_in_other_conventions(
             yield words, reported | {"friction": at_fault}
     for name in problem.quantities:
         factor = float(np.median(reported[name] / np.where(answer[name], answer[name], np.nan)))
-        # An arbitrary factor or an arbitrary shift would explain any single value.
+        # An arbitrary factor or an arbitrary offset would explain any single value.
         several = len(answer[name]) > 1
         usual = _find_common_conversion_factor(
             factor, _FACTOR_RTOL if several else _SINGLE_VALUE_FACTOR_RTOL
@@ -386,14 +390,16 @@ def _iterate_answers_in_other_conventions(
 
 
 def _find_common_conversion_factor(factor: float, tolerance: float) -> tuple[str, float] | None:
-    """Return the common conversion factor that equals a given factor.
+    """Find a common conversion factor that matches a factor.
 
-    The relative difference of the two factors must not exceed the tolerance.
+    The relative difference between the factor and the common conversion factor must not exceed the
+    tolerance.
 
     Returns
     -------
     tuple of (str, float) or None
-        Description of the common factor, and its value. None if no common factor matches.
+        Description and value of the common conversion factor, or None if no common conversion
+        factor matches.
     """
     if math.isclose(factor, -1.0, rel_tol=tolerance):
         return "has the opposite sign", -1.0
@@ -405,7 +411,7 @@ def _find_common_conversion_factor(factor: float, tolerance: float) -> tuple[str
 
 
 def _format_factor(factor: float) -> str:
-    """Format a factor so that a factor close to 1 is not displayed as 1."""
+    """Format a factor so that a value close to 1 is not rounded to 1."""
     text, beyond = f"{factor:.6g}", factor - 1.0
     return text if text != "1" else f"(1 {'-' if beyond < 0.0 else '+'} {abs(beyond):.2g})"
 
@@ -413,13 +419,13 @@ def _format_factor(factor: float) -> str:
 def _iterate_problems_in_other_conventions(
     problem: BenchmarkProblem,
 ) -> Iterator[tuple[str, BenchmarkProblem]]:
-    """Iterate over problems with other conventions.
+    """Iterate over copies of a problem with other conventions.
 
-    Each item contains a description of the convention, and the changed problem.
+    Each item contains a description of a convention, and the problem under that convention.
     """
 
     def changed(**parameters: object) -> BenchmarkProblem:
-        """Return the problem with some parameters replaced."""
+        """Return a copy of the problem with other parameter values."""
         return replace(problem, parameters={**problem.parameters, **parameters})
 
     if problem.radiation_damping:

@@ -1,7 +1,7 @@
 """Tables with the answers of other codes.
 
-The headings and units of a table may differ from the headings and units of the problem. The
-function ``read_external_answer`` converts the columns to SI units.
+The headings and units of a table may differ from the headings and units that the problem specifies.
+The function ``read_external_answer`` converts the columns to SI units.
 """
 
 from __future__ import annotations
@@ -19,15 +19,17 @@ from rsfstudy.referee import reference_answers
 from rsfstudy.referee.problem_files import BenchmarkProblem
 from rsfstudy.rig import Column, convert_to_si, read_table
 
-#: Quantities that a file may contain instead of a requested quantity, and their units.
+#: Substitute for each requested quantity, with units. A file may contain the substitute instead of
+#: the requested quantity.
 _SUBSTITUTE_AND_UNITS_BY_QUANTITY = {
     "slip_rate": ("log10_slip_rate", "1"),
     "friction": ("shear_stress", "Pa"),
 }
 _UNITS_BY_SUBSTITUTE_QUANTITY = dict(_SUBSTITUTE_AND_UNITS_BY_QUANTITY.values())
-#: Tolerance of times, relative to the last time. The times in files are rounded to some decimals.
+#: Tolerance for comparing times, relative to the last time. The tolerance is necessary because
+#: times in files are rounded.
 _RTOL_FOR_MATCHING_ANSWER_TIMES = 1e-9
-#: Largest allowed value in SI units. Larger values would cause an overflow in ratios.
+#: Largest allowed value of an answer in SI units. The ratio of larger values could overflow.
 _MAX_ACCEPTED_ANSWER_VALUE_IN_SI = 1e100
 
 
@@ -39,7 +41,7 @@ class ReportedQuantity(NamedTuple):
     values : ndarray, shape (n,)
         Values in SI units.
     last_place_unit : float
-        One unit in the last decimal place of the values, in SI units. The resolution is 0 if all
+        One unit in the last decimal place of the values, in SI units. The attribute is 0 if all
         values are zero, or if the quantity was computed from another quantity.
     """
 
@@ -71,7 +73,7 @@ def read_external_answer(
     ------
     InvalidValue
         If a column is missing, if units have the wrong dimension, if a value is missing, or if the
-        number of rows or the times differ from the problem.
+        number of rows or the times differ from those of the problem.
     DataError
         If the file cannot be read.
     """
@@ -170,9 +172,9 @@ def _convert_column_to_si(
 
 
 def _find_last_place_unit(values: np.ndarray) -> float:
-    """Return one unit in the last decimal place of the numbers.
+    """Return the value of one unit in the last decimal place of an array.
 
-    The resolution of whole numbers is 1. If all numbers are zero, the result is 0.
+    The result is 1 if all numbers are integers, and 0 if all numbers are zero.
     """
     exponents = [Decimal(repr(x)).normalize().as_tuple().exponent for x in values.tolist() if x]
     return float(10.0 ** min(0, *map(int, exponents))) if exponents else 0.0
@@ -181,12 +183,12 @@ def _find_last_place_unit(values: np.ndarray) -> float:
 def _check_index_values(
     column: Column, values: np.ndarray, expected_values: np.ndarray, problem: BenchmarkProblem
 ) -> None:
-    """Check that the index column has the values of the problem.
+    """Check that the index column has the values that the problem specifies.
 
     Raises
     ------
     InvalidValue
-        If a value differs, for example because the file contains other times.
+        If a value differs, for example because the file contains values at other times.
     """
     wrong = (
         np.abs(values - expected_values)

@@ -44,7 +44,7 @@ from rsfstudy.slider import (
 
 #: Folder of the shipped problems and their answers.
 SHIPPED_PROBLEM_FOLDER = Path(__file__).with_name("problems")
-#: SI units of the quantities that a problem can request, for each type of report.
+#: SI units of the quantities that a problem can request, for each type of answer.
 UNITS_OF_SERIES_QUANTITIES = {
     "time": "s", "friction": "1", "slip_rate": "m/s", "theta": "s", "theta_1": "s", "theta_2": "s",
     "slip": "m", "normal_stress": "Pa", "pore_pressure": "Pa",
@@ -61,7 +61,7 @@ QUANTITY_UNITS_BY_REPORT_KIND = {
     "peaks": UNITS_OF_PEAK_QUANTITIES,
     "numbers": SI_UNITS_BY_SCALAR_QUANTITY,
 }
-#: Fields of the rig by the names of the problem parameters. The first dictionary contains only the
+#: Rig fields, keyed by the names of problem parameters. The first dictionary contains only the
 #: required parameters.
 _REQUIRED_RIG_FIELD_BY_PARAMETER = {
     "normal_stress": "normal_stress",
@@ -79,20 +79,22 @@ _UNITS_BY_PARAMETER = {
     "b": "1", "b_2": "1", "D_c_2": "m", "radiation_damping": "Pa s/m", "V_c": "m/s",
     "V_unstable": "m/s",
 }  # fmt: skip
-#: Laws with the state variable b ln(theta/theta_*), so that theta follows from the state variable.
+#: Friction laws with the state variable b ln(theta/theta_*). For these laws, theta can be computed
+#: from the state variable.
 _NAMES_OF_LAWS_WITH_THETA_AS_STATE = (
     "slip", "slowness", "family", "perrin_rice_zheng", "composite", "two_slip_states",
     "two_slowness_states",
 )  # fmt: skip
 
 
-#: Pattern of the type errors of msgspec, and descriptions of the types for error messages.
+#: Pattern of messages about wrong types from msgspec, and descriptions of types for error messages
+#: of rsfstudy.
 _TYPE_ERROR_PATTERN = re.compile(r"Expected `(\w+)`, got `(\w+)`(?: - at `\$(.*)`)?")
 _READABLE_NAME_BY_TYPE_NAME = {
     "array": "a list", "object": "a table", "str": "a text", "int": "a whole number",
     "float": "a number", "bool": "true or false", "null": "nothing", "date": "a date",
 }  # fmt: skip
-#: Maximum number of digits of an answer, and maximum number of peaks.
+#: Maximum number of digits of an answer, and maximum number of requested peaks.
 _MAX_DIGITS, _MAX_PEAKS = 15, 10_000
 
 
@@ -107,23 +109,23 @@ class BenchmarkProblem:
     law : str
         Name of the state evolution law.
     equations : str, optional
-        Equations of the problem, as text for readers.
+        Description of the equations for readers of the problem.
     conventions : str, optional
-        Conventions that differ between codes, as text for readers.
+        Description of conventions that differ between codes, for readers of the problem.
     report : {"series", "peaks", "numbers"}, optional
-        Type of the answer. A series contains values at given times, and peaks are the times and
-        values of the maxima of slip rate. The default is a series.
+        Type of the answer: a series of values at the times ``times``, the times and values of slip
+        rate maxima, or single numbers. The default is a series.
     quantities : list of str
         Names of the requested quantities, which are columns of the answer.
     parameters : mapping of str to object
         Values of the parameters, as numbers in SI units or as strings with units. The parameters
-        ``a``, ``b``, ``D_c``, ``V_star`` and ``normal_stress`` are required. A law with two states
-        also needs ``b_2`` and ``D_c_2``. Optional parameters are ``mu_star``, ``stiffness``,
-        ``period``, ``mass``, ``radiation_damping``, ``V_c``, ``V_unstable``, and other fields of a
-        scene.
+        ``a``, ``b``, ``D_c``, ``V_star`` and ``normal_stress`` are required. A law with two state
+        variables also needs ``b_2`` and ``D_c_2``. Optional parameters are ``mu_star``,
+        ``stiffness``, ``period``, ``mass``, ``radiation_damping``, ``V_c``, ``V_unstable``, and
+        other fields of a scene.
     initial : mapping of str to object, optional
-        Initial values ``slip_rate`` and ``theta``. For a law with two states, ``theta`` is a list.
-        By default, the motion starts from steady sliding at ``V_star``.
+        Initial values ``slip_rate`` and ``theta``. For a law with two state variables, ``theta`` is
+        a list. By default, the motion starts from steady sliding at ``V_star``.
     loading : list of mapping, optional
         Segments of the loading history, as for ``Rig.protocol``.
     times : list of float, optional
@@ -133,7 +135,7 @@ class BenchmarkProblem:
     digits : int, default: 12
         Number of significant digits of the known answer, from 1 to 15.
     number : int, default: 0
-        Number of the problem. The number of a user-defined problem is 0.
+        Number of a shipped problem, or 0 for a user-defined problem.
 
     Raises
     ------
@@ -214,7 +216,7 @@ class BenchmarkProblem:
 
     @property
     def index_values(self) -> np.ndarray:
-        """Times of a series in s, or numbers of the peaks.
+        """Values of the index column: times in s, or numbers of the peaks.
 
         For an answer with a single row, the array contains the value 1.
         """
@@ -239,7 +241,7 @@ class BenchmarkProblem:
 
     @cached_property
     def si_parameters(self) -> Mapping[str, float]:
-        """SI values of parameters that are dimensionless in the scene."""
+        """SI values of the parameters that scenes contain as dimensionless fields."""
         stated = self.parameters
         return {
             n: convert_to_si(n, stated[n], units)
@@ -249,7 +251,7 @@ class BenchmarkProblem:
 
     @property
     def b(self) -> tuple[float, ...]:
-        """Evolution effects, one value per state variable."""
+        """Evolution effects b, one value per state variable."""
         return tuple(
             self.si_parameters[name] for name in ("b", "b_2") if name in self.si_parameters
         )
@@ -297,7 +299,7 @@ class BenchmarkProblem:
 
     @property
     def theta_star(self) -> tuple[float, ...]:
-        r"""Values of theta in steady sliding at the reference velocity.
+        r"""Steady-state values of theta at the reference velocity.
 
         The tuple contains one value of :math:`\theta_*` in s per state variable.
 
@@ -333,10 +335,10 @@ class BenchmarkProblem:
 
     @property
     def initial_event(self) -> Event | None:
-        """Start of the motion with the initial slip rate and state.
+        """Initial state of the motion with the initial slip rate and theta.
 
         The stress of the spring is chosen so that the slip rate equals the initial slip rate before
-        any step of the loading. The value is None if the problem has no initial values.
+        any step of the loading. The property is None if the problem has no initial values.
         """
         if not self.initial:
             return None
@@ -393,7 +395,7 @@ def read_problem(path: Path) -> BenchmarkProblem:
     Returns
     -------
     BenchmarkProblem
-        Validated problem. The scene and the initial state have been computed once without an error.
+        Validated problem, whose scene and initial state can be computed without errors.
 
     Raises
     ------
@@ -407,7 +409,8 @@ def read_problem(path: Path) -> BenchmarkProblem:
         stated = tomllib.loads(path.read_text(encoding="utf-8"))
     except RecursionError as error:
         raise DataError(f"{path}: cannot be read as TOML (it is nested too deeply)") from error
-    # ValueError is raised for wrong syntax, wrong encoding and numbers with too many digits.
+    # The TOML parser raises ValueError for wrong syntax, wrong encoding and numbers with too many
+    # digits.
     except (OSError, ValueError) as error:
         raise DataError(f"{path}: cannot be read as TOML ({shorten_text(error)})") from error
     known = {
@@ -446,7 +449,7 @@ def _check_declared_type(name: str, value: Any, expected_type: Any) -> None:
     Raises
     ------
     InvalidValue
-        If the value has another type.
+        If the value does not have the declared type.
     """
     try:
         msgspec.convert(value, expected_type)
@@ -475,8 +478,8 @@ def shipped_problem_files() -> dict[int, Path]:
 def write_problems(directory: Path) -> int:
     """Write the shipped problems, their answers and templates to a directory.
 
-    The directory then contains the folders ``problems``, ``answers`` and ``templates``, and the
-    script ``example.py``. A template is a table with the headings of an answer and without values.
+    The function creates the folders ``problems``, ``answers`` and ``templates``, and the script
+    ``example.py``. A template is a table that contains the headings of an answer, but no values.
 
     Parameters
     ----------
@@ -516,7 +519,7 @@ def write_problems(directory: Path) -> int:
 
 
 def _write_answer_template(problem: BenchmarkProblem, path: Path) -> None:
-    """Write an empty answer with the headings and the index column."""
+    """Write a table with the headings and the index column of an answer."""
     empty = [""] * len(problem.quantities)
     rows = [f"{row:.12g}" for row in problem.index_values] if problem.index_column else []
     with path.open("w", newline="", encoding="utf-8") as file:

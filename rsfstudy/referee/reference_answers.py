@@ -48,8 +48,8 @@ def compute_answer(problem: BenchmarkProblem, accuracy: Accuracy) -> AnswerColum
     Raises
     ------
     RsfStudyError
-        If the motion ends before the answer is complete, or if a requested number does not exist or
-        cannot be computed.
+        If the simulated motion ends before the answer is complete, or if a requested number does
+        not exist or cannot be computed.
     """
     found = {
         "series": _compute_series_answer,
@@ -83,9 +83,9 @@ def compute_normal_stress(problem: BenchmarkProblem) -> np.ndarray:
 def _compute_series_answer(problem: BenchmarkProblem, accuracy: Accuracy) -> AnswerColumnByQuantity:
     r"""Compute the values of a series at the times of the problem.
 
-    The motion provides the state variables :math:`\Theta`, which are converted to :math:`\theta =
-    \theta_* e^{\Theta/b}`. The effect of stress on the state is first subtracted from the state
-    variables in proportion to :math:`|b|`.
+    The state variables :math:`\Theta` of the simulated motion are converted to :math:`\theta =
+    \theta_* e^{\Theta/b}`. Before the conversion, the effect of normal stress on the state is
+    subtracted from the state variables in proportion to :math:`|b|`.
     """
     scene, rig = problem.scene, problem.rig
     at = np.array(problem.times) * rig.dimensionless("1 s")
@@ -126,7 +126,7 @@ def _compute_series_answer(problem: BenchmarkProblem, accuracy: Accuracy) -> Ans
 def _compute_times_and_rates_of_peaks(
     problem: BenchmarkProblem, accuracy: Accuracy
 ) -> AnswerColumnByQuantity:
-    """Compute the times and values of the maxima of slip rate."""
+    """Compute the times and values of slip rate maxima."""
     rig, meter = problem.rig, WorkMeter(accuracy.budget, engine=accuracy.engine)
     watched = integrate_events(
         problem.scene,
@@ -147,7 +147,7 @@ def _compute_times_and_rates_of_peaks(
 def _compute_requested_scalar_quantities(
     problem: BenchmarkProblem, accuracy: Accuracy
 ) -> AnswerColumnByQuantity:
-    """Compute the requested numbers."""
+    """Compute an answer that consists of single numbers."""
     told: dict[str, float] = {}
     for names, find in _COMPUTE_FUNCTION_BY_SCALAR_QUANTITIES.items():
         if {*names} & {*problem.quantities}:
@@ -163,7 +163,7 @@ def _run_measure_of_problem(
     Raises
     ------
     RsfStudyError
-        If the status of the measurement is not ok.
+        If the status of the measure is not ok.
     """
     found = measure(problem.scene, accuracy)
     if found.status is not Status.OK:
@@ -172,7 +172,7 @@ def _run_measure_of_problem(
 
 
 def _compute_stability_numbers(problem: BenchmarkProblem, accuracy: Accuracy) -> tuple[float, ...]:
-    """Compute the critical stiffness, the growth rate and the frequency."""
+    """Compute the critical stiffness, and the growth rate and frequency."""
     scene, rig = problem.scene, problem.rig
     growth = linear_growth_rates(scene, scene.log_load_velocity)[0] * scene.load_velocity
     stiffness = critical_stiffness(scene, scene.log_load_velocity)

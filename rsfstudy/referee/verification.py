@@ -1,4 +1,4 @@
-"""Comparison of files of other codes with known answers."""
+"""Comparison of the output files of other codes with known answers."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from rsfstudy.referee.problem_files import read_problem, shipped_problem_files
 def compare_file_with_known_answer(
     file: Path, stated_problem: str, columns: Mapping[str, str] | None, required_digits: float
 ) -> AnswerComparison:
-    """Compare a file of another code with the known answer to its problem.
+    """Compare the output file of another code with a known answer.
 
     Parameters
     ----------
@@ -25,10 +25,10 @@ def compare_file_with_known_answer(
         Number of a shipped problem, or path of a problem file. If the string is empty, the first
         two characters of the file name are the number of the problem.
     columns : mapping of str to str, or None
-        Heading and units of the columns in the file, as for ``rsfstudy.read_table``. If the value
-        is None, the first line of the file must contain the names of the columns.
+        Heading and units of the columns in the file, as for ``rsfstudy.read_table``. If the
+        argument is None, the first line of the file must contain the names of the columns.
     required_digits : float
-        Number of digits that is required to pass.
+        Number of correct digits that the answer needs to pass.
 
     Returns
     -------
@@ -61,12 +61,12 @@ def summarise_comparisons(comparisons: Sequence[AnswerComparison]) -> str:
     Parameters
     ----------
     comparisons : sequence of AnswerComparison
-        Comparisons of the files.
+        Comparison of each file.
 
     Returns
     -------
     str
-        Text such as "9 problems of 24, 9 to 10 digits". Only the problems that passed are counted.
+        Summary such as "9 problems of 24, 9 to 10 digits". Only problems that passed are counted.
     """
     passed = {
         one.problem.title: math.floor(one.agreeing_digits)

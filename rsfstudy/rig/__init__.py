@@ -1,8 +1,9 @@
-"""Laboratory rigs: quantities in SI units, and scenes, axes and files in units.
+"""Laboratory rigs, with scenes, axes and files in physical units.
 
-A ``Rig`` has a stiffness, a normal stress, a slip distance and velocities in units. The package
-converts these quantities to the dimensionless fields of scenes and back, and reads tables, load
-point protocols and records from files. It never integrates a motion and never fits a record.
+A ``Rig`` has a stiffness, a normal stress, a slip distance and a reference velocity in physical
+units. The package ``rsfstudy.rig`` converts rig quantities to the dimensionless fields of scenes
+and back, and reads tables, load point protocols and records from files. The package never
+integrates the equations of motion and never fits a record.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Axes with units for studies of a rig.
+"""Axes with physical units for studies of a rig.
 
 `make_axis_with_units` is the main function.
 """
@@ -31,19 +31,20 @@ from rsfstudy.rig.units import (
 
 
 def make_axis_with_units(dimension: str, values: Any, units: str | Mapping[str, str] = "") -> Axis:
-    """Create an axis with units.
+    """Create an axis with physical units.
 
-    The units of the axis are the units of its first value. A field without units becomes an
-    ordinary axis.
+    The first value determines the units of the axis. If the field has no units, the function
+    creates an ordinary axis.
 
     Parameters
     ----------
     dimension : str
-        Name of a quantity of a rig, or of a field of a scene.
+        Name of a rig quantity or of a scene field.
     values : sequence of quantity, str, or mapping
         Values of the axis. A string is a range with units, ``first:last:count`` or
-        ``first:last:count:log``. A mapping contains the fields, or a rig, for each label, and all
-        its fields are converted to SI units. A mapping may also be a table, as in `Axis.cases`.
+        ``first:last:count:log``. A mapping contains a rig, or the values of several fields, for
+        each label. The values of a mapping are converted to SI units. A mapping may also be a
+        table, as in `Axis.cases`.
     units : str, or mapping of str to str, optional
         Units of plain numbers, or of the columns of a table. By default, plain numbers are in SI
         units.
@@ -56,13 +57,14 @@ def make_axis_with_units(dimension: str, values: Any, units: str | Mapping[str, 
     Raises
     ------
     InvalidValue
-        If a value is not a quantity, if its units are incompatible, or if a quantity of a rig is
-        not positive.
+        If a value is not a quantity, if its units are incompatible, or if a rig quantity is not
+        positive.
 
     Notes
     -----
-    The names of two quantities differ between rigs and axes: the normal stress of a rig is named
-    ``sigma_star`` on axes, and a velocity with units is named without the suffix ``_ratio``.
+    Two names on axes differ from the names in rigs and scenes. An axis of the rig's normal stress
+    is named ``sigma_star``. An axis of velocities with units is named without the suffix
+    ``_ratio``.
     """
     if not is_variable_name(dimension):
         # The constructor raises an error that explains the rule for names.
@@ -89,13 +91,13 @@ def convert_axis_to_stated_units(axis: Axis) -> Axis:
     Parameters
     ----------
     axis : Axis
-        Axis of a study of a rig. Plain numbers are in SI units if the axis has no units for the
-        field.
+        Axis of a study of a rig. If the axis has no units for a field, plain numbers are in SI
+        units.
 
     Returns
     -------
     Axis
-        Axis of floats with units.
+        Axis with floats in the units of the axis.
     """
     if axis.is_single_field:
         return _single_field_axis(axis.rows, axis.units)
@@ -106,7 +108,7 @@ def convert_axis_to_stated_units(axis: Axis) -> Axis:
 
 
 def _single_field_axis(rows: Sequence[AxisRow], units: Mapping[str, str]) -> Axis:
-    """Create an axis of one field with units."""
+    """Create an axis with units for a single field."""
     found, stated = _convert_rows_to_axis_units(rows, units, first_value_sets_units=True)
     (name,) = found[0]
     return Axis(name, [row[name] for row in found], stated)
@@ -115,10 +117,10 @@ def _single_field_axis(rows: Sequence[AxisRow], units: Mapping[str, str]) -> Axi
 def _convert_rows_to_axis_units(
     rows: Sequence[AxisRow], units: Mapping[str, str], *, first_value_sets_units: bool
 ) -> tuple[list[dict[str, Any]], dict[str, str]]:
-    """Convert the rows of an axis to numbers, and return the units too.
+    """Convert the rows of an axis to numbers and return their units.
 
-    The function uses the names of fields on axes. The units of a field are the units of the axis,
-    the units of the first value of the column, or SI units, in this order of priority.
+    The function converts field names to their names on axes. The units of a field are the units of
+    the axis, the units of the first value of the column, or SI units, in this order of priority.
     """
     found: list[dict[str, Any]] = [{} for _row in rows]
     stated: dict[str, str] = {}
@@ -133,7 +135,7 @@ def _convert_rows_to_axis_units(
                 ours = _parse_units_of_value(value) if first_value_sets_units else ""
                 stated.setdefault(name, units.get(given) or ours or si)
             elif units.get(given):
-                factor_to_si(given, units[given])  # This call raises an error.
+                factor_to_si(given, units[given])  # This call always raises an error.
     for name, held in quantities.items():
         numbers = convert_values_to_units(name, [value for _row, value in held], stated[name])
         for (row, _value), number in zip(held, numbers, strict=True):
@@ -142,27 +144,27 @@ def _convert_rows_to_axis_units(
 
 
 def convert_values_to_units(quantity_name: str, values: Sequence[Any], units: str) -> list[float]:
-    """Convert the values of a quantity to given units.
+    """Convert the values of a quantity to the requested units.
 
     Parameters
     ----------
     quantity_name : str
-        Name of the quantity on axes.
+        Name of the quantity, as on an axis with units.
     values : sequence of quantity
-        Values to convert. Plain numbers are already in the given units.
+        Values to convert. Plain numbers are already in the requested units.
     units : str
         Units of the result.
 
     Returns
     -------
     list of float
-        Values in the given units.
+        Values in the requested units.
 
     Raises
     ------
     InvalidValue
-        If a value is not a quantity, if its units are incompatible, or if a quantity of a rig is
-        not positive.
+        If a value is not a quantity, if its units are incompatible, or if a rig quantity is not
+        positive.
     """
     scale, found = factor_to_si(quantity_name, units), []
     kind = (
@@ -192,35 +194,35 @@ def convert_values_to_units(quantity_name: str, values: Sequence[Any], units: st
 
 
 def _is_allowed_rig_number(quantity_name: str, number: Any) -> bool:
-    """Return False for a quantity of a rig that is not positive."""
+    """Return False if a quantity that must be positive is not positive."""
     return quantity_name not in RIG_NAME_BY_AXIS_NAME or (
         isinstance(number, float) and number > 0.0
     )
 
 
 def axis_name_and_units(name: str, value: Any) -> tuple[str, str | None]:
-    """Return the name of a field on an axis, and its SI units.
+    """Return the axis name and the SI units of a quantity or field.
 
     Parameters
     ----------
     name : str
-        Name of a quantity of a rig, or of a field of a scene.
+        Name of a rig quantity or of a scene field.
     value : object
-        Value of the field.
+        Value of the quantity or field.
 
     Returns
     -------
     name : str
-        Name of the field on axes.
+        Name of the axis for the quantity or field.
     units : str or None
-        SI units of the field. None if the value has no units.
+        SI units, or None if the value has no units.
     """
     name = _axis_field_name(name, value)
     return name, _axis_si_units(name, value)
 
 
 def _axis_field_name(name: str, value: Any) -> str:
-    """Return the name on axes of a quantity of a rig or a field of a scene."""
+    """Return the name of the axis that varies a rig quantity or scene field."""
     quantity = not isinstance(value, str) or split_number_and_units(value)[0] is not None
     if name in AXIS_NAME_BY_RIG_NAME and quantity:
         return AXIS_NAME_BY_RIG_NAME[name]
@@ -236,7 +238,7 @@ def _axis_field_name(name: str, value: Any) -> str:
 
 
 def _axis_si_units(name: str, value: Any) -> str | None:
-    """Return the SI units of a value on an axis, if it has units."""
+    """Return the SI units of an axis value, or None if it has no units."""
     if value is None or isinstance(value, bool):
         return None
     if name in RIG_NAME_BY_AXIS_NAME:
@@ -251,20 +253,20 @@ def _parse_units_of_value(value: Any) -> str:
 
 
 def factor_to_si(quantity_name: str, units: str) -> Fraction:
-    """Compute the conversion factor from given units to SI units.
+    """Compute the factor that converts a unit to SI units.
 
     Parameters
     ----------
     quantity_name : str
-        Name of the quantity on axes.
+        Name of the quantity, as on an axis with units.
     units : str
-        Units to convert from. A stiffness may be friction divided by displacement, which is
-        converted to 1/m.
+        Units to convert from. A stiffness may be in units of friction divided by displacement,
+        which are converted to 1/m.
 
     Returns
     -------
     Fraction
-        Value of 1 in SI units.
+        Value of one unit in SI units.
 
     Raises
     ------

@@ -1,8 +1,8 @@
 """Conversion of datasets between dimensionless and physical units.
 
-The attribute ``scale`` of a variable, for example ``D_c/V_*``, is the unit that makes the variable
-dimensionless. `convert_dataset_units` is the main function. `read_si_scales` provides the scales
-that it needs.
+The attribute ``scale`` of a dimensionless variable, for example ``D_c/V_*``, is the unit of the
+variable. The main function `convert_dataset_units` multiplies variables by the scales from
+`read_si_scales`.
 """
 
 from __future__ import annotations
@@ -20,20 +20,22 @@ from rsfstudy.netcdf_encoding import copy_with_cf_encoding
 from rsfstudy.quantities import format_unit_quotient, split_unit_quotient
 from rsfstudy.rig.units import compute_conversion_factor
 
-#: Names of velocity ratios and normal stress ratios after conversion to units. The name
-#: ``normal_stress`` is not available, because scenes have a field of this name.
+#: Names of velocity ratios and normal stress ratios after the conversion to physical units. The
+#: name ``normal_stress`` is not available, because scenes have a field with the name
+#: ``normal_stress``.
 _DIMENSIONAL_NAME_BY_RATIO_NAME = {
     "velocity_ratio": "velocity",
     "normal_stress_ratio": "effective_normal_stress",
 }
-#: Pattern of the names of logarithms of slip rates, and pattern of the words to remove from the
-#: start and the end of their descriptions.
+#: Pattern of variable names for logarithms of slip rates, and pattern of the words to remove from
+#: the start and the end of variable descriptions.
 _LOG_SLIP_RATE_PATTERN = re.compile(r"(\w+_)?log10_slip_rate")
 _LOG_SLIP_RATE_DESCRIPTION_PATTERN = re.compile(r"^decimal logarithm of (the )?| over V_star")
 
-#: Prefix of a dimensionless field whose own name is the name of an axis with units.
+#: Prefix for the name of a dimensionless field if an axis with units already has the name of the
+#: field.
 DIMENSIONLESS_PREFIX = "dimensionless_"
-#: Units of a rig in tables and figures.
+#: Units of stress, length and time in tables and figures of rigs.
 DISPLAY_BASE_UNITS = {"stress": "MPa", "length": "um", "time": "s"}
 #: Name of the dataset attribute that lists the scales after a conversion.
 NAME_OF_SCALES_ATTRIBUTE = "scales"
@@ -49,9 +51,9 @@ class UnitScale(NamedTuple):
     Parameters
     ----------
     factor : float or xarray.Variable
-        Value of 1. A variable contains one value per cell.
+        Value of one dimensionless unit. A variable contains one factor per lattice cell.
     units : str
-        Physical units.
+        Physical units of ``factor``.
     """
 
     factor: float | xr.Variable
@@ -64,15 +66,15 @@ def read_si_scales(
     slip_distance: float | None = None,
     reference_rate: float | None = None,
 ) -> dict[str, UnitScale]:
-    r"""Determine the scales of a dataset in SI units.
+    r"""Determine the SI values of the dimensionless units of a dataset.
 
-    The scales are read from the coordinates of the dataset. An argument replaces a scale that the
-    dataset does not contain.
+    The function reads the scales from the coordinates of the dataset. Pass arguments for scales
+    that the dataset does not contain.
 
     Parameters
     ----------
     dataset : xarray.Dataset
-        Results or a motion.
+        Results of a study, or a simulated motion.
     normal_stress : float, optional
         Normal stress :math:`\sigma_*` in Pa.
     slip_distance : float, optional
@@ -83,8 +85,8 @@ def read_si_scales(
     Returns
     -------
     dict of str to UnitScale
-        Scales by name, for example ``D_c``. The factors are variables if a scale varies between
-        cells.
+        Scales by name, for example ``D_c``. If a scale varies between lattice cells, its factor is
+        a variable.
 
     Raises
     ------
@@ -117,7 +119,7 @@ def _resolve_scale_of_dataset(
         compute_conversion_factor(coordinate_name, variable.attrs.get("units", units), units)
     )
     known = np.unique(held.values[np.isfinite(held.values)])
-    # If the scale does not vary, it also applies to cells in which the scale is NaN.
+    # If the scale does not vary, the same value also applies to cells in which the scale is NaN.
     if known.size == 1:
         held = xr.Variable((), known[0])
     if stated_value is not None and not np.allclose(
@@ -130,7 +132,7 @@ def _resolve_scale_of_dataset(
 
 
 def build_scales_of_rig(rig: Mapping[str, Any]) -> dict[str, UnitScale]:
-    """Compute the scales of a rig in SI units.
+    """Compute the SI values of the dimensionless units of a rig.
 
     Parameters
     ----------
@@ -153,21 +155,21 @@ def convert_dataset_units(
     length: str,
     time: str,
 ) -> xr.Dataset:
-    """Convert a dataset to units of stress, length and time.
+    """Convert a dataset to physical units of stress, length and time.
 
     Parameters
     ----------
     dataset : xarray.Dataset
-        Dimensionless results or motion.
+        Dimensionless results of a study, or a dimensionless motion.
     si_scales : mapping of str to UnitScale
         Scales in SI units, from `read_si_scales`.
     stress_unit, length_unit, time_unit : str
-        Units of the result.
+        Requested units.
 
     Returns
     -------
     xarray.Dataset
-        Dataset in units. See `apply_scales_to_dataset`.
+        Dataset in physical units. See `apply_scales_to_dataset` for details.
     """
     units = {
         "sigma_*": stress, "D_c": length, "D_c/V_*": time, "V_*/D_c": f"{time}-1",
@@ -190,7 +192,7 @@ def build_si_scales(
     slip_distance: float | xr.Variable,
     reference_rate: float | xr.Variable,
 ) -> dict[str, UnitScale]:
-    r"""Compute the scales of dimensionless quantities in SI units.
+    r"""Compute the SI values of all dimensionless units.
 
     Parameters
     ----------
@@ -243,20 +245,20 @@ def _format_number_or_range(values: float | xr.Variable) -> str:
 def find_scale_of_variable(
     variable: xr.DataArray | xr.Variable, scales_by_name: Mapping[str, UnitScale]
 ) -> UnitScale | None:
-    """Find the value of one dimensionless unit of a variable.
+    """Find the physical value of the dimensionless unit of a variable.
 
     Parameters
     ----------
     variable : xarray.DataArray or xarray.Variable
-        Variable with an attribute ``scale``. The scale may be a quotient: for ``D_c/V_* (V_*)-1``,
-        the function divides the first scale by the second scale.
+        Variable with an attribute ``scale``. The scale may be a quotient of two scales. For
+        example, ``D_c/V_* (V_*)-1`` is the quotient of ``D_c/V_*`` and ``V_*``.
     scales_by_name : mapping of str to UnitScale
         Scales of the dataset.
 
     Returns
     -------
     UnitScale or None
-        Scale of the variable. None if the variable has no scale, or an unknown scale.
+        Scale of the variable, or None if the variable has no scale or an unknown scale.
     """
     named = split_unit_quotient(variable.attrs.get("scale", ""))
     known = {"1": UnitScale(1.0, "1"), **scales_by_name}
@@ -276,12 +278,12 @@ def convert_to_display_units(dataset: xr.Dataset) -> xr.Dataset:
     Parameters
     ----------
     dataset : xarray.Dataset
-        Results.
+        Results of a study.
 
     Returns
     -------
     xarray.Dataset
-        Results in units. A dataset without a rig is returned unchanged.
+        Results in MPa, um and s. A dataset without a rig is returned unchanged.
     """
     if "sigma_star" not in dataset.variables or NAME_OF_SCALES_ATTRIBUTE in dataset.attrs:
         return dataset
@@ -289,18 +291,18 @@ def convert_to_display_units(dataset: xr.Dataset) -> xr.Dataset:
 
 
 def has_units_unexpected_by_its_figures(dataset: xr.Dataset) -> bool:
-    """Return True if results have units that study figures do not expect.
+    """Return True if results are in other units than the figures of studies.
 
     Parameters
     ----------
     dataset : xarray.Dataset
-        Results.
+        Results of a study.
 
     Returns
     -------
     bool
         True if the results were converted to units other than MPa, um and s, or if the results have
-        units but no rig.
+        physical units but no rig.
     """
     told = dataset.attrs.get(NAME_OF_SCALES_ATTRIBUTE, "")
     as_shown = "sigma_star" in dataset.variables and all(
@@ -317,14 +319,14 @@ def convert_dataset_by_unit_scales(
     Parameters
     ----------
     dataset : xarray.Dataset
-        Dimensionless results or motion.
+        Dimensionless results of a study, or a dimensionless motion.
     scales_by_name : mapping of str to UnitScale
         Scales by name.
 
     Returns
     -------
     xarray.Dataset
-        Dataset in units. The attribute ``scales`` lists the scales.
+        Dataset in physical units. The attribute ``scales`` lists the scales.
 
     Raises
     ------
@@ -333,11 +335,11 @@ def convert_dataset_by_unit_scales(
 
     Notes
     -----
-    The attribute ``units`` replaces the attribute ``scale`` of each variable. Names lose their
-    suffix ``_ratio``, which gives names such as ``critical_velocity``, ``load_velocity`` and
-    ``effective_normal_stress``. For each logarithm of a slip rate, the function adds the slip rate.
-    Variables without a scale do not change. A dimensionless coordinate is dropped if the dataset
-    also contains the same quantity in units.
+    Each converted variable has the attribute ``units`` instead of the attribute ``scale``. The
+    suffix ``_ratio`` is removed from names, for example in ``critical_velocity``, ``load_velocity``
+    and ``effective_normal_stress``. For each logarithm of a slip rate, the function adds a variable
+    with the slip rate. Variables without a scale do not change. A dimensionless coordinate is
+    removed if the dataset also contains the same quantity in physical units.
     """
     beside = [
         n
@@ -357,7 +359,8 @@ def convert_dataset_by_unit_scales(
         raise DataError(text)
     for name, scale in sizes.items():
         values = dataset[name].variable.to_base_variable()
-        # Zero has the same value in all units, so it does not get the dimensions of the scale.
+        # Zero has the same value in all units, so a variable of zeros does not get the dimensions
+        # of the scale.
         converted = values * scale.factor if np.any(values) else values
         if name in dataset.dims and converted.dims != (name,):
             other = next(dim for dim in converted.dims if dim != name)
@@ -367,7 +370,7 @@ def convert_dataset_by_unit_scales(
         kept = {key: value for key, value in values.attrs.items() if key not in gone}
         result[name] = (converted.dims, converted.values, kept | {"units": scale.units})
     held = {"sigma_star": "sigma_*", "slip_distance": "D_c", "reference_velocity": "V_*"}
-    # Convert the scales that are coordinates but not axes.
+    # Convert scales that are coordinates but not axes of the lattice.
     for name in set(held) & set(dataset.coords) - set(dataset.dims):
         one = xr.Variable((), 1.0) * scales_by_name[held[name]].factor
         words = dataset[name].attrs | {"units": scales_by_name[held[name]].units}
@@ -387,7 +390,7 @@ def convert_dataset_by_unit_scales(
 
 
 def convert_to_dimensional_name(variable_name: str) -> str:
-    """Return the name of a variable after conversion to units.
+    """Return the name of a variable after the conversion to physical units.
 
     Parameters
     ----------
@@ -417,14 +420,14 @@ def slip_rate_from_log(
     variable_name : str
         Name of the logarithm.
     factor : float or xarray.Variable
-        Value of :math:`V_*` in the given units.
+        Value of :math:`V_*` in ``units``.
     units : str
         Units of the slip rate.
 
     Returns
     -------
     dict of str to xarray.Variable
-        Slip rate by name. If the dataset contains an error estimate of the logarithm, the
+        Slip rate by its name. If the dataset contains an error estimate of the logarithm, the
         dictionary also contains the error estimate of the slip rate.
     """
     log, plain = dataset[variable_name].variable, variable_name.replace("log10_", "")

@@ -26,7 +26,7 @@ from rsfstudy.slider import (
     protocol,
 )
 
-#: Names of the columns of a sampled history, and their units if no rig is given.
+#: Column names of a sampled history, and the units of the columns if the user passes no rig.
 _SLIDER_UNITS_OF_RECORD_COLUMNS = {
     "time": "D_c/V_*", "displacement": "D_c", "velocity": "V_*", "normal_stress": "sigma_*",
     "pore_pressure": "sigma_*",
@@ -50,18 +50,19 @@ def history(
     ----------
     record : mapping, xarray.Dataset, str or Path
         Arrays by name, a dataset, or the path of a CSV file whose first line contains the names and
-        the units of the columns (see `read_table`). The column ``time`` is required. The columns
-        ``displacement`` or ``velocity`` describe the load point, which moves at :math:`V_*` if both
-        are missing. The column ``normal_stress`` contains the normal stress, and the column
-        ``pore_pressure`` contains the change of pore pressure since the time before the record.
+        the units of the columns (see `read_table`). The column ``time`` is required. The column
+        ``displacement`` or ``velocity`` describes the load point. If both columns are missing, the
+        load point moves at :math:`V_*`. The optional columns are ``normal_stress`` and
+        ``pore_pressure``, which contain the normal stress and the change of pore pressure relative
+        to its value before the record.
     rig : Rig, optional
-        Rig for the conversion of units. By default, all data are dimensionless, with the units
-        ``D_c/V_*``, ``D_c``, ``V_*`` and ``sigma_*``.
+        Rig for the conversion of units. By default, all data are dimensionless: times in
+        ``D_c/V_*``, displacements in ``D_c``, velocities in ``V_*`` and stresses in ``sigma_*``.
     columns : mapping of str to (str, str) or str, optional
-        Heading and units of each column, for example ``{"time": ("t", "s")}`` or
-        ``{"time": "t (s)"}``. By default, headings are equal to the names of the columns. Arrays
-        are in SI units if a rig is given, and dimensionless otherwise. The units of variables are
-        read from their attribute ``units``.
+        Heading and units of each column, for example ``{"time": ("t", "s")}`` or ``{"time": "t
+        (s)"}``. By default, the heading of a column is its name. Arrays are in SI units if you pass
+        a rig, and dimensionless otherwise. The units of dataset variables are read from their
+        attribute ``units``.
     name : str, default: "history"
         Name of the history in results.
 
@@ -75,8 +76,8 @@ def history(
     InvalidValue
         If units are missing, if a value is missing or not finite, if time does not increase, or if
         the normal stress is not positive. The error message contains the line and column of the
-        file, or the number of the sample. If the load point moves backwards, only scenes with
-        ``regularised=True`` accept the history, and other scenes raise the error.
+        file, or the number of the sample. The error is not raised if the load point moves
+        backwards. In that case, only scenes with ``regularised=True`` accept the history.
 
     Notes
     -----
@@ -99,7 +100,7 @@ def history(
     >>> rsfstudy.Scene(loading=loading).load_velocity
     2.0
 
-    The same history in units requires a rig:
+    A history with physical units requires a rig:
 
     >>> rig = rsfstudy.Rig(
     ...     normal_stress="5 MPa", slip_distance="10 um", reference_velocity="1 um/s"
@@ -149,7 +150,7 @@ def history(
 def _read_columns_of_record(
     record: Any, columns: Mapping[str, Any] | None, rig: Rig | None
 ) -> dict[str, Column]:
-    """Read the columns of a record of any type."""
+    """Read the columns of arrays, a dataset or a file."""
     if isinstance(record, str | Path):
         return read_table(record, columns)
     is_dataset = hasattr(record, "data_vars")
@@ -190,8 +191,8 @@ def _load_point_velocity(
 ) -> tuple[np.ndarray, tuple[str, float, str] | None]:
     """Compute the velocity of the load point after each sample.
 
-    The second returned value describes the first sample that moves the load point backwards by its
-    name, value and position. It is None if there is no such sample.
+    The function also returns the column name, value and position of the first sample at which the
+    load point moves backwards, or None if the load point never moves backwards.
     """
     time, key = (
         record_values["time"],
@@ -227,10 +228,10 @@ def read_protocol(path: str | Path, rig: Rig | None = None, name: str = "protoco
     ----------
     path : str or Path
         Path of the file. The first line contains the names and units of the columns, for example
-        ``velocity (um/s), duration (s)``. Each of the other lines describes a segment by its
-        velocity and either its ``duration`` or its ``distance``. Optional columns are ``step``, a
-        sudden displacement at the start of the segment, and ``normal_stress``. A field may be
-        empty.
+        ``velocity (um/s), duration (s)``. Each of the other lines describes a loading segment by
+        its velocity and either its ``duration`` or its ``distance``. Optional columns are ``step``,
+        a sudden displacement at the start of the segment, and ``normal_stress``. Fields of the
+        table may be empty.
     rig : Rig, optional
         Rig for the conversion of units. A rig is not needed if all columns have the dimensionless
         units ``V_*``, ``D_c``, ``D_c/V_*`` and ``sigma_*``.

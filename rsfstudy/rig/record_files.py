@@ -37,9 +37,9 @@ _UNITS_AND_FACTORS_OF_RECORD_COLUMNS = {
     "shear_stress": ("Pa", 1.0),
     "normal_stress": ("Pa", 1.0),
 }
-#: Units in the examples of error messages. The other columns are in MPa.
+#: Units of columns in the examples of error messages. Columns that are not listed are in MPa.
 _USUAL_UNITS_OF_RECORD_COLUMNS = {"time": "s", "displacement": "um", "slip": "um"}
-#: Patterns for the start of common headings of each column.
+#: For each column, the pattern that matches the start of common headings.
 _PATTERNS_OF_USUAL_HEADINGS = {
     "time": r"t(ime)?\b|time",
     "displacement": r"(load.*)?disp|lp(\b|_?disp)|l\.?p\.? disp|load.?point",
@@ -65,16 +65,16 @@ def read_record(
 ) -> Record:
     """Read a record of an experiment.
 
-    The result is the input of `rsfstudy.fit`.
+    Pass the result to `rsfstudy.fit`.
 
     Parameters
     ----------
     source : str, Path, mapping or pandas.DataFrame
-        Path of a text file, a CSV file or a binary xlook file, or arrays by name. The names are
-        ``time``, ``displacement`` (of the load point), ``friction`` or ``shear_stress``, and
-        optionally ``normal_stress``. By default arrays are in s, um and MPa, and times may have the
-        type `numpy.datetime64` or `numpy.timedelta64`. If the names contain units, for example
-        ``LP disp (um)``, the names are interpreted as the headings of a file.
+        Path of a text file, a CSV file or a binary xlook file, or a mapping of names to arrays. The
+        names are ``time``, ``displacement`` (of the load point), ``friction`` or ``shear_stress``,
+        and optionally ``normal_stress``. By default, arrays are in s, um and MPa, and times may
+        have the type `numpy.datetime64` or `numpy.timedelta64`. If the names contain units, for
+        example ``LP disp (um)``, the names are interpreted as the headings of a file.
     columns : mapping of str to str or tuple, optional
         Heading and units of each column, for example ``{"time": "t (s)", "friction": "mu"}`` or
         ``{"time": ("t", "s")}``. By default, common headings are recognised by their first letters,
@@ -87,9 +87,9 @@ def read_record(
     stiffness : quantity, optional
         Stiffness of the machine, for example ``"0.05 MPa/um"``, or stiffness divided by normal
         stress, for example ``"2e-3 1/um"``. A plain number is in 1/um. The stiffness is required if
-        the record has a column ``slip``, from which elastic shortening of the machine was
-        subtracted, instead of ``displacement``. The displacement of the load point is then slip
-        plus shear stress divided by stiffness. Pass the same stiffness to `rsfstudy.fit`.
+        the record has a column ``slip`` instead of ``displacement``. Slip is the displacement of
+        the load point minus the elastic shortening of the machine. The displacement is computed as
+        slip plus shear stress divided by stiffness. Pass the same stiffness to `rsfstudy.fit`.
     name : str, optional
         Name of the record in results. By default, the name is the name of the file, or "record".
 
@@ -153,7 +153,7 @@ def _check_column_name(column_name: str) -> None:
 
 
 def _record_name_from_source(source: Any) -> str:
-    """Return the name of a file as an identifier."""
+    """Convert the name of a file to a valid Python identifier."""
     stem = Path(source).stem if isinstance(source, str | Path) else "record"
     text = re.sub(r"\W", "_", stem, flags=re.ASCII)
     return text if text.isidentifier() else f"record_{text}"
@@ -177,8 +177,9 @@ def _compute_load_point_displacement(
 ) -> np.ndarray:
     """Compute load point displacement in um from slip, friction and stiffness.
 
-    Load point displacement is slip plus shear stress divided by stiffness. If the stiffness is
-    divided by normal stress, friction replaces shear stress.
+    The load point displacement is the slip plus the shear stress divided by the stiffness. For a
+    stiffness in units of friction divided by displacement, the shear stress is replaced by the
+    friction.
     """
     if stiffness is None:
         remedy = "Give the stiffness that the correction used: read_record(..., stiffness="
@@ -229,7 +230,7 @@ def _build_record(
 
 
 def _read_text_columns(path: Path, columns: Mapping[str, Any] | None) -> Mapping[str, Column]:
-    """Read the selected or recognised columns of a text file."""
+    """Read the selected columns of a text file, or columns with common headings."""
 
     def select(headings: list[str], place: str) -> dict[str, ColumnSpec]:
         told = _add_required_columns_by_usual_headings(columns or {}, headings, place)
@@ -239,7 +240,7 @@ def _read_text_columns(path: Path, columns: Mapping[str, Any] | None) -> Mapping
 
 
 def _read_array_columns(source: Any, columns: Mapping[str, Any] | None) -> Mapping[str, Column]:
-    """Select columns of arrays by their names, or by headings with units."""
+    """Select arrays by their names, or by headings with units."""
     headings = [*map(str, source)]
     check_heading_lengths(headings, "record")
     if columns is None and not any("(" in key or "[" in key for key in headings):
@@ -253,7 +254,7 @@ def _read_array_columns(source: Any, columns: Mapping[str, Any] | None) -> Mappi
 def _add_required_columns_by_usual_headings(
     selected_columns: Mapping[str, Any], headings: list[str], file_description: str
 ) -> dict[str, Any]:
-    """Add required columns with common headings to the selected columns."""
+    """Add required columns that have common headings to the selected columns."""
     lacking = {"time", "displacement", "slip"} - set(selected_columns)
     if not {"friction", "shear_stress"} & set(selected_columns):
         lacking |= {"friction", "shear_stress", "normal_stress"} - set(selected_columns)
@@ -280,9 +281,9 @@ def _find_column_with_usual_heading(
 ) -> dict[str, str]:
     """Find the column with a common heading for a quantity.
 
-    If several headings match, a heading with compatible units takes precedence, and then a heading
-    that is equal to the name of the quantity. The function raises an error if several columns
-    remain.
+    If several headings match, headings with compatible units take precedence. Among headings with
+    compatible units, a heading that is equal to the name of the quantity takes precedence. The
+    function raises an error if several columns are still possible.
     """
     parts = {text: match for text in headings if (match := HEADING_PATTERN.fullmatch(text))}
     meant = [
@@ -307,7 +308,7 @@ def _find_column_with_usual_heading(
 
 
 def _has_compatible_units(column_name: str, units: str) -> bool:
-    """Return True if the units are compatible with a column."""
+    """Return True if the units are compatible with the quantity of a column."""
     try:
         return _find_factor_to_record_units(column_name, units) > 0.0
     except InvalidValue:
@@ -319,7 +320,7 @@ def _parse_column_selection(
 ) -> ColumnSpec:
     """Parse the selection of a column, and check that it contains units.
 
-    Only friction may omit its units.
+    The units of friction may be omitted, but the units of other columns are required.
     """
     found = parse_column_spec(column_specification, headings)
     if not found.units and column_name != "friction" and isinstance(column_specification, str):

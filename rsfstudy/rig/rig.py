@@ -1,7 +1,7 @@
-"""Laboratory rig: conversion of scenes and results between units.
+"""Laboratory rig for converting scenes and results between units.
 
-`Rig.scene` creates dimensionless scenes from quantities in units. `Rig.in_units` converts
-dimensionless results to units.
+`Rig.scene` creates dimensionless scenes from quantities in physical units. `Rig.in_units` converts
+dimensionless results to physical units.
 """
 
 from __future__ import annotations
@@ -55,10 +55,10 @@ SLIDER_UNITS_OF_SEGMENT_FIELDS = {
 @guard_methods
 @dataclass(frozen=True, kw_only=True)
 class Rig(HtmlTableMixin):
-    r"""Laboratory rig with quantities in units.
+    r"""Laboratory rig with quantities in physical units.
 
-    Each quantity is a plain number in SI units, a string such as ``"5 MPa"``, ``"10 um"`` or
-    ``"1 um/s"``, or a `pint.Quantity`. Common units do not require pint.
+    Each quantity is a plain number in SI units, a string such as ``"5 MPa"``, ``"10 um"`` or ``"1
+    um/s"``, or a `pint.Quantity`. The package pint is not required for common units.
 
     Parameters
     ----------
@@ -67,21 +67,22 @@ class Rig(HtmlTableMixin):
     slip_distance : quantity
         Slip distance :math:`D_c` in m.
     reference_velocity : quantity
-        Reference velocity :math:`V_*` in m/s, the velocity of the load point before the test.
+        Reference velocity :math:`V_*` in m/s, which is the velocity of the load point before the
+        test.
     stiffness : quantity, optional
-        Stiffness of the machine with its sample in Pa/m. A stiffness in units of friction divided
-        by displacement, for example ``"2e-3 1/um"``, is multiplied by the normal stress.
+        Stiffness of the machine and the sample in Pa/m. A stiffness in units of friction divided by
+        displacement, for example ``"2e-3 1/um"``, is multiplied by the normal stress.
     period : quantity, optional
-        Period of free oscillation :math:`T` in s. Scenes of the rig have ``inertia=True`` if the
-        rig has a period or a mass.
+        Period of free oscillation :math:`T` in s. If the rig has a period or a mass, its scenes
+        have ``inertia=True``.
     mass : quantity, optional
-        Mass per area of the fault in kg/m². The mass is an alternative to the period, and requires
-        a stiffness.
+        Mass per fault area in kg/m². A mass can be passed instead of a period, and requires a
+        stiffness.
     shear_modulus : quantity, optional
         Shear modulus :math:`G` of the medium in Pa, for radiation damping.
     density : quantity, optional
-        Density :math:`\rho` of the medium in kg/m³, for radiation damping. The shear modulus and
-        the density require each other.
+        Density :math:`\rho` of the medium in kg/m³, for radiation damping. Pass both the shear
+        modulus and the density, or neither of them.
 
     Raises
     ------
@@ -92,9 +93,9 @@ class Rig(HtmlTableMixin):
 
     Notes
     -----
-    The period follows from the mass :math:`m` and the stiffness :math:`k`,
-    :math:`T = 2 \pi \sqrt{m/k}`. The coefficient of radiation damping,
-    :math:`\eta = \sqrt{G \rho}/2`, approximates the effect of inertia of the medium.
+    For a mass :math:`m` and a stiffness :math:`k`, the period is :math:`T = 2 \pi \sqrt{m/k}`. The
+    coefficient of radiation damping, :math:`\eta = \sqrt{G \rho}/2`, approximates the inertia of
+    the medium.
 
     Examples
     --------
@@ -122,7 +123,7 @@ class Rig(HtmlTableMixin):
     density: Any = None
 
     def __post_init__(self) -> None:
-        """Convert all quantities to SI units, and check them."""
+        """Convert all quantities to SI units and check their values."""
         for name in ("normal_stress", "slip_distance", "reference_velocity"):
             if getattr(self, name) is None:
                 raise InvalidValue(name, None, "is required", remedy="Give a value with units.")
@@ -145,7 +146,7 @@ class Rig(HtmlTableMixin):
         quantity : Quantity
             Description of the quantity, with its symbol and SI units.
         value : object
-            Value in SI units. Quantities that are not given are skipped.
+            Value in SI units. Optional quantities without a value are skipped.
         """
         for name, value in self.as_dict().items():
             about = RIG_QUANTITIES[name]
@@ -153,7 +154,7 @@ class Rig(HtmlTableMixin):
 
     @property
     def scales(self) -> dict[str, UnitScale]:
-        """Values of dimensionless units such as ``D_c/V_*`` in SI units."""
+        """SI values of dimensionless units such as ``D_c/V_*``."""
         return build_scales_of_rig(self.as_dict())
 
     def dimensionless(self, value: Any, scale: str = "D_c/V_*", name: str = "value") -> float:
@@ -193,17 +194,17 @@ class Rig(HtmlTableMixin):
         Parameters
         ----------
         **fields : dict
-            Fields of `Scene`. A field with a dimensionless unit, for example ``hold_time`` or
-            ``displacement_step``, is a quantity with units here. A velocity may be a ratio, as in
-            ``load_velocity_ratio=10``, or a quantity, as in ``load_velocity="10 um/s"``. The field
-            ``instability_norm`` may be a slip rate, for example ``"10 mm/s"``. Pass
+            Fields of `Scene`. Pass dimensionless fields such as ``hold_time`` or
+            ``displacement_step`` as quantities with physical units. A velocity may be a ratio, as
+            in ``load_velocity_ratio=10``, or a quantity, as in ``load_velocity="10 um/s"``. The
+            field ``instability_norm`` may be a slip rate, for example ``"10 mm/s"``. Pass
             ``inertia=False`` to ignore the mass or the period of the rig.
 
         Returns
         -------
         Scene
-            Dimensionless scene. By default, the normal stress is constant, or imposed if the
-            loading changes the normal stress.
+            Dimensionless scene. By default, the field ``normal_stress`` is "imposed" if the loading
+            changes the normal stress, and "constant" otherwise.
 
         Raises
         ------
@@ -234,21 +235,21 @@ class Rig(HtmlTableMixin):
         return Scene(**fields)
 
     def axis(self, dimension: str, values: Any, units: Mapping[str, str] | None = None) -> Axis:
-        """Create an axis for a study of this rig, in units.
+        """Create an axis with physical units for a study of this rig.
 
         Parameters
         ----------
         dimension : str
-            Name of a quantity of the rig, for example ``"slip_distance"``, or of a field of a
-            scene, for example ``"hold_time"`` or ``"load_velocity"``. The normal stress of the rig
-            is named ``sigma_star`` on axes.
+            Name of a rig quantity, for example ``"slip_distance"``, or of a scene field, for
+            example ``"hold_time"`` or ``"load_velocity"``. For the normal stress of the rig, pass
+            ``"sigma_star"``.
         values : sequence of quantity, str, or mapping
-            Values such as ``["10 s", "100 s"]``, or a range such as ``"1:100:20:log um/s"``, which
-            contains the first value, the last value, the number of values and the spacing. For a
-            zipped axis, pass a mapping of labels to fields or to rigs. A table is interpreted as in
-            `rsfstudy.Axis.cases`.
+            Values such as ``["10 s", "100 s"]``, or a range such as ``"1:100:20:log um/s"``. A
+            range contains the first value, the last value, the number of values and the spacing.
+            For a zipped axis, pass a mapping of labels to field values or to rigs. A table is
+            interpreted as in `rsfstudy.Axis.cases`.
         units : mapping of str to str, optional
-            Units of columns of a table that have no units. The default is SI units.
+            Units of table columns without units. The default is SI units.
 
         Returns
         -------
@@ -258,21 +259,21 @@ class Rig(HtmlTableMixin):
         Raises
         ------
         InvalidValue
-            If a value is not a quantity, if its units are incompatible, or if a quantity of the rig
-            is not positive.
+            If a value is not a quantity, if its units are incompatible, or if a rig quantity is not
+            positive.
         """
         return axes_with_units.make_axis_with_units(dimension, values, units or "")
 
     def protocol(
         self, segments: Sequence[Segment | Mapping[str, Any]], name: str = "protocol"
     ) -> Protocol:
-        """Create a loading history from segments with units.
+        """Create a loading history from segments with physical units.
 
         Parameters
         ----------
         segments : sequence of Segment or mapping
-            Segments in chronological order, as in `rsfstudy.protocol`. The values of mappings are
-            quantities with units.
+            Segments in chronological order, as in `rsfstudy.protocol`. The values of a mapping are
+            quantities with physical units.
         name : str, default: "protocol"
             Name of the protocol in results.
 
@@ -293,31 +294,34 @@ class Rig(HtmlTableMixin):
     def in_units(
         self, dataset: xr.Dataset, *, stress: str = "Pa", length: str = "m", time: str = "s"
     ) -> xr.Dataset:
-        """Convert results or a motion to units of the rig.
+        """Convert results or a motion to physical units.
 
         Parameters
         ----------
         dataset : xarray.Dataset
-            Dimensionless results or motion of a scene of this rig.
+            Dimensionless results or dimensionless motion of a scene of this rig.
         stress : str, default: "Pa"
             Unit of stress, for example ``"MPa"``.
         length : str, default: "m"
             Unit of length, for example ``"um"``.
         time : str, default: "s"
-            Unit of time. The units of velocities and stiffnesses follow from the three units.
+            Unit of time. The units of velocities and stiffnesses are computed from the units of
+            stress, length and time.
 
         Returns
         -------
         xarray.Dataset
-            Dataset in units. The attribute ``laboratory`` contains the quantities of the rig.
+            Dataset in physical units. The attribute ``laboratory`` contains the quantities of the
+            rig.
 
         Raises
         ------
         InvalidValue
-            If the units are incompatible, or if the dataset belongs to another rig or has another
-            reference rate.
+            If the units are incompatible, if the dataset belongs to another rig, or if the dataset
+            has another reference rate than the rig.
         DataError
-            If the dataset is already in units, or if rsfstudy has not created the dataset.
+            If the dataset is already in physical units, or if the dataset was not created by
+            rsfstudy.
 
         See Also
         --------
@@ -334,14 +338,14 @@ class Rig(HtmlTableMixin):
         Returns
         -------
         dict of str to float
-            Quantities by name, without the quantities that are not given.
+            Quantities by name. Optional quantities without a value are omitted.
         """
         found = {f.name: getattr(self, f.name) for f in fields(self)}
         return {name: value for name, value in found.items() if value is not None}
 
     @property
     def axis_fields(self) -> dict[str, float]:
-        """Quantities of the rig in SI units, by their names on axes."""
+        """Rig quantities in SI units, keyed by the names that axes use."""
         return {
             AXIS_NAME_BY_RIG_NAME.get(name, name): value for name, value in self.as_dict().items()
         }
@@ -377,21 +381,22 @@ class Rig(HtmlTableMixin):
 
 
 def convert_to_instability_norm(rig: Rig, norm_or_slip_rate: Any, scene: Scene) -> float:
-    r"""Compute the norm of instability for a scene of a rig.
+    r"""Compute the instability norm (dimensionless slip rate) of a scene.
 
     Parameters
     ----------
     rig : Rig
         Rig of the scene.
     norm_or_slip_rate : quantity
-        Norm :math:`V T/(2 \pi D_c)` as a number, or the corresponding slip rate :math:`V`.
+        Instability norm :math:`V T/(2 \pi D_c)` as a number, or the corresponding slip rate
+        :math:`V`.
     scene : Scene
-        Scene, which determines the period.
+        Scene with the period :math:`T`.
 
     Returns
     -------
     float
-        Norm of instability.
+        Instability norm.
     """
     try:
         return convert_to_si("instability_norm", norm_or_slip_rate, "1")

@@ -1,4 +1,4 @@
-"""Quantities of a rig, and fields of a scene with dimensionless units."""
+"""Quantities of a rig, and scene fields with dimensionless units."""
 
 from __future__ import annotations
 
@@ -48,22 +48,22 @@ RIG_QUANTITIES: Mapping[str, RigQuantity] = {
     "shear_modulus": RigQuantity("Pa", 1e5, 1e12, "$G$", "shear modulus of the medium"),
     "density": RigQuantity("kg/m^3", 1e2, 2e4, r"$\rho$", "density of the medium"),
 }
-#: Quantities that every rig must have, because they determine the scales of all other quantities.
+#: Quantities that every rig needs, because they determine the scales of all other quantities.
 REQUIRED_QUANTITIES = ("normal_stress", "slip_distance", "reference_velocity")
-#: Names on axes of quantities whose own names are also names of scene fields.
+#: Axis names of rig quantities whose names are also names of scene fields.
 AXIS_NAME_BY_RIG_NAME = {"normal_stress": "sigma_star"}
-#: Names of quantities by their names on axes.
+#: Names of rig quantities, keyed by their axis names.
 RIG_NAME_BY_AXIS_NAME = {AXIS_NAME_BY_RIG_NAME.get(name, name): name for name in RIG_QUANTITIES}
-#: SI units by the scale or the units of a scene field.
+#: SI unit for each scale, or dimensionless unit, of a scene field.
 SI_UNIT_BY_SCALE = {
     "sigma_*": "Pa", "D_c": "m", "V_*": "m/s", "D_c/V_*": "s", "sigma_*/D_c": "Pa/m",
     "V_*/D_c": "1/s", "s": "s", "s-1": "1/s",
 }  # fmt: skip
-#: Display units by SI units.
+#: Unit in tables and figures for each SI unit.
 DISPLAY_UNIT_BY_SI_UNIT = {"Pa": "MPa", "m": "um", "m/s": "um/s", "Pa/m": "MPa/um"}
 #: Descriptions of scene fields by name.
 SCENE_QUANTITY_BY_FIELD_NAME = {about.name: about for about in SCENE_FIELD_QUANTITIES}
-#: Names of velocity ratios of a scene by the names of the corresponding velocities.
+#: Names of velocity ratios in scenes, keyed by the names of the corresponding velocities.
 RATIO_FIELD_BY_DIMENSIONAL_NAME = {
     name.removesuffix("_ratio"): name
     for name, about in SCENE_QUANTITY_BY_FIELD_NAME.items()
@@ -74,7 +74,7 @@ RATIO_FIELD_BY_DIMENSIONAL_NAME = {
 def convert_rig_value_and_warn_if_unusual(
     quantity_name: str, value: Any, normal_stress: float | None = None
 ) -> float:
-    """Convert a quantity of a rig to SI units, and warn about unusual values.
+    """Convert a rig quantity to SI units, and warn about unusual values.
 
     Parameters
     ----------
@@ -83,7 +83,8 @@ def convert_rig_value_and_warn_if_unusual(
     value : quantity
         Value of the quantity.
     normal_stress : float, optional
-        Normal stress in Pa, for a stiffness in units of friction divided by displacement.
+        Normal stress in Pa. The argument is required for a stiffness in units of friction divided
+        by displacement.
 
     Returns
     -------
@@ -109,7 +110,7 @@ def convert_rig_value_and_warn_if_unusual(
 def convert_rig_value_to_si(
     quantity_name: str, value: Any, units: str, normal_stress: float | None
 ) -> float:
-    """Convert a quantity of a rig to SI units.
+    """Convert a rig quantity to SI units.
 
     Parameters
     ----------
@@ -142,12 +143,12 @@ def convert_rig_value_to_si(
 
 
 def is_stiffness_over_normal_stress(stiffness: Any) -> bool:
-    """Return True if a stiffness is friction divided by displacement.
+    """Return True if a stiffness has units of friction over displacement.
 
     Parameters
     ----------
     stiffness : quantity
-        Stiffness to check.
+        Stiffness whose units are checked.
 
     Returns
     -------
@@ -202,7 +203,7 @@ def in_display_units(
     rig : mapping of str to float
         Quantities of the rig in SI units.
     excluded_axis_names : collection of str, optional
-        Names of quantities to omit, because axes vary these quantities.
+        Axis names of quantities to omit, for example because an axis varies them.
 
     Returns
     -------
@@ -235,8 +236,8 @@ def derive_scene_fields_from_rig(rig_values: Mapping[str, Any]) -> dict[str, Any
     Returns
     -------
     dict of str to float or ndarray
-        Fields such as ``stiffness``, ``reference_rate`` and ``radiation_damping``. If the
-        quantities are arrays, the fields are arrays.
+        Values of fields such as ``stiffness``, ``reference_rate`` and ``radiation_damping``. If the
+        rig quantities are arrays, the values are arrays.
     """
     found = {"reference_rate": rig_values["reference_velocity"] / rig_values["slip_distance"]}
     if "stiffness" in rig_values:
@@ -267,7 +268,8 @@ def is_dimensionless_field_with_scale(field_name: str) -> bool:
     Returns
     -------
     bool
-        True for fields such as ``hold_time``. Ratios and fields without a scale return False.
+        True for fields such as ``hold_time``. The result is False for ratios and for fields without
+        a scale.
     """
     return (
         field_name in SCENE_QUANTITY_BY_FIELD_NAME
@@ -289,7 +291,7 @@ def find_si_units_of_field(field_name: str, value: Any) -> str | None:
     Returns
     -------
     str or None
-        SI units. None if the value has no units, for example if a ratio is a plain number.
+        SI units, or None if the value has no units, for example if a ratio is a plain number.
     """
     about = SCENE_QUANTITY_BY_FIELD_NAME.get(field_name)
     plain = isinstance(value, int | float | np.number)

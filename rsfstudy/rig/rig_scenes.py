@@ -1,6 +1,6 @@
-"""Scenes of the lattice cells in a study of a rig.
+"""Scenes for the lattice cells of a study of a rig.
 
-`LatticeScenesOnRig` converts axes in units to fields of scenes.
+`LatticeScenesOnRig` converts axes with physical units to dimensionless scene fields.
 """
 
 from __future__ import annotations
@@ -37,15 +37,16 @@ from rsfstudy.slider import Scene
 
 @dataclass(frozen=True)
 class LatticeScenesOnRig:
-    """Converter from axes in units to the scene fields of lattice cells.
+    """Converter from axes with physical units to dimensionless scene fields.
 
-    Fields of the base scene with dimensionless units keep their values in SI units if an axis
-    varies a scale, for example the slip distance. Ratios keep their dimensionless values.
+    If an axis varies a scale such as the slip distance, fields of the base scene keep their SI
+    values, and their dimensionless values vary. In contrast, ratios keep their dimensionless
+    values.
 
     Parameters
     ----------
     rig : Rig
-        Rig with the quantities that all cells share.
+        Rig with the quantities that are the same in all lattice cells.
     base_scene : Scene
         Base scene, created by `Rig.scene`.
     axes : sequence of Axis
@@ -54,8 +55,8 @@ class LatticeScenesOnRig:
     Raises
     ------
     InvalidValue
-        If the base scene does not belong to the rig, or if a rig on an axis lacks a quantity that
-        the rig of the study has.
+        If the base scene does not belong to the rig, or if a rig that is a value of an axis lacks a
+        quantity of ``rig``.
     """
 
     rig: Rig
@@ -81,16 +82,16 @@ class LatticeScenesOnRig:
 
     @property
     def units(self) -> dict[str, str]:
-        """Units of the fields on axes in units, by their names on axes."""
+        """Units of the quantities that axes vary, keyed by axis name."""
         return {name: units for along in self.axes for name, units in along.units.items()}
 
     def compute_rig_quantities(self, axis_row: AxisRow) -> dict[str, Any]:
-        """Compute the quantities of the rig at values of the axes.
+        """Compute the rig quantities for one row of axis values.
 
         Parameters
         ----------
         axis_row : mapping of str to value or ndarray
-            Values on the axes by field. Arrays are evaluated elementwise.
+            Axis values by field name. Arrays are evaluated elementwise.
 
         Returns
         -------
@@ -115,17 +116,17 @@ class LatticeScenesOnRig:
         return found
 
     def compute_scene_fields(self, axis_row: AxisRow) -> dict[str, Any]:
-        """Compute the scene fields at values of the axes.
+        """Compute the scene fields for one row of axis values.
 
         Parameters
         ----------
         axis_row : mapping of str to value or ndarray
-            Values on the axes by field. Arrays are evaluated elementwise.
+            Axis values by field name. Arrays are evaluated elementwise.
 
         Returns
         -------
         dict of str to object
-            Fields that may differ from the base scene.
+            Values of the scene fields that may differ from the base scene.
         """
         units, rig = self.units, self.compute_rig_quantities(axis_row)
         here, found = scale_factors_of_rig(rig), {}
@@ -149,7 +150,7 @@ class LatticeScenesOnRig:
     def _compute_base_fields_constant_in_si(
         self, scale_factors_of_cell: Mapping[str, Any]
     ) -> dict[str, Any]:
-        """Return fields of the base scene with fixed values in SI units."""
+        """Return the base scene fields whose SI values are fixed."""
         base = scale_factors_of_rig(self.rig.as_dict())
         held = {
             name: value
@@ -168,14 +169,14 @@ class LatticeScenesOnRig:
         return held
 
     def build_scale_coordinates(self) -> dict[str, tuple[tuple[str, ...], np.ndarray]]:
-        """Compute the dimensionless fields and scales of all cells.
+        """Compute the dimensionless fields and scales of all lattice cells.
 
         Returns
         -------
         dict of str to (tuple of str, ndarray)
-            Dimensions and values by name. Each array has only the dimensions along which its values
-            vary. If a field has the same name as an axis in units, its name here has the prefix
-            ``dimensionless_``.
+            Dimensions and values by field name. Each array has only the dimensions along which its
+            values vary. If a field has the same name as an axis with units, the prefix
+            ``dimensionless_`` is added to the name of the field.
         """
         # An axis with one point gets a second point to find out if the values depend on the axis.
         alone = {axis.dimension for axis in self.axes if len(axis) == 1 and axis.is_single_field}
@@ -227,12 +228,12 @@ def _is_close_within_rounding(other_value: Any, value: Any) -> bool:
 def convert_scene_and_axes_to_rig(
     rig: Rig, base: Scene, axes: Sequence[Axis]
 ) -> tuple[Scene, list[Axis], dict[str, float]]:
-    """Convert a dimensionless scene and its axes to units of a rig.
+    """Convert a dimensionless scene and its axes to physical units.
 
     Parameters
     ----------
     rig : Rig
-        Rig to use.
+        Rig that determines the scales.
     base : Scene
         Dimensionless scene.
     axes : sequence of Axis
@@ -243,9 +244,9 @@ def convert_scene_and_axes_to_rig(
     base : Scene
         Scene with the fields that the rig determines.
     axes : list of Axis
-        Axes in units.
+        Axes with physical units.
     sizes : dict of str to float
-        Factor that multiplied the values of each field.
+        Factor by which the axis values of each field were multiplied.
     """
     sizes_of = scale_factors_of_rig(rig.as_dict())
     converted: list[Axis] = []
@@ -271,7 +272,8 @@ def convert_scene_and_axes_to_rig(
         ]
         converted.append(along.with_rows(rows, units, along.sampling_info))
     changes = derive_scene_fields_from_rig(rig.as_dict())
-    # The inertia and the damping of the rig replace the values of the scene.
+    # The inertia and the radiation damping of the rig replace the values of the dimensionless
+    # scene.
     if {"inertia", "radiation_damping"} & set(changes):
         changes = {"inertia": False, "radiation_damping": 0.0, **changes}
     return base.with_(**changes), converted, every
@@ -280,7 +282,7 @@ def convert_scene_and_axes_to_rig(
 def replace_rig_quantity(
     rig: Rig, base_scene: Scene, quantity_name: str, value: Any
 ) -> tuple[Rig, Scene]:
-    """Return a rig and its scene with another value of one quantity.
+    """Return a rig and a scene in which one quantity has another value.
 
     Parameters
     ----------
@@ -289,16 +291,16 @@ def replace_rig_quantity(
     base_scene : Scene
         Scene of the rig.
     quantity_name : str
-        Name of the quantity, as on an axis in units.
+        Name of the quantity, as on an axis with units.
     value : object
-        Value of the quantity, as on an axis in units.
+        Value of the quantity, as on an axis with units.
 
     Returns
     -------
     rig : Rig
-        Changed rig.
+        Rig with the new value.
     scene : Scene
-        Changed scene.
+        Scene with the new value.
     """
     if quantity_name == "instability_norm":
         return rig, base_scene.with_(
@@ -318,7 +320,7 @@ def replace_rig_quantity(
 
 
 def scale_factors_of_rig(rig_values: Mapping[str, Any]) -> dict[str, Any]:
-    """Compute the values of the dimensionless units of a rig.
+    """Compute the SI values of the dimensionless units of a rig.
 
     Parameters
     ----------
@@ -328,13 +330,13 @@ def scale_factors_of_rig(rig_values: Mapping[str, Any]) -> dict[str, Any]:
     Returns
     -------
     dict of str to float or ndarray
-        Value of each dimensionless unit in SI units.
+        SI value of each dimensionless unit.
     """
     return {name: scale.factor for name, scale in build_scales_of_rig(rig_values).items()}
 
 
 def _add_second_point_to_axis(axis: Axis) -> Axis:
-    """Add a second point to an axis that has one point."""
+    """Add a second point to an axis that has a single point."""
     (row,) = axis.rows
     near = {
         name: 1.01 * value if isinstance(value, float) else value for name, value in row.items()
@@ -345,7 +347,7 @@ def _add_second_point_to_axis(axis: Axis) -> Axis:
 def _drop_constant_dimensions(
     axes: Sequence[Axis], values: np.ndarray
 ) -> tuple[tuple[str, ...], np.ndarray]:
-    """Remove the dimensions along which the values are constant."""
+    """Remove the dimensions along which an array is constant."""
     kept: list[str] = []
     for place, axis in reversed(list(enumerate(axes))):
         first = values.take([0], axis=place)
@@ -357,7 +359,7 @@ def _drop_constant_dimensions(
 
 
 def group_axis_rows_by_field_names(axes: Sequence[Axis]) -> Iterator[tuple[np.ndarray, ...]]:
-    """Iterate over groups of axis rows that set the same fields.
+    """Iterate over groups of axis points that set the same scene fields.
 
     Parameters
     ----------
@@ -367,7 +369,7 @@ def group_axis_rows_by_field_names(axes: Sequence[Axis]) -> Iterator[tuple[np.nd
     Yields
     ------
     tuple of ndarray of int
-        Indices of rows on each axis, for one combination of groups.
+        Indices of the points on each axis, for one combination of groups.
     """
     every = [classify_rows_by_fields(axis.rows) for axis in axes]
     for kind in np.ndindex(*(int(of.max()) + 1 for of in every)):

@@ -28,13 +28,14 @@ __getattr__ = renamed_names(__name__)
 _CHARACTERS_OF_PLAIN_NUMERIC_TABLES = frozenset("0123456789+-.eE \t\r\n")
 _EXAMPLE_OF_TABLE_HEADER = "velocity (um/s), distance (um), a (1)"
 _NUMBER_PATTERN = r"\s*((?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*"
-#: Heading followed by a scale and an offset.
+#: Pattern of a heading that is followed by a scale and an offset.
 _HEADING_WITH_SCALE_AND_OFFSET_PATTERN = re.compile(
     rf"(.*\S)\s*\*\s*(-?){_NUMBER_PATTERN}(?:([-+]){_NUMBER_PATTERN})?"
 )
-#: Heading with optional units in brackets.
+#: Pattern of a heading with optional units in brackets.
 HEADING_PATTERN = re.compile(r"\s*([^(\[]+?)\s*(?:[(\[]([^)\]]*)[)\]])?\s*")
-#: Maximum length of a heading. The patterns need quadratic time for longer strings.
+#: Maximum length of a heading. The limit is necessary because the time for matching a pattern
+#: increases with the square of the length.
 _MAX_HEADING_LENGTH = 200
 
 
@@ -48,7 +49,7 @@ class ColumnSpec(NamedTuple):
     units : str, default: ""
         Units of the column.
     scale : float, default: 1.0
-        Factor that multiplies raw numbers.
+        Factor by which raw numbers are multiplied.
     offset : float, default: 0.0
         Offset to add after the multiplication.
     """
@@ -59,7 +60,8 @@ class ColumnSpec(NamedTuple):
     offset: float = 0.0
 
 
-#: Function of the headings and their location in the file, which returns the selected columns.
+#: Function that takes a list of headings and a description of their location, and returns the
+#: selected columns.
 ColumnChoosingFunction = Callable[[list[str], str], dict[str, ColumnSpec]]
 
 
@@ -106,7 +108,7 @@ def check_heading_lengths(headings: Iterable[str], file_description: str) -> Non
 
 
 def _parse_column_spec_given_as_list(column_choice: Any) -> ColumnSpec:
-    """Parse a selection that lists heading, units, scale and offset."""
+    """Parse a column selection with heading, units, scale and offset."""
     rule = "must be a heading, or a list of a heading, its units, a scale and an offset"
     remedy = "Write ('Time (s)', 's', 0.001), for example."
     wrong = InvalidValue("column", column_choice, rule, remedy=remedy)
@@ -174,15 +176,15 @@ class Column(NamedTuple):
     Parameters
     ----------
     values : ndarray
-        Values of shape (rows,). Empty fields are NaN.
+        Values of the column, as an array of shape (rows,). Empty fields are NaN.
     units : str
         Units of the values.
     column_number : int, default: 0
         Number of the column in the file, counted from 1.
     line_numbers : ndarray, optional
-        Line number in the file of each value.
+        Line number of each value in the file.
     path : str, default: ""
-        Path of the file. Empty if the column does not come from a file.
+        Path of the file. The string is empty if the column does not come from a file.
     """
 
     values: np.ndarray
@@ -202,7 +204,7 @@ class Column(NamedTuple):
         Returns
         -------
         str
-            File, line and column, or the number of the sample.
+            File, line and column of the value, or the number of the sample.
         """
         if not self.path:
             return f"sample {row + 1}"
@@ -218,7 +220,7 @@ class Column(NamedTuple):
         invalid_mask : ndarray of bool
             True for each invalid value.
         rule : str
-            Rule that invalid values violate.
+            Rule that the values must satisfy.
 
         Raises
         ------
@@ -238,7 +240,7 @@ def select_columns_of_arrays(source: Any, columns: Mapping[str, Any]) -> dict[st
     Parameters
     ----------
     source : mapping of str to array, xarray.Dataset or pandas.DataFrame
-        Arrays by name. The units of variables are read from their attribute ``units``.
+        Arrays by name. The units of dataset variables are read from their attribute ``units``.
     columns : mapping of str to str, tuple or ColumnSpec
         Selection of each column, as in `parse_column_spec`.
 
@@ -270,9 +272,9 @@ def select_columns_of_arrays(source: Any, columns: Mapping[str, Any]) -> dict[st
 
 
 def _to_floats_and_units(column_name: str, values: Any) -> tuple[np.ndarray, str]:
-    """Convert an array to floats, and return the units if the type has units.
+    """Convert an array to floats, and return units if the type implies them.
 
-    Masked values become NaN. Times are converted to seconds. Dates are converted to seconds after
+    Masked values become NaN. Times are converted to seconds. Dates are converted to seconds since
     the first date.
     """
     kind = getattr(getattr(values, "dtype", None), "kind", "")
@@ -301,11 +303,11 @@ def read_table(
     path : str or Path
         Path of the file.
     columns : mapping of str to (str, str) or str, optional
-        Heading and units of each column, for example ``{"time": ("t", "s")}`` or
-        ``{"time": "t (s)"}``. By default, all columns are read, and the first line must contain
-        their names and units, as in ``velocity (um/s), distance (um)``. You can also pass a
-        function that takes the list of headings and a description of their location, and returns a
-        mapping of names to selections.
+        Heading and units of each column, for example ``{"time": ("t", "s")}`` or ``{"time": "t
+        (s)"}``. By default, all columns are read, and the first line must contain their names and
+        units, as in ``velocity (um/s), distance (um)``. You can also pass a function that takes a
+        list of headings and a description of their location, and returns a mapping of column names
+        to column selections.
 
     Returns
     -------
@@ -391,10 +393,10 @@ def read_table(
 def _read_plain_numeric_table(
     text: str, delimiter: str, header_line_count: int, column_count: int
 ) -> tuple[np.ndarray | None, np.ndarray]:
-    """Read a table that contains only finite numbers and its delimiters.
+    """Read a table that contains only finite numbers and delimiters.
 
-    The function returns the numbers and their line numbers. If the table has to be read line by
-    line, the function returns None instead of the numbers.
+    The function returns the numbers and their line numbers. If the table contains other characters
+    and has to be read line by line, the function returns None instead of the numbers.
     """
     body = "".join(text.split("\n", header_line_count)[header_line_count:])
     lines = header_line_count + 1 + np.arange(body.count("\n") + (not body.endswith("\n")))
@@ -422,7 +424,7 @@ def _detect_delimiter(header: str) -> str:
 def _choose_all_columns_of_header(
     headings: list[str], file_description: str
 ) -> dict[str, ColumnSpec]:
-    """Select all columns of a header with names and units."""
+    """Select all columns of a file whose header contains names and units."""
     found: dict[str, ColumnSpec] = {}
     for n, heading in enumerate(headings, start=1):
         stated = split_heading_into_name_and_units(heading)

@@ -1,9 +1,9 @@
 """Conversion of quantities with units to SI units.
 
-A quantity is a number followed by a unit, for example ``5 MPa``. The module converts common units,
-and uses pint for other units. Pint receives only names of units, because it would interpret numbers
-in a unit as factors. Conversion factors are fractions, so that a conversion is rounded only once:
-0.01 mm and 10 um give the same number.
+A quantity is a number followed by a unit, for example ``5 MPa``. This module converts common units
+without pint, and uses pint for other units. Only names of units are passed to pint, because pint
+would interpret numbers in a unit as factors. Conversion factors are fractions, so that each
+conversion is rounded only once. For example, 0.01 mm and 10 um are converted to the same number.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ import numpy as np
 from rsfstudy.axes import to_plain_value
 from rsfstudy.errors import InvalidValue
 
-#: Factor to SI units, and exponents of kilogram, metre and second.
+#: Conversion factor to SI units, and the exponents of kilogram, metre and second.
 SiFactorAndExponents = tuple[Fraction, tuple[int, int, int]]
 
 _STRESS_EXPONENTS, _FORCE_EXPONENTS, _LENGTH_EXPONENTS, _TIME_EXPONENTS = (
@@ -55,14 +55,15 @@ _KNOWN_UNITS: Mapping[str, SiFactorAndExponents] = {
 _NUMBER_PATTERN = re.compile(
     r"[-+]?(?:[0-9]+(?:\.[0-9]*)?|\.[0-9]+)(?:[eE][-+]?[0-9]+)?|nan|[-+]?inf"
 )
-#: Name of a unit with its power. The power has one digit, so that no factor overflows.
+#: Pattern of a unit name with an optional power. Powers have a single digit, so that conversion
+#: factors do not overflow.
 _UNIT_WITH_POWER_PATTERN = (
     r"([A-Za-z\u00b5\u03bc](?:[A-Za-z\u00b5\u03bc0-9_]*[A-Za-z\u00b5\u03bc])?)"
     r"(?:(?:\^|\*\*)?([-+]?[1-9]))?"
 )
 _UNIT_WITH_SIGNED_POWER_PATTERN = re.compile(rf"(/?)\s*{_UNIT_WITH_POWER_PATTERN}")
-#: Product of units, divided by further units. Each divisor has its own slash, because units such as
-#: ``Pa/m s`` are ambiguous.
+#: Pattern of a product of units that is divided by other units. Each divisor needs a separate
+#: slash, because units such as ``Pa/m s`` are ambiguous.
 _UNIT_PATTERN = re.compile(
     rf"(?:1(?=\s*/)|{_UNIT_WITH_POWER_PATTERN}(?:(?:\s*[*.\u00b7]\s*|\s+){_UNIT_WITH_POWER_PATTERN})*)?(?:\s*/\s*{_UNIT_WITH_POWER_PATTERN})*"
 )
@@ -71,7 +72,8 @@ _LOG_RANGE_SYNTAX_REMEDY = (
     "For logarithmic spacing write start:stop:count:log, as in hold_time=1:1e5:30:log."
 )
 _MAX_POINTS_OF_RANGE = 1_000_000
-#: Maximum length of a quantity. The patterns above need quadratic time for longer strings.
+#: Maximum number of characters of a quantity. The limit is necessary because the time for matching
+#: a pattern increases with the square of the length.
 _MAX_QUANTITY_TEXT_LENGTH = 200
 _PINT_INSTALL_ADVICE = "Install pint (pip install 'rsfstudy[units]')"
 
@@ -87,13 +89,13 @@ def parse_number(text: str) -> float | None:
     Returns
     -------
     float or None
-        Number. None if the string is not a number.
+        Number, or None if the string is not a number.
     """
     return float(text) if _NUMBER_PATTERN.fullmatch(text.strip()) else None
 
 
 def split_number_and_units(text: str) -> tuple[float | None, str]:
-    """Split a string into a number and the units after it.
+    """Split a string into a number and the units that follow the number.
 
     Parameters
     ----------
@@ -103,23 +105,23 @@ def split_number_and_units(text: str) -> tuple[float | None, str]:
     Returns
     -------
     number : float or None
-        Number. None if the string does not start with a number.
+        Number, or None if the string does not start with a number.
     units : str
-        Units. The string is empty if there is no number.
+        Units that follow the number. The string is empty if there is no number.
     """
     match = _NUMBER_PATTERN.match(text.strip())
     return (float(match[0]), text.strip()[match.end() :].strip()) if match else (None, "")
 
 
 def expand_range(argument_name: str, text: str, range_text: str) -> list[float] | list[str]:
-    """Expand a range to a list of numbers.
+    """Expand a range such as "1:100:20:log" to a list of numbers.
 
     Parameters
     ----------
     argument_name : str
         Name of the argument for error messages.
     text : str
-        Complete argument for error messages.
+        Complete argument, which error messages quote.
     range_text : str
         Range as ``first:last:count`` or ``first:last:count:log``, optionally followed by units.
 
@@ -187,7 +189,7 @@ def convert_to_si(quantity_name: str, value: Any, units: str) -> float:
 
 
 def convert_to_si_as_fraction(quantity_name: str, value: Any, units: str) -> Fraction:
-    """Convert a quantity to SI units without rounding.
+    """Convert a quantity to an exact fraction in SI units.
 
     Parameters
     ----------
@@ -248,10 +250,10 @@ def compute_conversion_factor(quantity_name: str, stated_units: str, target_unit
 
 
 def multiply_by_exact_fraction(values: Any, factor: Fraction) -> Any:
-    """Multiply numbers by a conversion factor with a single rounding.
+    """Multiply numbers by a conversion factor and round only once.
 
-    The function uses the decimal digits of each number, so that a number in a file and the same
-    number in a string give the same result.
+    The function multiplies the decimal representation of each number, so that numbers in files and
+    numbers in strings are converted to identical results.
 
     Parameters
     ----------
@@ -263,7 +265,7 @@ def multiply_by_exact_fraction(values: Any, factor: Fraction) -> Any:
     Returns
     -------
     float or ndarray
-        Products.
+        Product of each number and the conversion factor.
     """
     # Arrays of coordinates often repeat their values, so each value is multiplied once.
     if isinstance(values, np.ndarray):
@@ -293,7 +295,7 @@ def _to_float(number: Fraction | float) -> float:
 def _parse_quantity(quantity_name: str, text: str, units: str) -> Fraction | float:
     """Convert a string with a number and units to SI units.
 
-    A number that is not finite is returned unchanged.
+    Infinite numbers and NaN are returned unchanged.
     """
     if len(text) > _MAX_QUANTITY_TEXT_LENGTH:
         rule = f"is no quantity, because it has more than {_MAX_QUANTITY_TEXT_LENGTH} characters"
@@ -330,9 +332,9 @@ def _incompatible_units_error(quantity_name: str, value: Any, units: str) -> Inv
 
 
 def _parse_unit_powers(unit_text: str) -> list[tuple[str, int]] | None:
-    """Parse a product or quotient of units into units and powers.
+    """Parse a product or quotient of units into unit names and powers.
 
-    The function returns None if the string has another form.
+    The function returns None if the string is not a product or quotient of units.
     """
     if not _UNIT_PATTERN.fullmatch(unit_text):
         return None
@@ -341,7 +343,7 @@ def _parse_unit_powers(unit_text: str) -> list[tuple[str, int]] | None:
 
 
 def _multiply_known_units(units_and_powers: Iterable[tuple[str, int]]) -> SiFactorAndExponents:
-    """Return the product of known units."""
+    """Multiply powers of units that are known without pint."""
     scale, exponents = Fraction(1), [0, 0, 0]
     for name, power in units_and_powers:
         size, of = _KNOWN_UNITS[name]
@@ -365,7 +367,7 @@ def _compute_factor_with_pint(
     registry = pint.get_application_registry()
     try:
         unit = math.prod(registry.parse_units(unit) ** power for unit, power in units_and_powers)
-    except Exception as error:  # Both pint and the parser of Python may raise other errors.
+    except Exception as error:  # Both pint and the Python parser may raise errors of other types.
         remedy = (
             _suggest_unit_with_other_capitals(units_and_powers) or f"Write it as in '2.5 {units}'."
         )
@@ -378,7 +380,7 @@ def _compute_factor_with_pint(
 
 
 def _suggest_unit_with_other_capitals(units_and_powers: Iterable[tuple[str, int]]) -> str:
-    """Suggest units that differ only by upper-case and lower-case letters."""
+    """Suggest known units that differ only in upper-case and lower-case letters."""
     for name, _power in units_and_powers:
         meant = [known for known in _KNOWN_UNITS if known.lower() == name.lower() and known != name]
         if meant:
@@ -387,7 +389,7 @@ def _suggest_unit_with_other_capitals(units_and_powers: Iterable[tuple[str, int]
 
 
 def _convert_pint_quantity(quantity_name: str, value: Any, quantity: Any, units: str) -> Any:
-    """Return the magnitude of a pint quantity in SI units."""
+    """Return the value of a pint quantity in SI units."""
     try:
         magnitude = quantity.to(units).magnitude
     except Exception as error:
