@@ -197,9 +197,9 @@ def check_axis_fields(
 def check_outputs_are_same_in_all_cells(
     measure: Measure, measure_field_changes: Iterable[Mapping[str, Any]]
 ) -> None:
-    """Raise InvalidValue if the cells of a study have different sets of results.
+    """Raise InvalidValue if the cells of a study have different result variables.
 
-    All cells of a lattice must have the same results.
+    All cells of a lattice must have the same result variables.
 
     Parameters
     ----------
@@ -211,7 +211,7 @@ def check_outputs_are_same_in_all_cells(
     Raises
     ------
     InvalidValue
-        If the measure has different results in different cells.
+        If the measure computes different variables in different cells.
     """
     given = _describe_measure_outputs(measure)
     for changed in (measure.with_(**values) for values in measure_field_changes):

@@ -64,9 +64,9 @@ class Panel:
     facet : sequence of str, optional
         Axes whose points are shown in separate panels.
     isel : mapping of str to int, list of int, slice or callable, optional
-        Indices of the selected points on the axes that the panel does not show. A function such as
-        ``min`` receives the list of coordinate values and returns one value or a list of values. A
-        scalar coordinate with the index 0 is shown in the title.
+        Indices of the selected points on each axis, by axis name. A function such as ``min``
+        receives the list of coordinate values and returns one value or a list of values. A scalar
+        coordinate with the index 0 is shown in the title.
     markers_only : bool, default: False
         If True, draw markers without lines.
     style : mapping or callable, optional

@@ -116,8 +116,8 @@ class Study:
     ------
     InvalidValue
         If an argument has a wrong type. The error is also raised if two axes have the same
-        dimension or vary the same field, if an axis varies an unknown field, or if an axis changes
-        the set of results.
+        dimension or vary the same field, if an axis varies an unknown field, or if different cells
+        would have different result variables.
 
     Examples
     --------
