@@ -1,8 +1,8 @@
 """Computation of cells, in this process or in a worker process.
 
-``compute_cell`` computes a single cell. If a cell raises an exception, the exception becomes the
-outcome of the cell. ``compute_serially`` computes all cells in this process, and ``compute_batch``
-computes a batch of cells in a worker process.
+``compute_cell`` computes a single cell. If the computation of a cell raises an exception, the
+exception is recorded as the outcome of the cell. ``compute_serially`` computes all cells in this
+process, and ``compute_batch`` computes a batch of cells in a worker process.
 """
 
 from __future__ import annotations
@@ -41,7 +41,8 @@ if TYPE_CHECKING:
 #: Ratio of the wall time limit to the CPU time limit of a cell. The wall time limit ends cells that
 #: sleep or wait.
 WALL_OVER_CPU_TIME_LIMIT = 10.0
-#: Time in s after which finished cells are handed over. Writing the cells to disk may take 30 ms.
+#: Time in s after which finished cells are passed to the journal. Writing the cells to disk may
+#: take 30 ms.
 _FINISHED_CELLS_HANDOVER_INTERVAL = 0.5
 #: Unique identifier of this process.
 _PROCESS_ID = uuid.uuid4().hex
@@ -60,9 +61,9 @@ class CellTask:
     Parameters
     ----------
     base_scene : Scene
-        Scene of the study. Each cell changes some of its fields.
+        Scene of the study. Each cell changes some fields of the base scene.
     measure : Measure
-        Measure of the study. Each cell may change some of its fields.
+        Measure of the study. Each cell may change some fields of the measure.
     accuracy : Accuracy
         Accuracy of each cell.
     time_limit : float, optional
@@ -71,9 +72,10 @@ class CellTask:
     user_parts : tuple of UserPart, default: ()
         User-defined parts of the slider.
     user_stepper_classes : tuple of type, default: ()
-        User-defined stepper, if any.
+        Class of the user-defined stepper. The tuple is empty if the stepper is built in.
     code_fingerprint : mapping of str to str, optional
-        Versions and code digests that affect the results. Every worker must have the same values.
+        Versions and code digests that affect the results. All workers must have the same versions
+        and digests.
     origin_process_id : str, optional
         Identifier of the process that created the task.
     """
@@ -89,7 +91,7 @@ class CellTask:
 
     @functools.cached_property
     def output_packer(self) -> OutputPacker:
-        """Layout of the outputs of a cell."""
+        """Layout in which the outputs of a cell are stored."""
         return OutputPacker(self.measure)
 
 
@@ -135,9 +137,9 @@ def compute_serially(task: CellTask, batches: CellBatchIterator) -> Generator[St
 def serialize_task(task: CellTask) -> bytes:
     """Serialise a task for the workers.
 
-    Code that workers cannot import is included in the serialised task. The modules of named studies
-    are included too, because importing them on a worker would load all code that declares and
-    reduces studies.
+    Code that workers cannot import is included in the serialised task. The serialised task also
+    includes the modules of named studies, because importing these modules on a worker would load
+    all code that declares and reduces studies.
 
     Parameters
     ----------
@@ -235,8 +237,8 @@ def compute_batch(serialized_task: bytes, packed_batch: bytes) -> bytes:
     -------
     bytes
         Pickled list of the finished cells. The list contains only the first cells of the batch if
-        the batch takes longer than 0.5 s. The list is pickled here because Dask would serialise
-        each value of a list separately.
+        the batch takes longer than 0.5 s. The list is pickled in this function because Dask would
+        serialise each value of a list separately.
 
     Raises
     ------
@@ -282,14 +284,14 @@ def compute_cell(
     cell : Cell
         Cell to compute.
     propagated_exceptions : tuple of type, default: ()
-        Exceptions that are raised instead of recorded.
+        Types of exceptions that the function raises instead of recording them in the outcome.
 
     Returns
     -------
     outcome : Outcome
         Status, outputs and message of the cell.
     wall_time : float
-        Wall time in s, without the compilation of code.
+        Wall time in s, excluding the compilation of code.
     """
     begin = time.perf_counter() - compilation_log.total_compilation_seconds
     try:
@@ -318,9 +320,9 @@ class _CpuTimeLimits:
     the lock of the Python interpreter. The limits apply to CPU time rather than wall time, because
     a slow or busy machine needs more wall time for the same computation.
 
-    The operating system measures the CPU time of the whole process. The limit is therefore
-    multiplied by the number of computing threads. The limit is set once per batch, because all
-    cells of a batch except the last cell finish within ``_FINISHED_CELLS_HANDOVER_INTERVAL``.
+    Because the operating system measures the CPU time of the whole process, the limit is multiplied
+    by the number of computing threads. The limit is set once per batch, because all cells of a
+    batch except the last cell finish within ``_FINISHED_CELLS_HANDOVER_INTERVAL``.
     """
 
     def __init__(self) -> None:
@@ -345,7 +347,7 @@ class _CpuTimeLimits:
 
     @contextlib.contextmanager
     def suspend_temporarily(self) -> Iterator[None]:
-        """Suspend the limit, and restart the timers afterwards."""
+        """Suspend the CPU time limits, and restart the timers afterwards."""
         self._set_timers(0.0)
         try:
             yield
@@ -354,9 +356,10 @@ class _CpuTimeLimits:
 
     @staticmethod
     def _set_timers(seconds: float) -> None:
-        """Set the timers, or cancel them if the limit is 0 s.
+        """Set the CPU timers, or cancel the timers if the limit is 0 s.
 
-        If the limit is exceeded, the stacks of all threads are written to the log of the worker.
+        If the CPU time limit is exceeded, the stacks of all threads are written to the log of the
+        worker.
         """
         faulthandler.cancel_dump_traceback_later()
         signal.setitimer(signal.ITIMER_PROF, 0.0)

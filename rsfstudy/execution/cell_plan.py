@@ -32,7 +32,7 @@ _SECONDS_PER_RHS_EVALUATION = {SCIPY: 1.2e-5, PYTHON: 8e-6, COMPILED: 5e-7}
 
 
 def compute_cell_key(scene: Scene, measure: Measure) -> bytes:
-    """Compute the key of a cell.
+    """Compute the key that identifies a cell.
 
     The key is a digest of the exact values of the scene fields and the measure fields.
 
@@ -88,7 +88,7 @@ class CellPlan:
     unique_cell_numbers : ndarray of int
         Numbers of the distinct cells. If several cells are equal, only the first cell is included.
     example_scenes : list of Scene
-        One scene for each combination of parts.
+        One scene for each combination of slider parts in the lattice.
 
     Raises
     ------
@@ -132,7 +132,7 @@ class CellPlan:
 def _add_failure_counts_to_error(
     study: Study, cell_number: int, first_error: InvalidValue
 ) -> InvalidValue:
-    """Add the number of invalid points to the error of an invalid cell.
+    """Add the number of invalid axis points to the error message of a cell.
 
     The number is added only if the lattice has an axis with numbered points, such as random
     samples.
@@ -194,7 +194,7 @@ class CellBatchIterator(Iterator[np.ndarray]):
         Returns
         -------
         int
-            Number of cells, which is 1 until the time of a cell is known.
+            Number of cells, which is 1 until the first cell has finished.
         """
         if not self._timed_seconds:
             return 1
@@ -220,10 +220,10 @@ class CellBatchIterator(Iterator[np.ndarray]):
 
 
 def order_cells_by_golden_section(cell_numbers: np.ndarray) -> np.ndarray:
-    """Reorder cells with strides of the golden section.
+    """Reorder cells so that the first few cells represent all cells.
 
-    The first few cells are then a representative sample of all cells. The computation times and
-    failures of the sample are typical of the remaining cells.
+    The order follows strides of the golden section. The computation times and failures of the first
+    few cells are therefore typical of the remaining cells.
 
     Parameters
     ----------
@@ -245,8 +245,8 @@ def order_cells_by_golden_section(cell_numbers: np.ndarray) -> np.ndarray:
 def estimate_cost(plan: CellPlan) -> tuple[int, float]:
     """Estimate the cost of the distinct cells of a study.
 
-    The estimate is approximate, because it uses the typical work of the measure and does not depend
-    on the scenes.
+    The estimate is approximate, because it uses a typical number of right-hand-side evaluations of
+    the measure and does not depend on the scenes.
 
     Parameters
     ----------

@@ -41,7 +41,7 @@ def check_script_has_main_guard(worker_count: int) -> None:
     Raises
     ------
     InvalidValue
-        If the line is not inside a condition.
+        If the calling line of the main script is not inside a condition.
     """
     main = sys.modules["__main__"]
     frame: FrameType | None = sys._getframe()
@@ -214,7 +214,7 @@ def connect_to_cluster(scheduler_address: str, *, timeout: float = 30.0) -> Iter
     scheduler_address : str
         Address of the scheduler.
     timeout : float, default: 30.0
-        Time to wait for an answer in s.
+        Time in s to wait for an answer of the scheduler.
 
     Yields
     ------

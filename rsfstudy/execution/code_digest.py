@@ -1,17 +1,17 @@
-"""Digests of code.
+"""Digests of source code and of user-defined classes.
 
-``digest_sources`` computes the digest of the physics from the source files.
+``digest_sources`` computes the digest of the physics code from the source files.
 ``digest_user_classes`` computes the digest of user-defined measures, parts and steppers from the
 objects in memory, because their files may have changed since the import. Measures in the modules of
 named studies are treated like user-defined measures, because the other code of these modules does
 not affect the results (see ``digest_physics_and_measures``).
 
 All digests are computed from compiled code, so that comments, docstrings and line numbers do not
-affect a digest. For a user-defined class, the search follows every name that a function uses. Any
-change of a function, a constant or a helper therefore changes the digest. The same code has the
-same digest in a study file, a script, a notebook and a worker. The search does not follow the
-imports inside functions. The search ends at Python, at installed packages and at rsfstudy, because
-these packages have version numbers.
+affect a digest. The digest of a user-defined class includes every object whose name a function of
+the class uses. Any change of a function, a constant or a helper therefore changes the digest. The
+same code has the same digest in a study file, a script, a notebook and a worker. Modules that are
+imported inside functions are not included. The code of Python, of installed packages and of
+rsfstudy is not included, because these packages have version numbers.
 """
 
 from __future__ import annotations
@@ -44,7 +44,7 @@ _INSTALLATION_DIRECTORIES = tuple(
     }
 )
 _TYPES_DIGESTED_BY_REPR = (int, float, complex, str, bytes, bool, type(None), type(Ellipsis))
-#: Functions that return the contents of containers and the functions inside wrappers.
+#: Functions that return the contents of a container or the function inside a wrapper, by type.
 _GETTERS_OF_CONTAINER_PARTS: tuple[tuple[Any, Callable[[Any], Any]], ...] = (
     (property, lambda value: (value.fget, value.fset)),
     (functools.cached_property, lambda value: value.func),
@@ -76,20 +76,20 @@ def digest_sources(sources_by_file_name: Mapping[str, bytes]) -> str:
 
 
 def digest_physics_and_measures(physics_digest: str, measure_classes: Iterable[type]) -> str:
-    """Compute the digest of the physics and of measures in named studies.
+    """Compute the digest of the physics code and of measures in named studies.
 
     Parameters
     ----------
     physics_digest : str
-        Digest of the physics.
+        Digest of the physics code.
     measure_classes : iterable of type
         Classes of the measure.
 
     Returns
     -------
     str
-        Digest of 16 hexadecimal digits. If no class is defined in the module of a named study, this
-        is ``physics_digest``.
+        Digest of 16 hexadecimal digits. If no class is defined in the module of a named study, the
+        function returns ``physics_digest``.
     """
     theirs = tuple(measure for measure in measure_classes if _is_study_module(measure.__module__))
     return (
@@ -130,7 +130,7 @@ def _hash_texts(texts: Iterable[str]) -> str:
 
 
 class _DigestTextCollector:
-    """Collector of strings that differ if the code differs.
+    """Collector of the strings from which the digest of code is computed.
 
     Each object is visited only once.
     """
@@ -139,7 +139,7 @@ class _DigestTextCollector:
         self._visited: dict[Hashable, Any] = {}
 
     def collect_texts(self, value: Any, used_names: Iterable[str]) -> Iterator[str]:
-        """Yield the strings for a value.
+        """Yield the strings that represent a value in the digest.
 
         The argument ``used_names`` contains the names that the surrounding code uses.
         """
@@ -176,7 +176,7 @@ class _DigestTextCollector:
             yield from self._texts_of_instance_state(value, used_names)
 
     def _module_texts(self, module: ModuleType, used_names: Iterable[str]) -> Iterator[str]:
-        """Yield the strings for the used members of a module."""
+        """Yield the strings that represent the used members of a module."""
         if not _is_digested_by_used_names(module.__name__):
             yield module.__name__
             return
@@ -236,7 +236,7 @@ class _PicklerWithoutCachedProperties(pickle.Pickler):
     """
 
     def reducer_override(self, value: Any) -> Any:
-        """Reduce a copy of the object without its cached properties."""
+        """Pickle a copy of the object without its cached properties."""
         state = _state_without_caches(value)
         if isinstance(value, type) or len(state) == len(getattr(value, "__dict__", ())):
             return NotImplemented
@@ -259,7 +259,7 @@ def _state_without_caches(value: Any) -> dict[str, Any]:
 
 
 def _has_docstring_slot(code: CodeType) -> bool:
-    """Return True if the first constant is reserved for a docstring."""
+    """Return True if the first constant of a code object is for a docstring."""
     if sys.version_info >= (3, 13):
         return bool(code.co_flags & inspect.CO_HAS_DOCSTRING)
     return bool(code.co_flags & inspect.CO_NEWLOCALS) and not code.co_name.startswith("<")

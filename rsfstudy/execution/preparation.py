@@ -25,12 +25,12 @@ def prepare_study_run(study: Study, options: OutputOptions, workers: WorkerPool)
     Returns
     -------
     StudyRun
-        Run that is ready to be called.
+        Run, which starts when you call it as a function.
 
     Raises
     ------
     InvalidValue
-        If the study is invalid, or if its code cannot be sent to the workers.
+        If the study is invalid, or if the code of the study cannot be sent to the workers.
     """
     task = CellTask(
         study.base,

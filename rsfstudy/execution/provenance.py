@@ -59,7 +59,8 @@ def read_physics_sources(package_directory: Path) -> dict[str, bytes]:
     return {file.relative_to(package_directory).as_posix(): file.read_bytes() for file in files}
 
 
-#: Source files at the time of the import, because later changes do not affect the running code.
+#: Source files as they were at the time of the import, because later changes of the files do not
+#: affect the running code.
 _PHYSICS_SOURCES_AT_IMPORT = read_physics_sources(_PACKAGE_DIRECTORY)
 
 
@@ -90,7 +91,7 @@ def code_fingerprint(engine: str = SCIPY, user_classes: Iterable[object] = ()) -
 
 @functools.cache
 def _physics_digest() -> str:
-    """Compute the digest of the physics."""
+    """Compute the digest of the physics code."""
     return code_digest.digest_sources(_PHYSICS_SOURCES_AT_IMPORT)
 
 
@@ -134,7 +135,7 @@ def collect_provenance(study: Study, command_line: str) -> dict[str, Any]:
     study : Study
         Study to run.
     command_line : str
-        Command or call of the user.
+        Command line or Python call of the user.
 
     Returns
     -------
@@ -165,7 +166,7 @@ def provenance_attributes(command_line: str) -> dict[str, str]:
     Parameters
     ----------
     command_line : str
-        Command or call of the user.
+        Command line or Python call of the user.
 
     Returns
     -------
@@ -235,7 +236,7 @@ def read_git_commit_and_state(checkout_directory: Path) -> str:
 
 
 def package_versions(name: str) -> dict[str, str]:
-    """Return the versions of the packages that only one engine needs.
+    """Return the versions of the packages that only a particular engine needs.
 
     NumPy and SciPy are not included, because ``code_fingerprint`` adds them for all engines.
 
@@ -247,7 +248,8 @@ def package_versions(name: str) -> dict[str, str]:
     Returns
     -------
     dict of str to str
-        Versions by package name. The dictionary is empty unless the engine compiles motions.
+        Versions by package name. The dictionary is empty unless the engine compiles the equations
+        of motion.
     """
     if name != COMPILED:
         return {}

@@ -34,7 +34,7 @@ from rsfstudy.storage import (
 )
 from rsfstudy.study import Study
 
-#: Names of the statuses of cells whose worker ended.
+#: Names of the statuses of cells whose worker process ended during the computation.
 _STATUSES_OF_LOST_CELLS = (Status.WORKER_LOST.name, Status.TIME_LIMIT_SPENT.name)
 _STATUSES_WITH_ANSWER = frozenset(status.name for status in Status if status.is_answer)
 #: Number of failed cells after which a run ends early if no cell has succeeded.
@@ -61,7 +61,7 @@ class OutputOptions:
     despite_failures : bool, default: False
         If True, apply reductions to the remaining cells if some cells have failed.
     command_line : str, default: "rsfstudy.run"
-        Command or call of the user, for the history of the file.
+        Command line or Python call of the user, for the history of the file.
 
     Raises
     ------
@@ -107,8 +107,8 @@ class StudyRun:
     Raises
     ------
     InvalidValue
-        If the scene of a cell is invalid, or if a reduction or a claim does not fit the lattice.
-        The constructor checks the study before any cell is computed.
+        If the scene of a cell is invalid, or if a reduction or a claim cannot be applied to the
+        lattice. The constructor checks the study before any cell is computed.
     """
 
     def __init__(
@@ -120,7 +120,7 @@ class StudyRun:
         self._check_reductions_and_claims()
 
     def _check_reductions_and_claims(self) -> None:
-        """Check the reductions and claims with a lattice of pending cells.
+        """Check the reductions and claims on a lattice without computed cells.
 
         The check finds mistakes in a study before any cell is computed. Claims are not checked if
         the user has overridden values of the study.
@@ -158,7 +158,7 @@ class StudyRun:
 
     @property
     def worker_log_path(self) -> Path | None:
-        """Path of the worker log, or None without an output directory."""
+        """Path of the worker log, or None if there is no output directory."""
         return None if self.options.output is None else self.output_path(".workers.log")
 
     def __call__(
@@ -190,7 +190,8 @@ class StudyRun:
             If the run cannot continue. The finished cells remain in the journal and, for NetCDF
             output, in the file ``NAME.partial.nc``.
         Interrupted
-            If the user interrupts the run. The finished cells are saved as for a ``RunError``.
+            If the user interrupts the run. The finished cells are saved in the same way as for a
+            ``RunError``.
         """
         keeping = self.options
         if keeping.format == "zarr":
@@ -246,7 +247,7 @@ class StudyRun:
                     )
 
     def _warn_of_lost_cells(self, finished_cells: StoredCellRows) -> None:
-        """Warn about cells whose worker ended."""
+        """Warn about cells that were lost because their worker process ended."""
         for key, status, message, *_ in finished_cells:
             if status in _STATUSES_OF_LOST_CELLS:
                 cell = int(np.flatnonzero(self.plan.keys == np.void(key))[0])
@@ -259,7 +260,7 @@ class StudyRun:
     # ---- from cells to results ------------------------------------------------------------------
 
     def _write_results(self, journal: CellJournal) -> xr.Dataset:
-        """Assemble, reduce and write the dataset."""
+        """Assemble the dataset, apply the reductions and write the results."""
         zarr = self.options.format == "zarr"
         try:
             results = (
@@ -306,7 +307,7 @@ class StudyRun:
         )
 
     def _save_partial_results(self, journal: CellJournal, error: BaseException) -> RunError:
-        """Write the finished cells, and return the error to raise."""
+        """Write the finished cells to a file, and return the error to raise."""
         why = f"{self.study.name}: {str(error) or 'interrupted'}. "
         if self.options.output is not None and self.options.format == "netcdf":
             lattice = self.assemble_lattice(journal)

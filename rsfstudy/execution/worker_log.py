@@ -1,6 +1,6 @@
 """Log file for the errors of worker processes.
 
-The file contains stack traces of threads, and tracebacks of Dask and of the libraries that Dask
+The log file contains stack traces of threads, and tracebacks of Dask and of the libraries that Dask
 uses.
 """
 
@@ -29,7 +29,7 @@ _NAMES_OF_DASK_LOGGERS = ("distributed", "tornado", "asyncio")
 def open_worker_log(log_path: Path | None) -> Iterator[Path]:
     """Open a log file for errors, and redirect the loggers of Dask to it.
 
-    The file is deleted afterwards if it is empty.
+    An empty log file is deleted when the context is left.
 
     Parameters
     ----------

@@ -1,9 +1,9 @@
 """Computation of cells on Dask workers.
 
 ``WorkerPool`` starts worker processes on this machine, or uses a Dask cluster. If a worker dies,
-its batch is lost, and other batches that were waiting on that worker may be lost too. All lost
-cells are then computed one at a time while no other cell is running. A cell is therefore recorded
-as lost only if the cell itself kills a worker.
+its batch is lost, and other batches that were waiting on that worker may be lost too. The pool
+computes all lost cells again, one at a time, while no other cell is running, so that a cell is
+recorded as lost only if the cell itself kills a worker.
 """
 
 from __future__ import annotations
@@ -56,7 +56,7 @@ class WorkerPool(contextlib.ExitStack):
     """Pool of workers that compute the cells of one or more runs.
 
     Use the pool as a context manager. Worker processes on this machine are started when the first
-    cell is computed, which takes a few seconds. The processes end when the context is left.
+    cell is computed, which takes a few seconds. The worker processes end when the context is left.
 
     Parameters
     ----------
@@ -159,7 +159,7 @@ class WorkerPool(contextlib.ExitStack):
     def _compute_batches_on_processes(
         self, log_path: Path | None, task: CellTask, batches: CellBatchIterator
     ) -> Generator[StoredCellRows]:
-        """Compute batches on local processes, and start them if necessary."""
+        """Compute batches on local processes, and start the processes if necessary."""
         from rsfstudy.execution import worker_log
 
         try:
@@ -186,7 +186,7 @@ def make_dask_batch_mapper(
     dask_client : distributed.Client
         Client of the cluster.
     log_path : str, optional
-        File to which the workers write errors, for messages.
+        File to which the workers write errors, which is named in error messages.
 
     Returns
     -------

@@ -3,7 +3,8 @@
 A measure is a frozen dataclass derived from ``Measure``. A measure returns an outcome with a
 status, named results and error estimates. Use the measures of this package in studies, or derive
 your own measure from ``Measure``. The package only exports names: each measure is defined in the
-package of its topic. Measures that only the named studies use are defined next to these studies.
+package of its topic. Measures that are used only in named studies are defined in the modules of the
+named studies.
 """
 
 from __future__ import annotations

@@ -25,7 +25,7 @@ from rsfstudy.reporting.tables import TextTable
 from rsfstudy.status import STATUS_LABELS, Status
 from rsfstudy.storage import read_declaration
 
-#: Names of parameters in laboratories, if they differ from the names in rsfstudy.
+#: Names that laboratories use for parameters, if the names in rsfstudy are different.
 _LABORATORY_NAME_BY_PARAMETER_NAME = {
     "slip_distance": "Dc",
     "slip_distance_2": "Dc2",
@@ -35,15 +35,15 @@ _LABORATORY_NAME_BY_PARAMETER_NAME = {
 }
 #: Maximum number of fits next to each other in a table.
 _MAX_FITS_PER_TABLE = 3
-#: Headings of the parameters in the final table.
+#: Headings of the parameters in the final table, which has one row per fit.
 _PARAMETERS_IN_FIT_SUMMARY = ("a", "b", "b1", "b2", "Dc")
 #: Status of fits that have values and valid standard errors.
 _STATUS_LABELS_OF_FITS_WITH_VALUES = (Status.OK.label, Status.NOT_IDENTIFIED.label)
-#: Ratio of the standard error to the value above which neither is printed.
+#: Ratio of the standard error to the value above which neither number is printed.
 _MAX_PRINTED_RELATIVE_ERROR = 1e4
-#: Difference of AIC above which the comparison of two laws is decisive.
+#: AIC difference above which the comparison of two friction laws is decisive.
 _DECISIVE_AIC_DIFFERENCE = 10.0
-#: Mark of invalid standard errors.
+#: Symbol that marks invalid standard errors.
 _MARK_OF_INVALID_STDERRS = "*"
 
 
@@ -103,8 +103,8 @@ def record_and_step_of_fit(fit: xr.Dataset) -> dict[str, Any]:
     Returns
     -------
     dict of str to object
-        The keys are ``record`` and ``step``. A key is missing if the dataset has no coordinate of
-        this name, because all fits have the same record or step.
+        The keys are ``record`` and ``step``. A key is missing if the dataset has no coordinate with
+        the name of the key, because all fits have the same record or step.
     """
     found = {n: fit[n].item() for n in ("record", "step") if n in fit.coords}
     return {n: value if n == "record" else int(value) for n, value in found.items()}
@@ -144,7 +144,7 @@ def fit_table(dataset: xr.Dataset) -> pd.DataFrame:
     Returns
     -------
     pandas.DataFrame
-        Table with one row per fit. Lengths are in um. Parameters that were not free are NaN.
+        Table with one row per fit. Lengths are in um. Parameters that were not fitted are NaN.
 
         - Columns ``<name>_std`` contain standard errors. The standard errors of a row with the
           status ``errors_not_valid`` are not valid.
@@ -271,7 +271,7 @@ def summarise_fits(dataset: xr.Dataset) -> Iterator[TextTable | str]:
 def _compare_laws_of_fits(fits: Sequence[xr.Dataset]) -> Iterator[str]:
     """Yield a sentence that names the law with the lowest AIC.
 
-    The sentence also reports if the difference to the next law is decisive.
+    The sentence also reports whether the AIC difference to the second-best law is decisive.
     """
     known = [(one["criterion"].item(), str(one["law"].item())) for one in fits]
     known = sorted(pair for pair in known if math.isfinite(pair[0]))
@@ -287,7 +287,7 @@ def _compare_laws_of_fits(fits: Sequence[xr.Dataset]) -> Iterator[str]:
 
 
 def _summary_row_of_fit(fit: xr.Dataset) -> dict[str, str]:
-    """Return the row of a fit in the final table."""
+    """Return the row of a fit in the table with one row per fit."""
     few = {
         n: format_with_stderr(fit, name)
         for name, n in parameter_headings(fit).items()
@@ -307,7 +307,7 @@ def _parameter_table(table_title: str, fits: Sequence[xr.Dataset]) -> TextTable:
 
 
 def _build_parameter_column(fit: xr.Dataset) -> dict[str, str]:
-    """Return the parameters, the quality and the noise of a fit."""
+    """Return a table column with the parameters, quality and noise of a fit."""
     found = {
         n + _bracketed_units(split_window_number(name)[0]): format_with_stderr(fit, name)
         for name, n in parameter_headings(fit).items()
@@ -355,7 +355,7 @@ def _describe_window(fit: xr.Dataset) -> str:
 def format_with_stderr(fit: xr.Dataset, parameter_name: str) -> str:
     """Format a fitted parameter with its standard error.
 
-    The value and the error are rounded to two digits of the error.
+    The value and the error are rounded to two significant digits of the error.
 
     Parameters
     ----------
@@ -379,7 +379,7 @@ def format_with_stderr(fit: xr.Dataset, parameter_name: str) -> str:
 def _format_rounded_to_error(value: float, error: float) -> str:
     """Format a value with its standard error.
 
-    The value and the error are rounded to two digits of the error.
+    The value and the error are rounded to two significant digits of the error.
     """
     if not math.isfinite(value):
         return "-"

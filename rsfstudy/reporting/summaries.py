@@ -39,7 +39,8 @@ def build_summary_tables_and_sentences(dataset: xr.Dataset) -> Iterator[SummaryT
     ------
     TextTable, mapping of str to str, or str
         The summary of a study includes the primary output and the reductions. The summary of a
-        motion includes its extremes, the stability of the scene and the events.
+        motion includes the peak friction, the peak slip rate, the stability of the scene and the
+        events.
     """
     if fit_tables.is_fit(dataset):
         yield from fit_tables.summarise_fits(dataset)
@@ -79,7 +80,7 @@ def build_motion_tables_and_sentences(
     Returns
     -------
     list of (mapping of str to str, str, or TextTable)
-        Extremes of the motion, stability of the scene, and table of the events.
+        Peak values of the motion, stability of the scene, and table of the events.
     """
     return [summarise_motion(motion), describe_stability(scene), build_events_table(catalogue)]
 
@@ -128,7 +129,7 @@ def describe_dataset_origin(dataset: xr.Dataset) -> dict[str, str]:
 
 
 def summarise_motion(dataset: xr.Dataset) -> dict[str, str]:
-    """Summarise a motion by its duration and its extremes.
+    """Summarise a motion by its duration and its peak values.
 
     Parameters
     ----------
@@ -138,8 +139,9 @@ def summarise_motion(dataset: xr.Dataset) -> dict[str, str]:
     Returns
     -------
     dict of str to str
-        Duration, peak friction, peak slip rate, and friction at the end. If the motion exceeds the
-        instability norm without inertia or radiation damping, the time is included.
+        Duration, peak friction, peak slip rate, and friction at the end. If the motion has neither
+        inertia nor radiation damping and exceeds the instability norm, the time at which the motion
+        exceeds the norm is included.
     """
     time, friction = dataset["time"], dataset["friction_coefficient"]
     over_reference = (10.0 ** dataset["log10_slip_rate"]).assign_attrs(scale="V_*")
@@ -175,7 +177,7 @@ def describe_stability(scene: Scene) -> str:
 
 
 def build_events_table(event_catalogue: xr.Dataset) -> TextTable | str:
-    """Build a table of the events of a motion, without errors.
+    """Build a table of the events of a motion, without error estimates.
 
     Parameters
     ----------

@@ -34,10 +34,10 @@ from rsfstudy.storage import find_primary_output, read_declaration, read_provena
 from rsfstudy.study import NOT_APPLICABLE_VERDICT, VERDICTS, format_verdict_row
 from rsfstudy.vocabulary import find_quantity
 
-#: Maximum number of cells in a table of a thinned lattice, maximum number of cells of a lattice
-#: that is not thinned, and maximum number of failed cells in a table.
+#: Maximum number of cells in a table that shows a selection of cells, maximum number of cells in a
+#: table that shows all cells, and maximum number of failed cells in a table.
 MAX_CELLS_SHOWN, _MAX_CELLS_SHOWN_WITHOUT_THINNING, _MAX_FAILURES = 24, 36, 20
-#: Number of fields per point of a numbered axis above which fewer cells are shown.
+#: Number of fields per point of a numbered axis above which a table shows fewer cells.
 _MAX_FIELDS_PER_POINT_WITHOUT_THINNING = 4
 #: Maximum number of significant digits of a float.
 _MAX_DIGITS = 15
@@ -54,7 +54,7 @@ VariableAndFormatterByHeading = dict[str, tuple[str, Callable[[Any], str]]]
 
 @dataclass(frozen=True)
 class TextTable:
-    """Table with rows of text.
+    """Table whose cells are strings.
 
     Parameters
     ----------
@@ -93,7 +93,7 @@ def format_number_or_dash(value: float, format_specification: str = ".8g") -> st
 
 
 def format_rounded_to_error(value: float, error: float) -> str:
-    """Format a number, rounded to two digits of its error.
+    """Format a number, rounded to two significant digits of its error.
 
     Parameters
     ----------
@@ -174,14 +174,15 @@ def format_axis_name(axis_coordinate: xr.DataArray) -> str:
     Returns
     -------
     str
-        Name, followed by the units in brackets if the units differ from the usual units.
+        Name, followed by the units in brackets if the units differ from the units in the
+        vocabulary.
     """
     name, units = str(axis_coordinate.name), axis_coordinate.attrs.get("units", "1")
     return name if units in ("1", find_quantity(name).units) else f"{name} ({units})"
 
 
 def format_status_counts(dataset: xr.Dataset) -> str:
-    """Format the number of cells per status, and their work.
+    """Format the number of cells per status and of right-hand-side evaluations.
 
     Parameters
     ----------
@@ -191,8 +192,8 @@ def format_status_counts(dataset: xr.Dataset) -> str:
     Returns
     -------
     str
-        Counts and the total number of right-hand side evaluations. If no cell has the status
-        ``ok``, each status is followed by its meaning.
+        Number of cells per status, and total number of right-hand-side evaluations. If no cell has
+        the status ``ok``, each status is followed by its meaning.
     """
     work, counts = int(dataset["rhs_evaluations"].sum()), count_statuses(dataset)
     nothing = Status.OK.label not in counts
@@ -214,7 +215,7 @@ def describe_scene_and_rig_fields(
     Parameters
     ----------
     heading : str
-        Key of the fields that have a nonzero value.
+        Key in the returned dictionary for the fields that have a nonzero value.
     scene_fields : mapping of str to object
         Fields of the scene.
     rig_values : mapping of str to float
@@ -281,21 +282,21 @@ def describe_study_origin(dataset: xr.Dataset) -> dict[str, str]:
 def build_rows_along_dimensions(
     dataset: xr.Dataset, dimensions: Iterable[Hashable], columns: VariableAndFormatterByHeading
 ) -> list[dict[str, str]]:
-    """Build one row for each point of some dimensions.
+    """Build one table row for each point of the lattice of some dimensions.
 
     Parameters
     ----------
     dataset : xarray.Dataset
         Dataset with the variables of the columns.
     dimensions : iterable of hashable
-        Dimensions of the rows.
+        Dimensions along which the points become rows.
     columns : dict of str to (str, callable)
-        Variable of each column, and the function that formats a value, by heading.
+        Name of the variable in each column and function that formats a value, by column heading.
 
     Returns
     -------
     list of dict of str to str
-        Rows with the coordinates of the point, followed by the columns.
+        Rows with the coordinates of a point, followed by the formatted values.
     """
     dimensions, found = list(map(str, dimensions)), []
     for at in np.ndindex(*(dataset.sizes[d] for d in dimensions)):
@@ -373,7 +374,7 @@ def summarise_study_as_text_lines(dataset: xr.Dataset) -> list[str]:
     Returns
     -------
     list of str
-        Range of the primary output, one line per slope, and the counts of the status.
+        Range of the primary output, one line per slope, and the number of cells per status.
     """
     lines, converted = [], convert_to_display_units(dataset)
     if (name := find_primary_output(dataset)) is not None:
@@ -438,7 +439,7 @@ def build_reduction_tables_and_sentences(dataset: xr.Dataset) -> Iterator[TextTa
 
 
 def find_refusal_reasons_of_reductions(dataset: xr.Dataset) -> dict[str, str]:
-    """Find the reasons why reductions were not computed from their cells.
+    """Find the reasons why reductions were refused, such as failed cells.
 
     Parameters
     ----------
@@ -448,7 +449,7 @@ def find_refusal_reasons_of_reductions(dataset: xr.Dataset) -> dict[str, str]:
     Returns
     -------
     dict of str to str
-        Reasons by the name of the reduction.
+        Reasons by reduction name.
     """
     named = [str(reduction["name"]) for reduction in read_declaration(dataset).reductions]
     named.sort(key=len, reverse=True)  # A name may begin with another name.
@@ -494,7 +495,7 @@ def missing_result_reasons(dataset: xr.Dataset) -> dict[str, str]:
     Returns
     -------
     dict of str to str
-        Reasons by the name of the reduction.
+        Reasons by reduction name.
     """
     found, there = find_refusal_reasons_of_reductions(dataset), tuple(map(str, dataset.data_vars))
     for stated_as in read_declaration(dataset).reductions:
@@ -508,7 +509,7 @@ def missing_result_reasons(dataset: xr.Dataset) -> dict[str, str]:
 
 
 def note_on_norms_near_load_velocity(dataset: xr.Dataset) -> str:
-    """Describe results of a rig with a norm close to the load point velocity.
+    """Describe results whose instability norm is close to the load velocity.
 
     Parameters
     ----------
@@ -518,8 +519,9 @@ def note_on_norms_near_load_velocity(dataset: xr.Dataset) -> str:
     Returns
     -------
     str
-        Number of results with a norm close to the load point velocity, and the first message. The
-        string is empty if the number is zero, or if the study has no rig.
+        Number of results whose instability norm is close to the load point velocity, and the
+        message of the first such result. The string is empty if there is no such result, or if the
+        study has no rig.
     """
     if read_declaration(dataset).laboratory is None:
         return ""
@@ -623,7 +625,7 @@ def summarise_verdicts(dataset: xr.Dataset, verdicts: pd.DataFrame) -> tuple[str
     counts : str
         Number of claims per verdict.
     problems : list of str
-        Failures of cells, and claims whose verdict differs from the expected verdict.
+        Descriptions of failed cells, and of claims whose verdict differs from the expected verdict.
     """
     wrong = [f"{count} {label}" for label, count in count_failures(dataset).items()]
     wrong += [f"{claim} moved" for claim in dict.fromkeys(verdicts["id"][verdicts["moved"]])]
@@ -670,7 +672,7 @@ def failures_table(dataset: xr.Dataset, file: str) -> tuple[TextTable, list[str]
     table : TextTable
         Table with up to 20 failed cells.
     commands : list of str
-        Commands that recompute each of the cells.
+        Commands that recompute the cells in the table, one command per cell.
     """
     status = dataset["status"]
     failed = (status >= int(Status.WORK_BUDGET_SPENT)) & (status != int(Status.PENDING))
@@ -773,7 +775,7 @@ def count_statuses(dataset: xr.Dataset) -> Mapping[str, int]:
     Returns
     -------
     mapping of str to int
-        Number of cells by the label of the status.
+        Number of cells by status label.
     """
     status = np.asarray(dataset["status"].values)
     return {s.label: int((status == int(s)).sum()) for s in Status if (status == int(s)).any()}
@@ -790,7 +792,7 @@ def count_failures(dataset: xr.Dataset) -> Mapping[str, int]:
     Returns
     -------
     mapping of str to int
-        Number of failed cells by the label of the status.
+        Number of failed cells by status label.
     """
     return {
         label: n

@@ -86,7 +86,7 @@ def _check_text_attribute(attribute_path: str, value: object, max_characters: in
 
 
 def _check_flag_values_and_meanings(variable_name: str, attributes: Mapping[Any, Any]) -> None:
-    """Check that flag values are numbers, and that each has a meaning."""
+    """Check that flag values are numbers, and that each value has a meaning."""
     if not {"flag_values", "flag_meanings"} & set(attributes):
         return
     values = np.ravel(attributes.get("flag_values", ()))

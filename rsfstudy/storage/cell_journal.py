@@ -176,7 +176,7 @@ class CellColumns:
 class CellJournal:
     """Journal of the finished cells of one study.
 
-    The journal locks its file until it is closed. Use the journal as a context manager.
+    The journal locks its file until the journal is closed. Use the journal as a context manager.
 
     Parameters
     ----------
@@ -185,7 +185,7 @@ class CellJournal:
     fingerprint : mapping of str to object
         Settings that affect the results of all cells, as plain data. The fingerprint does not
         contain the fields that form the cell keys.
-    packing : OutputPacking
+    output_packer : OutputPacker
         Layout of the outputs of a cell.
     fresh : bool, default: False
         If True, delete an existing journal first.
@@ -256,11 +256,11 @@ class CellJournal:
     def _accept_journal_with_smaller_budget(
         self, stored_fingerprint: Any, run_fingerprint: Mapping[str, Any]
     ) -> None:
-        """Accept a smaller work budget, and reject any other difference.
+        """Accept a journal with a smaller work budget, and reject other differences.
 
         If the fingerprints differ only in the work budget and the new budget is larger, the method
         stores the new fingerprint. The results in the journal remain valid because no result
-        depends on the budget. Otherwise the method raises ``DataError``.
+        depends on the budget. For any other difference, the method raises ``DataError``.
         """
         try:
             differ = find_fingerprint_differences(
@@ -373,7 +373,7 @@ class CellJournal:
     def _query_rows_of_cells(
         self, cell_keys: np.ndarray, column_names: str
     ) -> Iterator[tuple[list[int], list[Any]]]:
-        """Yield the rows of cells that are in the journal, in groups.
+        """Yield the stored rows of the cells that are in the journal, in groups.
 
         Each group is a list of indices into ``cell_keys`` and a list of rows.
         """

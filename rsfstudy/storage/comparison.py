@@ -55,8 +55,9 @@ def compare_same_lattice(first: xr.Dataset, second: xr.Dataset) -> pd.DataFrame:
         ``identical`` is the number of identical values, and ``largest_difference`` is the largest
         absolute difference. The column ``beyond_errors`` is the number of values that differ by
         more than the sum of both error estimates, or NaN if the variable has no error estimates.
-        For floating-point variables with flag values, every difference is beyond the errors. The
-        attribute ``differs`` in ``attrs`` contains the differences between the fingerprints.
+        For floating-point variables with flag values, every difference is counted in
+        ``beyond_errors``. The attribute ``differs`` in ``attrs`` contains the differences between
+        the fingerprints.
     """
     if is_of_single_scene(first):
         return _compare_motions(first, second)
@@ -89,7 +90,7 @@ def _compare_motions(first: xr.Dataset, second: xr.Dataset) -> pd.DataFrame:
 def _agreement_table(
     variable_rows: Sequence[dict[str, Any]], first: Mapping[str, Any], second: Mapping[str, Any]
 ) -> pd.DataFrame:
-    """Build the table of agreement, with the fingerprint differences."""
+    """Build the table of compared variables, with fingerprint differences."""
     frame = pd.DataFrame(variable_rows, columns=_AGREEMENT_COLUMNS)
     frame.attrs["differs"] = find_fingerprint_differences(first, second)
     return frame
@@ -155,9 +156,9 @@ class Comparison:
         Table of the cells that are finished in both datasets with different statuses. The columns
         are the coordinates of the cell, ``first`` and ``second``.
     agreement_table : pandas.DataFrame
-        Agreement of the variables in the cells that are finished in both datasets. The columns are
-        documented in ``compare_same_lattice``. If the main result has no error estimates, any
-        difference is beyond the errors.
+        Comparison of the variables in the cells that are finished in both datasets. The columns are
+        documented in ``compare_same_lattice``. If the main result has no error estimates, every
+        difference is counted in ``beyond_errors``.
     uncompared_variables : mapping of str to str
         Reasons why variables are not compared, by variable name.
     """
@@ -172,12 +173,12 @@ class Comparison:
 
     @property
     def beyond_errors(self) -> list[str]:
-        """Variables that differ by more than the sum of the errors."""
+        """Variables that differ by more than the sum of both error estimates."""
         return list(self.agreement_table["variable"][self.agreement_table["beyond_errors"] > 0])
 
     @property
     def agrees(self) -> bool:
-        """True if the datasets agree in the cells that are finished in both.
+        """True if the datasets agree in the cells that both datasets have finished.
 
         The datasets agree if they have finished cells in common, if these cells have the same
         statuses, and if no variable differs by more than the sum of the error estimates.
@@ -204,9 +205,9 @@ def compare_results(first: xr.Dataset, second: xr.Dataset) -> Comparison:
     Raises
     ------
     InvalidValue
-        If a dataset lacks an axis and has no fixed value of the coordinate, or if points with the
-        same label have different field values. For example, two different random samples have
-        numbered points with different values.
+        If a dataset has neither an axis of the other dataset nor a fixed value of this coordinate,
+        or if points with the same label have different field values. For example, two different
+        random samples have numbered points with different values.
     """
     both = [
         _add_axes_of_other_dataset(one, other) for one, other in ((first, second), (second, first))
@@ -243,7 +244,7 @@ def compare_results(first: xr.Dataset, second: xr.Dataset) -> Comparison:
 
 
 def _add_axes_of_other_dataset(dataset: xr.Dataset, other: xr.Dataset) -> xr.Dataset:
-    """Add the axes that only another dataset has.
+    """Add the axes that another dataset has in addition to this dataset's axes.
 
     Each added axis has one point, which is the fixed value of the coordinate in the dataset.
     """
@@ -297,7 +298,7 @@ def _check_same_axis_points(first: xr.Dataset, second: xr.Dataset) -> None:
 
 
 def _uncompared_variables(aligned_datasets: Sequence[xr.Dataset]) -> dict[str, str]:
-    """Find the variables that cannot be compared, and the reasons."""
+    """Find the variables that cannot be compared, with the reasons."""
     first, second = aligned_datasets
     unequal = {
         str(d) for d in first["status"].dims if set(first.indexes[d]) != set(second.indexes[d])
@@ -315,9 +316,9 @@ def _uncompared_variables(aligned_datasets: Sequence[xr.Dataset]) -> dict[str, s
 
 
 def _compare_numbers_of_shared_cells(shared_cells: Sequence[xr.Dataset]) -> pd.DataFrame:
-    """Compare the numbers of the cells that both datasets have.
+    """Compare the numeric variables in the cells that both datasets have.
 
-    If the main result has no error estimates, any difference is beyond the errors.
+    If the main result has no error estimates, every difference is counted in ``beyond_errors``.
     """
     frame = compare_same_lattice(*shared_cells)
     about = find_primary_output(shared_cells[0])
@@ -382,8 +383,8 @@ def find_cell_number(dataset: xr.Dataset, coordinate_values: Mapping[str, Any]) 
     dataset : xarray.Dataset
         Results of a study.
     coordinate_values : mapping of str to object
-        Coordinate value for each dimension. Dimensions with a single point can be omitted. Numbers
-        must agree with a point of the axis within a relative tolerance of 1e-5.
+        Coordinate value for each dimension. Dimensions with a single point can be omitted. Each
+        number must agree with a point of the axis within a relative tolerance of 1e-5.
 
     Returns
     -------
@@ -423,9 +424,10 @@ def find_cell_number(dataset: xr.Dataset, coordinate_values: Mapping[str, Any]) 
 
 
 def _find_index_on_axis(axis_values: np.ndarray, wanted_value: Any) -> int | None:
-    """Find the index of an equal label, or of the nearest number.
+    """Find the index of an equal label or of the nearest number on an axis.
 
-    The relative difference of the nearest number must be at most 1e-5.
+    The relative difference between the wanted number and the nearest number on the axis must be at
+    most 1e-5.
     """
     if axis_values.dtype.kind in "iuf":
         try:

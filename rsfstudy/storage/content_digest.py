@@ -1,10 +1,10 @@
 """Digest of the contents of a dataset, stored in its NetCDF file.
 
 The digest covers the numbers, the strings and the declaration of the dataset. A second digest, at
-the end of the file, covers all bytes. The second digest is lost if the file is truncated or if
-another program saves the file, whereas the digest of the contents is an attribute and is preserved.
-HDF5 stores checksums of small attributes, names and shapes. HDF5 does not store checksums of the
-data, nor of attributes larger than 4 kB, such as a long declaration.
+the end of the file, covers all bytes of the file. The second digest is lost if the file is
+truncated or if another program saves the file, whereas the digest of the contents is an attribute
+and is preserved. HDF5 stores checksums of small attributes, names and shapes. HDF5 does not store
+checksums of the data, nor of attributes larger than 4 kB, such as a long declaration.
 """
 
 from __future__ import annotations
@@ -45,8 +45,8 @@ def check_content(dataset: xr.Dataset, path: str) -> None:
     """Check the contents of a dataset against its digest.
 
     Datasets without a digest are not checked. The function compares only attributes and variables
-    that the digest lists. A variable is compared only if its dimensions, shape and units are
-    unchanged. Other programs may therefore add, remove, select or convert variables.
+    that are listed in the digest. A variable is compared only if its dimensions, shape and units
+    are unchanged. Other programs may therefore add, remove, select or convert variables.
 
     Parameters
     ----------
@@ -116,7 +116,7 @@ def _array_to_portable_bytes(values: np.ndarray) -> bytes:
 
 
 def _parse_digest(text: object) -> Mapping[str, str]:
-    """Parse a digest. Return an empty mapping if the string is invalid."""
+    """Parse a digest string. Return an empty mapping for an invalid string."""
     try:
         listed = json.loads(str(text))
     except (ValueError, RecursionError):

@@ -1,10 +1,10 @@
 """Reading and writing of results files.
 
-A NetCDF file is written under a temporary name, read back and compared with the dataset. Only then
-is the file renamed. Each NetCDF file ends with a digest of all its bytes, which HDF5 ignores. The
-digest is checked before HDF5 opens the file, because HDF5 may hang on damaged bytes. If the digest
-is missing, because another program saved the file or because the file was truncated, the file is
-checked against the digest of its contents (see ``content_digest``).
+A NetCDF file is written under a temporary name, read back and compared with the dataset. The file
+is renamed only if the contents are identical. Each NetCDF file ends with a digest of all its bytes,
+which HDF5 ignores. The digest is checked before HDF5 opens the file, because HDF5 may hang on
+damaged bytes. If the digest is missing, because another program saved the file or because the file
+was truncated, the file is checked against the digest of its contents (see ``content_digest``).
 """
 
 from __future__ import annotations
@@ -267,7 +267,7 @@ def read_dataset(path: Path) -> xr.Dataset:
 def _check_readable_path(path: Path, file_description: str) -> None:
     """Raise ``DataError`` unless a path is a regular file or a Zarr store.
 
-    Opening a pipe could block forever.
+    The check prevents the opening of a pipe, which could block forever.
     """
     check_path("file", path)
     if not path.exists():
@@ -316,7 +316,7 @@ def convert_attributes_for_netcdf(dataset: xr.Dataset) -> xr.Dataset:
 
 
 def _convert_attribute_mapping_for_netcdf(attributes: Mapping[Any, Any]) -> dict[str, Any]:
-    """Convert the attributes of a dataset or variable, without None."""
+    """Convert a mapping of attributes, and omit attributes that are None."""
     return {
         str(name): _to_netcdf_value(value)
         for name, value in attributes.items()

@@ -1,4 +1,4 @@
-"""Scenes of datasets.
+"""Reconstruction of the scenes that datasets describe.
 
 The attributes of a motion describe its scene. In the results of a study, each cell has a scene.
 """
@@ -100,7 +100,8 @@ def read_scene_from_attributes(dataset: xr.Dataset) -> Scene:
     Raises
     ------
     DataError
-        If the attributes are missing or invalid, or if the samples do not match their digest.
+        If the attributes are missing or invalid, or if the samples of a loading do not match their
+        digest.
     InvalidValue
         If the scene contains a user-defined part that is not registered.
     """

@@ -37,7 +37,7 @@ _COMMENT_ON_RIG_UNITS = (
     " Axes are in the units that they state; sigma_star, slip_distance and reference_velocity are "
     "the scales of each cell."
 )
-#: Root attributes that users set with environment variables, for example ``RSFSTUDY_LICENSE``.
+#: Root attributes that users can set with environment variables, for example ``RSFSTUDY_LICENSE``.
 _CREDIT_ATTRIBUTES_FROM_ENVIRONMENT = (
     "creator_name",
     "creator_email",
@@ -127,8 +127,8 @@ def build_lattice_coordinates(study: Study) -> dict[Any, Any]:
     """Build the coordinates of the lattice of a study.
 
     The coordinates include the dimension coordinates, the fields that vary along each axis, and the
-    fixed scene fields as scalars. The tables of user-defined loadings and the inner coordinates of
-    the measure are included too.
+    fixed scene fields as scalars. The coordinates also include the tables of user-defined loadings,
+    and the coordinates of array outputs of the measure.
 
     Parameters
     ----------
@@ -204,8 +204,8 @@ def build_lattice_coordinates(study: Study) -> dict[Any, Any]:
 def _to_storable_array(values: list[Any]) -> np.ndarray:
     """Convert the values of a field to an array that NetCDF can store.
 
-    Strings become an object array and Boolean values become int8. Otherwise the values become
-    floats, and None becomes NaN.
+    Strings become an object array and Boolean values become int8. All other values become floats,
+    and None becomes NaN.
     """
     if isinstance(_first_value_not_none(values), str):
         return np.array([value or "" for value in values], dtype=object)

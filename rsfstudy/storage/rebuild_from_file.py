@@ -182,13 +182,13 @@ def study_from_declaration(
     stored_loadings : mapping of str to UserPart
         User-defined loadings from the results file, by name.
     study_with_user_code : Study, optional
-        Study that contains the user-defined code. Its measure, reductions and parts are used. The
-        plain fields of the measure are taken from the declaration.
+        Study that contains the user-defined code. The measure, reductions and user-defined parts of
+        this study are used. The plain fields of the measure are taken from the declaration.
 
     Returns
     -------
     Study
-        Study with this declaration.
+        Study that the declaration describes.
 
     Raises
     ------
@@ -229,7 +229,7 @@ def _collect_known_user_parts(study: Study | None) -> Mapping[str, UserPart]:
 
 
 def _rebuild_axis(plain_axis: StoredAxis, user_parts: Mapping[str, UserPart]) -> Axis:
-    """Build an axis, and replace the names of user-defined parts."""
+    """Build an axis, and replace the names of user-defined parts by the parts."""
     named = schema.build_axis_from_stored(plain_axis)
     rows = [replace_names_by_user_parts(row, user_parts) for row in named.rows]
     return named.with_rows(rows, named.units, named.sampling_info)
@@ -256,7 +256,7 @@ def rebuild_measure(plain_measure: StoredMeasure, path_in_file: str) -> Measure:
     Returns
     -------
     Measure
-        Measure with this description.
+        Measure that the description defines.
 
     Raises
     ------
@@ -307,7 +307,7 @@ def _find_class_by_declared_name(
 
 
 def _named_subclasses(base_class: Any) -> dict[str, Any]:
-    """Return the concrete subclasses in rsfstudy by their declared names."""
+    """Return the concrete subclasses in rsfstudy, by their names in files."""
     found: dict[str, Any] = {}
     for kind in base_class.__subclasses__():
         found |= _named_subclasses(kind)
@@ -320,8 +320,8 @@ def _named_subclasses(base_class: Any) -> dict[str, Any]:
 def find_primary_output(dataset: xr.Dataset) -> str | None:
     """Find the name of the main result of a dataset.
 
-    If rsfstudy has no such measure, or if the main result is not numeric, the function returns the
-    first numeric output with one value per cell.
+    If rsfstudy has no measure with the declared name, or if the main result is not numeric, the
+    function returns the first numeric output with one value per cell.
 
     Parameters
     ----------

@@ -3,8 +3,8 @@
 ``check_results`` checks a file before any other function uses the file. Error messages contain the
 path of the invalid entry, for example ``declaration.claims[3].id``.
 
-The classes describe the layout. A missing entry is never replaced by a default value, because the
-file would then describe a different study.
+The classes describe the layout of results files. A missing entry is never replaced by a default
+value, because a default value could change the meaning of the study.
 
 We convert and check plain data with msgspec for three reasons. First, msgspec is a single package
 of 0.5 MB without dependencies, and its import takes 17 ms (pydantic: four packages, 10 MB, 50 ms;
@@ -53,7 +53,7 @@ MAX_CLAIMS, MAX_AXIS_POINTS_OF_FILE = 10_000, 10_000_000
 
 
 class RootAttributes(TypedDict):
-    """Root attributes of a file that rsfstudy reads.
+    """Root attributes of results files that are read by rsfstudy.
 
     Attributes
     ----------
@@ -85,8 +85,8 @@ class StoredAxis(TypedDict):
     dimension : str
         Name of the dimension.
     values : sequence or mapping
-        List of values, mapping of labels to the fields at each point, or, for numbered points,
-        mapping of fields to their values.
+        List of values. For a zipped axis, mapping of point labels to field values. For a numbered
+        axis, mapping of field names to lists of values.
     units : mapping of str to str, optional
         Units of the fields.
     drawn : mapping of str to object, optional
@@ -134,13 +134,13 @@ def build_axis_from_stored(stored_axis: StoredAxis) -> Axis:
 
 
 class StoredMeasure(TypedDict):
-    """Measure, as plain data. Other entries depend on the measure."""
+    """Measure as plain data. Additional entries depend on the measure."""
 
     name: str
 
 
 class StoredReduction(TypedDict):
-    """Reduction, as plain data. Other entries depend on its kind."""
+    """Reduction as plain data. Additional entries depend on the kind."""
 
     kind: str
     name: str
@@ -175,7 +175,7 @@ class StoredDeclaration(msgspec.Struct, frozen=True, forbid_unknown_fields=True)
     plot : str
         Name of the figure.
     references : sequence of str
-        Sources of the study.
+        Literature references of the study.
     overrides : mapping of str to object
         Values that the user has overridden.
     laboratory : mapping of str to float, optional
@@ -201,7 +201,7 @@ class StoredDeclaration(msgspec.Struct, frozen=True, forbid_unknown_fields=True)
 class StoredFingerprint(TypedDict):
     """Code digests and versions that affect the results.
 
-    Other entries of a fingerprint are only compared, so they need no declared type.
+    Additional entries of a fingerprint are only compared, so the entries need no declared type.
     """
 
     own_code: str
@@ -215,7 +215,7 @@ class StoredProvenance(TypedDict):
     time : str
         Time of the run in UTC.
     command : str
-        Command or call of the user.
+        Command line or Python call of the user.
     declared_in : str
         File that declares the study, or an empty string.
     versions : mapping of str to str
@@ -263,7 +263,7 @@ def check_results(dataset: xr.Dataset) -> None:
     Raises
     ------
     DataError
-        If an entry is missing or invalid. The message contains the path of the first such entry.
+        If an entry is missing or invalid. The message contains the path of the first invalid entry.
     """
     layout = dataset.attrs.get("layout", 1)
     if not isinstance(layout, int | np.integer) or not 1 <= layout <= FILE_LAYOUT_VERSION:
@@ -411,7 +411,7 @@ def build_scene_from_stored(
     Returns
     -------
     Scene
-        Scene with these fields.
+        Scene with the stored fields.
 
     Raises
     ------
@@ -455,7 +455,7 @@ def find_user_part_missing_from_file(
     Returns
     -------
     tuple of (str, str) or None
-        Slot and name of the first such part, or None if there is no such part.
+        Slot and name of the first missing part, or None if no part is missing.
     """
     rows: list[Mapping[str, Any]] = [declaration.base]
     for plain in declaration.axes:

@@ -24,7 +24,7 @@ from rsfstudy.slider import (
 )
 from rsfstudy.storage.schema import invalid_part_error
 
-#: Name of a row, and description of the columns, of each kind of table.
+#: For each kind of loading table, the name of a row and the description of the columns.
 _DESCRIPTION_OF_SAMPLE_ROWS = (
     "sample",
     "time, load point velocity, fall and rate of normal stress",
@@ -34,7 +34,7 @@ _DESCRIPTION_OF_SEGMENT_ROWS = (
     "load point velocity and step, duration, and normal stress above sigma_star",
 )
 
-#: Attributes that distinguish the kinds of sampled histories.
+#: Attributes that distinguish sampled histories of velocity, normal stress and pore pressure.
 _FLAGS_OF_SAMPLED_HISTORIES = ("of_stress", "of_pressure")
 
 

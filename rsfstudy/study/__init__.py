@@ -1,8 +1,9 @@
 """Declarations of studies: axes, a measure, reductions, claims and a figure.
 
-A ``Study`` describes a lattice of cells and the results to compute in the cells. This package
-checks declarations, loads named studies, applies reductions to results, and compares results with
-claims. The package never runs a study, reads or writes a results file, or draws a figure.
+A ``Study`` describes a lattice of parameter combinations (cells) and the results to compute in each
+cell. This package checks declarations, loads named studies, applies reductions to results, and
+compares results with claims. The package never runs a study, reads or writes a results file, or
+draws a figure.
 """
 
 from __future__ import annotations

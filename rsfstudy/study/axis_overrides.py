@@ -1,4 +1,4 @@
-"""Point selection and new field values for zipped and numbered axes."""
+"""Functions that select axis points or replace the field values of an axis."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ def select_axis_points(axis: Axis, labels_or_numbers: Sequence[Any]) -> Axis:
     Raises
     ------
     InvalidValue
-        If the axis does not have a selected point.
+        If a selected point does not exist on the axis.
     """
     rows: dict[Any, AxisRow] = dict(zip(axis.labels or range(len(axis)), axis.rows, strict=True))
     for point in labels_or_numbers:
@@ -64,10 +64,10 @@ def replace_field_values(axis: Axis, field_name: str, values: Sequence[Any]) -> 
     Returns
     -------
     Axis
-        A zipped axis has one point for each combination of a new value with the other fields. If a
-        point exists already, the point keeps its label. Each new label depends only on its own
-        point, not on the other values. A numbered axis loses the information about the sampling
-        method.
+        Axis with the new values. If the axis is zipped, the new axis has one point for each
+        combination of a new value with the values of the other fields. A point that already exists
+        keeps its label, and the label of a new point depends only on the field values of the new
+        point. If the axis is numbered, the information about the sampling method is removed.
 
     Raises
     ------
@@ -122,9 +122,10 @@ def _relabel_overridden_point(
 ) -> str:
     """Return the label of a point after the value of one field has changed.
 
-    If the label contains the old value, as in ``"imposed, alpha = 0.25"``, the old value is
-    replaced. Otherwise, if the new value identifies the point (``value_identifies_point``), the
-    label becomes ``"alpha = 0.3"``. In all other cases ``"alpha = 0.3"`` is appended to the label.
+    If the label contains the old value, as in ``"imposed, alpha = 0.25"``, the new value replaces
+    the old value in the label. If the label does not contain the old value, but the new value
+    identifies the point (``value_identifies_point``), the label becomes ``"alpha = 0.3"``. In all
+    other cases ``"alpha = 0.3"`` is appended to the label.
     """
     text = f"{field_name} = {_format_with_all_digits(new_value)}"
     old_text = re.escape(_format_with_all_digits(old_value))
@@ -136,7 +137,7 @@ def _relabel_overridden_point(
 
 
 def _format_with_all_digits(value: Any) -> str:
-    """Format a value with six digits, or with all digits if necessary."""
+    """Format a value with six digits, or with all digits if rounding changes it."""
     short_text = format_value(value)
     is_rounded = isinstance(value, float) and float(short_text) != value
     return repr(value) if is_rounded else short_text

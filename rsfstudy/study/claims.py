@@ -30,12 +30,12 @@ NOT_APPLICABLE_VERDICT = "not applicable"
 VERDICTS = (REPRODUCED_VERDICT, DIFFERS_VERDICT, UNDECIDED_VERDICT, NOT_APPLICABLE_VERDICT)
 
 CLAIM_RELATIONS = ("equals", "below", "above")
-#: Columns of a table of verdicts.
+#: Columns of the table of verdicts on claims.
 _VERDICT_TABLE_COLUMNS = (
     *("id", "claim", "source", "relation", "published", "ours"),
     *("tolerance", "reason", "verdict", "expected", "because", "moved"),
 )
-#: Default reason of the tolerance. The default is accepted only for inequalities.
+#: Default reason for the tolerance of a claim. The default is accepted only for inequalities.
 TOLERANCE_REASON_OF_INEQUALITY = "an inequality"
 _EXPECTED_VERDICTS = (REPRODUCED_VERDICT, DIFFERS_VERDICT)
 _TEXT_FIELDS = (
@@ -48,7 +48,7 @@ _TEXT_FIELDS = (
 @guard_methods
 @dataclass(frozen=True, kw_only=True)
 class Claim:
-    """Published value, and the expected verdict of a comparison.
+    """Published value to compare with a result, and the expected verdict.
 
     Parameters
     ----------
@@ -65,15 +65,15 @@ class Claim:
     published : float
         Published value.
     tolerance : float, default: 0.0
-        Largest permitted distance from the published value. In an inequality, the result may be on
-        the wrong side of the published value by up to this distance.
+        Largest permitted difference between the result and the published value. An inequality may
+        be violated by up to ``tolerance``.
     reason : str, default: "an inequality"
         Reason for the tolerance. Required if ``relation`` is ``"equals"``.
     relation : {"equals", "below", "above"}, default: "equals"
         Expected relation of the result to the published value.
     minus : mapping of str to object, optional
-        Coordinate values that select a second value. If given, the difference of the two values is
-        compared with the published value.
+        Coordinate values that select a second value. If ``minus`` is given, the first value minus
+        the second value is compared with the published value.
     minus_variable : str, optional
         Name of the variable of the second value. The default is ``variable``.
     expected : {"reproduced", "differs"}, default: "reproduced"
@@ -200,8 +200,8 @@ class Claim:
         Raises
         ------
         InvalidValue
-            If the dataset does not have the variable, a coordinate or the selected point. The
-            verdict would always be ``"not applicable"``.
+            If the dataset does not have the variable, a coordinate or the selected point, so that
+            the verdict would always be ``"not applicable"``.
         """
         variables, coordinates = map(str, dataset.data_vars), [str(n) for n in dataset.coords]
         for variable in filter(None, (self.variable, self.minus_variable)):
@@ -231,7 +231,7 @@ class Claim:
         verdict : str
             Verdict, which is ``"reproduced"``, ``"differs"``, ``"undecided"`` or ``"not
             applicable"``. The claim is not applicable if the dataset does not contain the selected
-            point. The claim is undecided if the value at this point is NaN.
+            point. The claim is undecided if the value at the selected point is NaN.
         """
         try:
             ours = _select_single_value(dataset, self.variable, self.where)
@@ -303,7 +303,7 @@ def _is_number(value: object) -> bool:
 def _has_all_overridden_dimensions(
     dataset: xr.Dataset, variable_name: str, study_overrides: Mapping[str, Any]
 ) -> bool:
-    """Return True if a variable has every dimension that was overridden."""
+    """Return True if a variable has all dimensions with overridden values."""
     changed = {str(d) for n in study_overrides if n in dataset.coords for d in dataset[n].dims}
     return variable_name not in dataset or changed <= set(dataset[variable_name].dims)
 

@@ -31,7 +31,8 @@ from rsfstudy.study.claims import Claim
 from rsfstudy.study.reductions.application import Reduction
 from rsfstudy.vocabulary import QUANTITY_BY_NAME
 
-#: Types of the attributes of a study, and types of the items of its lists. The rig is optional.
+#: Required types of the attributes of a study, and of the items of its list attributes. The rig is
+#: optional.
 _TYPES_OF_STUDY_FIELDS = {"base": Scene, "measure": Measure, "accuracy": Accuracy, "rig": Rig}
 _ITEM_TYPES_OF_STUDY_LISTS = {
     "axes": Axis,
@@ -114,7 +115,8 @@ def check_fields_not_solved_by_measure(measure: Measure, field_names: Sequence[s
     Raises
     ------
     InvalidValue
-        If the measure solves for a field or for the ratio that is equivalent to the field.
+        If the measure solves for one of the fields, or for a ratio that is equivalent to one of the
+        fields.
     """
     for name in field_names:
         if {name, RATIO_FIELD_BY_DIMENSIONAL_NAME.get(name)} & set(measure.solved_fields):
@@ -166,7 +168,7 @@ def check_axis_fields(
     scene_field_names : sequence of str
         Names of all scene fields.
     scenes_on_rig : LatticeScenesOnRig or None
-        Converter of axis values with units. None in a study without a rig.
+        Converter of axis values with units, or None if the study has no rig.
 
     Raises
     ------
@@ -195,21 +197,21 @@ def check_axis_fields(
 def check_outputs_are_same_in_all_cells(
     measure: Measure, measure_field_changes: Iterable[Mapping[str, Any]]
 ) -> None:
-    """Raise InvalidValue if an axis changes the set of results.
+    """Raise InvalidValue if the cells of a study have different result variables.
 
-    All cells of a lattice must have the same results.
+    All cells of a lattice must have the same result variables.
 
     Parameters
     ----------
     measure : Measure
         Measure of the study.
     measure_field_changes : iterable of mapping of str to object
-        Changes of the measure fields in all cells.
+        New values of measure fields in each cell, by field name.
 
     Raises
     ------
     InvalidValue
-        If a change of the measure fields changes the set of results.
+        If the measure computes different variables in different cells.
     """
     given = _describe_measure_outputs(measure)
     for changed in (measure.with_(**values) for values in measure_field_changes):
@@ -230,8 +232,9 @@ def check_override_of_partly_set_field(
 ) -> None:
     """Reject an override of a field that is set at only some axis points.
 
-    At the other points, the field has the value of the base scene, which the override would not
-    change. The override is accepted if the field has no value or no meaning at the other points.
+    At the axis points that do not set the field, the field has the value of the base scene, which
+    the override would not change. The override is accepted if the field has no value or no meaning
+    at the points that do not set the field.
 
     Parameters
     ----------
@@ -249,7 +252,7 @@ def check_override_of_partly_set_field(
     Raises
     ------
     InvalidValue
-        If the override would change the field in only some of the points.
+        If the override would change the field at only some of the axis points.
     """
     stating = [
         point for point, row in zip(axis.point_names, axis.rows, strict=True) if field_name in row
@@ -272,7 +275,7 @@ def check_override_of_partly_set_field(
 
 
 def check_axes_are_distinct(axes: Sequence[Axis]) -> None:
-    """Raise InvalidValue if two axes have the same dimension or field.
+    """Raise InvalidValue if two axes have the same dimension or vary one field.
 
     Parameters
     ----------
@@ -310,7 +313,8 @@ def unknown_name_error(
     rule : str
         Rule that the name violates.
     known_names : collection of str
-        Known names. The message lists similar names, unless there is a hint for the unknown name.
+        Known names. The error message lists similar known names, unless there is a hint for the
+        unknown name.
 
     Returns
     -------
@@ -324,9 +328,9 @@ def unknown_name_error(
 
 
 def _describe_measure_outputs(measure: Measure) -> str:
-    """Describe the results and the solved fields of a measure.
+    """Describe the results of a measure and the fields for which it solves.
 
-    The description is a string, so that NaN values compare equal.
+    The description is a string, because two NaN values are equal only as strings.
     """
     inner = {name: np.asarray(at).tolist() for name, at in measure.inner_coordinates.items()}
     return repr((measure.primary_output, dict(measure.variables), inner, measure.solved_fields))

@@ -1,7 +1,7 @@
-"""Declarations of the figure of a study.
+"""Classes that declare the figure of a study.
 
 A figure consists of panels, or is a user-defined function or module. This module does not import
-matplotlib, so that workers do not load it.
+matplotlib, so that worker processes do not load matplotlib.
 """
 
 from __future__ import annotations
@@ -29,8 +29,8 @@ __getattr__ = renamed_names(__name__)
 #: Name of a variable, or a function of a dataset that computes the values.
 VariableNameOrFunction = str | Callable[["xr.Dataset"], "xr.DataArray"]
 TextOrFunction = str | Callable[["xr.Dataset"], str]
-#: Type of `matplotlib.axes.Axes` in annotations. Workers load this module, so it must not import
-#: matplotlib.
+#: Type of `matplotlib.axes.Axes` in annotations. Worker processes load this module, so the module
+#: must not import matplotlib.
 Axes = Any
 #: Function ``draw(dataset, axes)`` that draws a dataset on matplotlib axes.
 DrawFunction = Callable[[Any, Any], Any]
@@ -45,61 +45,62 @@ GENERIC_FIGURE_NAMES = frozenset(
 @guard_methods
 @dataclass(frozen=True, kw_only=True)
 class Panel:
-    """Panel of a figure, or several panels for the points of some axes.
+    """Panel of a figure, or one panel for each point of the axes in ``facet``.
 
     Functions that receive a dataset are called with the part of the dataset that the panel shows.
-    Functions that receive a row are called with the part of the dataset that one curve shows.
+    The data of one curve are the part of the dataset that the curve shows.
 
     Parameters
     ----------
     x : str or callable
-        Name of the variable along x, or a function of the row that returns the values. If the
-        values are strings, the points are equally spaced.
+        Name of the variable along x, or a function that receives the data of one curve and returns
+        the values. If the values are strings, the points are equally spaced.
     y : str or callable
-        Name of the variable along y, or a function of the row that returns the values. If the
-        values are strings, the points are equally spaced.
+        Name of the variable along y, or a function that receives the data of one curve and returns
+        the values. If the values are strings, the points are equally spaced.
     hue : sequence of str, optional
-        Axes whose points are shown as curves. The first axis is distinguished by colours and
-        markers, and the second axis by line styles and open markers.
+        Axes whose points are drawn as separate curves in one panel. The first axis is distinguished
+        by colours and markers, and the second axis by line styles and open markers.
     facet : sequence of str, optional
         Axes whose points are shown in separate panels.
     isel : mapping of str to int, list of int, slice or callable, optional
-        Indices of the selected points on other axes. A function such as ``min`` receives the list
-        of coordinate values and returns one value or a list of values. A scalar coordinate with the
-        index 0 is shown in the title.
+        Indices of the selected points on each axis, by axis name. A function such as ``min``
+        receives the list of coordinate values and returns one value or a list of values. A scalar
+        coordinate with the index 0 is shown in the title.
     markers_only : bool, default: False
         If True, draw markers without lines.
     style : mapping or callable, optional
-        Properties for `matplotlib.axes.Axes.plot`, or a function of the row that returns
-        properties. The properties override the default style of the curve.
+        Keyword arguments for `matplotlib.axes.Axes.plot`, or a function that receives the data of
+        one curve and returns keyword arguments. The keyword arguments override the default style of
+        the curve.
     error_bars : str, optional
         Name of the variable with the half lengths of the error bars.
     fit_line : callable, optional
-        Function of the row that returns x and y of a fitted or theoretical line. The line has the
-        colour of the curve.
+        Function that receives the data of one curve and returns x and y of a fitted or theoretical
+        line. The line has the colour of the curve.
     curve_label : callable, optional
-        Function of the row that returns the legend entry of the curve. The default is the point of
-        the curve on the axes of ``hue``.
+        Function that receives the data of one curve and returns its legend entry. By default, the
+        legend entry contains the coordinates of the curve on the axes of ``hue``.
     annotation : str, optional
         Name of a slope that is shown in the legend entry of each curve, with its standard error.
         The slope is omitted if the standard error is not finite.
     overlays : sequence of callable, optional
         Functions ``draw(dataset, axes)`` that add elements to the panel.
     title : str or callable, optional
-        Title, or a function of the dataset. The default is the point of the panel on the axes of
-        ``facet`` and ``isel``.
+        Title, or a function that receives the dataset and returns the title. By default, the title
+        contains the coordinates of the panel on the axes of ``facet`` and ``isel``.
     x_label, y_label : str or callable, optional
-        Labels of the axes, or functions of the dataset. By default, a label contains the long name,
-        symbol and units of the variable.
+        Labels of the x and y axes, or functions that receive the dataset and return the labels. By
+        default, a label contains the long name, symbol and units of the variable.
     log : {"", "x", "y", "xy"} or None, default: ""
-        Directions with a logarithmic scale. None selects a logarithmic scale if the coordinates are
+        Axes with a logarithmic scale. None selects a logarithmic scale if the coordinates are
         logarithmically spaced, or if the values span decades.
     x_limits, y_limits : tuple of (float or None, float or None), default: (None, None)
-        Limits of the scales. None adapts the limit to the data.
+        Lower and upper limits of the axes. A limit of None is computed from the data.
     y_scale_group : str, optional
-        Name of a group of panels with the same limits along y.
+        Name of a group of panels with the same limits of the y axis.
     condition : callable, optional
-        Function of the dataset. If the function returns False, the panel is omitted.
+        Function that receives the dataset. If the function returns False, the panel is omitted.
     legend_columns : int, default: 2
         Largest number of columns of the legend.
     legend_title : str, optional
@@ -161,16 +162,16 @@ class Figure:
     Parameters
     ----------
     panels : sequence of Panel or callable
-        Panels from left to right and from top to bottom. A function ``draw(dataset, axes)``
-        is converted to a panel that only has this overlay.
+        Panels from left to right and from top to bottom. A function ``draw(dataset, axes)`` is
+        converted to a panel whose only overlay is the function.
     columns : int, default: 2
         Largest number of panels in a row.
     height : float or callable, optional
-        Height of a panel without its legend in mm, or a function of the dataset. The default is the
-        height of the current style.
+        Height of a panel without its legend in mm, or a function that receives the dataset and
+        returns the height. The default is the height of the current style.
     allow_extra_dims : bool, default: False
         If True, the panels also show additional dimensions of the lattice. If False, the panels are
-        repeated for the points of additional dimensions.
+        repeated for each point of the additional dimensions.
 
     Examples
     --------
@@ -208,7 +209,7 @@ def horizontal_line(height: float, **style: Any) -> DrawFunction:
     height : float
         Position of the line along y.
     **style : object
-        Properties for `matplotlib.axes.Axes.axhline`.
+        Keyword arguments for `matplotlib.axes.Axes.axhline`.
 
     Returns
     -------
@@ -233,9 +234,9 @@ def reference_line(
     name : str
         Legend entry.
     start : float, optional
-        First x value of the line. The default is the smallest value of the variable.
+        First x value of the line. The default is the smallest value of the variable ``x``.
     **style : object
-        Properties for `matplotlib.axes.Axes.plot`.
+        Keyword arguments for `matplotlib.axes.Axes.plot`.
 
     Returns
     -------
@@ -255,7 +256,7 @@ def reference_line(
 
 
 def name_of_figure(plot: Any, study_name: str) -> str:
-    """Return the name under which a figure is stored in a declaration.
+    """Return the name that represents a figure in the declaration of a study.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Cells of a lattice.
+"""Cells, which are the points of the lattice of a study.
 
 The module does not depend on ``Study``, because workers need only the cells of a study.
 """
@@ -11,7 +11,7 @@ from rsfstudy.slider import Scene
 
 
 class Cell(NamedTuple):
-    """Scene of a cell, and the measure fields that vary along axes.
+    """Scene of a lattice cell, and the measure fields that the axes change.
 
     Parameters
     ----------
@@ -26,14 +26,14 @@ class Cell(NamedTuple):
 
 
 class CellChanges(NamedTuple):
-    """Changes that the axes make in a cell.
+    """Field values of a lattice cell that differ from the base scene and measure.
 
     Parameters
     ----------
     scene_fields : dict of str to object
-        Changed fields of the base scene.
+        Scene fields that differ from the base scene.
     measure_fields : dict of str to object
-        Changed fields of the measure.
+        Measure fields that differ from the measure of the study.
     """
 
     scene_fields: dict[str, Any]
@@ -45,11 +45,11 @@ class CellChanges(NamedTuple):
         Parameters
         ----------
         base_scene : Scene
-            Scene to change.
+            Scene with the fields that all cells share.
 
         Returns
         -------
         Cell
-            Cell with the changed scene.
+            Cell whose scene contains the changed fields.
         """
         return Cell(base_scene.with_(**self.scene_fields), self.measure_fields)

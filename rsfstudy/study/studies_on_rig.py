@@ -36,7 +36,7 @@ def convert_study_to_rig_units(study: Study, rig: Rig) -> Study:
 
 
 def _convert_reduction_range_to_rig_units(reduction: Any, scale: float | None) -> Any:
-    """Convert the range of a reduction to units.
+    """Convert the coordinate range of a reduction to units of a rig.
 
     A reduction without a range is returned unchanged.
     """

@@ -57,7 +57,7 @@ from rsfstudy.study.user_parts import find_named_user_parts, user_field_quantiti
 #: Maximum length of the name of a study in bytes. Most file systems allow file names of at most 255
 #: bytes, and the names of files have suffixes.
 _MAX_NAME_BYTES = 200
-#: Fields that select a part of the slider.
+#: Scene fields that select a part of the slider, such as the friction law.
 _SLOT_AND_PART_SELECTING_FIELDS = frozenset({*SLOT_NAMES, *PART_SELECTING_FIELDS})
 #: Pairs of equivalent fields. A slip rate can be given as a velocity or as a ratio, and the spring
 #: as a stiffness or as a ratio to the critical stiffness.
@@ -104,7 +104,7 @@ class Study:
         Accuracy of each cell.
     rig : Rig, optional
         Rig of the base scene. In a study with a rig, axes may have units and may vary quantities of
-        the rig. Numbers without units are then in SI units.
+        the rig. If the study has a rig, numbers without units are interpreted in SI units.
     version : int, default: 1
         Version of the study. Increase the version if the meaning of the results changes.
     overrides : mapping of str to object, optional
@@ -116,8 +116,8 @@ class Study:
     ------
     InvalidValue
         If an argument has a wrong type. The error is also raised if two axes have the same
-        dimension or vary the same field, if an axis varies an unknown field, or if an axis changes
-        the set of results.
+        dimension or vary the same field, if an axis varies an unknown field, or if different cells
+        would have different result variables.
 
     Examples
     --------
@@ -242,7 +242,7 @@ class Study:
 
     @cached_property
     def scene_fields(self) -> tuple[str, ...]:
-        """Names of all scene fields, including those of user-defined parts."""
+        """Names of all scene fields, including fields of user-defined parts."""
         return tuple(scene_field_quantities(self.user_parts.values()))
 
     @cached_property
@@ -257,7 +257,7 @@ class Study:
     def scene_builder(self) -> LatticeScenesOnRig | None:
         """Converter from axis values with units to scene fields.
 
-        None in a study without a rig.
+        The converter is None if the study has no rig.
         """
         return LatticeScenesOnRig(self.rig, self.base, self.axes) if self.rig else None
 
@@ -285,7 +285,7 @@ class Study:
     def quantities(self) -> dict[str, Quantity]:
         """Quantities of the measure and of user-defined parts, by name.
 
-        The common vocabulary does not contain these quantities.
+        The dictionary contains only quantities that are not in the common vocabulary.
         """
         stated = *user_field_quantities(self.user_parts.values()), *self.measure.quantities
         return {about.name: about for about in stated}
@@ -313,7 +313,7 @@ class Study:
         Yields
         ------
         Cell
-            Scene and changes of the measure.
+            Scene of the cell, and measure fields that the axes change.
 
         Raises
         ------
@@ -342,12 +342,12 @@ class Study:
         Returns
         -------
         Cell
-            Scene and changes of the measure.
+            Scene of the cell, and measure fields that the axes change.
         """
         return self._build_cell(self._axis_rows_of_cell(number))
 
     def cell_changes(self, number: int) -> CellChanges:
-        """Compute the changes that the axes make in one cell.
+        """Compute the field values that the axes change in one cell.
 
         This method does not build a scene, so it is faster than `cell`.
 
@@ -364,7 +364,7 @@ class Study:
         return self._compute_cell_changes(self._axis_rows_of_cell(number))
 
     def _axis_rows_of_cell(self, cell_number: int) -> list[AxisRow]:
-        """Return the row of each axis at a cell."""
+        """Return the field values that each axis sets in a cell."""
         places = np.unravel_index(cell_number, self.shape)
         return [axis.rows[i] for axis, i in zip(self.axes, places, strict=True)]
 
@@ -415,7 +415,7 @@ class Study:
         Parameters
         ----------
         rows : sequence of mapping of str to object
-            Rows of several axes.
+            Field values at one point of each axis.
 
         Returns
         -------
@@ -447,7 +447,7 @@ class Study:
         )
 
     def _compute_cell_changes(self, axis_rows: Sequence[AxisRow]) -> CellChanges:
-        """Compute the changes of a cell at one row of each axis."""
+        """Compute the changed fields of the cell at one point of each axis."""
         given, of_measure = self.split_rows(axis_rows)
         of_scene = self.scene_fields_of_row(given)
         if _SLOT_AND_PART_SELECTING_FIELDS.isdisjoint(
@@ -471,7 +471,7 @@ class Study:
         return CellChanges({n: values[n] for n in of_scene if n not in meaningless}, of_measure)
 
     def _build_cell(self, axis_rows: Sequence[AxisRow]) -> Cell:
-        """Build the cell at one row of each axis."""
+        """Build the cell at one point of each axis."""
         try:
             return self._compute_cell_changes(axis_rows).build_cell(self.base)
         except InvalidValue as error:
@@ -569,7 +569,7 @@ class Study:
     def _override_axis(self, axis: Axis, field_name: str, values: Sequence[Any]) -> Axis | None:
         """Apply an override to one axis.
 
-        The result is None if the axis varies neither this field nor an equivalent field.
+        The result is None if the axis varies neither the overridden field nor an equivalent field.
         """
         units = axis.units.get(field_name, "")
         if field_name == axis.dimension:
@@ -605,7 +605,7 @@ class Study:
     def _make_axis(self, field_name: str, values: Sequence[Any], units: str = "") -> Axis:
         """Create an axis of a field.
 
-        In a study with a rig, numbers without units are interpreted in the given units.
+        In a study with a rig, numbers without units are interpreted in ``units``.
         """
         if self.rig is None:
             return Axis(field_name, values)
@@ -642,5 +642,5 @@ class Study:
 
 
 def _rows_of_overridden_field(field_name: str, value: Any) -> list[AxisRow]:
-    """Return one row for each value of a field."""
+    """Return one axis row for each value of an overridden field."""
     return [{field_name: v} for v in (value if is_sequence_of_axis_values(value) else [value])]

@@ -61,7 +61,7 @@ def _html_details(caption: str, content: HtmlMarkup) -> HtmlMarkup:
 
 
 def _describe_axis_quantity(axis: Axis, known_quantities: Mapping[str, Quantity]) -> Quantity:
-    """Return the quantity of an axis.
+    """Return the quantity that an axis varies.
 
     If the axis has units, the quantity has no symbol and no scale.
     """

@@ -40,8 +40,8 @@ def load_study(name_or_file: str) -> Study:
     Raises
     ------
     InvalidValue
-        If there is no study of this name, if the file cannot be read or raises an exception, or if
-        the file does not declare a study. For an unknown name, the message lists similar names.
+        If there is no study with this name, if the file cannot be read or raises an exception, or
+        if the file does not declare a study. For an unknown name, the message lists similar names.
     """
     check_path("study", name_or_file)
     if name_or_file.endswith(".py"):
@@ -63,8 +63,9 @@ def _import_study_file(study_file: Path) -> ModuleType:
     """Import a study file as a module.
 
     The module and the modules in the same directory are removed from ``sys.modules`` after the
-    import. Worker processes cannot import these modules, and therefore receive their contents by
-    value. Another study file may import other modules with the same names.
+    import. Worker processes cannot import the removed modules, and therefore receive the contents
+    of these modules by value. After the removal, another study file can import different modules
+    with the same names.
     """
     try:
         path = study_file.resolve(strict=True)
@@ -101,7 +102,7 @@ def _import_study_file(study_file: Path) -> ModuleType:
 
 
 def _is_module_in_directory_of(module_name: str, study_file: Path) -> bool:
-    """Return True if a module or its package is in the directory of a file."""
+    """Return True if a module or its package is next to a study file."""
     top = sys.modules.get(module_name.partition(".")[0])
     places = [getattr(top, "__file__", None), *getattr(top, "__path__", ())]
     return any(Path(place).parent == study_file.parent for place in places if place)
@@ -110,7 +111,7 @@ def _is_module_in_directory_of(module_name: str, study_file: Path) -> bool:
 def _describe_error_line(error: BaseException, study_file: Path) -> str:
     """Return the line of the study file in which an error was raised.
 
-    The result is empty if the error was raised elsewhere.
+    The string is empty if the error was not raised in the study file.
     """
     lines = [
         frame.lineno

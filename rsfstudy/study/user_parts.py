@@ -12,7 +12,7 @@ from rsfstudy.slider import SCENE_FIELD_NAMES, SLOTS, UserPart, scene_field_quan
 def find_named_user_parts(
     names: Iterable[str], rows: Iterable[Mapping[str, Any]]
 ) -> dict[str, UserPart]:
-    """Find the user-defined parts whose names occur in rows of values.
+    """Find the user-defined parts whose names occur among field values.
 
     Parameters
     ----------
@@ -44,7 +44,7 @@ def user_field_quantities(parts: Iterable[UserPart]) -> Iterator[Quantity]:
     Returns
     -------
     iterator of Quantity
-        Quantities of the fields that are not fields of every scene.
+        Quantities of the fields that exist only in scenes with user-defined parts.
     """
     return (
         about

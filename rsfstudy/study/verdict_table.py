@@ -32,7 +32,7 @@ def format_published_value(verdict_row: dict[Any, Any]) -> str:
     Parameters
     ----------
     verdict_row : dict
-        Row of a table of verdicts.
+        Row of the table of verdicts.
 
     Returns
     -------
@@ -43,7 +43,7 @@ def format_published_value(verdict_row: dict[Any, Any]) -> str:
 
 
 def _format_row_for_terminal(verdict_row: dict[Any, Any]) -> dict[str, str]:
-    """Format the cells of a row for a terminal."""
+    """Format the cells of a verdict row for a terminal."""
     return {
         "id": textwrap.shorten(str(verdict_row["id"]), _CLAIM_ID_WIDTH, placeholder="..."),
         "claim": " ".join(str(verdict_row["claim"]).split()),
@@ -98,18 +98,18 @@ class VerdictTable(pd.DataFrame):
 
 
 def format_verdict_row(verdict_row: dict[Any, Any]) -> dict[str, str]:
-    """Format the cells of a row for a notebook or a report.
+    """Format the cells of a verdict row for a notebook or a report.
 
     Parameters
     ----------
     verdict_row : dict
-        Row of a table of verdicts.
+        Row of the table of verdicts.
 
     Returns
     -------
     dict of str to str
-        Cells of the row by heading. If the row has a column ``study``, the claim begins with the
-        name of the study.
+        Cells of the row by heading. If the row has a column ``study``, the text of the claim begins
+        with the name of the study.
     """
     reason = f"{verdict_row['tolerance']:.3g}: {verdict_row['reason']}"
     if verdict_row["because"]:

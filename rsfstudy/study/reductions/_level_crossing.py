@@ -1,4 +1,4 @@
-"""Level crossing of a sampled curve.
+"""Search for the position at which a sampled curve crosses a level.
 
 ``find_crossing`` returns the position of a crossing with lower and upper bounds. The bounds account
 for the unknown shape of the curve between two samples.
@@ -14,19 +14,19 @@ import numpy as np
 from scipy.interpolate import PchipInterpolator
 from scipy.optimize import brentq
 
-#: Minimum number of samples.
+#: Minimum number of samples of a curve.
 MIN_SAMPLES_OF_CURVE = 4
-#: Number of intervals on either side of the bracket in which the curve is examined.
+#: Number of intervals that are examined on each side of the interval with the crossing.
 _EXAMINED_INTERVALS_BESIDE_BRACKET = 3
 #: Changes of slope below this fraction of the largest slope are regarded as rounding errors.
 _MAX_ROUNDING_ERROR_OF_SLOPE_CHANGES = 1e-9
-#: Minimum changes of slope that indicate an oscillation, relative to the largest change of slope
-#: and to the smallest slope nearby.
+#: Smallest change of slope that indicates an oscillation, relative to the largest change of slope
+#: and to the smallest slope of the neighbouring intervals.
 _MIN_RELATIVE_OSCILLATION_SLOPE_CHANGE = 0.1
 
 
 class CrossingStatus(IntEnum):
-    """Outcome of the search for a crossing.
+    """Outcome of the search for a level crossing.
 
     Result files contain the integer values, so the values must not be changed.
     """
@@ -61,7 +61,7 @@ def find_crossing(x: np.ndarray, y: np.ndarray, level: float) -> Crossing:
     x, y : ndarray, shape (n,)
         Samples, with x in ascending order.
     level : float
-        Level to reach.
+        Level that the curve must cross.
 
     Returns
     -------
@@ -79,13 +79,13 @@ def find_crossing(x: np.ndarray, y: np.ndarray, level: float) -> Crossing:
 
     :math:`T` is estimated by the change of slope from the previous chord to the next chord. The
     estimate is exact for a single kink. For a parabola, the estimate is twice the true value. In
-    the first and the last interval, the kink may also be located next to the end, and the curve
-    then follows the neighbouring chord.
+    the first and the last interval, the kink may also be located next to the end of the curve. In
+    this case, the curve follows the extrapolated chord of the neighbouring interval.
 
     If the slope does not vary monotonically over the neighbouring intervals, changes of opposite
-    sign partly cancel. The largest :math:`T` of the neighbouring intervals is then doubled and used
-    for all intervals. If the changes of slope alternate in sign, the samples may hide an
-    oscillation. The bounds then enclose at least the whole interval.
+    sign partly cancel. In this case, the largest :math:`T` of the neighbouring intervals is doubled
+    and used for all intervals. If the changes of slope alternate in sign, the samples may hide an
+    oscillation, and the bounds enclose at least the whole interval.
     """
     if x.size < MIN_SAMPLES_OF_CURVE:
         return _build_result_without_crossing(CrossingStatus.TOO_FEW_POINTS)
@@ -120,14 +120,14 @@ def find_crossing(x: np.ndarray, y: np.ndarray, level: float) -> Crossing:
 
 
 def find_all_crossings(x: np.ndarray, y: np.ndarray, level: float) -> list[float]:
-    """Return all positions at which the interpolant reaches a level.
+    """Return all positions at which the interpolated curve reaches a level.
 
     Parameters
     ----------
     x, y : ndarray, shape (n,)
         Samples, with x in ascending order.
     level : float
-        Level to reach.
+        Level that the curve must cross.
 
     Returns
     -------
@@ -146,7 +146,7 @@ def find_all_crossings(x: np.ndarray, y: np.ndarray, level: float) -> list[float
 
 
 def _build_result_without_crossing(crossing_status: CrossingStatus) -> Crossing:
-    """Return a crossing without a position."""
+    """Return a ``Crossing`` that has a status but no position."""
     return Crossing(math.nan, math.nan, math.nan, crossing_status)
 
 
@@ -165,7 +165,7 @@ def _estimate_slope_changes(
     Returns
     -------
     turns : dict of int to float
-        Total change of slope by the index of the interval.
+        Total change of slope within each interval, by interval index.
     alternates : bool
         True if the changes of slope alternate in sign.
     """
@@ -202,8 +202,9 @@ def _crossing_bounds(
 ) -> tuple[float, float] | None:
     """Return the bounds of a crossing in an interval.
 
-    Positions are relative to the first sample, and ``level_minus_first_value`` is the level minus
-    the value of the first sample. The result is None if the level cannot be reached.
+    Positions are measured from the first sample of the interval, and ``level_minus_first_value`` is
+    the level minus the value of the first sample. The function returns None if the curve cannot
+    reach the level.
     """
     if slope < 0.0:
         slope, level_minus_first_value = -slope, -level_minus_first_value
@@ -250,9 +251,9 @@ def _crossing_bounds_at_end(
 ) -> tuple[float, float]:
     """Return the bounds of a crossing in the first or last interval.
 
-    The curve may have one kink in this interval. The distance of the curve from the chord is at
-    most the difference between the slopes of this chord and the neighbouring chord, multiplied by
-    the distance from the inner sample.
+    The curve may have one kink in the first or last interval. The distance between the curve and
+    the chord of the interval is at most the difference between the slopes of this chord and the
+    neighbouring chord, multiplied by the distance from the inner sample.
     """
     slope, following = (slopes[0], slopes[1]) if is_first_interval else (slopes[-1], slopes[-2])
     width = float(interval_widths[0] if is_first_interval else interval_widths[-1])

@@ -2,8 +2,9 @@
 
 ``apply_reductions`` is the main function. A reduction never uses failed or missing cells. If a
 result depends on failed or missing cells, the result is NaN, and the attribute ``refused`` contains
-the reason. The option ``despite_failures`` omits failed cells instead. Cells that have an answer
-but no value, such as cells with the status ``stable_for_all_steps``, are omitted.
+the reason. With the option ``despite_failures``, reductions omit failed cells and use the remaining
+cells. Finished cells without a value, such as cells with the status ``stable_for_all_steps``, are
+omitted.
 """
 
 from __future__ import annotations
@@ -61,7 +62,7 @@ __all__ = [
     "apply_reductions",
 ]
 
-#: Suffixes of the variables that describe the quality of a result.
+#: Suffixes of the names of variables that describe the quality of a result.
 _SUFFIXES_OF_QUALITY_VARIABLES = ("error", "stderr", "misfit", "points", "status")
 
 
@@ -82,9 +83,9 @@ def apply_reductions(
     Parameters
     ----------
     dataset : xarray.Dataset
-        Results of the cells, including the variable ``status``.
+        Results of all cells of the lattice, including the variable ``status``.
     reductions : tuple of Reduction
-        Reductions, applied in order. A reduction may use the results of the preceding reductions.
+        Reductions to apply, in order. A reduction may use the results of the preceding reductions.
     despite_failures : bool, default: False
         If True, omit failed cells. If False, all results that depend on failed cells are NaN.
 
@@ -92,7 +93,7 @@ def apply_reductions(
     -------
     xarray.Dataset
         Dataset with the results. If failed cells were omitted, the attribute ``despite`` of each
-        result contains their number.
+        result contains the number of omitted cells.
 
     Raises
     ------

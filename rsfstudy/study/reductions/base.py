@@ -24,12 +24,12 @@ from rsfstudy.vocabulary import QUANTITY_BY_NAME
 
 DatasetOrArray = TypeVar("DatasetOrArray", xr.Dataset, xr.DataArray)
 
-#: Pairs of a derivative with respect to cells and the position of these cells along some
-#: dimensions.
+#: Pairs of the derivative of a result with respect to cell values, and the coordinates of these
+#: cells along some dimensions.
 DerivativesByVariable = Sequence[tuple[xr.DataArray, Mapping[str, Any]]]
 
-#: For each suffix of a result name, the fields of the reduction that name the variables from which
-#: the units of the result are derived.
+#: Names of the reduction fields that contain the variables from which the units of a result are
+#: derived, by the suffix of the result name.
 UnitFieldsByResultSuffix = Mapping[str, Sequence[str]]
 
 #: Value of the attribute ``comment`` of propagated errors.
@@ -52,7 +52,7 @@ class Reduction(CheckedKeywords):
 
     If you call a reduction, as in ``reduction(dataset)``, it returns a dataset with the new
     variables. To write your own reduction, derive a frozen dataclass from this class. Fields other
-    than ``name`` and ``of`` are options of the reduction. One method is required::
+    than ``name`` and ``of`` are options of the reduction. A reduction must define one method::
 
         __call__(self, dataset) -> xarray.Dataset
 
@@ -64,14 +64,14 @@ class Reduction(CheckedKeywords):
         unit_fields: ClassVar[Mapping[str, Sequence[str]]]
         derivatives(self, dataset) -> Sequence[tuple[xarray.DataArray, Mapping]]
 
-    ``kind`` is the name of the reduction in files. The default is the class name. ``long_names``
-    and ``unit_fields`` define the long names and the units of the results. ``derivatives`` returns
-    the derivatives with which the numerical errors of cells are propagated to ``<name>_error``.
+    ``kind`` is the name of the reduction in files, by default the class name. ``long_names`` and
+    ``unit_fields`` define the long names and the units of the results. ``derivatives`` returns the
+    derivatives with which the numerical errors of cells are propagated to ``<name>_error``.
 
     Parameters
     ----------
     name : str
-        Name of the result, and the beginning of the names of all further results.
+        Name of the result. The names of all further results begin with ``name``.
     of : str
         Name of the variable to reduce.
 
@@ -98,7 +98,7 @@ class Reduction(CheckedKeywords):
     #: Fields that determine the units of the results, by the suffix that follows ``name`` in the
     #: name of the result. For ``("of",)``, the result has the units of the variable that the field
     #: ``of`` names. For ``("of", "on")``, the result has the units of the first variable divided by
-    #: the units of the second variable. All other results are dimensionless.
+    #: the units of the second variable. Results without an entry are dimensionless.
     unit_fields: ClassVar[UnitFieldsByResultSuffix] = {}
     #: True if the reduction also uses failed cells. All other reductions reject failed cells.
     uses_failed_cells: ClassVar[bool] = False
@@ -107,7 +107,7 @@ class Reduction(CheckedKeywords):
     of: str
 
     def __init_subclass__(cls) -> None:
-        """Set the default kind of a subclass and adopt former member names."""
+        """Set the default ``kind`` of a subclass and accept former member names."""
         super().__init_subclass__()
         adopt_former_members(cls)
         if "kind" not in vars(cls) and not cls.__name__.startswith("_"):
@@ -119,7 +119,7 @@ class Reduction(CheckedKeywords):
         Parameters
         ----------
         dataset : xarray.Dataset
-            Results of the cells, including the variable ``status``.
+            Results of all cells of the lattice, including the variable ``status``.
 
         Returns
         -------
@@ -155,8 +155,8 @@ class Reduction(CheckedKeywords):
         """Return the status of the cells on which the results depend.
 
         The base class returns the status of all cells. A subclass that uses only some of the cells
-        overrides this method. The status of a result is the largest of these status codes along the
-        dimensions that the result does not have.
+        overrides this method. The status of a result is the largest of the returned status codes
+        along the dimensions that the result does not have.
 
         Parameters
         ----------
@@ -179,16 +179,16 @@ class Reduction(CheckedKeywords):
         Parameters
         ----------
         dataset : xarray.Dataset
-            Results of the cells, including the variable ``status``.
+            Results of all cells of the lattice, including the variable ``status``.
 
         Returns
         -------
         sequence of (xarray.DataArray, mapping)
-            Each derivative is paired with the position of the cells. If the mapping is empty, the
-            cells are at the same position as the result. Otherwise, the mapping contains coordinate
-            values of the cells along some dimensions. If a derivative has dimensions that the
-            result does not have, the result depends on all cells along these dimensions. The
-            derivative is 0 for cells without a value.
+            Pairs of a derivative and a mapping that contains the position of the cells. If the
+            mapping is empty, the cells are at the same position as the result. A mapping that is
+            not empty contains coordinate values of the cells along some dimensions. If a derivative
+            has dimensions that the result does not have, the result depends on all cells along
+            these dimensions. The derivative is 0 for cells without a value.
         """
         return ()
 
@@ -229,7 +229,7 @@ def failed_cell_mask(status: xr.DataArray) -> xr.DataArray:
 def worst_status_along_other_dims(
     status: xr.DataArray, kept_dimensions: Collection[Hashable]
 ) -> xr.DataArray:
-    """Return the worst status along all dimensions that are not kept.
+    """Return the worst cell status along the dimensions that are not kept.
 
     The worst status is the maximum, because failures have the largest status codes.
 
@@ -243,7 +243,7 @@ def worst_status_along_other_dims(
     Returns
     -------
     xarray.DataArray
-        Largest status code along all other dimensions.
+        Largest status code along all dimensions that the result does not have.
     """
     return status.max([d for d in status.dims if d not in kept_dimensions])
 
@@ -251,11 +251,11 @@ def worst_status_along_other_dims(
 def mask_unusable_values(
     dataset: xr.Dataset, variable_name: str, status: xr.DataArray
 ) -> xr.Dataset:
-    """Mask values that must not be used.
+    """Replace values that must not be used by NaN.
 
     The values of failed cells are replaced by NaN. If ``variable_name`` is the name of a standard
-    error or of a bound of a confidence interval, values that are not valid are replaced by NaN as
-    well.
+    error or of a bound of a confidence interval, standard errors and bounds that are not valid are
+    also replaced by NaN.
 
     Parameters
     ----------
@@ -270,7 +270,7 @@ def mask_unusable_values(
     Returns
     -------
     xarray.Dataset
-        Copy with masked values.
+        Copy in which the values that must not be used are NaN.
     """
     bad = failed_cell_mask(status)
     if variable_name.endswith(_STATISTICAL_SUFFIXES):
@@ -288,7 +288,7 @@ def refused_result_mask(
     Parameters
     ----------
     dataset : xarray.Dataset
-        Results of the cells, including the variable ``status``.
+        Results of all cells of the lattice, including the variable ``status``.
     variable_name : str
         Name of the variable to reduce.
     *reduced_dimensions : str
@@ -307,19 +307,20 @@ def refused_result_mask(
 
 
 def mask_failures(dataset: xr.Dataset) -> xr.Dataset:
-    """Replace failed cells by cells that have an answer but no value.
+    """Replace failed cells by finished cells without a value.
 
     Pending cells are not changed.
 
     Parameters
     ----------
     dataset : xarray.Dataset
-        Results of the cells, including the variable ``status``.
+        Results of all cells of the lattice, including the variable ``status``.
 
     Returns
     -------
     xarray.Dataset
-        Copy in which the values of failed cells are NaN, and their status is ``NO_STEP``.
+        Copy in which the values of failed cells are NaN, and the status of these cells is
+        ``NO_STEP``.
     """
     lost = failed_cell_mask(dataset["status"]) & (dataset["status"] != int(Status.PENDING))
     kept = {
@@ -349,7 +350,7 @@ def dimension_of_coordinate(dataset: xr.Dataset | xr.DataArray, coordinate_name:
     Raises
     ------
     InvalidValue
-        If the object has no one-dimensional coordinate of this name, or if the coordinate is not
+        If the object has no one-dimensional coordinate with this name, or if the coordinate is not
         numeric.
     """
     if coordinate_name not in dataset.coords or dataset[coordinate_name].ndim != 1:
@@ -395,7 +396,7 @@ def select_coordinate_range(
 
 
 def read_quantities_not_in_vocabulary(dataset: xr.Dataset) -> dict[str, Quantity]:
-    """Read the quantities of variables that the vocabulary does not describe.
+    """Read the quantities of variables that are not in the vocabulary.
 
     Parameters
     ----------
@@ -424,7 +425,7 @@ def read_quantities_not_in_vocabulary(dataset: xr.Dataset) -> dict[str, Quantity
 
 
 def _is_in_vocabulary(variable_name: str, variable_attributes: Mapping[Any, Any]) -> bool:
-    """Return True if the long name and units of a variable are standard."""
+    """Return True if the vocabulary has the long name and units of a variable."""
     about = QUANTITY_BY_NAME.get(variable_name)
     if about is None or variable_attributes["long_name"] != about.long_name:
         return False
@@ -439,16 +440,16 @@ def add_propagated_errors(
 ) -> xr.Dataset:
     r"""Propagate the numerical errors of cells to the result of a reduction.
 
-    If the reduction has already computed its own error, the propagated error is added. Nothing is
-    propagated if the reduced variable has no error estimates or if the reduction has no
-    derivatives.
+    If the reduction has already computed its own error, the propagated error is added to this
+    error. No errors are propagated if the reduced variable has no error estimates or if the
+    reduction has no derivatives.
 
     Parameters
     ----------
     reduction : Reduction
         Reduction that computed the results.
     dataset : xarray.Dataset
-        Dataset that was reduced.
+        Dataset to which the reduction was applied.
     reduction_results : xarray.Dataset
         Results of the reduction.
 

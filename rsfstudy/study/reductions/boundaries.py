@@ -1,7 +1,7 @@
 """Reductions that find boundaries and level crossings.
 
-A ``Boundary`` separates cells on either side of a threshold. An ``Inverse`` interpolates a smooth
-variable to find the coordinate value at which the variable reaches a level.
+A ``Boundary`` is located between cells with values below and above a threshold. An ``Inverse``
+interpolates a smooth variable to find the coordinate value at which the variable reaches a level.
 """
 
 from __future__ import annotations
@@ -39,17 +39,17 @@ class Boundary(Reduction):
     """Boundary between cells with values below and above a threshold.
 
     The boundary is not interpolated. The result only shows that the boundary is between two
-    neighbouring cells. A cell is ignored if its value differs from the threshold by no more than
-    the numerical error.
+    neighbouring cells. A cell is ignored if the difference between its value and the threshold does
+    not exceed its numerical error.
 
     Parameters
     ----------
     name : str
-        Name of the boundary, which is the midpoint of its bracket. The ends of the bracket are
-        ``<name>_stable`` (value at or below the threshold) and ``<name>_unstable`` (value above the
-        threshold). Half the width of the bracket is ``<name>_error``. The number of crossings of
-        the threshold along the coordinate is ``<name>_crossings``. The boundary is NaN unless there
-        is exactly one crossing.
+        Name of the boundary, which is the midpoint between two neighbouring cells (the bracket).
+        The ends of the bracket are ``<name>_stable`` (value at or below the threshold) and
+        ``<name>_unstable`` (value above the threshold). Half the width of the bracket is
+        ``<name>_error``. The number of crossings of the threshold along the coordinate is
+        ``<name>_crossings``. The boundary is NaN unless there is exactly one crossing.
     of : str
         Name of the variable that is compared with the threshold. A value above the threshold means
         that the cell is unstable.
@@ -77,15 +77,15 @@ class Boundary(Reduction):
     unit_fields: ClassVar[UnitFieldsByResultSuffix] = {"": ("on",)}
 
     def __call__(self, dataset: xr.Dataset) -> xr.Dataset:
-        """Find the boundary for each point of the other dimensions.
+        """Find the boundary for each point along the other dimensions.
 
-        If a cell failed, the boundary of the row with the failed cell is NaN. Cells without a value
-        are ignored.
+        If a cell along the coordinate failed, the boundary is NaN. Cells without a value are
+        ignored.
 
         Parameters
         ----------
         dataset : xarray.Dataset
-            Results of the cells, including the variable ``status``.
+            Results of all cells of the lattice, including the variable ``status``.
 
         Returns
         -------
@@ -128,7 +128,7 @@ class Boundary(Reduction):
             the last cell below the threshold or the first cell above the threshold is returned, and
             the other coordinate is NaN.
         crossings : xarray.DataArray
-            Number of crossings. NaN if there are no values.
+            Number of crossings, or NaN if there are no values.
         """
         dimension = dimension_of_coordinate(values, self.on)
         edges: tuple[xr.DataArray, ...] = xr.apply_ufunc(
@@ -144,7 +144,7 @@ class Boundary(Reduction):
     def _bracket_boundary_along_coordinate(
         self, values: np.ndarray, coordinate: np.ndarray
     ) -> tuple[float, float, float]:
-        """Bracket the first crossing and count the crossings."""
+        """Bracket the first crossing of the threshold and count all crossings."""
         order = [i for i in np.argsort(coordinate) if not np.isnan(values[i])]
         if not order:
             return np.nan, np.nan, np.nan
@@ -171,7 +171,7 @@ class Inverse(Reduction):
     name : str
         Name of the result. Two more variables are returned. ``<name>_error`` is the sum of three
         contributions: the uncertainty of the level, the distance to the farthest position at which
-        a curve through the cells may reach the level, and the numerical errors of the cells.
+        a curve through the values may reach the level, and the numerical errors of the cells.
         ``<name>_status`` is ``ok`` or the reason why the result is NaN. ``out_of_reach`` means that
         the variable does not reach the level. ``not_unique`` means that the variable reaches the
         level several times. ``unresolved`` means that the variable may oscillate between the cells.
@@ -184,9 +184,10 @@ class Inverse(Reduction):
         A single level, or one level for each label of the dimension ``along``. Labels that are not
         in the mapping have no level.
     uncertainty : float, or mapping of str to float, default: 0.0
-        Relative uncertainty of the level, in the same form as ``levels``.
+        Relative uncertainty of the level, given as a single number or as a mapping like ``levels``.
     along : str
-        Name of the dimension of the labels. Required if ``levels`` or ``uncertainty`` is a mapping.
+        Name of the dimension with the labels in ``levels`` or ``uncertainty``. Required if
+        ``levels`` or ``uncertainty`` is a mapping.
 
     Examples
     --------
@@ -212,18 +213,18 @@ class Inverse(Reduction):
 
     @property
     def quantities(self) -> Sequence[Quantity]:
-        """Quantity of the status of the interpolation."""
+        """Quantity that describes the status variable ``<name>_status``."""
         flags = tuple(verdict.name.lower() for verdict in CrossingStatus)
         text = f"status of {self.name.replace('_', ' ')}"
         return [Quantity(f"{self.name}_status", "", "1", text, flags=flags)]
 
     def __call__(self, dataset: xr.Dataset) -> xr.Dataset:
-        """Find the coordinate value for each point of the other dimensions.
+        """Find the coordinate value for each point along the other dimensions.
 
         Parameters
         ----------
         dataset : xarray.Dataset
-            Results of the cells, including the variable ``status``.
+            Results of all cells of the lattice, including the variable ``status``.
 
         Returns
         -------
@@ -268,12 +269,13 @@ class Inverse(Reduction):
         Parameters
         ----------
         dataset : xarray.Dataset
-            Results of the cells, including the variable ``status``.
+            Results of all cells of the lattice, including the variable ``status``.
 
         Returns
         -------
         sequence of (xarray.DataArray, mapping)
-            Derivatives with the positions of the cells, as described in the base class `Reduction`.
+            Pairs of a derivative and the position of the cells, as described in
+            `Reduction.derivatives`.
         """
         dimension = dimension_of_coordinate(dataset, self.on)
         by_cells = xr.apply_ufunc(
@@ -301,7 +303,7 @@ class Inverse(Reduction):
 def _invert_along_coordinate(
     values: np.ndarray, coordinate: np.ndarray, level: float, uncertainty: float
 ) -> tuple[float, float, float]:
-    """Return the crossing position, its error and its status for one row."""
+    """Return the position, error and status of the level crossing of one curve."""
     x, y, _places = _take_logs_of_positive_samples(values, coordinate)
     if np.isnan(level) or level <= 0.0:
         return np.nan, np.nan, float(CrossingStatus.OUT_OF_REACH)
@@ -344,8 +346,8 @@ def _take_logs_of_positive_samples(
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Return the logarithms of the sorted coordinate and of the values.
 
-    The third array contains the indices of the points. Points are omitted if the coordinate or the
-    value is not positive.
+    The third returned array contains the indices of the remaining points. Points are omitted if the
+    coordinate or the value is not positive.
     """
     places = np.flatnonzero(np.isfinite(values) & (values > 0.0) & (coordinate > 0.0))
     places = places[np.argsort(coordinate[places])]

@@ -1,4 +1,4 @@
-"""Reductions that compare values.
+"""Reductions that compare the values of a variable.
 
 A variable is compared with its value at a reference point, with its other values along a dimension,
 or with a closed-form solution.
@@ -41,9 +41,9 @@ class Difference(Reduction):
     of : str
         Name of the variable to compare.
     along : str
-        Dimension of the reference point.
+        Dimension along which the reference point is selected.
     reference : str or float
-        Coordinate value of the reference point on this dimension.
+        Coordinate value of the reference point on the dimension ``along``.
 
     Examples
     --------
@@ -72,7 +72,7 @@ class Difference(Reduction):
         values : xarray.DataArray
             Values of the variable.
         reference : xarray.DataArray
-            Value at the reference point.
+            Value of the variable at the reference point.
 
         Returns
         -------
@@ -84,26 +84,26 @@ class Difference(Reduction):
     def partial_derivatives(
         self, values: xr.DataArray, reference: xr.DataArray
     ) -> ValueAndReferenceDerivatives:
-        """Compute the derivatives of the comparison.
+        """Compute the derivatives with respect to the value and the reference.
 
         Parameters
         ----------
         values : xarray.DataArray
             Values of the variable.
         reference : xarray.DataArray
-            Value at the reference point.
+            Value of the variable at the reference point.
 
         Returns
         -------
         by_value : xarray.DataArray
-            Derivative with respect to the value, which is 1.
+            Derivative with respect to ``values``, equal to 1.
         by_reference : xarray.DataArray
-            Derivative with respect to the reference, which is -1.
+            Derivative with respect to ``reference``, equal to -1.
         """
         return xr.ones_like(values), -xr.ones_like(values)
 
     def support_status(self, status: xr.DataArray) -> xr.DataArray:
-        """Return the worse status of each point and the reference point.
+        """Return the worse of the statuses at each point and the reference point.
 
         Parameters
         ----------
@@ -119,17 +119,17 @@ class Difference(Reduction):
         return status.where(status >= reference, reference)
 
     def __call__(self, dataset: xr.Dataset) -> xr.Dataset:
-        """Compare the values with the reference point.
+        """Compare each value with the value at the reference point.
 
         Parameters
         ----------
         dataset : xarray.Dataset
-            Results of the cells, including the variable ``status``.
+            Results of all cells of the lattice, including the variable ``status``.
 
         Returns
         -------
         xarray.Dataset
-            Result of the comparison. Empty if the lattice has no reference point.
+            Result of the comparison. The dataset is empty if the lattice has no reference point.
         """
         values = dataset[self.of]
         if self.along not in values.dims or self.reference not in dataset[self.along].values:
@@ -143,17 +143,18 @@ class Difference(Reduction):
         """Compute the derivatives of the result.
 
         At the reference point, the derivatives are 0 because the result does not depend on the
-        value.
+        value at this point.
 
         Parameters
         ----------
         dataset : xarray.Dataset
-            Results of the cells, including the variable ``status``.
+            Results of all cells of the lattice, including the variable ``status``.
 
         Returns
         -------
         sequence of (xarray.DataArray, mapping)
-            Derivatives with the positions of the cells, as described in the base class `Reduction`.
+            Pairs of a derivative and the position of the cells, as described in
+            `Reduction.derivatives`.
         """
         values, place = dataset[self.of], {self.along: self.reference}
         own, others = self.partial_derivatives(values, values.sel(place, drop=True))
@@ -176,9 +177,9 @@ class RelativeDifference(Difference):
     of : str
         Name of the variable to compare.
     along : str
-        Dimension of the reference point.
+        Dimension along which the reference point is selected.
     reference : str or float
-        Coordinate value of the reference point on this dimension.
+        Coordinate value of the reference point on the dimension ``along``.
 
     Examples
     --------
@@ -205,7 +206,7 @@ class RelativeDifference(Difference):
         values : xarray.DataArray
             Values of the variable.
         reference : xarray.DataArray
-            Value at the reference point.
+            Value of the variable at the reference point.
 
         Returns
         -------
@@ -217,21 +218,21 @@ class RelativeDifference(Difference):
     def partial_derivatives(
         self, values: xr.DataArray, reference: xr.DataArray
     ) -> ValueAndReferenceDerivatives:
-        """Compute the derivatives of the comparison.
+        """Compute the derivatives with respect to the value and the reference.
 
         Parameters
         ----------
         values : xarray.DataArray
             Values of the variable.
         reference : xarray.DataArray
-            Value at the reference point.
+            Value of the variable at the reference point.
 
         Returns
         -------
         by_value : xarray.DataArray
-            Derivative with respect to the value, which is ``-1 / reference``.
+            Derivative with respect to ``values``, equal to ``-1 / reference``.
         by_reference : xarray.DataArray
-            Derivative with respect to the reference, which is ``values / reference**2``.
+            Derivative with respect to ``reference``, equal to ``values / reference**2``.
         """
         return -xr.ones_like(values) / reference, values / reference**2
 
@@ -271,7 +272,7 @@ class Range(Reduction):
     unit_fields: ClassVar[UnitFieldsByResultSuffix] = {"": ("of",)}
 
     def support_status(self, status: xr.DataArray) -> xr.DataArray:
-        """Return the status of the points in the range.
+        """Return the status of the cells in the coordinate range ``within``.
 
         Parameters
         ----------
@@ -291,13 +292,13 @@ class Range(Reduction):
         Parameters
         ----------
         dataset : xarray.Dataset
-            Results of the cells, including the variable ``status``.
+            Results of all cells of the lattice, including the variable ``status``.
 
         Returns
         -------
         xarray.Dataset
-            Range of the values. Empty if there are fewer than two points. NaN if fewer than two
-            points have a value, or if a cell failed.
+            Range of the values. The dataset is empty if there are fewer than two points. The range
+            is NaN if fewer than two points have a value, or if a cell failed.
 
         Raises
         ------
@@ -327,12 +328,13 @@ class Range(Reduction):
         Parameters
         ----------
         dataset : xarray.Dataset
-            Results of the cells, including the variable ``status``.
+            Results of all cells of the lattice, including the variable ``status``.
 
         Returns
         -------
         sequence of (xarray.DataArray, mapping)
-            Derivatives with the positions of the cells, as described in the base class `Reduction`.
+            Pairs of a derivative and the position of the cells, as described in
+            `Reduction.derivatives`.
         """
         dimension, support = self._select_points_in_range(dataset)
         values, errors = support[self.of], support[f"{self.of}_error"]
@@ -341,7 +343,7 @@ class Range(Reduction):
         return [((number == reach.argmax(dimension)).astype(float), {}) for reach in reaches]
 
     def _select_points_in_range(self, dataset: xr.Dataset) -> tuple[str, xr.Dataset]:
-        """Return the dimension, and the dataset of the points in the range."""
+        """Return the dimension and the points in the coordinate range ``within``."""
         along = self.over in dataset[self.of].dims
         dimension = self.over if along else dimension_of_coordinate(dataset, self.over)
         return dimension, select_coordinate_range(dataset, self.over, self.within)
@@ -364,7 +366,7 @@ class ClosedFormRatio(Reduction):
     Raises
     ------
     InvalidValue
-        If there is no solution of this name.
+        If there is no closed-form solution with this name.
 
     Examples
     --------
@@ -384,7 +386,7 @@ class ClosedFormRatio(Reduction):
     unit_fields: ClassVar[UnitFieldsByResultSuffix] = {"_closed_form": ("of",)}
 
     def __post_init__(self) -> None:
-        """Check that the solution exists."""
+        """Check that the closed-form solution exists."""
         if self.form not in CLOSED_FORMS:
             raise InvalidValue("form", self.form, "is no closed form", choices=CLOSED_FORMS)
 
@@ -394,13 +396,13 @@ class ClosedFormRatio(Reduction):
         Parameters
         ----------
         dataset : xarray.Dataset
-            Results of the cells, including the variable ``status``.
+            Results of all cells of the lattice, including the variable ``status``.
 
         Returns
         -------
         xarray.Dataset
-            Ratio and closed-form solution. Empty if a parameter of the solution is not a coordinate
-            of the dataset.
+            Ratio and closed-form solution. The dataset is empty if a parameter of the closed-form
+            solution is not a coordinate of the dataset.
         """
         form = CLOSED_FORMS[self.form]
         if not all(name in dataset.coords for name in form.scene_field_names):
@@ -412,17 +414,18 @@ class ClosedFormRatio(Reduction):
         return xr.Dataset({self.name: ratio, **beside})
 
     def derivatives(self, dataset: xr.Dataset) -> DerivativesByVariable:
-        """Return the reciprocal of the closed-form solution.
+        """Compute the derivatives of the ratio, which are 1 / closed-form solution.
 
         Parameters
         ----------
         dataset : xarray.Dataset
-            Results of the cells, including the variable ``status``.
+            Results of all cells of the lattice, including the variable ``status``.
 
         Returns
         -------
         sequence of (xarray.DataArray, mapping)
-            Derivatives with the positions of the cells, as described in the base class `Reduction`.
+            Pairs of a derivative and the position of the cells, as described in
+            `Reduction.derivatives`.
         """
         return [(1.0 / self._evaluate_closed_form(dataset), {})]
 

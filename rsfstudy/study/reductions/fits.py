@@ -43,7 +43,7 @@ class LinearFit(Reduction):
     on : str
         Name of a one-dimensional coordinate.
     within : tuple of (float, float), optional
-        Range of the coordinate that is fitted, including both ends. The default is the whole
+        Range of coordinate values that are fitted, including both ends. The default is the whole
         coordinate.
 
     Examples
@@ -61,22 +61,22 @@ class LinearFit(Reduction):
 
     on: str = ""
     within: tuple[float, float] | None = None
-    #: Number of fitted parameters, and the template of the fitted equation, which contains the
-    #: names of the fields of the fit.
+    #: Number of fitted parameters, followed by a template of the fitted equation. The placeholders
+    #: are field names of the fit.
     parameter_count: ClassVar[int] = 2
     formula: ClassVar[str] = "{of} = constant + {name} * {on}"
     kind: ClassVar[str] = "linear_fit"
     unit_fields: ClassVar[UnitFieldsByResultSuffix] = {"": ("of", "on"), "_misfit": ("of",)}
 
     def centre_values(self, values: xr.DataArray, dimension: str) -> xr.DataArray:
-        """Subtract the mean of the values, which eliminates the constant.
+        """Subtract the mean of the values to eliminate the constant of the fit.
 
         Parameters
         ----------
         values : xarray.DataArray
-            Transformed coordinate or variable.
+            Values of the transformed coordinate or variable.
         dimension : str
-            Dimension of the fit.
+            Dimension along which the variable is fitted.
 
         Returns
         -------
@@ -86,7 +86,7 @@ class LinearFit(Reduction):
         return values - values.mean(dimension)
 
     def support_status(self, status: xr.DataArray) -> xr.DataArray:
-        """Return the status of the points in the range.
+        """Return the status of the cells in the coordinate range ``within``.
 
         Parameters
         ----------
@@ -101,18 +101,18 @@ class LinearFit(Reduction):
         return select_coordinate_range(status, self.on, self.within)
 
     def __call__(self, dataset: xr.Dataset) -> xr.Dataset:
-        """Fit the variable separately for each point of the other dimensions.
+        """Fit the variable separately for each point along the other dimensions.
 
         Parameters
         ----------
         dataset : xarray.Dataset
-            Results of the cells, including the variable ``status``.
+            Results of all cells of the lattice, including the variable ``status``.
 
         Returns
         -------
         xarray.Dataset
-            Slope, standard error, largest residual and number of points. Empty if there are no
-            points in the range.
+            Slope, standard error, largest residual and number of points. The dataset is empty if
+            there are no points in the range.
 
         Raises
         ------
@@ -147,17 +147,18 @@ class LinearFit(Reduction):
     def derivatives(self, dataset: xr.Dataset) -> DerivativesByVariable:
         """Compute the derivatives of the slope with respect to the cells.
 
-        The derivatives are the weights of the least-squares fit.
+        The slope is a linear combination of the values, and the derivatives are the coefficients.
 
         Parameters
         ----------
         dataset : xarray.Dataset
-            Results of the cells, including the variable ``status``.
+            Results of all cells of the lattice, including the variable ``status``.
 
         Returns
         -------
         sequence of (xarray.DataArray, mapping)
-            Derivatives with the positions of the cells, as described in the base class `Reduction`.
+            Pairs of a derivative and the position of the cells, as described in
+            `Reduction.derivatives`.
         """
         x, _y = self._centred_fit_coordinates(
             select_coordinate_range(dataset, self.on, self.within)
@@ -228,7 +229,7 @@ class ProportionalFit(LinearFit):
     on : str
         Name of a one-dimensional coordinate.
     within : tuple of (float, float), optional
-        Range of the coordinate that is fitted, including both ends. The default is the whole
+        Range of coordinate values that are fitted, including both ends. The default is the whole
         coordinate.
     minus : float, default: 0.0
         Value of the variable at the origin of the coordinate.
@@ -257,9 +258,9 @@ class ProportionalFit(LinearFit):
         Parameters
         ----------
         values : xarray.DataArray
-            Transformed coordinate or variable.
+            Values of the transformed coordinate or variable.
         dimension : str
-            Dimension of the fit.
+            Dimension along which the variable is fitted.
 
         Returns
         -------
@@ -291,8 +292,9 @@ class SemilogFit(LinearFit):
 
     The equation ``of = constant + name * log10(on)`` is fitted by unweighted least squares. The
     slope is the change of the variable per decade. Points are omitted if the coordinate is not
-    positive. To fit a power law, use `PowerLaw`. If you apply this fit to a `Logarithm`, which is a
-    natural logarithm, the slope is 2.303 times the exponent of the power law.
+    positive. To fit a power law, use `PowerLaw`. If you apply `SemilogFit` to the result of
+    `Logarithm`, which is a natural logarithm, the slope is 2.303 times the exponent of the power
+    law.
 
     Parameters
     ----------
@@ -303,7 +305,7 @@ class SemilogFit(LinearFit):
     on : str
         Name of a one-dimensional coordinate.
     within : tuple of (float, float), optional
-        Range of the coordinate that is fitted, including both ends. The default is the whole
+        Range of coordinate values that are fitted, including both ends. The default is the whole
         coordinate.
 
     Examples
@@ -343,11 +345,11 @@ class SemilogFit(LinearFit):
 @guard_methods
 @dataclass(frozen=True)
 class PowerLaw(SemilogFit):
-    """Fit of a power law.
+    """Fit of a power law to a variable as a function of a coordinate.
 
     The equation ``log10(of) = constant + name * log10(on)`` is fitted by unweighted least squares.
-    The slope is the exponent of the power law, and the largest residual is in decades. Points are
-    omitted if the coordinate or the variable is not positive.
+    The slope is the exponent of the power law, and the largest residual is given in decades. Points
+    are omitted if the coordinate or the variable is not positive.
 
     Parameters
     ----------
@@ -358,7 +360,7 @@ class PowerLaw(SemilogFit):
     on : str
         Name of a one-dimensional coordinate.
     within : tuple of (float, float), optional
-        Range of the coordinate that is fitted, including both ends. The default is the whole
+        Range of coordinate values that are fitted, including both ends. The default is the whole
         coordinate.
 
     Examples
@@ -396,17 +398,18 @@ class PowerLaw(SemilogFit):
     def derivatives(self, dataset: xr.Dataset) -> DerivativesByVariable:
         """Compute the derivatives of the exponent with respect to the cells.
 
-        The derivatives are the least-squares weights divided by ``ln(10) * of``.
+        The derivatives are the coefficients of the linear fit divided by ``ln(10) * of``.
 
         Parameters
         ----------
         dataset : xarray.Dataset
-            Results of the cells, including the variable ``status``.
+            Results of all cells of the lattice, including the variable ``status``.
 
         Returns
         -------
         sequence of (xarray.DataArray, mapping)
-            Derivatives with the positions of the cells, as described in the base class `Reduction`.
+            Pairs of a derivative and the position of the cells, as described in
+            `Reduction.derivatives`.
         """
         of = select_coordinate_range(dataset[self.of], self.on, self.within)
         ((weights, place),) = super().derivatives(dataset)

@@ -15,7 +15,7 @@ from rsfstudy.quantities import Quantity, format_unit_quotient
 from rsfstudy.study.reductions.base import Reduction, read_quantities_not_in_vocabulary
 from rsfstudy.vocabulary import find_quantity
 
-#: Coordinates that contain the scales of quantities, by the symbol of the scale.
+#: Names of the coordinates that contain the scales of quantities, by the symbol of the scale.
 _COORDINATE_NAME_BY_SCALE = {
     "sigma_*": "sigma_star",
     "D_c": "slip_distance",
@@ -29,17 +29,17 @@ def describe_reduction_results(
     """Determine the quantities of the results of a reduction.
 
     The units and the scale of a result are the quotient of the units and scales of the variables
-    that ``Reduction.unit_fields`` names. All other results are dimensionless. If the scale varies
-    between the cells that were combined, the result has no scale, and a note is appended to the
-    attribute ``comment`` of the result. The description in the vocabulary is used only if its units
-    and scale agree with the units and scale of the result.
+    that ``Reduction.unit_fields`` names. Results without an entry in ``Reduction.unit_fields`` are
+    dimensionless. If the scale varies between the cells that were combined, the result has no
+    scale, and a note is appended to the attribute ``comment`` of the result. The description in the
+    vocabulary is used only if its units and scale agree with the units and scale of the result.
 
     Parameters
     ----------
     reduction : Reduction
         Reduction that computed the results.
     dataset : xarray.Dataset
-        Dataset that was reduced.
+        Dataset to which the reduction was applied.
     reduction_results : xarray.Dataset
         Results of the reduction.
 
@@ -82,7 +82,7 @@ def find_varying_scale(
     Parameters
     ----------
     dataset : xarray.Dataset
-        Results of a study. On a rig, the coordinates contain the scales.
+        Results of a study. In a study with a rig, the coordinates contain the scales.
     scale_expression : str
         Scale of a variable, such as ``"D_c/V_*"``.
     reduced_dimensions : collection of str
@@ -91,8 +91,8 @@ def find_varying_scale(
     Returns
     -------
     str
-        Symbol of the first scale in the expression that varies along these dimensions. Empty if no
-        scale varies.
+        Symbol of the first scale in the expression that varies along the reduced dimensions. Empty
+        if no scale varies.
     """
     held = {
         part: dataset[n].dims

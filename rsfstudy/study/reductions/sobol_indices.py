@@ -1,6 +1,6 @@
 """Sobol indices of sampled quantities.
 
-A Sobol index is a share of the variance of a result that is caused by one sampled quantity.
+A Sobol index is the share of the variance of a result that one sampled quantity causes.
 """
 
 from __future__ import annotations
@@ -39,9 +39,9 @@ class SobolIndices(Reduction):
     Parameters
     ----------
     name : str
-        Beginning of the names of the results ``<name>_first_order`` and ``<name>_total``. The
-        bounds of their confidence intervals have the suffixes ``_low`` and ``_high``. The results
-        have the dimension ``input``.
+        Prefix of the names of the results, which are ``<name>_first_order`` and ``<name>_total``.
+        The bounds of their confidence intervals have the suffixes ``_low`` and ``_high``. The
+        results have the dimension ``input``, whose labels are the sampled quantities.
     of : str
         Name of the variable whose variance is analysed.
     over : str, default: "sample"
@@ -78,7 +78,7 @@ class SobolIndices(Reduction):
 
     @property
     def quantities(self) -> Sequence[Quantity]:
-        """Quantities of the indices, their bounds and the new dimension."""
+        """Quantities that describe the indices, their bounds and the new dimension."""
         about = Quantity("input", "", "", "sampled quantity")
         return (about, *(Quantity(n, "", "1", text) for n, text in self._result_descriptions()))
 
@@ -91,12 +91,12 @@ class SobolIndices(Reduction):
                 yield f"{self.name}_{order}_{end}", f"{end} end of the 95 % interval of the {text}"
 
     def __call__(self, dataset: xr.Dataset) -> xr.Dataset:
-        """Compute the indices for each point of the other dimensions.
+        """Compute the indices for each point along the other dimensions.
 
         Parameters
         ----------
         dataset : xarray.Dataset
-            Results of the cells, including the variable ``status``.
+            Results of all cells of the lattice, including the variable ``status``.
 
         Returns
         -------
@@ -156,8 +156,8 @@ def _indices_with_intervals(sample_values: np.ndarray) -> np.ndarray:
     Parameters
     ----------
     sample_values : ndarray, shape (2 + inputs, points)
-        Values at the sample matrix A, at the sample matrix B, and at copies of A in which one
-        column at a time is replaced by the column of B.
+        Values of the variable for the sample matrix A, for the sample matrix B, and for copies of A
+        in which one column at a time is replaced by the same column of B.
 
     Returns
     -------
@@ -181,7 +181,7 @@ def _saltelli_indices(sample_values: np.ndarray) -> np.ndarray:
     Parameters
     ----------
     sample_values : ndarray, shape (2 + inputs, sets, points)
-        Values of each set, in the order of `_indices_with_intervals`.
+        Values of each set, in the order described in `_indices_with_intervals`.
 
     Returns
     -------

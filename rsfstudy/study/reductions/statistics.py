@@ -1,9 +1,10 @@
 """Statistics over samples.
 
-The statistics are mean, standard deviation and quantiles, and the shares of all statuses. Each
-statistic has two errors. The sampling error ``<name>_stderr`` is the standard error for independent
-samples. Sobol points and Latin hypercubes usually have smaller errors. The numerical error
-``<name>_error`` is propagated from the numerical errors of the cells.
+The statistics are the mean, the standard deviation, quantiles, and the share of samples with each
+status. Each statistic has two errors. The sampling error ``<name>_stderr`` is the standard error
+for independent samples. Sobol points and Latin hypercubes usually have smaller sampling errors than
+independent samples. The numerical error ``<name>_error`` is propagated from the numerical errors of
+the cells.
 """
 
 from __future__ import annotations
@@ -41,8 +42,8 @@ class _SampleStatistic(Reduction):
     ----------
     name : str
         Name of the result. Three more variables are returned: the sampling error ``<name>_stderr``,
-        the propagated numerical error ``<name>_error``, and the number of samples with a value
-        ``<name>_points``.
+        the propagated numerical error ``<name>_error``, and ``<name>_points``, which is the number
+        of samples that have a value.
     of : str
         Name of the variable to reduce.
     over : str, default: "sample"
@@ -84,12 +85,12 @@ class _SampleStatistic(Reduction):
         raise TypeError(f"{type(self).__name__} is no statistic")
 
     def __call__(self, dataset: xr.Dataset) -> xr.Dataset:
-        """Reduce the variable along the dimension of the samples.
+        """Compute the statistic along the dimension of the samples.
 
         Parameters
         ----------
         dataset : xarray.Dataset
-            Results of the cells, including the variable ``status``.
+            Results of all cells of the lattice, including the variable ``status``.
 
         Returns
         -------
@@ -149,14 +150,14 @@ def standard_deviation(
 @guard_methods
 @dataclass(frozen=True)
 class Mean(_SampleStatistic):
-    """Mean over samples.
+    """Mean of a variable over samples.
 
     Parameters
     ----------
     name : str
         Name of the mean. Three more variables are returned: the sampling error ``<name>_stderr``,
-        the propagated numerical error ``<name>_error``, and the number of samples with a value
-        ``<name>_points``.
+        the propagated numerical error ``<name>_error``, and ``<name>_points``, which is the number
+        of samples that have a value.
     of : str
         Name of the variable to reduce.
     over : str, default: "sample"
@@ -199,17 +200,18 @@ class Mean(_SampleStatistic):
         return of.mean(self.over), standard_deviation(of, self.over) / count**0.5
 
     def derivatives(self, dataset: xr.Dataset) -> DerivativesByVariable:
-        """Return the reciprocal of the number of samples with a value.
+        """Compute the derivatives of the mean, which are 1 / number of samples.
 
         Parameters
         ----------
         dataset : xarray.Dataset
-            Results of the cells, including the variable ``status``.
+            Results of all cells of the lattice, including the variable ``status``.
 
         Returns
         -------
         sequence of (xarray.DataArray, mapping)
-            Derivatives with the positions of the cells, as described in the base class `Reduction`.
+            Pairs of a derivative and the position of the cells, as described in
+            `Reduction.derivatives`.
         """
         has = _select_sampled_variable(self, dataset).notnull()
         return [(has / has.sum(self.over), {})]
@@ -218,14 +220,14 @@ class Mean(_SampleStatistic):
 @guard_methods
 @dataclass(frozen=True)
 class StandardDeviation(_SampleStatistic):
-    """Standard deviation over at least three samples.
+    """Standard deviation of a variable over at least three samples.
 
     Parameters
     ----------
     name : str
         Name of the standard deviation. Three more variables are returned: the sampling error
-        ``<name>_stderr``, the propagated numerical error ``<name>_error``, and the number of
-        samples with a value ``<name>_points``.
+        ``<name>_stderr``, the propagated numerical error ``<name>_error``, and ``<name>_points``,
+        which is the number of samples that have a value.
     of : str
         Name of the variable to reduce.
     over : str, default: "sample"
@@ -288,12 +290,13 @@ class StandardDeviation(_SampleStatistic):
         Parameters
         ----------
         dataset : xarray.Dataset
-            Results of the cells, including the variable ``status``.
+            Results of all cells of the lattice, including the variable ``status``.
 
         Returns
         -------
         sequence of (xarray.DataArray, mapping)
-            Derivatives with the positions of the cells, as described in the base class `Reduction`.
+            Pairs of a derivative and the position of the cells, as described in
+            `Reduction.derivatives`.
 
         Notes
         -----
@@ -310,7 +313,7 @@ class StandardDeviation(_SampleStatistic):
 @guard_methods
 @dataclass(frozen=True)
 class Quantile(_SampleStatistic):
-    """Quantile over samples.
+    """Quantile of a variable over samples.
 
     The quantile is interpolated linearly between two neighbouring samples. The standard error is
     half the difference between two quantiles, whose levels are one binomial standard deviation
@@ -320,8 +323,8 @@ class Quantile(_SampleStatistic):
     ----------
     name : str
         Name of the quantile. Three more variables are returned: the sampling error
-        ``<name>_stderr``, the propagated numerical error ``<name>_error``, and the number of
-        samples with a value ``<name>_points``.
+        ``<name>_stderr``, the propagated numerical error ``<name>_error``, and ``<name>_points``,
+        which is the number of samples that have a value.
     of : str
         Name of the variable to reduce.
     over : str, default: "sample"
@@ -397,7 +400,7 @@ class Quantile(_SampleStatistic):
         return found[0], 0.5 * (found[2] - found[1])
 
     def __call__(self, dataset: xr.Dataset) -> xr.Dataset:
-        """Reduce the variable along the dimension of the samples.
+        """Compute the statistic along the dimension of the samples.
 
         If the variable has error estimates, the error of the quantile is computed from two bounds,
         which are the quantiles of the values plus and minus their errors. The quantile of the exact
@@ -406,7 +409,7 @@ class Quantile(_SampleStatistic):
         Parameters
         ----------
         dataset : xarray.Dataset
-            Results of the cells, including the variable ``status``.
+            Results of all cells of the lattice, including the variable ``status``.
 
         Returns
         -------
@@ -458,8 +461,8 @@ class StatusShares(Reduction):
     Parameters
     ----------
     name : str
-        Name of the shares, which have the dimension ``ended``. The standard error is returned as
-        ``<name>_stderr``.
+        Name of the shares, which have the dimension ``ended``, whose labels are the statuses. The
+        standard error is returned as ``<name>_stderr``.
     of : str
         Name of a measured variable.
     over : str, default: "sample"
@@ -487,7 +490,7 @@ class StatusShares(Reduction):
 
     @property
     def quantities(self) -> Sequence[Quantity]:
-        """Quantities of the shares, their errors and the new dimension."""
+        """Quantities that describe the shares, their errors and the new dimension."""
         return [*super().quantities, Quantity("ended", "", "", "status with which a sample ended")]
 
     def support_status(self, status: xr.DataArray) -> xr.DataArray:
@@ -513,12 +516,12 @@ class StatusShares(Reduction):
         Parameters
         ----------
         dataset : xarray.Dataset
-            Results of the cells, including the variable ``status``.
+            Results of all cells of the lattice, including the variable ``status``.
 
         Returns
         -------
         xarray.Dataset
-            Shares and standard errors. NaN if there are pending samples.
+            Shares and standard errors, which are NaN if some samples are pending.
 
         Raises
         ------
@@ -571,7 +574,7 @@ class Logarithm(Reduction):
         Parameters
         ----------
         dataset : xarray.Dataset
-            Results of the cells, including the variable ``status``.
+            Results of all cells of the lattice, including the variable ``status``.
 
         Returns
         -------
@@ -584,17 +587,18 @@ class Logarithm(Reduction):
         return xr.Dataset({self.name: logarithm.drop_attrs(deep=False).assign_attrs(note)})
 
     def derivatives(self, dataset: xr.Dataset) -> DerivativesByVariable:
-        """Return the reciprocal of the variable.
+        """Compute the derivatives of the logarithm, which are 1 / variable.
 
         Parameters
         ----------
         dataset : xarray.Dataset
-            Results of the cells, including the variable ``status``.
+            Results of all cells of the lattice, including the variable ``status``.
 
         Returns
         -------
         sequence of (xarray.DataArray, mapping)
-            Derivatives with the positions of the cells, as described in the base class `Reduction`.
+            Pairs of a derivative and the position of the cells, as described in
+            `Reduction.derivatives`.
         """
         of = dataset[self.of]
         return [((1.0 / of.where(of > 0.0)).fillna(0.0), {})]

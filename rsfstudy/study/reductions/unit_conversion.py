@@ -18,7 +18,7 @@ from rsfstudy.study.reductions.base import DerivativesByVariable, Reduction
 @guard_methods
 @dataclass(frozen=True)
 class InUnits(Reduction):
-    """Variable in units of a rig, converted in each cell with its own scales.
+    """Variable converted to units of a rig, with the scales of each cell.
 
     Convert a variable before you compute its mean over samples with different scales. A mean of the
     dimensionless values would combine values in different units.
@@ -55,7 +55,7 @@ class InUnits(Reduction):
 
     @property
     def quantities(self) -> Sequence[Quantity]:
-        """Quantity of the result, with the requested units."""
+        """Quantity that describes the result, with the requested units."""
         return (Quantity(self.name, "", self.units, self.name.replace("_", " ")),)
 
     def __call__(self, dataset: xr.Dataset) -> xr.Dataset:
@@ -64,7 +64,7 @@ class InUnits(Reduction):
         Parameters
         ----------
         dataset : xarray.Dataset
-            Results of the cells, including the variable ``status``.
+            Results of all cells of the lattice, including the variable ``status``.
 
         Returns
         -------
@@ -86,12 +86,13 @@ class InUnits(Reduction):
         Parameters
         ----------
         dataset : xarray.Dataset
-            Results of the cells, including the variable ``status``.
+            Results of all cells of the lattice, including the variable ``status``.
 
         Returns
         -------
         sequence of (xarray.DataArray, mapping)
-            Derivatives with the positions of the cells, as described in the base class `Reduction`.
+            Pairs of a derivative and the position of the cells, as described in
+            `Reduction.derivatives`.
         """
         return [(self._scale_factor(dataset) * xr.ones_like(dataset[self.of]), {})]
 
