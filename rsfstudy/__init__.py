@@ -11,7 +11,7 @@ import importlib
 from typing import TYPE_CHECKING, Any
 
 from rsfstudy import _former_modules
-from rsfstudy._deprecation import RENAMED, warn_renamed
+from rsfstudy._deprecation import NEW_NAME_BY_OWNER_AND_FORMER_NAME, warn_renamed
 
 if TYPE_CHECKING:
     from rsfstudy.api.event_catalogue import events as events
@@ -91,8 +91,8 @@ def __getattr__(name: str) -> Any:
     """Import an exported name or a documented namespace on first use."""
     if name in _DOCUMENTED_NAMESPACES:
         return importlib.import_module(f"{__name__}.{name}")
-    if name in RENAMED[__name__]:
-        warn_renamed(name, new := RENAMED[__name__][name], __name__)
+    if name in NEW_NAME_BY_OWNER_AND_FORMER_NAME[__name__]:
+        warn_renamed(name, new := NEW_NAME_BY_OWNER_AND_FORMER_NAME[__name__][name], __name__)
         name = new
     if name not in _MODULE_BY_EXPORTED_NAME:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")

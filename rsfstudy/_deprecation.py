@@ -1,17 +1,19 @@
 """Former names of public functions, classes, members and keywords.
 
 A former name works for one release and emits a ``DeprecationWarning`` that contains the new name.
-The former names will be removed in version 1.0.0. The dictionary ``RENAMED`` maps former names to
-new names. The keys of ``RENAMED`` have three forms:
+The former names will be removed in version 1.0.0. The dictionary
+``NEW_NAME_BY_OWNER_AND_FORMER_NAME`` maps former names to new names. The keys of
+``NEW_NAME_BY_OWNER_AND_FORMER_NAME`` have three forms:
 
 ``"package.module"``
-    Names in a module. The module sets ``__getattr__ = renamed_names(__name__)``.
+    Names in a module. The module sets ``__getattr__ = build_getattr_for_former_names(__name__)``.
 ``"package.module:Class"``
-    Members of a class with the decorator ``renamed_members``. If users may override the members in
-    a subclass, the method ``__init_subclass__`` of the class calls ``adopt_former_members``.
+    Members of a class with the decorator ``add_former_member_names``. If users may override the
+    members in a subclass, the method ``__init_subclass__`` of the class calls
+    ``add_new_names_for_former_members``.
 ``"package.module:function()"``, ``"package.module:Class()"``
     Keyword arguments of a function or of a constructor. The outermost decorator of the function or
-    class is ``renamed_keywords``.
+    class is ``accept_former_keyword_names``.
 """
 
 from __future__ import annotations
@@ -23,11 +25,11 @@ import warnings
 from collections.abc import Callable, Mapping
 from typing import Any, TypeVar
 
-F = TypeVar("F", bound=Callable[..., Any])
-C = TypeVar("C", bound=type)
+DecoratedFunction = TypeVar("DecoratedFunction", bound=Callable[..., Any])
+DecoratedClass = TypeVar("DecoratedClass", bound=type)
 
 #: Mapping from former names to new names, for each module, class, function or constructor.
-RENAMED: Mapping[str, Mapping[str, str]] = {
+NEW_NAME_BY_OWNER_AND_FORMER_NAME: Mapping[str, Mapping[str, str]] = {
     "rsfstudy": {
         "Laboratory": "Rig",
         "picture": "plot_motion",
@@ -144,7 +146,7 @@ RENAMED: Mapping[str, Mapping[str, str]] = {
     "rsfstudy.plots._motion:plot_motion()": {
         "laboratory": "rig",
     },
-    "rsfstudy.api.accessor:Accessor": {
+    "rsfstudy.api.accessor:DatasetAccessor": {
         "laboratory": "rig",
         "table": "fit_table",
         "draw": "sample_parameters",
@@ -425,7 +427,7 @@ RENAMED: Mapping[str, Mapping[str, str]] = {
 }
 
 
-def user_stacklevel() -> int:
+def find_stacklevel_of_user_code() -> int:
     """Return the ``stacklevel`` that attributes a warning to user code.
 
     Returns
@@ -455,16 +457,16 @@ def warn_renamed(former_name: str, new_name: str, owner_name: str) -> None:
         f"{former_name!r} of {owner_name} is now called {new_name!r}. The old name will be "
         "removed in 1.0.0."
     )
-    warnings.warn(text, DeprecationWarning, stacklevel=user_stacklevel())
+    warnings.warn(text, DeprecationWarning, stacklevel=find_stacklevel_of_user_code())
 
 
-def renamed_names(module_name: str) -> Callable[[str], Any]:
+def build_getattr_for_former_names(module_name: str) -> Callable[[str], Any]:
     """Return a module ``__getattr__`` that looks up former names.
 
     Parameters
     ----------
     module_name : str
-        Full name of the module, which must be a key of ``RENAMED``.
+        Full name of the module, which must be a key of ``NEW_NAME_BY_OWNER_AND_FORMER_NAME``.
 
     Returns
     -------
@@ -473,7 +475,7 @@ def renamed_names(module_name: str) -> Callable[[str], Any]:
     """
 
     def __getattr__(name: str) -> Any:  # noqa: N807
-        if (new := RENAMED[module_name].get(name)) is None:
+        if (new := NEW_NAME_BY_OWNER_AND_FORMER_NAME[module_name].get(name)) is None:
             raise AttributeError(f"module {module_name!r} has no attribute {name!r}")
         warn_renamed(name, new, module_name)
         return getattr(importlib.import_module(module_name), new)
@@ -481,7 +483,9 @@ def renamed_names(module_name: str) -> Callable[[str], Any]:
     return __getattr__
 
 
-def renamed_members(owner_class: C, *, writable: bool = False) -> C:
+def add_former_member_names(
+    owner_class: DecoratedClass, *, writable: bool = False
+) -> DecoratedClass:
     """Add the former names of members to a class.
 
     Parameters
@@ -496,12 +500,14 @@ def renamed_members(owner_class: C, *, writable: bool = False) -> C:
     type
         The modified class.
     """
-    for former, new in RENAMED[_key_of_class_or_function(owner_class)].items():
+    for former, new in NEW_NAME_BY_OWNER_AND_FORMER_NAME[
+        _key_of_class_or_function(owner_class)
+    ].items():
         setattr(owner_class, former, (_FormerField if writable else _FormerMember)(former, new))
     return owner_class
 
 
-def renamed_value(owner_class: type, member_name: str) -> str:
+def translate_former_member_name(owner_class: type, member_name: str) -> str:
     """Return the new name of a class member.
 
     Parameters
@@ -516,13 +522,15 @@ def renamed_value(owner_class: type, member_name: str) -> str:
     str
         New name. A name that is not a former name is returned unchanged.
     """
-    new = RENAMED[_key_of_class_or_function(owner_class)].get(member_name, member_name)
+    new = NEW_NAME_BY_OWNER_AND_FORMER_NAME[_key_of_class_or_function(owner_class)].get(
+        member_name, member_name
+    )
     if new != member_name:
         warn_renamed(member_name, new, owner_class.__name__)
     return new
 
 
-def adopt_former_members(subclass: type) -> None:
+def add_new_names_for_former_members(subclass: type) -> None:
     """Add new names for members that a subclass defines by former names.
 
     If the subclass also defines the new name, the former name is ignored. A dataclass field becomes
@@ -535,7 +543,9 @@ def adopt_former_members(subclass: type) -> None:
         Subclass of a class with renamed members. The subclass is modified in place.
     """
     for base in subclass.__mro__[1:]:
-        for former, new in RENAMED.get(_key_of_class_or_function(base), {}).items():
+        for former, new in NEW_NAME_BY_OWNER_AND_FORMER_NAME.get(
+            _key_of_class_or_function(base), {}
+        ).items():
             own, annotation = (
                 vars(subclass),
                 vars(subclass).get("__annotations__", {}).get(former, ""),
@@ -546,10 +556,12 @@ def adopt_former_members(subclass: type) -> None:
             if is_field and not isinstance(getattr(base, new, None), property):
                 continue
             warn_renamed(former, new, subclass.__name__)
-            setattr(subclass, new, _field_property(former) if is_field else own[former])
+            setattr(
+                subclass, new, _build_property_reading_field(former) if is_field else own[former]
+            )
 
 
-def renamed_keywords(function_or_class: F) -> F:
+def accept_former_keyword_names(function_or_class: DecoratedFunction) -> DecoratedFunction:
     """Accept the former names of keyword arguments.
 
     Parameters
@@ -562,7 +574,7 @@ def renamed_keywords(function_or_class: F) -> F:
     callable or type
         Wrapped function, or the class with a wrapped constructor.
     """
-    table = RENAMED[f"{_key_of_class_or_function(function_or_class)}()"]
+    table = NEW_NAME_BY_OWNER_AND_FORMER_NAME[f"{_key_of_class_or_function(function_or_class)}()"]
     owner: Any = function_or_class
     wrapped = owner.__init__ if isinstance(function_or_class, type) else function_or_class
 
@@ -608,11 +620,11 @@ class _FormerField(_FormerMember):
         setattr(instance, self.new, value)
 
 
-def _field_property(field_name: str) -> property:
+def _build_property_reading_field(field_name: str) -> property:
     """Return a property that reads the value of a field."""
     return property(lambda self: getattr(self, field_name))
 
 
 def _key_of_class_or_function(class_or_function: Any) -> str:
-    """Return the key of a class or function in ``RENAMED``."""
+    """Return the key of a class or function in ``NEW_NAME_BY_OWNER_AND_FORMER_NAME``."""
     return f"{class_or_function.__module__}:{class_or_function.__qualname__}"

@@ -50,7 +50,7 @@ FORMER_MODULES = {
 }
 
 
-class FormerModules(MetaPathFinder, Loader):
+class FormerModuleFinder(MetaPathFinder, Loader):
     """Import hook that finds modules under their former paths."""
 
     def find_spec(
@@ -128,5 +128,5 @@ def install_former_module_finder() -> None:
 
     The hook is inserted only once.
     """
-    if not any(isinstance(finder, FormerModules) for finder in sys.meta_path):
-        sys.meta_path.insert(0, FormerModules())
+    if not any(isinstance(finder, FormerModuleFinder) for finder in sys.meta_path):
+        sys.meta_path.insert(0, FormerModuleFinder())

@@ -10,10 +10,10 @@ import sys
 from collections.abc import Callable, Iterable, Mapping
 from typing import Any
 
-from rsfstudy._deprecation import RENAMED, warn_renamed
+from rsfstudy._deprecation import NEW_NAME_BY_OWNER_AND_FORMER_NAME, warn_renamed
 
 
-def lazy_exports(
+def build_lazy_export_functions(
     package_name: str, names_by_module: Mapping[str, Iterable[str]]
 ) -> tuple[Callable[[str], Any], Callable[[], list[str]]]:
     """Create the ``__getattr__`` and ``__dir__`` functions of a package.
@@ -22,7 +22,7 @@ def lazy_exports(
     ----------
     package_name : str
         Full name of the package. The functions also look up the former names of the package in
-        ``RENAMED``.
+        ``NEW_NAME_BY_OWNER_AND_FORMER_NAME``.
     names_by_module : mapping of str to iterable of str
         Exported names by module. Each module is specified by its path relative to ``rsfstudy``. The
         entry ``"name as other"`` exports ``name`` under the name ``other``.
@@ -36,7 +36,7 @@ def lazy_exports(
     for module, names in names_by_module.items():
         for name, _, other in (entry.partition(" as ") for entry in names):
             sources[other or name] = f"rsfstudy.{module}", name
-    renamed = RENAMED.get(package_name, {})
+    renamed = NEW_NAME_BY_OWNER_AND_FORMER_NAME.get(package_name, {})
 
     def get(name: str) -> Any:
         if name in renamed:

@@ -23,12 +23,12 @@ from rsfstudy.errors import InvalidValue, shorten_text
 
 #: Maximum number of items of a list that is passed as an argument. A ``range`` or an array that
 #: repeats a single value can be longer than any list that fits in memory.
-MAX_ITEMS = 2**20
+MAX_ITEMS_OF_LIST_ARGUMENT = 2**20
 #: Maximum number of items, and maximum number of nesting levels, that the checks examine in an
 #: argument.
 _MAX_CHECKED_ITEMS, _MAX_CHECKED_NESTING_LEVELS = 1000, 4
 #: Mapping from the import aliases that annotations use to module names.
-_MODULE_ALIASES = {"xr": "xarray", "pd": "pandas", "np": "numpy"}
+_MODULE_BY_IMPORT_ALIAS = {"xr": "xarray", "pd": "pandas", "np": "numpy"}
 #: Pattern of the error messages of xarray about a missing array dimension.
 _MISSING_DIMENSION_MESSAGE_PATTERN = re.compile(
     r"'(.+?)' (?:not found in array dimensions|is not a valid dimension)"
@@ -50,7 +50,7 @@ def check_argument_lengths(arguments: Mapping[str, Any]) -> None:
     """Reject a range or a repeated-value array that is too long.
 
     Other checks iterate over all items of an argument, which would take too long. The maximum
-    length is ``MAX_ITEMS``.
+    length is ``MAX_ITEMS_OF_LIST_ARGUMENT``.
 
     Parameters
     ----------
@@ -65,7 +65,7 @@ def check_argument_lengths(arguments: Mapping[str, Any]) -> None:
     for name, value in arguments.items():
         for part in _iterate_nested_values(value, _MAX_CHECKED_NESTING_LEVELS):
             if _is_too_long_lazy_sequence(part):
-                rule = f"has more than {MAX_ITEMS:,} items"
+                rule = f"has more than {MAX_ITEMS_OF_LIST_ARGUMENT:,} items"
                 raise InvalidValue(name, part, rule, remedy="Pass a shorter list.")
 
 
@@ -159,18 +159,18 @@ def unusable_value_error(
                 return InvalidValue(name, value, "must be finite", remedy=remedy)
             if isinstance(part, int) and abs(part) >= 2**63:
                 return InvalidValue(name, value, "is too large a number", remedy=remedy)
-            if isinstance(part, str) and not _is_encodable(part):
+            if isinstance(part, str) and not _is_encodable_as_utf8(part):
                 return InvalidValue(name, value, "must be a text that UTF-8 can hold")
         if (dimension := _find_missing_dimension(value, error)) is not None:
             rule, dims = f"has no dimension {shorten_text(dimension)!r}", map(str, value.dims)
             return InvalidValue(name, value, rule, choices=dims, remedy=remedy)
-        if isinstance(error, OSError) and _is_part_of_path(value, error.filename):
+        if isinstance(error, OSError) and _is_substring_of_path(value, error.filename):
             rule = f"cannot be the name of a file: {error.strerror}"
             return InvalidValue(name, value, rule, remedy=remedy)
         is_outside = isinstance(error, IndexError) or "out of bounds" in str(error)
         if is_outside and isinstance(value, Integral):
             return InvalidValue(name, value, "is out of range", remedy=remedy)
-        if isinstance(value, str) and value == _missing_name(error):
+        if isinstance(value, str) and value == _find_missing_name_in_error(error):
             return InvalidValue(name, value, "is unknown", remedy=remedy)
         if name != "self" and callable(value) and _was_raised_by(value, error):
             rule = f"fails when it is called ({type(error).__name__}: {shorten_text(error)})"
@@ -188,13 +188,13 @@ def _find_missing_dimension(value: Any, error: Exception) -> str | None:
     return found[1] if found and found[1] not in value.dims else None
 
 
-def _is_part_of_path(value: object, path: object) -> bool:
+def _is_substring_of_path(value: object, path: object) -> bool:
     """Return True if a string or path is contained in another path."""
     is_path = isinstance(value, str | os.PathLike) and isinstance(path, str | os.PathLike)
     return is_path and str(value) in str(path)
 
 
-def _missing_name(error: Exception) -> object:
+def _find_missing_name_in_error(error: Exception) -> object:
     """Return the missing name of a KeyError or AttributeError.
 
     The result is None if the exception contains no name.
@@ -411,7 +411,7 @@ class _AnnotationNamespace(dict[str, Any]):
 
     def __missing__(self, name: str) -> Any:
         """Look up a name that is not a global name of the module."""
-        module = sys.modules.get(_MODULE_ALIASES.get(name, ""))
+        module = sys.modules.get(_MODULE_BY_IMPORT_ALIAS.get(name, ""))
         if module is not None:
             return module
         for home, module in list(sys.modules.items()):
@@ -447,18 +447,18 @@ def _iterate_nested_values(value: object, nesting_levels: int) -> Iterator[Any]:
 
 
 def _is_too_long_lazy_sequence(value: Any) -> bool:
-    """Return True if a lazy sequence has more than ``MAX_ITEMS`` items.
+    """Return True if a lazy sequence has more than ``MAX_ITEMS_OF_LIST_ARGUMENT`` items.
 
     A lazy sequence is a ``range``, or an array with a stride of zero. The memory of a lazy sequence
     does not grow with the number of items.
     """
     if isinstance(value, range):
-        return bool(value) and (value[-1] - value[0]) // value.step >= MAX_ITEMS
+        return bool(value) and (value[-1] - value[0]) // value.step >= MAX_ITEMS_OF_LIST_ARGUMENT
     is_array = type(value).__module__ == "numpy" and hasattr(value, "strides")
-    return is_array and 0 in value.strides and value.size > MAX_ITEMS
+    return is_array and 0 in value.strides and value.size > MAX_ITEMS_OF_LIST_ARGUMENT
 
 
-def _is_encodable(text: str) -> bool:
+def _is_encodable_as_utf8(text: str) -> bool:
     """Return True if UTF-8 can encode a string without null characters."""
     try:
         return "\0" not in text.encode().decode()

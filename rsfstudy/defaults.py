@@ -17,4 +17,4 @@ FIGURE_FORMATS = ("png", "pdf", "svg")
 #: this time.
 CELL_TIME_LIMIT = 600.0
 #: Maximum number of right-hand-side evaluations of a fit to a record.
-FIT_BUDGET = 50_000_000
+FIT_EVALUATION_BUDGET = 50_000_000

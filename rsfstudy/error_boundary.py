@@ -16,7 +16,7 @@ from collections.abc import Callable, Iterable
 from pathlib import Path
 from typing import Any, ParamSpec, Self, TypeVar
 
-from rsfstudy._deprecation import user_stacklevel as user_stacklevel
+from rsfstudy._deprecation import find_stacklevel_of_user_code as find_stacklevel_of_user_code
 from rsfstudy.argument_checks import (
     check_argument_lengths,
     convert_numpy_number,
@@ -26,9 +26,9 @@ from rsfstudy.argument_checks import (
 )
 from rsfstudy.errors import CallError, DataError, InvalidValue, RsfStudyError, shorten_text
 
-P = ParamSpec("P")
-T = TypeVar("T")
-C = TypeVar("C", bound=type)
+FunctionParameters = ParamSpec("FunctionParameters")
+FunctionResult = TypeVar("FunctionResult")
+GuardedClass = TypeVar("GuardedClass", bound=type)
 
 #: Exceptions that the error boundary does not convert.
 _EXCEPTIONS_PASSED_UNCHANGED = (RsfStudyError, Warning, bdb.BdbQuit)
@@ -36,15 +36,15 @@ _EXCEPTIONS_PASSED_UNCHANGED = (RsfStudyError, Warning, bdb.BdbQuit)
 _GUARDED_SPECIAL_METHODS = ("__init__", "__new__", "__call__", "__getitem__")
 #: Modules that are skipped when the error boundary looks for the calling module, because they only
 #: forward calls from other modules.
-_MODULES_CALLING_FOR_THEIR_CALLER = ("dataclasses", "functools", "rsfstudy._deprecation")
+_MODULES_SKIPPED_WHEN_FINDING_CALLER = ("dataclasses", "functools", "rsfstudy._deprecation")
 
 
 def error_boundary(
-    function: Callable[P, T],
+    function: Callable[FunctionParameters, FunctionResult],
     *,
     is_called_internally: bool = False,
     unchanged_exceptions: tuple[type[Exception], ...] = _EXCEPTIONS_PASSED_UNCHANGED,
-) -> Callable[P, T]:
+) -> Callable[FunctionParameters, FunctionResult]:
     """Wrap a function so that it raises only errors of rsfstudy.
 
     Parameters
@@ -76,7 +76,7 @@ def error_boundary(
     )
 
 
-def guard_methods(guarded_class: C) -> C:
+def wrap_methods_in_error_boundary(guarded_class: GuardedClass) -> GuardedClass:
     """Apply the error boundary to the constructor and the public methods.
 
     The wrapped constructor also rejects arguments that do not match their annotations. Most
@@ -109,11 +109,12 @@ def guard_methods(guarded_class: C) -> C:
     return guarded_class
 
 
-class CheckedKeywords:
+class ConstructorKeywordCheckMixin:
     """Base class for classes that users define, such as measures.
 
     If a keyword argument of the constructor is unknown, the error lists the valid keywords. The
-    check is needed because ``guard_methods`` is not applied to user-defined classes.
+    check is needed because ``wrap_methods_in_error_boundary`` is not applied to user-defined
+    classes.
 
     Parameters
     ----------
@@ -150,12 +151,12 @@ def _constructor_parameters(cls: type) -> tuple[str, ...]:
 
 
 def _wrap_in_error_boundary(
-    function: Callable[P, T],
+    function: Callable[FunctionParameters, FunctionResult],
     *,
     is_called_internally: bool = False,
     is_constructor: bool = False,
     unchanged_exceptions: tuple[type[Exception], ...] = _EXCEPTIONS_PASSED_UNCHANGED,
-) -> Callable[P, T]:
+) -> Callable[FunctionParameters, FunctionResult]:
     """Wrap a function in the error boundary.
 
     If ``is_constructor`` is True, NumPy numbers are converted to Python numbers, which can be
@@ -178,7 +179,9 @@ def _wrap_in_error_boundary(
             raise CallError(text) from None
 
     @functools.wraps(function)
-    def wrapper(*args: P.args, **options: P.kwargs) -> T:
+    def wrapper(
+        *args: FunctionParameters.args, **options: FunctionParameters.kwargs
+    ) -> FunctionResult:
         if is_constructor:
             args = tuple(map(convert_numpy_number, args))  # type: ignore[assignment]
             options = {key: convert_numpy_number(value) for key, value in options.items()}  # type: ignore[assignment]
@@ -229,7 +232,7 @@ def _unknown_keyword_error(
 def _is_called_from_rsfstudy() -> bool:
     """Return True if the caller is a module of rsfstudy other than the command line."""
     frame = sys._getframe(2)
-    while frame.f_back and frame.f_globals.get("__name__") in _MODULES_CALLING_FOR_THEIR_CALLER:
+    while frame.f_back and frame.f_globals.get("__name__") in _MODULES_SKIPPED_WHEN_FINDING_CALLER:
         frame = frame.f_back
     module = str(frame.f_globals.get("__name__"))
     return module.startswith("rsfstudy.") and not module.startswith("rsfstudy.cli.")

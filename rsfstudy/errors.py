@@ -11,9 +11,9 @@ import reprlib
 import signal
 from collections.abc import Iterable
 
-from rsfstudy._deprecation import renamed_members, renamed_names
+from rsfstudy._deprecation import add_former_member_names, build_getattr_for_former_names
 
-__getattr__ = renamed_names(__name__)
+__getattr__ = build_getattr_for_former_names(__name__)
 
 #: Maximum number of characters of a value in a message, maximum number of listed choices, and
 #: maximum number of choices that are listed in addition to suggestions.
@@ -70,7 +70,7 @@ class RsfStudyError(Exception):
         )
 
 
-@renamed_members
+@add_former_member_names
 class InvalidValue(RsfStudyError, ValueError):
     """Error raised if a value breaks a rule.
 

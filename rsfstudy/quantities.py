@@ -11,17 +11,17 @@ from html import escape
 from html.entities import html5
 from typing import Any
 
-from rsfstudy._deprecation import renamed_members, renamed_names
-from rsfstudy.error_boundary import guard_methods
+from rsfstudy._deprecation import add_former_member_names, build_getattr_for_former_names
+from rsfstudy.error_boundary import wrap_methods_in_error_boundary
 from rsfstudy.errors import InvalidValue, escape_control_characters
 
-__getattr__ = renamed_names(__name__)
+__getattr__ = build_getattr_for_former_names(__name__)
 
 #: Pattern of a column heading with a name and units.
 _HEADING_WITH_UNITS_PATTERN = re.compile(r"(\w+)\s*[\[(]([^\[\]()]*)[\])]")
 
 
-@guard_methods
+@wrap_methods_in_error_boundary
 @dataclass(frozen=True)
 class Quantity:
     """Named quantity with a symbol, units and a description.
@@ -77,8 +77,8 @@ class Quantity:
         return {"flag_values": values, "flag_meanings": " ".join(self.flags)} if self.flags else {}
 
 
-@renamed_members
-@guard_methods
+@add_former_member_names
+@wrap_methods_in_error_boundary
 @dataclass(frozen=True)
 class Output(Quantity):
     r"""Number or array that a measure computes.

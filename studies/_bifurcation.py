@@ -16,7 +16,7 @@ from rsfstudy import Accuracy, Scene, Segment
 from rsfstudy.errors import InvalidValue
 from rsfstudy.limit_cycles.limit_cycle import (
     EVENTS_PER_PERIOD_OUTPUT,
-    INDEX_OF_PEAK_OUTPUT,
+    INDEX_OF_PEAK_SLIP_RATE_OUTPUT,
     INITIAL_PERTURBATION_DISPLACEMENT,
     STEADY_SLIDING_OUTCOME,
     estimate_primary_output_errors,
@@ -28,7 +28,7 @@ from rsfstudy.limit_cycles.return_map import (
     DIFFERENCE_STEP_OVER_LOG_RATE_RANGE,
     PeriodicOrbit,
     ReturnMap,
-    section_vector_at,
+    section_coordinates_at_point,
 )
 from rsfstudy.limit_cycles.stick_slip_cycles import LN10, Cycle, suggest_raising_event_limit
 from rsfstudy.measure_base import check_loading_changes_stress_only_in_steps
@@ -242,7 +242,7 @@ def _one_event_cycle_outputs(
     if one is None:
         return Status.OK, "", {}
     again = ReturnMap(scene, accuracy.refined(), meter).find_periodic_orbit(
-        one.start_section, 1, one.cycles[0].log_slip_rate_range
+        one.start_section_coordinates, 1, one.cycles[0].log_slip_rate_range
     )
     if again is None:
         return Status.OK, "", {}
@@ -254,11 +254,16 @@ def _one_event_cycle_outputs(
         "floquet_multiplier_error": estimate_error(first.real, same.real, chance),
         "floquet_multiplier_imaginary": float(abs(first.imag)),
         "floquet_multiplier_size": float(abs(first)),
-        "one_event_log10_peak": float(one.corrected_primary_outputs[INDEX_OF_PEAK_OUTPUT]),
-        "one_event_log10_peak_error": float(errors[INDEX_OF_PEAK_OUTPUT]),
+        "one_event_log10_peak": float(
+            one.corrected_primary_outputs[INDEX_OF_PEAK_SLIP_RATE_OUTPUT]
+        ),
+        "one_event_log10_peak_error": float(errors[INDEX_OF_PEAK_SLIP_RATE_OUTPUT]),
     }
     return *status_from_output_errors(
-        accuracy, one, errors, slice(INDEX_OF_PEAK_OUTPUT, INDEX_OF_PEAK_OUTPUT + 1)
+        accuracy,
+        one,
+        errors,
+        slice(INDEX_OF_PEAK_SLIP_RATE_OUTPUT, INDEX_OF_PEAK_SLIP_RATE_OUTPUT + 1),
     ), values
 
 
@@ -291,10 +296,10 @@ def _mean_growth(by: ReturnMap, seen: Sequence[Cycle], kept: int) -> tuple[float
         * by.scene.a
         * max(cycle.log_slip_rate_range for cycle in seen)
     )
-    departure, grown = np.ones(len(section_vector_at(seen[0].start_point))), []
+    departure, grown = np.ones(len(section_coordinates_at_point(seen[0].start_point))), []
     for cycle in seen:
         start, offset = (
-            section_vector_at(cycle.start_point),
+            section_coordinates_at_point(cycle.start_point),
             step * departure / np.linalg.norm(departure),
         )
         ahead, behind = by.follow_one_cycle(start + offset), by.follow_one_cycle(start - offset)
@@ -325,7 +330,10 @@ def _find_one_event_cycle(by: ReturnMap, seen: Sequence[Cycle]) -> PeriodicOrbit
     """
     for near in _closest_returns(seen):
         # After a period doubling, successive events alternate between the two sides of the cycle.
-        midpoint = 0.5 * (section_vector_at(near.start_point) + section_vector_at(near.end_point))
+        midpoint = 0.5 * (
+            section_coordinates_at_point(near.start_point)
+            + section_coordinates_at_point(near.end_point)
+        )
         orbit = by.find_periodic_orbit(
             midpoint, 1, near.log_slip_rate_range, max_distance=_MAX_GUESS_DISTANCE
         )

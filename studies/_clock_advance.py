@@ -247,7 +247,9 @@ def _find_free_cycle(
     approach = LimitCycleSearch(nudged, accuracy, meter)
     if not approach.follow_until_converged(MAX_EVENTS):
         return None
-    start = ReturnMap(free, accuracy, meter).point_at_section(approach.orbit.start_section)
+    start = ReturnMap(free, accuracy, meter).section_coordinates_to_point(
+        approach.orbit.start_section_coordinates
+    )
     motion = integrate_events(
         free, accuracy, meter, _event_specifications(free), start=start, with_time=True
     )

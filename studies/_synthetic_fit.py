@@ -301,7 +301,7 @@ class SyntheticFit(Measure):
         )
         nearer = profiles[0].best_coordinates + (exact - profiles[0].best_coordinates) / wider
         each = zip(profiles, nearer.tolist(), strict=True)
-        squared = [one.scaled_likelihood_decrease(x) for one, x in each]
+        squared = [one.compute_twice_log_likelihood_decrease(x) for one, x in each]
         naively = np.square(
             (search.values_to_coordinates(naive.parameter_values) - exact) / naive.coordinate_stderr
         )
@@ -309,7 +309,7 @@ class SyntheticFit(Measure):
             "estimate": search.values_to_coordinates(found.parameter_values),
             "deviation": search.values_to_coordinates(found.parameter_values) - exact,
             "deviation_error": np.array([found.numerical_errors[n] for n in self._free_parameters])
-            / found.coordinate_derivatives,
+            / found.parameter_derivatives_by_coordinates,
             "spread": found.coordinate_stderr,
             "promised_spread": promised,
             "told": np.array(
@@ -326,7 +326,7 @@ class SyntheticFit(Measure):
             for n in self.free
         ]
         values: dict[str, OutputValue] = {name: each[shown] for name, each in by_parameter.items()}
-        values |= {"criterion": found.aic, "noise_order": found.noise_model.order}
+        values |= {"criterion": found.aic, "noise_order": found.noise_model.autoregressive_order}
         return values | {"flagged": float(bool(reasons))}
 
     def _window_segments(self) -> list[list[_ProtocolSegment]]:

@@ -18,7 +18,7 @@ from time_domain_reference import TimeDomainMotion
 import rsfstudy
 from rsfstudy import Scene
 from rsfstudy.critical_steps import critical_step, motion_after_step
-from rsfstudy.critical_steps.critical_path import CriticalPath, scalar_function_for_engine
+from rsfstudy.critical_steps.critical_path import CriticalPath, prepare_scalar_function_for_engine
 from rsfstudy.critical_steps.critical_step import CriticalStep
 from rsfstudy.critical_steps.slow_manifold_accuracy import slow_manifold_relative_error
 from rsfstudy.motion.accuracy import Accuracy
@@ -414,7 +414,7 @@ def test_public_call_returns_a_small_dataset():
 def test_the_critical_path_touches_the_norm_at_rest(law, load):
     """At the tangency point, ln V equals the norm and is stationary."""
     scene = Scene(law=law, load_velocity_ratio=load)
-    start = CriticalPath.from_scene(scene).tangency_point
+    start = CriticalPath.from_scene(scene).tangency_point_at_instability_norm
     assert start is not None
     system = equations_between_ruptures(scene, with_time=False)
     point = system.evaluate_point(start)
@@ -433,11 +433,13 @@ def test_where_a_path_begins_and_ends_is_the_same_by_all_engines(law, normal_str
     for load in (1e-3, 1.5, 40.0):
         scene = Scene(law=law, normal_stress=normal_stress, load_velocity_ratio=load)
         paths = [CriticalPath.from_scene(scene, engine) for engine in (SCIPY, COMPILED)]
-        plain, compiled = (path.tangency_point for path in paths)
+        plain, compiled = (path.tangency_point_at_instability_norm for path in paths)
         assert compiled == pytest.approx(plain, rel=1e-12, abs=1e-14)
         begin = (0.01, -0.02), paths[0].parameters
         at = [
-            scalar_function_for_engine(path.evaluate_point, path.engine, *begin)(*begin)
+            prepare_scalar_function_for_engine(path.motion_point_evaluator, path.engine, *begin)(
+                *begin
+            )
             for path in paths
         ]
         assert all(isinstance(point, MotionPoint) for point in at)

@@ -11,7 +11,7 @@ import pytest
 from numpydoc.validate import validate
 
 import rsfstudy
-from rsfstudy._deprecation import RENAMED
+from rsfstudy._deprecation import NEW_NAME_BY_OWNER_AND_FORMER_NAME
 
 ROOT = Path(rsfstudy.__file__).parent
 NAMESPACES = ("", ".fitting", ".measures", ".parts", ".plots", ".reductions")
@@ -41,7 +41,9 @@ def public_objects() -> Iterator[str]:
                 yield f"{module.__name__}.{name}"
             elif inspect.isclass(exported):
                 yield f"{module.__name__}.{name}"
-                former = RENAMED.get(f"{exported.__module__}:{exported.__qualname__}", {})
+                former = NEW_NAME_BY_OWNER_AND_FORMER_NAME.get(
+                    f"{exported.__module__}:{exported.__qualname__}", {}
+                )
                 for member, value in vars(exported).items():
                     if member in former:
                         continue

@@ -15,7 +15,7 @@ from study_runs import study_of
 
 import rsfstudy
 from rsfstudy import Axis, Figure, Panel, Rig, Scene, Segment, measures, reductions
-from rsfstudy.argument_checks import MAX_ITEMS, describe_type, matches_annotation
+from rsfstudy.argument_checks import MAX_ITEMS_OF_LIST_ARGUMENT, describe_type, matches_annotation
 from rsfstudy.error_boundary import error_boundary
 from rsfstudy.errors import CallError, DataError, IncompleteWarning, InvalidValue, RsfStudyError
 from rsfstudy.measures import Measure
@@ -200,7 +200,7 @@ def test_the_argument_is_named(call, message, record):
     ],
 )
 def test_a_list_without_end_is_refused(call):
-    with pytest.raises(InvalidValue, match=f"{MAX_ITEMS:,}"):
+    with pytest.raises(InvalidValue, match=f"{MAX_ITEMS_OF_LIST_ARGUMENT:,}"):
         call()
 
 
@@ -208,7 +208,9 @@ def test_a_function_of_the_user_that_fails_is_named(dataset):
     def draw(dataset, axes):
         raise ZeroDivisionError("no")
 
-    with pytest.raises(InvalidValue, match="user_figure = <function .*fails when it is called .*: no"):
+    with pytest.raises(
+        InvalidValue, match="user_figure = <function .*fails when it is called .*: no"
+    ):
         rsfstudy.plot(dataset, user_figure=draw)
 
 

@@ -11,7 +11,7 @@ from synthetic_records import EXACT_PARAMETERS, FIT_OPTIONS
 
 import rsfstudy
 from rsfstudy.errors import InvalidValue
-from rsfstudy.fitting.averaged_noise_correlation import AveragingCorrelation, apply_running_mean
+from rsfstudy.fitting.averaged_noise_correlation import AveragedNoiseCorrelation, apply_running_mean
 from rsfstudy.fitting.filters import FILTER_KINDS, LOW_PASS_ORDERS, Filter
 from rsfstudy.status import Status
 
@@ -67,7 +67,7 @@ def test_the_correlation_of_averages_is_removed() -> None:
     time = 0.2 * np.arange(60.0)
     lags = np.abs(time[:, None] - time)
     exact = np.maximum(1.0 - lags, 0.0) + 0.002 * np.eye(60)
-    overlap = AveragingCorrelation(time, 1.0)
+    overlap = AveragedNoiseCorrelation(time, 1.0)
     root = np.linalg.inv(np.linalg.cholesky(exact))
     np.testing.assert_allclose(overlap.whiten_columns(np.eye(60)), root, atol=1e-9)
     assert overlap.log_determinant == pytest.approx(np.linalg.slogdet(exact)[1])

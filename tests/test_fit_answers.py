@@ -24,7 +24,7 @@ import rsfstudy
 from rsfstudy import Scene
 from rsfstudy.fitting.load_point_noise import shift_steps_by_their_errors
 from rsfstudy.fitting.record import loading_history
-from rsfstudy.fitting.window_model import STEP_SHIFT_IN_STANDARD_DEVIATIONS, WindowModel
+from rsfstudy.fitting.window_model import LOADING_STEP_SHIFT_OVER_STANDARD_ERROR, WindowModel
 from rsfstudy.motion.accuracy import Accuracy
 from rsfstudy.motion.work_meter import WorkMeter
 
@@ -145,7 +145,7 @@ def test_errors_of_steps_are_those_of_two_straight_lines() -> None:
         ]
     )
     variances = np.square(times - np.array([one.loading_steps[0][:4]])).sum(axis=(0, 1))
-    variances = variances[[0, 2, 3]] / STEP_SHIFT_IN_STANDARD_DEVIATIONS**2
+    variances = variances[[0, 2, 3]] / LOADING_STEP_SHIFT_OVER_STANDARD_ERROR**2
     (step,) = one.loading_steps
     counts = np.array([(one.time < step.start).sum(), (one.time >= step.start).sum()])
     lasts = np.array([step.start - one.time[0], one.time[-1] - step.start])

@@ -35,7 +35,11 @@ class Relaxation:
         self.friction = self.model_friction(truth) + SIZE * noise
 
     def model_friction(
-        self, values: ParameterValues, *, refined: bool = False, require_stable: bool = False
+        self,
+        values: ParameterValues,
+        *,
+        with_refined_tolerances: bool = False,
+        require_stable: bool = False,
     ) -> np.ndarray:
         """Return the friction of the model."""
         return np.asarray(

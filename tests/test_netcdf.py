@@ -21,7 +21,7 @@ from synthetic_records import synthetic_record
 
 import rsfstudy
 from rsfstudy import Axis, Rig, Scene
-from rsfstudy.api.accessor import Accessor, Backend
+from rsfstudy.api.accessor import Backend, DatasetAccessor
 from rsfstudy.fitting.record import Record
 from rsfstudy.reductions import ProportionalFit
 from rsfstudy.responses.healing import Healing
@@ -111,7 +111,7 @@ MADE = {
         Scene(stiffness_ratio=0.5, load_velocity_ratio=30.0), duration=100.0, **QUICK
     ),
     "to_si": lambda _: rsfstudy.to_si(motion(), **SCALES),
-    "Accessor.to_si": lambda _: cycle().rsf.to_si(**SCALES),
+    "DatasetAccessor.to_si": lambda _: cycle().rsf.to_si(**SCALES),
     "Rig.in_units": lambda _: rig_motion(stress="MPa", length="um"),
     "Rig.in_units in h": lambda _: rig_motion(time="h"),
     "critical_step": lambda _: rsfstudy.critical_step(STEPPED, **QUICK),
@@ -119,7 +119,7 @@ MADE = {
     "limit_cycle without one": lambda _: rsfstudy.limit_cycle(
         CYCLING.with_(stiffness_ratio=2.0), **QUICK
     ),
-    "Accessor.events": lambda _: motion().rsf.events(slip_rate=1.5),
+    "DatasetAccessor.events": lambda _: motion().rsf.events(slip_rate=1.5),
     "events": lambda _: stick_slip(),
     "run": lambda _: run(STABILITY),
     "run along phase": lambda _: run(HEALING, rtol=1e-3),
@@ -127,14 +127,14 @@ MADE = {
     "run of a rig": lambda _: run(OF_RIG),
     "run into a file": lambda place: run(STABILITY, output=place),
     "run into a store": lambda place: run(STABILITY, output=place, format="zarr"),
-    "Accessor.in_units": lambda _: run(OF_RIG).rsf.in_units(),
+    "DatasetAccessor.in_units": lambda _: run(OF_RIG).rsf.in_units(),
     "open": opened,
     "open a store": lambda place: opened(place, format="zarr"),
     "Backend.open_dataset": lambda place: xr.open_dataset(
         opened(place).encoding.get("source", place / "stability.nc"), engine="rsfstudy"
     ),
     "fit": lambda _: fit(),
-    "Accessor.sample_parameters": lambda _: fit().rsf.sample_parameters(5),
+    "DatasetAccessor.sample_parameters": lambda _: fit().rsf.sample_parameters(5),
     "Record.to_dataset": lambda _: synthetic_record(seed=1).to_dataset(),
     "Record.steps": lambda _: synthetic_record(seed=1).steps(),
 }
@@ -182,7 +182,7 @@ def test_any_dataset_is_written_as_it_is_and_follows_cf(name, tmp_path, monkeypa
 
 
 def test_every_public_function_that_returns_a_dataset_is_tried():
-    owners = {"": rsfstudy, **{c.__name__: c for c in (Accessor, Backend, Rig, Record)}}
+    owners = {"": rsfstudy, **{c.__name__: c for c in (DatasetAccessor, Backend, Rig, Record)}}
     names = {"": rsfstudy.__all__}
 
     def find(of, name):

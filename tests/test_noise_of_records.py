@@ -18,7 +18,7 @@ from rsfstudy.fitting.noise import NoiseModel
 from rsfstudy.fitting.outliers import find_non_outlier_mask, find_rounding_quantum
 from rsfstudy.fitting.uniform_sampling_runs import (
     SamplingRun,
-    find_level_changes,
+    find_noise_level_changes,
     find_sampling_runs,
 )
 
@@ -108,7 +108,7 @@ def test_what_is_minimised_is_the_restricted_likelihood_of_dense_matrices(
     rng = np.random.default_rng(1)
     jacobian = np.column_stack([np.ones(130), np.linspace(0.0, 50.0, 130), rng.normal(size=130)])
     residuals = 1e-3 * rng.normal(size=130)
-    products = noises._LaggedProducts(
+    products = noises._LaggedProductSums(
         noise.sampling_runs, np.column_stack([jacobian, residuals]), 3
     )
 
@@ -122,9 +122,9 @@ def test_what_is_minimised_is_the_restricted_likelihood_of_dense_matrices(
 
     plain = NoiseModel(noise.sampling_runs, np.zeros((2, 3)), np.array([1.0, 2.0]))
     apart = exact(dense(noise)) - exact(dense(plain))
-    assert products.reml_objective(noise) - products.reml_objective(plain) == pytest.approx(
-        apart, abs=1e-8
-    )
+    assert products.compute_restricted_likelihood_objective(
+        noise
+    ) - products.compute_restricted_likelihood_objective(plain) == pytest.approx(apart, abs=1e-8)
 
 
 def test_independent_samples_of_first_order() -> None:
@@ -140,7 +140,7 @@ def test_degrees_of_freedom_count_the_coefficients_that_are_found() -> None:
     """
     one = NoiseModel((SamplingRun(0, 500, 0, 0, 0),), np.array([[0.9]]), np.ones(1))
     assert one.degrees_of_freedom_of_slow_noise == pytest.approx(500 / (1 + 2 * 1.9 / 0.1))
-    assert noises.white_noise(np.arange(500.0)).degrees_of_freedom_of_slow_noise == 500
+    assert noises.build_white_noise_model(np.arange(500.0)).degrees_of_freedom_of_slow_noise == 500
     rng, logs = np.random.default_rng(7), []
     for _ in range(400):
         drawn = lfilter([1.0], [1.0, *(-AR3)], rng.normal(size=3_200))[200:]
@@ -201,7 +201,7 @@ def test_noise_of_other_sampling_intervals_is_another() -> None:
     fast = lfilter([1.0], [1.0, -0.95], rng.normal(size=1_500))[600:] * math.sqrt(1 - 0.95**2)
     left = np.concatenate([slow, 3.0 * fast])
     found = noises.fit_noise("ar1", time, left, np.ones((1_500, 1)))
-    assert [(*run[:2], run.preceding_rows) for run in found.sampling_runs] == [
+    assert [(*run[:2], run.row_count_since_clock_start) for run in found.sampling_runs] == [
         (0, 600, 0),
         (600, 1_500, 600),
     ]
@@ -264,7 +264,7 @@ def test_the_noise_level_may_change(rho: float) -> None:
 
 def test_a_steady_level_does_not_change() -> None:
     rng = np.random.default_rng(12)
-    changes = [find_level_changes(rng.normal(size=600)) for _ in range(100)]
+    changes = [find_noise_level_changes(rng.normal(size=600)) for _ in range(100)]
     assert sum(map(bool, changes)) <= 3
 
 
@@ -272,7 +272,7 @@ def test_a_steady_level_does_not_change() -> None:
 def test_changes_of_the_noise_level_are_located(ratio: float) -> None:
     rng = np.random.default_rng(15)
     scale = np.where(np.arange(700) < 500, 1.0, ratio)
-    rows = [find_level_changes(scale * rng.normal(size=700)) for _ in range(50)]
+    rows = [find_noise_level_changes(scale * rng.normal(size=700)) for _ in range(50)]
     assert all(len(found) == 1 for found in rows)
     # Rows are misplaced only if the louder noise is as small as the quieter noise.
     assert max(abs(found[0] - 500) for found in rows) <= 5

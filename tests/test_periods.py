@@ -13,7 +13,7 @@ from rsfstudy.limit_cycles.limit_cycle_search import LimitCycleSearch, follow_to
 from rsfstudy.limit_cycles.return_map import (
     ReturnMap,
     multiply_cycle_derivatives,
-    section_vector_at,
+    section_coordinates_at_point,
 )
 from rsfstudy.limit_cycles.stick_slip_cycles import Cycle
 from rsfstudy.motion.accuracy import Accuracy
@@ -89,10 +89,12 @@ def test_periods(ratio, period):
     found = LimitCycle(phases=50)(scene, quick(1e-7))
     assert found.status is Status.OK
     assert found.values["period_events"] == period
-    orbit = came_to(scene).orbit.starting_at_largest_event
+    orbit = came_to(scene).orbit.orbit_starting_at_largest_event
     assert orbit.period == period
     assert orbit.is_attracting
-    begin, end = map(section_vector_at, (orbit.cycles[0].start_point, orbit.cycles[-1].end_point))
+    begin, end = map(
+        section_coordinates_at_point, (orbit.cycles[0].start_point, orbit.cycles[-1].end_point)
+    )
     assert np.abs(end - begin).max() < 1e-6 * scene.a
     # The orbit covers the whole period, and the outputs belong to its largest event.
     assert found.values["time"][-1] == pytest.approx(
@@ -124,7 +126,7 @@ def test_multipliers_of_a_period_are_those_of_all_its_events():
     assert whole == pytest.approx(
         np.linalg.multi_dot([e[:size] for e in orbit.cycle_derivatives[::-1]])
     )
-    turned = orbit.starting_at_largest_event.floquet_multipliers
+    turned = orbit.orbit_starting_at_largest_event.floquet_multipliers
     assert turned[0] == pytest.approx(orbit.floquet_multipliers[0], rel=1e-5)
 
 
@@ -187,7 +189,7 @@ def test_the_growth_of_departures_is_that_of_the_motion_alone(monkeypatch):
     monkeypatch.setattr(return_map, "DIFFERENCE_STEP_OVER_LOG_RATE_RANGE", 3e-5)
     direction, grown = np.array([0.2, 1.0, -0.3]), []
     for cycle in seen:
-        begin = section_vector_at(cycle.start_point)
+        begin = section_coordinates_at_point(cycle.start_point)
         (slopes,) = by.compute_cycle_derivatives(begin, 1, scene.a * cycle.log_slip_rate_range)
         direction = slopes[: len(begin)] @ direction / np.linalg.norm(direction)
         grown.append(math.log(np.linalg.norm(direction)))

@@ -15,11 +15,11 @@ import pytest
 import rsfstudy
 from rsfstudy import Scene
 from rsfstudy._deprecation import (
-    RENAMED,
-    adopt_former_members,
-    renamed_keywords,
-    renamed_members,
-    renamed_value,
+    NEW_NAME_BY_OWNER_AND_FORMER_NAME,
+    accept_former_keyword_names,
+    add_former_member_names,
+    add_new_names_for_former_members,
+    translate_former_member_name,
 )
 from rsfstudy.critical_steps.critical_step import CriticalStep
 from rsfstudy.fitting.record import Record
@@ -34,7 +34,11 @@ from rsfstudy.slider.parts import Part
 from rsfstudy.slider.scene_assembly import SceneBase
 from rsfstudy.status import Status
 
-NAMES = [(place, former) for place, table in RENAMED.items() for former in table]
+NAMES = [
+    (place, former)
+    for place, table in NEW_NAME_BY_OWNER_AND_FORMER_NAME.items()
+    for former in table
+]
 #: Members that only some kinds of parts have.
 OF_SOME_SLOTS = {"steady_states", "relaxation", "auxiliary_rates", "auxiliary_steady_states"}
 
@@ -58,7 +62,7 @@ def member_names(kind: type) -> set[str]:
 
 @pytest.mark.parametrize(("place", "former"), NAMES)
 def test_former_names_lead_to_new_names(place, former):
-    new, owner = RENAMED[place][former], find_owner(place)
+    new, owner = NEW_NAME_BY_OWNER_AND_FORMER_NAME[place][former], find_owner(place)
     if place.endswith("()"):
         function = owner.__init__ if isinstance(owner, type) else owner
         assert function.__code__.co_filename.endswith("_deprecation.py")
@@ -169,13 +173,13 @@ def test_helpers_leave_other_names_alone(monkeypatch):
     kind = type("Kind", (SimpleNamespace,), {"__module__": "somewhere", "new": 3})
     tables = {"somewhere:Kind": {"old": "new"}, "somewhere:Kind()": {"old": "new"}}
     monkeypatch.setattr("rsfstudy._deprecation.RENAMED", tables)
-    renamed_keywords(renamed_members(kind))
+    accept_former_keyword_names(add_former_member_names(kind))
     with pytest.warns(DeprecationWarning, match="'old' of Kind is now called 'new'"):
         assert kind.old == 3
     with pytest.warns(DeprecationWarning, match=r"'old' of Kind\(\) is now called 'new'"):
         assert kind(old=5).new == 5
-    assert renamed_value(kind, "other") == "other"
-    adopt_former_members(kind)
+    assert translate_former_member_name(kind, "other") == "other"
+    add_new_names_for_former_members(kind)
 
 
 def test_former_keywords_are_passed_on_under_the_new_names():

@@ -63,7 +63,7 @@ def test_batches_are_sized_by_what_finished_cells_took(seconds, size):
     """A batch takes a fraction of a second, so little work can be lost."""
     batches = cell_plan.CellBatchIterator(None, np.arange(100_000), worker_count=2)
     assert batches.compute_next_batch_size() == 1
-    batches.record_time(seconds)
+    batches.record_cell_time(seconds)
     assert batches.compute_next_batch_size() == size
 
 

@@ -20,7 +20,7 @@ import pytest
 
 import rsfstudy
 from rsfstudy import measures, reductions
-from rsfstudy.api.accessor import Accessor
+from rsfstudy.api.accessor import DatasetAccessor
 from rsfstudy.cli.command_line import cli
 from rsfstudy.fitting.fit_measure import Fit
 from rsfstudy.limit_cycles.limit_cycle import LimitCycle
@@ -181,6 +181,8 @@ def test_every_name_is_there(pages, kind):
 def test_every_public_name_has_an_entry(pages):
     page = next(page for file, page in pages.items() if file.name == "python.html")
     assert {f"rsfstudy.{name}" for name in rsfstudy.__all__} <= page.anchors
-    members = {name for name in vars(Accessor) if not name.startswith("_")}
-    assert {f"{Accessor.__module__}.Accessor.{name}" for name in members} <= page.anchors
+    members = {name for name in vars(DatasetAccessor) if not name.startswith("_")}
+    assert {
+        f"{DatasetAccessor.__module__}.DatasetAccessor.{name}" for name in members
+    } <= page.anchors
     assert {"Law", "Measure", "Loading", "Reduction", "Stepper"} <= words_in(page.text)

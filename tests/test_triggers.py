@@ -8,7 +8,7 @@ from rsfstudy.named_studies._critical_triggers import TRIGGERS, Triggers
 from rsfstudy import Scene
 from rsfstudy.critical_steps.critical_step import CriticalStep
 from rsfstudy.critical_steps.monotone_approach_to_load_rate import (
-    monotone_rise_events,
+    build_events_testing_monotone_rise,
     rises_monotonically_to_load_rate,
 )
 from rsfstudy.critical_steps.triggered import Triggered
@@ -53,7 +53,7 @@ def test_what_is_said_to_rise_to_the_load_point_does(law, normal_stress, ratio):
     damped = {"radiation_damping": 1e-3, "load_velocity_ratio": 2e3, "stiffness_ratio": ratio}
     scene = Scene(law=law, b_over_a=1.7, normal_stress=normal_stress, **effect, **slope, **damped)
     accuracy, meter = Accuracy(1e-7, 10**6, engine=COMPILED), WorkMeter(10**6, engine=COMPILED)
-    levels = monotone_rise_events(scene)
+    levels = build_events_testing_monotone_rise(scene)
     told = [False]
     for event in integrate_events(
         scene, accuracy, meter, [maximum("log_slip_rate"), approach_to_steady_state(1e-3), *levels]
@@ -71,7 +71,7 @@ def test_what_is_said_to_rise_to_the_load_point_does(law, normal_stress, ratio):
 
 def test_a_slider_that_waves_do_not_hold_back_is_not_asked():
     for fields in ({}, {"inertia": True}, {"law": "two_slip_states", "radiation_damping": 1e-3}):
-        assert monotone_rise_events(Scene(**fields, load_velocity_ratio=1e3)) == []
+        assert build_events_testing_monotone_rise(Scene(**fields, load_velocity_ratio=1e3)) == []
 
 
 def test_oscillations_do_not_rise_to_the_load_point():

@@ -9,26 +9,26 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from rsfstudy._lazy_exports import lazy_exports
+from rsfstudy._lazy_exports import build_lazy_export_functions
 
 if TYPE_CHECKING:
     from rsfstudy.api.html_report import write_report
     from rsfstudy.api.result_paths import find_results
-    from rsfstudy.api.simulation import BEYOND_NORM_ATTRIBUTE_NAME
+    from rsfstudy.api.simulation import BEYOND_INSTABILITY_NORM_ATTRIBUTE_NAME
     from rsfstudy.api.study_runs import apply_overrides_to_study, prepare_run_with_progress
 else:
-    __getattr__, __dir__ = lazy_exports(
+    __getattr__, __dir__ = build_lazy_export_functions(
         __name__,
         {
             "api.html_report": ("write_report",),
             "api.result_paths": ("find_results",),
-            "api.simulation": ("BEYOND_NORM_ATTRIBUTE_NAME",),
+            "api.simulation": ("BEYOND_INSTABILITY_NORM_ATTRIBUTE_NAME",),
             "api.study_runs": ("apply_overrides_to_study", "prepare_run_with_progress"),
         },
     )
 
 __all__ = [
-    "BEYOND_NORM_ATTRIBUTE_NAME",
+    "BEYOND_INSTABILITY_NORM_ATTRIBUTE_NAME",
     "apply_overrides_to_study",
     "find_results",
     "prepare_run_with_progress",

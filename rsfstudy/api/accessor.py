@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 import xarray as xr
 from xarray.backends import BackendEntrypoint
 
-from rsfstudy._deprecation import renamed_members
+from rsfstudy._deprecation import add_former_member_names
 from rsfstudy.error_boundary import error_boundary
 from rsfstudy.errors import DataError
 
@@ -26,16 +26,16 @@ if TYPE_CHECKING:
     from rsfstudy.slider import Scene
     from rsfstudy.study import Study
 
-_FOREIGN_DATASET_MESSAGE = (
+_NOT_AN_RSFSTUDY_DATASET_MESSAGE = (
     "the dataset is not of rsfstudy: it has neither the attribute 'scene' nor 'declaration'. "
     "Take it from rsfstudy.simulate, critical_step, limit_cycle, run or open, or from a file of "
     "theirs, with its attributes."
 )
 
 
-@renamed_members
+@add_former_member_names
 @xr.register_dataset_accessor("rsf")  # type: ignore[no-untyped-call]
-class Accessor:
+class DatasetAccessor:
     """Accessor for datasets that rsfstudy has created.
 
     The accessor is available as ``dataset.rsf``. The dataset is a motion, a critical step or a
@@ -528,7 +528,7 @@ class Accessor:
     def _require_rsfstudy_dataset(self) -> None:
         """Raise ``DataError`` if rsfstudy has not created the dataset."""
         if not {"scene", "declaration"} & set(self._dataset.attrs):
-            raise DataError(_FOREIGN_DATASET_MESSAGE)
+            raise DataError(_NOT_AN_RSFSTUDY_DATASET_MESSAGE)
 
     def _require_all_cells_present(self, requested_action: str) -> None:
         """Raise ``DataError`` if a selection has removed an axis."""

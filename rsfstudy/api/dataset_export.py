@@ -25,8 +25,8 @@ def to_dataframe(dataset: xr.Dataset) -> pd.DataFrame:
     Returns
     -------
     pandas.DataFrame
-        Table as returned by ``Accessor.to_dataframe``. If the table would have fewer than two rows,
-        no columns are omitted.
+        Table as returned by ``DatasetAccessor.to_dataframe``. If the table would have fewer than
+        two rows, no columns are omitted.
     """
     along = [name for name in ("time",) if name in dataset.dims]
     along = list(map(str, dataset["status"].dims)) if "status" in dataset else along
@@ -43,7 +43,7 @@ def to_dataframe(dataset: xr.Dataset) -> pd.DataFrame:
     return table
 
 
-def rerun_motion(motion: xr.Dataset) -> pd.DataFrame:
+def rerun_and_compare_motion(motion: xr.Dataset) -> pd.DataFrame:
     """Compute a motion again, and compare it with the stored motion.
 
     Parameters

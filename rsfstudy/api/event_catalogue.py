@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from rsfstudy.error_boundary import error_boundary, user_stacklevel
+from rsfstudy.error_boundary import error_boundary, find_stacklevel_of_user_code
 from rsfstudy.errors import InvalidValue, NoResultWarning
 from rsfstudy.execution import provenance_attributes
 from rsfstudy.fitting import (
@@ -26,18 +26,18 @@ from rsfstudy.netcdf_encoding import copy_with_cf_encoding
 from rsfstudy.rig import compute_conversion_factor, convert_to_si, read_table
 
 #: Variables of the record that determine the units of a quantity, by the scale of the quantity.
-_RECORD_VARIABLE_BY_SCALE = {"D_c/V_*": "time", "D_c": "slip", "sigma_*": "shear_stress"}
+_VARIABLE_PROVIDING_UNITS_BY_SCALE = {"D_c/V_*": "time", "D_c": "slip", "sigma_*": "shear_stress"}
 #: Quantities of an event that can be computed only if displacement is known.
 _QUANTITIES_REQUIRING_DISPLACEMENT = ("slip", "peak_slip_rate", "dynamic_stress_drop")
 #: Meanings of the codes 0, 1, 2 and 3 of the variable ``cut``.
-_MEANINGS_OF_CUT_FLAGS = ("whole", "begins_before", "lasts_beyond", "both")
+_MEANINGS_OF_EVENT_TRUNCATION_FLAGS = ("whole", "begins_before", "lasts_beyond", "both")
 
 #: Ratio of the largest stress decrease to the smallest detectable drop above which an empty
 #: catalogue causes a warning.
-_SUSPICIOUS_DECREASE_OVER_MIN_DROP = 10.0
+_SUSPICIOUS_DECREASE_OVER_DETECTABLE_DROP = 10.0
 
 
-def build_catalogue(
+def build_event_catalogue(
     event_numbers: Sequence[EventNumbers], variable_attributes: Mapping[str, Mapping[Any, Any]]
 ) -> xr.Dataset:
     """Build a dataset from the measured quantities of events.
@@ -74,8 +74,8 @@ def build_catalogue(
         dataset[f"{name}_error"] = "event", errors, of_error
     flags = {
         "long_name": "what of the event the record leaves out",
-        "flag_values": np.arange(len(_MEANINGS_OF_CUT_FLAGS), dtype=np.int8),
-        "flag_meanings": " ".join(_MEANINGS_OF_CUT_FLAGS),
+        "flag_values": np.arange(len(_MEANINGS_OF_EVENT_TRUNCATION_FLAGS), dtype=np.int8),
+        "flag_meanings": " ".join(_MEANINGS_OF_EVENT_TRUNCATION_FLAGS),
     }
     dataset["cut"] = (
         "event",
@@ -99,8 +99,8 @@ def _build_unit_attributes(
     Times, slips and stresses have the units of the corresponding variable of the record. A slip
     rate is in units of slip over units of time. All other quantities are dimensionless.
     """
-    if scale in _RECORD_VARIABLE_BY_SCALE:
-        source = variable_attributes[_RECORD_VARIABLE_BY_SCALE[scale]]
+    if scale in _VARIABLE_PROVIDING_UNITS_BY_SCALE:
+        source = variable_attributes[_VARIABLE_PROVIDING_UNITS_BY_SCALE[scale]]
         return {key: str(source[key]) for key in ("units", "scale") if key in source}
     if not scale or "scale" in variable_attributes["slip"]:
         return {"units": "1", **({"scale": scale} if scale else {})}
@@ -245,13 +245,15 @@ def events(
     rows, detection, is_slip = read_drops(times, stress, moves, check_slip=stiffness is None)
     for row in rows if not is_slip else ():
         row[0].update(dict.fromkeys(_QUANTITIES_REQUIRING_DISPLACEMENT, (math.nan, math.nan)))
-    dataset = build_catalogue(rows, about | {"slip": about["displacement"]})
+    dataset = build_event_catalogue(rows, about | {"slip": about["displacement"]})
     if rows and not is_slip:
         why = "displacement moves no faster during the drops of stress than before and after"
         dataset["slip"].attrs["comment"] = why
         remedy = "Give stiffness='0.05 MPa/um', that of the rig, or math.inf if it is the fault's"
         warnings.warn(
-            f"slip has no number: {why}. {remedy}", NoResultWarning, stacklevel=user_stacklevel()
+            f"slip has no number: {why}. {remedy}",
+            NoResultWarning,
+            stacklevel=find_stacklevel_of_user_code(),
         )
     units = {key: value for key, value in about["shear_stress"].items() if key == "units"}
     dataset["noise"] = (
@@ -262,7 +264,7 @@ def events(
     words = "smallest drop of shear stress that is missed once in 1,000 records"
     dataset["smallest_drop"] = ((), detection.detectable_drop, {"long_name": words, **units})
     dataset.attrs["sign_of_shear_stress"] = int(direction)
-    if not rows and (text := _warn_if_no_drop(detection)):
+    if not rows and (text := _warn_if_stress_falls_without_drop(detection)):
         dataset.attrs["comment"] = text
     return dataset
 
@@ -335,7 +337,7 @@ def _find_stress_sign(stress: np.ndarray, stated_sign: int | None) -> float:
     return float(stated_sign)
 
 
-def _warn_if_no_drop(detection: Detection) -> str:
+def _warn_if_stress_falls_without_drop(detection: Detection) -> str:
     """Warn if no drop is found although stress falls considerably.
 
     Returns
@@ -343,7 +345,10 @@ def _warn_if_no_drop(detection: Detection) -> str:
     str
         Message of the warning, or an empty string if no warning was issued.
     """
-    if not detection.max_decrease > _SUSPICIOUS_DECREASE_OVER_MIN_DROP * detection.detectable_drop:
+    if (
+        not detection.max_decrease
+        > _SUSPICIOUS_DECREASE_OVER_DETECTABLE_DROP * detection.detectable_drop
+    ):
         return ""
     text = (
         f"no drop was found, although stress falls by {detection.max_decrease:.4g} in all, "
@@ -352,5 +357,5 @@ def _warn_if_no_drop(detection: Detection) -> str:
         "or too slowly"
     )
     remedy = "Select a part of the record, or pass sign=-1 if shear stress is negative"
-    warnings.warn(f"{text}. {remedy}.", NoResultWarning, stacklevel=user_stacklevel())
+    warnings.warn(f"{text}. {remedy}.", NoResultWarning, stacklevel=find_stacklevel_of_user_code())
     return text

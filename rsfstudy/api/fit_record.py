@@ -17,7 +17,7 @@ import xarray as xr
 
 from rsfstudy.api import study_runs
 from rsfstudy.axes import Axis
-from rsfstudy.defaults import FIT_BUDGET as BUDGET
+from rsfstudy.defaults import FIT_EVALUATION_BUDGET as BUDGET
 from rsfstudy.error_boundary import error_boundary
 from rsfstudy.errors import InvalidValue
 from rsfstudy.fitting import (
@@ -52,13 +52,13 @@ DEFAULT_FREE_PARAMETERS = (
 )
 #: Parameters that depend on the number of states of the law, and the remedy in error messages.
 _EVOLUTION_EFFECT_PARAMETERS = ("b", "b1", "b2")
-_STATE_PARAMETERS_REMEDY = (
+_REMEDY_FOR_WRONG_STATE_PARAMETERS = (
     "One state has b; two states have b1, b2, slip_distance and slip_distance_2."
 )
 #: Initial guess of the slip distance, as a fraction of the load point displacement after a step.
 _SLIP_DISTANCE_GUESS_OVER_DISPLACEMENT = 0.05
 #: Maximum value of the argument ``windows``.
-_MAX_WINDOWS = 1000
+_MAX_FIT_WINDOW_COUNT = 1000
 #: A backward jump of displacement is a reset to zero if the jump exceeds each of three limits: a
 #: multiple of the noise and of the neighbouring changes, and a fraction of the total displacement.
 #: The noise is estimated only if the record has more than 20 rows.
@@ -68,7 +68,7 @@ _MAX_WINDOWS = 1000
     _MIN_ROWS_FOR_NOISE_ESTIMATE,
 ) = 10.0, 0.01, 20
 #: Length of the shortest window, as a fraction of the displacement after a step.
-_SHORTEST_WINDOW_FRACTION = 0.5
+_MIN_WINDOW_LENGTH_OVER_FULL_LENGTH = 0.5
 #: Initial values of the scene fields in a fit. Values that the user passes take precedence.
 _INITIAL_SCENE_FIELDS = {"a": 0.01, "mu_star": 0.6, "normal_stress": "constant"}
 _INITIAL_FIELDS_OF_ONE_STATE_LAW = {"b_over_a": 1.2}
@@ -296,11 +296,13 @@ def fit(
     if len(numbers) > 1 and not together:
         axes.append(Axis("step", list(numbers)))
     reductions = []
-    if not isinstance(windows, int) or not 1 <= windows <= _MAX_WINDOWS:
-        rule = f"must be a whole number from 1 to {_MAX_WINDOWS:,}"
+    if not isinstance(windows, int) or not 1 <= windows <= _MAX_FIT_WINDOW_COUNT:
+        rule = f"must be a whole number from 1 to {_MAX_FIT_WINDOW_COUNT:,}"
         raise InvalidValue("windows", windows, rule)
     if windows > 1:
-        axes.append(Axis("part", np.linspace(1.0, _SHORTEST_WINDOW_FRACTION, windows).tolist()))
+        axes.append(
+            Axis("part", np.linspace(1.0, _MIN_WINDOW_LENGTH_OVER_FULL_LENGTH, windows).tolist())
+        )
         reductions = [Range(f"{n}_windows", n, over="part") for n in measure.parameters]
     chosen: Any = engine
     if engine is None:
@@ -542,7 +544,7 @@ def _free_parameters(
         if name not in shared:
             rule = f"is no parameter with {' or '.join(f'law={law!r}' for law in laws)}"
             remedy = (
-                _STATE_PARAMETERS_REMEDY
+                _REMEDY_FOR_WRONG_STATE_PARAMETERS
                 if name in (*_EVOLUTION_EFFECT_PARAMETERS, "slip_distance_2")
                 else ""
             )
@@ -553,7 +555,7 @@ def _free_parameters(
             and not {*_EVOLUTION_EFFECT_PARAMETERS} & {*names}
         ):
             rule = f"names no {'evolution effect' if names else 'parameter'} of law={law!r}"
-            raise InvalidValue("free", free, rule, remedy=_STATE_PARAMETERS_REMEDY)
+            raise InvalidValue("free", free, rule, remedy=_REMEDY_FOR_WRONG_STATE_PARAMETERS)
     return shared
 
 

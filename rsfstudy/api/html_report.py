@@ -45,7 +45,7 @@ from rsfstudy.storage import is_of_single_scene, read_dataset, read_declaration
 
 _UNREADABLE_FILE_STATUS = "cannot be read"
 #: HTML tag that identifies reports of rsfstudy, and signature at the beginning of PNG files.
-_GENERATOR_TAG = b'<meta name="generator" content="rsfstudy">'
+_HTML_GENERATOR_META_TAG = b'<meta name="generator" content="rsfstudy">'
 _PNG_SIGNATURE = b"\x89PNG\r\n\x1a\n"
 
 
@@ -151,7 +151,7 @@ def write_report(
         raise InvalidValue("output", str(output), "must be a file that ends in .html")
     check_regular_file("output", page)
     try:
-        if page.exists() and _GENERATOR_TAG not in page.read_bytes()[:1000]:
+        if page.exists() and _HTML_GENERATOR_META_TAG not in page.read_bytes()[:1000]:
             remedy = "Choose another output, or move it away first."
             raise InvalidValue(
                 "output", str(page), "is there already, and no report", remedy=remedy

@@ -11,7 +11,7 @@ from scipy.interpolate import KroghInterpolator
 from scipy.ndimage import find_objects, label
 from scipy.optimize import brentq
 
-from rsfstudy.api.event_catalogue import build_catalogue
+from rsfstudy.api.event_catalogue import build_event_catalogue
 from rsfstudy.errors import DataError, InvalidValue
 from rsfstudy.fitting import EventNumbers
 from rsfstudy.rig import slip_rate_from_log
@@ -26,7 +26,7 @@ _EVENT_SLIP_RATE_OVER_LOAD_VELOCITY = 10.0
 _ROWS_PER_INTERPOLANT, _ROWS_PER_ERROR_CHECK_INTERPOLANT = 6, 4
 #: Maximum time difference between the rows before and after a jump, in spacings of floating-point
 #: numbers.
-_MAX_FLOAT_SPACINGS_OF_JUMP = 16
+_MAX_JUMP_DURATION_IN_FLOAT_SPACINGS = 16
 #: Maximum change of log10 slip rate between rows that are interpolated. Motions with a tolerance of
 #: 1e-4 have rows that differ by up to 0.37, except at the sudden beginning or end of a rupture.
 _MAX_LOG10_SLIP_RATE_STEP = 0.5
@@ -51,7 +51,7 @@ def find_motion_events(
     Returns
     -------
     xarray.Dataset
-        Variables along the dimension ``event``, as returned by ``Accessor.events``.
+        Variables along the dimension ``event``, as returned by ``DatasetAccessor.events``.
 
     Raises
     ------
@@ -75,7 +75,7 @@ def find_motion_events(
     rows = _InterpolatedMotionRows(times, np.column_stack(rest), math.log10(slip_rate))
     found = [rows.measure_event(*ends) for ends in rows.iterate_event_row_spans()]
     about = {name: motion[name].attrs for name in names}
-    told = build_catalogue(found, about).assign_attrs(slip_rate_threshold=slip_rate)
+    told = build_event_catalogue(found, about).assign_attrs(slip_rate_threshold=slip_rate)
     if "slip_rate" in motion and motion.sizes["time"]:  # The motion has units.
         rate = motion["slip_rate"]
         size = float(rate[0]) / 10.0 ** float(motion["log10_slip_rate"][0])
@@ -147,10 +147,14 @@ class _InterpolatedMotionRows:
         top = highest + int(np.argmax(stress[highest : peak + 1]))
         bottom = peak + int(np.argmin(stress[peak : lowest + 1]))
         (begin, slip), begun = (
-            self._level_crossing(first_row - 1) if first_row else self._values_at_end_row(0)
+            self._find_level_crossing_after_row(first_row - 1)
+            if first_row
+            else self._read_time_and_slip_at_end_row(0)
         )
         (finish, slipped), finished = (
-            self._level_crossing(last_row) if last_row < end else self._values_at_end_row(end)
+            self._find_level_crossing_after_row(last_row)
+            if last_row < end
+            else self._read_time_and_slip_at_end_row(end)
         )
         (rate, _, at_peak), (rate_error, _, peak_error) = self._find_extreme(peak, 0, 1.0)
         (*_, before), (*_, before_error) = self._find_extreme(top, 2, 1.0)
@@ -176,9 +180,9 @@ class _InterpolatedMotionRows:
         """
         first = max(row + 1 - row_count // 2, 0)
         last = min(row + row_count // 2, len(self._times) - 1)
-        apart = np.diff(self._times[first : last + 1]) > _MAX_FLOAT_SPACINGS_OF_JUMP * np.spacing(
-            self._times[row]
-        )
+        apart = np.diff(
+            self._times[first : last + 1]
+        ) > _MAX_JUMP_DURATION_IN_FLOAT_SPACINGS * np.spacing(self._times[row])
         apart[row - first] = True
         smooth = label(apart)[0]
         kept = np.flatnonzero(smooth == smooth[row - first])
@@ -198,7 +202,7 @@ class _InterpolatedMotionRows:
         """Return the time derivative of a column of the interpolating polynomial."""
         return float(interpolant.derivative(time)[column])
 
-    def _level_crossing(self, row: int) -> tuple[np.ndarray, np.ndarray]:
+    def _find_level_crossing_after_row(self, row: int) -> tuple[np.ndarray, np.ndarray]:
         """Find the threshold crossing between a row and the next row.
 
         Returns
@@ -218,7 +222,7 @@ class _InterpolatedMotionRows:
         error = np.abs(many - fewer) + 2.0 * np.spacing(np.abs(many))
         return many, error + self._is_too_coarse_to_interpolate(sides) * np.array(left)
 
-    def _values_at_end_row(self, row: int) -> tuple[np.ndarray, np.ndarray]:
+    def _read_time_and_slip_at_end_row(self, row: int) -> tuple[np.ndarray, np.ndarray]:
         """Return time and slip at the first or the last row, with errors of zero."""
         return np.array([self._times[row], self._values[row, 1]]), np.zeros(2)
 
@@ -238,7 +242,7 @@ class _InterpolatedMotionRows:
             best = self._values[row]
             for begin in range(sides.start, sides.start + len(times) - 1):
                 span = self._times[begin + 1] - self._times[begin]
-                if span <= _MAX_FLOAT_SPACINGS_OF_JUMP * np.spacing(times[-1]):
+                if span <= _MAX_JUMP_DURATION_IN_FLOAT_SPACINGS * np.spacing(times[-1]):
                     continue
                 through = self._interpolate_after_row(begin, number)
                 if (

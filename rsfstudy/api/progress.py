@@ -82,7 +82,7 @@ def _print_progress_lines(study_name: str, console: Console) -> ProgressCallback
 
 
 def compile_scenes_with_notice(
-    example_scenes: Sequence[Scene], with_time_variants: Sequence[bool], is_shown: bool
+    example_scenes: Sequence[Scene], with_time_variable_flags: Sequence[bool], is_shown: bool
 ) -> None:
     """Compile the equations of scenes, and print the compilation time.
 
@@ -93,14 +93,14 @@ def compile_scenes_with_notice(
     ----------
     example_scenes : sequence of Scene
         Scenes whose equations are compiled. Scenes with the same parts share their equations.
-    with_time_variants : sequence of bool
+    with_time_variable_flags : sequence of bool
         Variants of the equations to compile. True selects the equations with time as a variable.
     is_shown : bool
         If False, nothing is displayed.
     """
     console, before = Console(stderr=True, quiet=not is_shown), replace(compilation_log)
     with console.status("compiling the equations ..."):
-        for scene, clock in itertools.product(example_scenes, with_time_variants):
+        for scene, clock in itertools.product(example_scenes, with_time_variable_flags):
             import_compiled_engine().compile_equations_of_scene(scene, with_time=clock)
     programs, seconds = (
         compilation_log.compiled_program_count - before.compiled_program_count,

@@ -53,7 +53,7 @@ _MIN_TIME_ULPS, _MIN_TIME_DIFFERENCE = 4, 1e-290
 #: Default duration after a step in D_c/V_*, and load point displacement in D_c that is added after
 #: the last segment of a protocol.
 _DEFAULT_DURATION, _DISPLACEMENT_AFTER_PROTOCOL = 50.0, 20.0
-_NOTHING_STEPPED_MESSAGE = (
+_UNPERTURBED_SCENE_MESSAGE = (
     "nothing is stepped: the motion is steady sliding at V_*. State load_velocity_ratio, "
     "displacement_step, hold_time, velocity_steps, loading or initial_state in the scene."
 )
@@ -62,7 +62,7 @@ _INSTABILITY_TIME_QUANTITY = Quantity(
     "instability_time", "$t V_*/D_c$", "1", _INSTABILITY_TIME_LONG_NAME, "D_c/V_*"
 )
 #: Attribute that contains the time after which a motion has no physical meaning.
-BEYOND_NORM_ATTRIBUTE_NAME = "beyond_instability_norm"
+BEYOND_INSTABILITY_NORM_ATTRIBUTE_NAME = "beyond_instability_norm"
 #: Attribute that contains the time, the slip and the state of the slider at the end of a motion.
 MOTION_END_ATTRIBUTE_NAME = "end"
 #: Ratio of slip rate to load point velocity that defines instability if the load point velocity
@@ -70,10 +70,10 @@ MOTION_END_ATTRIBUTE_NAME = "end"
 #: the scene is not the period of the slider.
 _INSTABILITY_SLIP_RATE_OVER_LOAD_RATE = 1e6
 #: Variables of motions that are computed from spring stress.
-_VARIABLES_OF_SPRING_STRESS = ("shear_stress", "friction_coefficient")
+_VARIABLES_DERIVED_FROM_SPRING_STRESS = ("shear_stress", "friction_coefficient")
 #: Names of the regimes (forms of the equations of motion) of the built-in dynamics. Regimes of
 #: user-defined dynamics have larger codes.
-_STANDARD_REGIMES = ("quasi_static", "slow_manifold", RUPTURE_REGIME, "quasi_dynamic")
+_BUILT_IN_REGIME_NAMES = ("quasi_static", "slow_manifold", RUPTURE_REGIME, "quasi_dynamic")
 
 
 @error_boundary
@@ -222,9 +222,9 @@ def simulate(
         raise InvalidValue("accuracy, meter", (accuracy, meter), rule, remedy=remedy)
     check_engine_is_usable(accuracy.engine)
     if is_alone and not scene.is_perturbed:
-        warnings.warn(_NOTHING_STEPPED_MESSAGE, NoResultWarning, stacklevel=3)
+        warnings.warn(_UNPERTURBED_SCENE_MESSAGE, NoResultWarning, stacklevel=3)
     spent, by_regime = meter.evaluations, dict(meter.evaluations_by_regime)
-    recording = Recording(list(_STANDARD_REGIMES), at)
+    recording = Recording(list(_BUILT_IN_REGIME_NAMES), at)
     status, message, limit, passed = (
         Status.OK,
         "",
@@ -247,7 +247,7 @@ def simulate(
         if status is Status.WORK_BUDGET_SPENT:
             message += suggest_raising_budget(budget)
     seen = recording.as_table(scene)
-    seen = with_increasing_times(seen) if at is None else seen
+    seen = make_row_times_strictly_increasing(seen) if at is None else seen
     dataset = _recording_to_dataset(scene, seen, recording.regime_names)
     dataset = dataset.assign_attrs(
         {
@@ -275,7 +275,9 @@ def simulate(
     if status is Status.OK:
         dataset.attrs[MOTION_END_ATTRIBUTE_NAME] = json.dumps((last.time, last.slip, last.point))
     if isinstance(scene.parts.loading, SampledHistory):
-        dataset = dataset.assign(history_samples=_build_history_variable(scene.parts.loading))
+        dataset = dataset.assign(
+            history_samples=_build_loading_history_variable(scene.parts.loading)
+        )
     if passed >= 0.0:
         text = f"from {passed:.9g} D_c/V_* on, with neither mass nor radiation damping: no physics"
         dataset[_INSTABILITY_TIME_QUANTITY.name] = (
@@ -283,7 +285,7 @@ def simulate(
             passed,
             _INSTABILITY_TIME_QUANTITY.attributes,
         )
-        dataset = dataset.assign_attrs({BEYOND_NORM_ATTRIBUTE_NAME: text})
+        dataset = dataset.assign_attrs({BEYOND_INSTABILITY_NORM_ATTRIBUTE_NAME: text})
         if is_alone:
             warnings.warn(f"beyond the instability norm {text}", NoResultWarning, stacklevel=3)
     if status is not Status.OK:
@@ -306,7 +308,8 @@ def _recording_to_dataset(
     if scene.parts.law.state_count > 1:
         of_law = range(scene.parts.law.state_count)
         columns |= {
-            _state_quantity(i + 1): recorded_rows[:, FIRST_STATE_COLUMN + i] for i in of_law
+            _build_state_variable_quantity(i + 1): recorded_rows[:, FIRST_STATE_COLUMN + i]
+            for i in of_law
         }
     columns[find_quantity("load_point_displacement")] = recorded_load_point_displacement(
         scene, recorded_rows
@@ -349,12 +352,15 @@ def motion_variable_attributes(quantity: Quantity, scene: Scene) -> dict[str, An
         Attributes of the variable.
     """
     attributes = quantity.attributes
-    if quantity.name in _VARIABLES_OF_SPRING_STRESS and scene.dynamics.radiated_stress_slope(0.0):
+    if (
+        quantity.name in _VARIABLES_DERIVED_FROM_SPRING_STRESS
+        and scene.dynamics.radiated_stress_slope(0.0)
+    ):
         attributes["long_name"] += " less the radiation damping stress at V_star"
     return attributes
 
 
-def _state_quantity(state_number: int) -> Quantity:
+def _build_state_variable_quantity(state_number: int) -> Quantity:
     """Return the quantity of a single state, for laws with several states."""
     about = (
         f"state {state_number} of the law, as a part of the friction coefficient, freed of stress"
@@ -375,7 +381,7 @@ def _read_end_of_motion(motion: object, scene: Scene) -> Event:
     return Event(EventKind.END, None, time, slip, point, "", 0, 0.0)
 
 
-def _build_history_variable(history: SampledHistory) -> xr.Variable:
+def _build_loading_history_variable(history: SampledHistory) -> xr.Variable:
     """Convert the samples of a loading history to a variable.
 
     The loading of the scene can be recreated from the variable.
@@ -440,7 +446,7 @@ def _check_requested_times(
     return at
 
 
-def with_increasing_times(table: np.ndarray) -> np.ndarray:
+def make_row_times_strictly_increasing(table: np.ndarray) -> np.ndarray:
     """Return a recorded motion with strictly increasing times.
 
     A regime or a segment of the loading begins with a row at the time at which the previous regime

@@ -15,12 +15,12 @@ from typing import TYPE_CHECKING, Any
 import pandas as pd
 import xarray as xr
 
-from rsfstudy._deprecation import renamed_keywords
+from rsfstudy._deprecation import accept_former_keyword_names
 from rsfstudy.api import dataset_export
 from rsfstudy.api.progress import compile_scenes_with_notice, show_progress
 from rsfstudy.api.result_paths import find_results, output_directory
 from rsfstudy.defaults import CELL_TIME_LIMIT, OUTPUT_DIRECTORY
-from rsfstudy.error_boundary import error_boundary, user_stacklevel
+from rsfstudy.error_boundary import error_boundary, find_stacklevel_of_user_code
 from rsfstudy.errors import IncompleteWarning, InvalidValue, RsfStudyWarning, shorten_text
 from rsfstudy.execution import OutputOptions, WorkerPool, prepare_study_run, run_fingerprint
 from rsfstudy.measures import Outcome
@@ -215,9 +215,9 @@ def run(
             prepare_run_with_progress(declared, keeping, where, progress)()
         )
     if told := format_notes_on_incomplete_results(results):
-        warnings.warn("; ".join(told), IncompleteWarning, stacklevel=user_stacklevel())
+        warnings.warn("; ".join(told), IncompleteWarning, stacklevel=find_stacklevel_of_user_code())
     if slow := note_on_norms_near_load_velocity(results):
-        warnings.warn(slow, RsfStudyWarning, stacklevel=user_stacklevel())
+        warnings.warn(slow, RsfStudyWarning, stacklevel=find_stacklevel_of_user_code())
     return results
 
 
@@ -371,7 +371,7 @@ def read_results(path: Path) -> xr.Dataset:
     return dataset
 
 
-def _resolve_results_dataset(dataset: xr.Dataset | str | Path) -> xr.Dataset:
+def _open_dataset_if_name_or_path(dataset: xr.Dataset | str | Path) -> xr.Dataset:
     """Return results, and load the results first if a name or a path is passed."""
     if not isinstance(dataset, xr.Dataset):
         return open(dataset)
@@ -379,7 +379,7 @@ def _resolve_results_dataset(dataset: xr.Dataset | str | Path) -> xr.Dataset:
     return dataset
 
 
-@renamed_keywords
+@accept_former_keyword_names
 @partial(error_boundary, is_called_internally=True)
 def plot(
     dataset: xr.Dataset | str | Path,
@@ -443,7 +443,7 @@ def plot(
     from rsfstudy.plots import draw_figure
 
     return draw_figure(
-        _resolve_results_dataset(dataset), user_figure, variable=variable, style=style
+        _open_dataset_if_name_or_path(dataset), user_figure, variable=variable, style=style
     )
 
 
@@ -489,7 +489,7 @@ def check(dataset: xr.Dataset | str | Path) -> pd.DataFrame:
     >>> len(check(run(study, workers=0, output=None, progress=False)))
     0
     """
-    results = _resolve_results_dataset(dataset)
+    results = _open_dataset_if_name_or_path(dataset)
     declared = read_declaration(results)
     return build_verdict_table(results, list(declared.claims), declared.overrides)
 
@@ -572,7 +572,7 @@ def rerun(
     if is_of_single_scene(theirs):
         if study is not None:
             load_study(str(study))  # The file defines user-defined parts of the scene.
-        return dataset_export.rerun_motion(theirs)
+        return dataset_export.rerun_and_compare_motion(theirs)
     declared = rebuild_study(theirs, study)
     place = output_directory(output)
     if place is not None:
@@ -640,7 +640,9 @@ def compare(first: xr.Dataset | str | Path, second: xr.Dataset | str | Path) -> 
     >>> comparison.agrees, comparison.finished_cell_counts
     (True, (1, 1, 1))
     """
-    return compare_results(_resolve_results_dataset(first), _resolve_results_dataset(second))
+    return compare_results(
+        _open_dataset_if_name_or_path(first), _open_dataset_if_name_or_path(second)
+    )
 
 
 @partial(error_boundary, unchanged_exceptions=(Exception,))
@@ -708,7 +710,7 @@ def recompute_cell(
     declared, number, differs = _find_cell_in_results_file(file, place, study)
     for name, (theirs, ours) in differs.items():
         text = f"{name}: {theirs} then, {ours} now"
-        warnings.warn(text, RsfStudyWarning, stacklevel=user_stacklevel())
+        warnings.warn(text, RsfStudyWarning, stacklevel=find_stacklevel_of_user_code())
     scene, changes = declared.cell(number)
     return scene, declared.measure.with_(**changes)(scene, declared.accuracy)
 

@@ -9,19 +9,19 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from rsfstudy._lazy_exports import lazy_exports
+from rsfstudy._lazy_exports import build_lazy_export_functions
 
 if TYPE_CHECKING:
     from rsfstudy.axes.axis import (
         Axis,
         AxisRow,
         check_storable_text,
-        classify_rows_by_fields,
+        classify_axis_rows_by_fields_and_texts,
         fields_of_axis_point,
         to_plain_value,
     )
 else:
-    __getattr__, __dir__ = lazy_exports(
+    __getattr__, __dir__ = build_lazy_export_functions(
         __name__,
         {
             "axes.axis": (
@@ -29,7 +29,7 @@ else:
                 "AxisRow",
                 "check_storable_text",
                 "fields_of_axis_point",
-                "classify_rows_by_fields",
+                "classify_axis_rows_by_fields_and_texts",
                 "to_plain_value",
             ),
         },
@@ -40,6 +40,6 @@ __all__ = [
     "AxisRow",
     "check_storable_text",
     "fields_of_axis_point",
-    "classify_rows_by_fields",
+    "classify_axis_rows_by_fields_and_texts",
     "to_plain_value",
 ]

@@ -14,8 +14,8 @@ from typing import Any
 
 import numpy as np
 
-from rsfstudy._deprecation import renamed_keywords, renamed_members, warn_renamed
-from rsfstudy.error_boundary import guard_methods
+from rsfstudy._deprecation import accept_former_keyword_names, add_former_member_names, warn_renamed
+from rsfstudy.error_boundary import wrap_methods_in_error_boundary
 from rsfstudy.errors import InvalidValue
 from rsfstudy.formatting import format_value, is_sequence_of_axis_values
 from rsfstudy.quantities import is_variable_name
@@ -24,9 +24,9 @@ from rsfstudy.slider import normalise_field_value
 AxisRow = Mapping[str, Any]
 
 
-@renamed_keywords
-@renamed_members
-@guard_methods
+@accept_former_keyword_names
+@add_former_member_names
+@wrap_methods_in_error_boundary
 @dataclass(frozen=True, init=False)
 class Axis:
     """Axis of a study, along which one or several fields vary.
@@ -339,7 +339,7 @@ class Axis:
         return list(self.labels or values)
 
 
-def classify_rows_by_fields(axis_rows: Sequence[AxisRow]) -> np.ndarray:
+def classify_axis_rows_by_fields_and_texts(axis_rows: Sequence[AxisRow]) -> np.ndarray:
     """Assign each row of an axis to a group of similar rows.
 
     All rows of a group set the same fields. Within a group, the strings and flags of a field are
@@ -358,11 +358,11 @@ def classify_rows_by_fields(axis_rows: Sequence[AxisRow]) -> np.ndarray:
     """
     known: dict[tuple[Any, ...], int] = {}
     return np.array(
-        [known.setdefault(_fields_and_texts_of_row(row), len(known)) for row in axis_rows]
+        [known.setdefault(_build_classification_key_of_row(row), len(known)) for row in axis_rows]
     )
 
 
-def _fields_and_texts_of_row(axis_row: AxisRow) -> tuple[Any, ...]:
+def _build_classification_key_of_row(axis_row: AxisRow) -> tuple[Any, ...]:
     return tuple(
         (name, type(value), bool(value) if isinstance(value, float) else value)
         for name, value in axis_row.items()

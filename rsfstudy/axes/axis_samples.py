@@ -13,7 +13,7 @@ import numpy as np
 from scipy.special import ndtr, ndtri
 from scipy.stats import qmc
 
-from rsfstudy.argument_checks import MAX_ITEMS
+from rsfstudy.argument_checks import MAX_ITEMS_OF_LIST_ARGUMENT
 from rsfstudy.errors import InvalidValue
 from rsfstudy.quantities import split_heading_into_name_and_units
 
@@ -64,7 +64,7 @@ def draw_samples(
     if not isinstance(distributions, Mapping) or not distributions:
         raise InvalidValue("distribution", distributions, "must map names to distributions")
     _check_sampling_arguments(distributions, sample_count, seed, method)
-    deviations, correlation = _deviations_and_correlation(distributions, covariance, method)
+    deviations, correlation = _compute_sds_and_correlation_matrix(distributions, covariance, method)
     scores = ndtri(
         _draw_uniform_samples(len(distributions), sample_count, seed, method)
     ) @ _matrix_square_root(correlation)
@@ -95,8 +95,8 @@ def _check_sampling_arguments(
     for name, value, least in (("n", sample_count, 1), ("seed", seed, 0)):
         if not isinstance(value, int | np.integer) or isinstance(value, bool) or value < least:
             raise InvalidValue(name, value, f"must be a whole number, {least} or more")
-    if sample_count > MAX_ITEMS:
-        raise InvalidValue("n", sample_count, f"must be at most {MAX_ITEMS:,}")
+    if sample_count > MAX_ITEMS_OF_LIST_ARGUMENT:
+        raise InvalidValue("n", sample_count, f"must be at most {MAX_ITEMS_OF_LIST_ARGUMENT:,}")
     if method in _SOBOL_METHODS and sample_count & (sample_count - 1):
         below = 1 << (int(sample_count).bit_length() - 1)
         rule = "is no power of two, without which Sobol points are not balanced"
@@ -108,7 +108,7 @@ def _check_sampling_arguments(
             raise InvalidValue(name, drawn, rule, remedy="As in scipy.stats.norm(0.01, 0.001).")
 
 
-def _deviations_and_correlation(
+def _compute_sds_and_correlation_matrix(
     distributions: Mapping[str, Any], covariance: Any, method: str
 ) -> tuple[np.ndarray, np.ndarray]:
     """Compute the standard deviations and the correlation matrix."""

@@ -52,7 +52,7 @@ def parse_overrides(study: Study, settings: tuple[str, ...]) -> dict[str, Any]:
     return found
 
 
-def parse_fields(settings: tuple[str, ...]) -> dict[str, Any]:
+def parse_scene_field_assignments(settings: tuple[str, ...]) -> dict[str, Any]:
     """Parse the fields of a scene.
 
     Parameters
@@ -72,7 +72,7 @@ def parse_fields(settings: tuple[str, ...]) -> dict[str, Any]:
     """
     rule = "must read FIELD=VALUE, as in law=slowness"
     given = _parse_each_assignment(settings, lambda text: split_assignment("--set", text, rule))
-    return {name: parse_flag_number_or_text(text) for name, text in given.items()}
+    return {name: parse_boolean_number_or_text(text) for name, text in given.items()}
 
 
 def _parse_each_assignment(
@@ -183,7 +183,7 @@ def parse_cell_coordinate(text: str) -> tuple[str, str]:
     return name, value
 
 
-def split_assignment(option_name: str, text: str, rule: str) -> tuple[str, str]:
+def split_assignment(option_name: str, text: str, format_rule: str) -> tuple[str, str]:
     """Split an assignment at the first equals sign.
 
     Parameters
@@ -192,7 +192,7 @@ def split_assignment(option_name: str, text: str, rule: str) -> tuple[str, str]:
         Name of the option, for the error message.
     text : str
         Assignment such as ``law=slowness``.
-    rule : str
+    format_rule : str
         Description of the expected form, for the error message.
 
     Returns
@@ -207,7 +207,7 @@ def split_assignment(option_name: str, text: str, rule: str) -> tuple[str, str]:
     """
     name, equals, given = (part.strip() for part in text.partition("="))
     if not (name and equals and given):
-        raise InvalidValue(option_name, text, rule)
+        raise InvalidValue(option_name, text, format_rule)
     return name, given
 
 
@@ -264,13 +264,13 @@ def parse_axis_assignment(text: str, known_labels: Collection[str]) -> tuple[str
     if not all(parts):
         raise InvalidValue("--set", text, "leaves a value out")
     if len(parts) > 1:
-        return name, [parse_flag_number_or_text(part) for part in parts]
+        return name, [parse_boolean_number_or_text(part) for part in parts]
     return name, expand_range(
         "--set", text, values
-    ) if ":" in values else parse_flag_number_or_text(values)
+    ) if ":" in values else parse_boolean_number_or_text(values)
 
 
-def parse_flag_number_or_text(text: str) -> Any:
+def parse_boolean_number_or_text(text: str) -> Any:
     """Convert a string to a Boolean or a number if possible.
 
     Parameters

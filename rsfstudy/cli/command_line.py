@@ -36,7 +36,7 @@ EXIT_STATUS_OK, EXIT_STATUS_FAILED, EXIT_STATUS_WRONG_USAGE = 0, 1, 2
 _SIGNALS_THAT_END_COMMAND = (signal.SIGTERM, signal.SIGHUP)
 
 
-class GroupInOrderOfDefinition(click.Group):
+class CommandGroupInDefinitionOrder(click.Group):
     """Command group that lists its commands in the order of definition."""
 
     command_class = options.LazilyLoadedCommand
@@ -83,7 +83,7 @@ class GroupInOrderOfDefinition(click.Group):
 
 
 @click.group(
-    cls=GroupInOrderOfDefinition,
+    cls=CommandGroupInDefinitionOrder,
     context_settings={"help_option_names": ["-h", "--help"], "show_default": True},
     epilog="To begin with: rsfstudy list, then rsfstudy show NAME, then rsfstudy run NAME. "
     "Each command has a --help of its own.",

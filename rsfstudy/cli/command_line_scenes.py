@@ -12,8 +12,8 @@ from typing import Any
 import click
 
 from rsfstudy.cli import options
-from rsfstudy.cli.options import F
-from rsfstudy.defaults import FIT_BUDGET
+from rsfstudy.cli.options import DecoratedFunction
+from rsfstudy.defaults import FIT_EVALUATION_BUDGET
 from rsfstudy.motion import DEFAULT_EVALUATION_BUDGET, DEFAULT_RTOL, ENGINES, SCIPY
 
 
@@ -68,18 +68,18 @@ def _parse_number_or_text(
     return None if text is None else assignment_parsing.parse_number_or_text(text)
 
 
-def _comma_list_option(
+def _make_comma_list_option(
     *option_names: str, help_text: str, default: str | None = None, metavar: str = "TEXT"
-) -> Callable[[F], F]:
+) -> Callable[[DecoratedFunction], DecoratedFunction]:
     """Create an option for a comma-separated list."""
     return click.option(
         *option_names, callback=_split_commas, default=default, metavar=metavar, help=help_text
     )
 
 
-def _quantity_option(
+def _make_quantity_option(
     option_name: str, help_text: str, default: str | None = None
-) -> Callable[[F], F]:
+) -> Callable[[DecoratedFunction], DecoratedFunction]:
     """Create an option for a number with units.
 
     The help text of the option describes the default.
@@ -98,28 +98,32 @@ def _quantity_option(
     "[default: by headings that are known]",
 )
 @click.option("--normal-stress", help="As in '20 MPa', where the record does not hold it.")
-@_quantity_option("--stiffness", "Over normal stress, as in '1.6e-3 /um', or as in '0.03 MPa/um'.")
-@_quantity_option("--slip-distance", "First guess of D_c, as in '10 um'.")
-@_comma_list_option(
+@_make_quantity_option(
+    "--stiffness", "Over normal stress, as in '1.6e-3 /um', or as in '0.03 MPa/um'."
+)
+@_make_quantity_option("--slip-distance", "First guess of D_c, as in '10 um'.")
+@_make_comma_list_option(
     "--law", "laws", default="slip,slowness", help_text="State evolution laws, a fit by each."
 )
-@_comma_list_option(
+@_make_comma_list_option(
     "--free",
     help_text="Parameters to look for, of which each law is fitted with those that it has; also "
     "stiffness, step_time, trend2, alpha; of law=family law_exponent.  [default: a, b (b1 and b2 "
     "of two states), slip_distance (slip_distance_2), mu_star, trend1]",
 )
-@_comma_list_option("--step", "steps", metavar="N,...", help_text="Steps to fit.  [default: all]")
+@_make_comma_list_option(
+    "--step", "steps", metavar="N,...", help_text="Steps to fit.  [default: all]"
+)
 @click.option(
     "--together", is_flag=True, help="Fit these steps, of all RECORDS, as one, by one a, b and D_c."
 )
-@_quantity_option(
+@_make_quantity_option(
     "--before",
     "Load point displacement that is fitted before a step.  [default: half the way back to the "
     "step before]",
     "0 um",
 )
-@_quantity_option(
+@_make_quantity_option(
     "--after", "That after it, as in '250 um'.  [default: up to the next step]", "0 um"
 )
 @options.make_count_option(
@@ -136,7 +140,7 @@ def _quantity_option(
     default="steps",
     help="The load point by its steps, or as it was recorded.",
 )
-@_quantity_option(
+@_make_quantity_option(
     "--averaging",
     "Time over which the data logger averaged friction, as in '1 s', or 'trailing 1 s' if the "
     "average ends at the row.  [default: none]",
@@ -157,7 +161,9 @@ def _quantity_option(
     help="Draws from the posterior, by emcee.  [default: none]",
 )
 @options.make_set_scene_fields_option("A field of the scene that is not looked for, as in a=0.01.")
-@options.make_count_option("--budget", FIT_BUDGET, "Right-hand sides that a fit may evaluate.")
+@options.make_count_option(
+    "--budget", FIT_EVALUATION_BUDGET, "Right-hand sides that a fit may evaluate."
+)
 @click.option(
     "--engine",
     type=click.Choice(ENGINES),

@@ -32,7 +32,7 @@ from rsfstudy.api import (
 )
 from rsfstudy.cli import assignment_parsing, printed_reports
 from rsfstudy.cli.console import stderr_console, stdout_console
-from rsfstudy.cli.cost_estimates import format_duration, missing_packages
+from rsfstudy.cli.cost_estimates import describe_missing_engine_packages, format_duration
 from rsfstudy.cli.export_files import to_csv, to_mat
 from rsfstudy.cli.options import CommandOptions
 from rsfstudy.cli.printed_reports import EXIT_STATUS_FAILED, EXIT_STATUS_OK, RunSummary
@@ -104,7 +104,7 @@ def run(options: CommandOptions) -> int:
         _skip_studies_without_engine(studies) if options.every and options.engine is None else []
     )
     studies = [study for study in studies if study.name not in {end.study for end in left_out}]
-    kept = options.select_options(
+    kept = options.collect_option_values(
         "output", "format", "fresh", "keep_going", "despite_failures", "command_line"
     )
     log = options.output / "workers.log" if options.every else None
@@ -148,7 +148,7 @@ def _skip_studies_without_engine(studies: Sequence[Study]) -> list[RunSummary]:
     """Print and return the studies whose engine is not installed."""
     ends = []
     for study in studies:
-        if why := missing_packages(study.accuracy.engine):
+        if why := describe_missing_engine_packages(study.accuracy.engine):
             stdout_console.print(f"{study.name}: left out: {why}", style="yellow")
             text = f"left out: {why.partition(' (')[0]}"
             ends.append(RunSummary(study.name, "-", text, colour="yellow"))
@@ -214,7 +214,7 @@ def rerun(options: CommandOptions) -> int:
             scene, outcome, there, [str(one.message) for one in caught]
         )
     with _open_worker_pool(options) as where:
-        asked = options.select_options("study", "output", "time_limit") | {
+        asked = options.collect_option_values("study", "output", "time_limit") | {
             "progress": not options.quiet
         }
         table = rerun_file(options.file, workers=where.process_count, client=where.client, **asked)
@@ -278,7 +278,7 @@ def check(options: CommandOptions) -> int:
     for name in _selected_study_names(options):
         if not options.every or (options.output / f"{name}.nc").exists():
             datasets.append(open_results(name, options.output))
-        elif why := missing_packages(load_study(name).accuracy.engine):
+        elif why := describe_missing_engine_packages(load_study(name).accuracy.engine):
             stdout_console.print(f"{name}: left out: {why}", style="yellow")
         else:
             stdout_console.print(f"{name}: not run yet", style="red")
@@ -405,7 +405,7 @@ def _build_study_from_options(study_name: str, options: CommandOptions) -> Study
     texts = {n: t if parse_number(t) is None else f"{t} {in_si[n]}" for n, t in stated.items()}
     changes = texts | assignment_parsing.parse_overrides(study, options.settings)
     return apply_overrides_to_study(
-        study, changes, **options.select_options("rtol", "engine", "budget")
+        study, changes, **options.collect_option_values("rtol", "engine", "budget")
     )
 
 

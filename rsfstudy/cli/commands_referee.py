@@ -70,7 +70,7 @@ def verify(options: CommandOptions) -> int:
         _print_verdict(file, one)
     stdout_console.print(summarise_comparisons(found), style="bold")
     if options.figure is not None:
-        _draw_agreement(found, options.figure)
+        _write_agreement_figure(found, options.figure)
     return (
         printed_reports.EXIT_STATUS_OK
         if all(one.has_required_digits for one in found)
@@ -91,7 +91,7 @@ def _print_verdict(answer_file: Path, comparison: AnswerComparison) -> None:
         stdout_console.print(f"  {comparison.explanation_of_disagreement or unexplained}")
 
 
-def _draw_agreement(comparisons: list[AnswerComparison], figure_path: Path) -> None:
+def _write_agreement_figure(comparisons: list[AnswerComparison], figure_path: Path) -> None:
     """Draw the number of agreeing digits of each quantity.
 
     If a single file is compared and its problem has an index column, the abscissa is the index.

@@ -10,7 +10,7 @@ import xarray as xr
 from rsfstudy import Rig, Scene, plot_motion, read_record
 from rsfstudy import fit as fit_record_fit
 from rsfstudy import simulate as simulated
-from rsfstudy.api import BEYOND_NORM_ATTRIBUTE_NAME
+from rsfstudy.api import BEYOND_INSTABILITY_NORM_ATTRIBUTE_NAME
 from rsfstudy.cli import assignment_parsing, printed_reports, table_layout
 from rsfstudy.cli.console import stdout_console
 from rsfstudy.cli.options import CommandOptions
@@ -32,7 +32,7 @@ from rsfstudy.storage import write_dataset
 
 #: Exit status if the slip rate of a motion exceeds the instability norm without inertia and without
 #: radiation damping.
-_UNPHYSICAL_EXIT_STATUS = 3
+_EXIT_STATUS_UNPHYSICAL_MOTION = 3
 #: Maximum number of steps of a record that are printed.
 _MAX_LISTED_STEPS = 24
 #: Options that are passed to ``rsfstudy.fit`` unchanged.
@@ -58,21 +58,24 @@ def simulate(options: CommandOptions) -> int:
     _check_output_may_be_replaced(options.output.with_suffix(".nc"), is_motion, "motion")
     scene, laboratory = _build_scene_and_rig(options)
     duration, accuracy = _parse_duration(options.duration, laboratory), ("rtol", "budget", "engine")
-    motion = simulated(scene, duration=duration, **options.select_options(*accuracy))
+    motion = simulated(scene, duration=duration, **options.collect_option_values(*accuracy))
     motion = motion.assign_attrs(provenance_attributes(options.command_line))
     _write_motion_and_figure(motion, laboratory, options)
     if motion.attrs["status"] != Status.OK.label:
         return printed_reports.EXIT_STATUS_FAILED
     return (
-        _UNPHYSICAL_EXIT_STATUS
-        if BEYOND_NORM_ATTRIBUTE_NAME in motion.attrs
+        _EXIT_STATUS_UNPHYSICAL_MOTION
+        if BEYOND_INSTABILITY_NORM_ATTRIBUTE_NAME in motion.attrs
         else printed_reports.EXIT_STATUS_OK
     )
 
 
 def _build_scene_and_rig(options: CommandOptions) -> tuple[Scene, Rig | None]:
     """Build the scene, and the rig if the options define a rig."""
-    fields, rig = assignment_parsing.parse_fields(options.settings), options.rig_option_texts
+    fields, rig = (
+        assignment_parsing.parse_scene_field_assignments(options.settings),
+        options.rig_option_texts,
+    )
     if (velocity := rig.pop("load_velocity", None)) is not None:
         fields["load_velocity"] = assignment_parsing.parse_number_or_text(velocity)
     laboratory = assignment_parsing.parse_rig(rig) if rig else None
@@ -137,8 +140,8 @@ def fit(options: CommandOptions) -> int:
         records,
         steps=[_parse_step_number(text) for text in options.steps],
         command=options.command_line,
-        **options.select_options(*_OPTIONS_PASSED_TO_FIT),
-        **assignment_parsing.parse_fields(options.settings),
+        **options.collect_option_values(*_OPTIONS_PASSED_TO_FIT),
+        **assignment_parsing.parse_scene_field_assignments(options.settings),
     )
     dataset = write_dataset(dataset, data)
     save_figure(dataset, options.output)

@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 
 from rsfstudy.errors import InvalidValue
-from rsfstudy.execution import CellPlan, estimate_cost
+from rsfstudy.execution import CellPlan, estimate_evaluations_and_time
 from rsfstudy.motion import COMPILED, SCIPY, check_engine_is_usable
 from rsfstudy.storage import CellTimings, read_timings
 
@@ -20,9 +20,9 @@ from rsfstudy.storage import CellTimings, read_timings
 #: reports factors from 7 to 12 and from 31 to 72. The factors increase with the accuracy.
 _COMPILED_SPEEDUP_BY_MEASURE = {"critical_step": 10, "limit_cycle": 30}
 #: Measure that compares the integrators of SciPy and therefore needs the SciPy engine.
-_SCIPY_ONLY_MEASURE = "work_precision"
+_NAME_OF_MEASURE_REQUIRING_SCIPY_ENGINE = "work_precision"
 #: Minimum computing time in s for which the faster engine is suggested.
-_MIN_TIME_FOR_HINT = 60.0
+_MIN_SECONDS_FOR_FASTER_ENGINE_HINT = 60.0
 
 
 def describe_study_cost(cell_plan: CellPlan, output_directory: Path) -> str:
@@ -41,14 +41,14 @@ def describe_study_cost(cell_plan: CellPlan, output_directory: Path) -> str:
     str
         Number of right-hand-side evaluations, and measured or estimated time.
     """
-    work, guess = estimate_cost(cell_plan)
+    work, guess = estimate_evaluations_and_time(cell_plan)
     work = round(work, 2 - len(str(work)))  # more digits would not be significant
     text = f"about {work:,} right-hand sides at rtol {cell_plan.study.accuracy.rtol:g}; "
     kept = output_directory / f"{cell_plan.study.name}.cells.sqlite"
     took = read_timings(kept)
     if (
         took is None
-        or not _timed_at_same_accuracy_and_engine(cell_plan, took)
+        or not _timings_match_accuracy_and_engine(cell_plan, took)
         or not took.seconds_by_cell_key
     ):
         return (
@@ -89,10 +89,10 @@ def compiled_engine_hint(cell_plan: CellPlan, output_directory: Path) -> str:
     kept = output_directory / f"{cell_plan.study.name}.cells.sqlite"
     saves = (
         engine == SCIPY
-        and measure != _SCIPY_ONLY_MEASURE
-        and estimate_cost(cell_plan)[1] > _MIN_TIME_FOR_HINT
+        and measure != _NAME_OF_MEASURE_REQUIRING_SCIPY_ENGINE
+        and estimate_evaluations_and_time(cell_plan)[1] > _MIN_SECONDS_FOR_FASTER_ENGINE_HINT
     )
-    if not saves or kept.exists() or missing_packages(COMPILED):
+    if not saves or kept.exists() or describe_missing_engine_packages(COMPILED):
         return ""
     if measure in _COMPILED_SPEEDUP_BY_MEASURE:
         return (
@@ -129,7 +129,7 @@ def format_duration(seconds: float) -> str:
     return f"{whole // 3600} h {whole % 3600 // 60} min"
 
 
-def _timed_at_same_accuracy_and_engine(cell_plan: CellPlan, cell_timings: CellTimings) -> bool:
+def _timings_match_accuracy_and_engine(cell_plan: CellPlan, cell_timings: CellTimings) -> bool:
     """Return True if the timings were measured with the same rtol and engine."""
     asked = cell_plan.study.accuracy
     return cell_timings.fingerprint.get("rtol") == asked.rtol and cell_timings.fingerprint.get(
@@ -137,12 +137,12 @@ def _timed_at_same_accuracy_and_engine(cell_plan: CellPlan, cell_timings: CellTi
     ) == (asked.engine)
 
 
-def missing_packages(name: str) -> str:
+def describe_missing_engine_packages(engine_name: str) -> str:
     """Describe the missing packages of an engine.
 
     Parameters
     ----------
-    name : str
+    engine_name : str
         Name of the engine.
 
     Returns
@@ -157,9 +157,9 @@ def missing_packages(name: str) -> str:
         If the engine is unknown.
     """
     try:
-        check_engine_is_usable(name)
+        check_engine_is_usable(engine_name)
     except InvalidValue:
-        if name != COMPILED:
+        if engine_name != COMPILED:
             raise
         return "needs Numba (pip install 'rsfstudy[fast]')"
     return ""

@@ -23,7 +23,7 @@ from rsfstudy.errors import InvalidValue
 from rsfstudy.motion import ENGINES
 from rsfstudy.path_checks import check_path
 
-F = TypeVar("F", bound=Callable[..., Any])
+DecoratedFunction = TypeVar("DecoratedFunction", bound=Callable[..., Any])
 
 
 class CommandOptions(SimpleNamespace):
@@ -38,7 +38,7 @@ class CommandOptions(SimpleNamespace):
         """Command line that the user entered."""
         return shlex.join(["rsfstudy", *sys.argv[1:]])
 
-    def select_options(self, *option_names: str) -> dict[str, Any]:
+    def collect_option_values(self, *option_names: str) -> dict[str, Any]:
         """Return the values of selected options.
 
         Parameters
@@ -143,7 +143,9 @@ class FilePath(click.Path):
         return super().convert(value, param, ctx)
 
 
-def combine_options(*option_decorators: Callable[[Any], Any]) -> Callable[[F], F]:
+def combine_option_decorators(
+    *option_decorators: Callable[[Any], Any],
+) -> Callable[[DecoratedFunction], DecoratedFunction]:
     """Combine several option decorators into one decorator.
 
     Parameters
@@ -162,7 +164,9 @@ def combine_options(*option_decorators: Callable[[Any], Any]) -> Callable[[F], F
     )
 
 
-def make_count_option(option_name: str, default: int | None, help_text: str) -> Callable[[F], F]:
+def make_count_option(
+    option_name: str, default: int | None, help_text: str
+) -> Callable[[DecoratedFunction], DecoratedFunction]:
     """Create an option whose value is a positive integer.
 
     Parameters
@@ -185,7 +189,7 @@ def make_count_option(option_name: str, default: int | None, help_text: str) -> 
 
 def make_output_option(
     help_text: str, default: Path | None = None, **path_settings: bool
-) -> Callable[[F], F]:
+) -> Callable[[DecoratedFunction], DecoratedFunction]:
     """Create the option ``--output``.
 
     Parameters
@@ -205,7 +209,7 @@ def make_output_option(
     return click.option("--output", type=FilePath(**path_settings), default=default, help=help_text)
 
 
-study_name_or_all_argument = combine_options(
+study_name_or_all_argument = combine_option_decorators(
     click.argument("name", required=False),
     click.option("--all", "every", is_flag=True, help="Every named study."),
 )
@@ -238,7 +242,7 @@ budget_option = make_count_option(
     "[default: the study's, 500000]",
 )
 #: Options of the worker pool that computes the cells.
-worker_options = combine_options(
+worker_options = combine_option_decorators(
     make_count_option("--workers", 2, "Worker processes of this machine."),
     click.option("--serial", is_flag=True, help="Compute in this process."),
     click.option("--scheduler", metavar="ADDRESS", help="Use an existing Dask cluster."),
@@ -287,7 +291,7 @@ def _check_style_option(
 
 
 #: Options for the format and the style of figures.
-figure_options = combine_options(
+figure_options = combine_option_decorators(
     click.option(
         "--figure",
         "form",
@@ -322,7 +326,9 @@ def _check_image_path(
     return value
 
 
-def make_image_option(option_name: str, default: Path | None, help_text: str) -> Callable[[F], F]:
+def make_image_option(
+    option_name: str, default: Path | None, help_text: str
+) -> Callable[[DecoratedFunction], DecoratedFunction]:
     """Create an option for the path of an image file.
 
     Parameters
@@ -345,7 +351,9 @@ def make_image_option(option_name: str, default: Path | None, help_text: str) ->
     )
 
 
-def make_set_scene_fields_option(help_text: str) -> Callable[[F], F]:
+def make_set_scene_fields_option(
+    help_text: str,
+) -> Callable[[DecoratedFunction], DecoratedFunction]:
     """Create the option ``--set`` for the fields of a single scene.
 
     Parameters
@@ -377,7 +385,7 @@ EXAMPLE_VALUES_OF_RIG_OPTIONS = {
 
 _RIG_OPTION_HELP = "Of the rig, as in '{}'; a plain number is in SI units."
 #: Options that define a rig.
-rig_options = combine_options(
+rig_options = combine_option_decorators(
     *(
         click.option(f"--{n.replace('_', '-')}", help=_RIG_OPTION_HELP.format(e))
         for n, e in EXAMPLE_VALUES_OF_RIG_OPTIONS.items()

@@ -161,7 +161,7 @@ class RunSummary:
     ----------
     study : str
         Name of the study.
-    time : str
+    elapsed_time_text : str
         Elapsed time.
     status : str, default: "ok"
         "ok", or a description of the failures.
@@ -172,7 +172,7 @@ class RunSummary:
     """
 
     study: str
-    time: str
+    elapsed_time_text: str
     status: str = "ok"
     verdicts: str = "-"
     colour: str = "red"
@@ -256,7 +256,7 @@ def print_short_run_report(
         *([f"not as declared: {format_overrides(overrides)}"] if overrides else []),
         *summarise_study_as_text_lines(dataset),
         f"claims: {summary_of_run.verdicts}",
-        f"in {summary_of_run.time}, wrote {' and '.join(map(str, written_files))}",
+        f"in {summary_of_run.elapsed_time_text}, wrote {' and '.join(map(str, written_files))}",
     ):
         stdout_console.print(f"  {line}", soft_wrap=True)
     _print_unexpected_verdicts(check(dataset))

@@ -56,13 +56,13 @@ from rsfstudy.status import Status
 
 #: Number of right-hand-side evaluations, at a tolerance of 1e-5, after which the search for the
 #: start of a critical path is abandoned.
-_PATH_EVALUATION_BUDGET = 1_500
+_MAX_EVALUATIONS_OF_PATH_START_SEARCH = 1_500
 #: Value of ln(V/V_*) below which the integration of a critical path is abandoned. The slip rate is
 #: about 1e-100 V_*.
 _MIN_LOG_SLIP_RATE = -230.0
 #: Distance in ln V above the instability norm at which a path is considered to touch the norm from
 #: above.
-_LOG_RATE_OFFSET_ABOVE_NORM = 1e-6
+_LOG_RATE_OFFSET_ABOVE_INSTABILITY_NORM = 1e-6
 
 
 class CriticalPath(NamedTuple):
@@ -70,38 +70,38 @@ class CriticalPath(NamedTuple):
 
     Parameters
     ----------
-    log_slip_rate_at_norm : float
+    log_slip_rate_at_instability_norm : float
         Value of ln(V/V_*) at the instability norm.
     min_frictional_stress : float
         Frictional stress at which the normal stress vanishes, in units of sigma_*.
-    radiated_stress_at_norm : float
+    radiated_stress_at_instability_norm : float
         Stress that seismic waves radiate at the instability norm, in units of sigma_*.
-    unknowns_after_step : tuple of float
+    spring_stress_and_states_after_step : tuple of float
         Spring stress and states immediately after the step.
     parameters : tuple of float
         Parameters of the scene.
-    solve_tangency : callable
-        Function ``(x, weakest, p) -> (g, Psi)``. See ``_build_tangency_solver``.
-    evaluate_point : callable
+    tangency_point_solver : callable
+        Function ``(x, weakest, p) -> (g, Psi)``. See ``_build_tangency_point_solver``.
+    motion_point_evaluator : callable
         Function ``(state, p) -> MotionPoint``.
     motion_driver : MotionDriver
         Driver that integrates the path.
     engine : str
         Name of the engine that integrates the path.
-    has_single_state : bool
+    has_single_state_variable : bool
         True if the scene has one state. Scenes with several states have no critical path.
     """
 
-    log_slip_rate_at_norm: float
+    log_slip_rate_at_instability_norm: float
     min_frictional_stress: float
-    radiated_stress_at_norm: float
-    unknowns_after_step: Numbers
+    radiated_stress_at_instability_norm: float
+    spring_stress_and_states_after_step: Numbers
     parameters: Numbers
-    solve_tangency: Function
-    evaluate_point: Function
+    tangency_point_solver: Function
+    motion_point_evaluator: Function
     motion_driver: MotionDriver
     engine: str
-    has_single_state: bool
+    has_single_state_variable: bool
 
     @classmethod
     def from_scene(cls, scene: Scene, engine: str = SCIPY) -> CriticalPath:
@@ -123,7 +123,7 @@ class CriticalPath(NamedTuple):
         weakest = scene.parts.normal_stress.min_frictional_stress(scene)
         begin = (scene.spring_stress_step, *(0.0,) * scene.state_count)
         tangency, planar = (
-            _build_tangency_solver(scene.equation_functions.friction_functions),
+            _build_tangency_point_solver(scene.equation_functions.friction_functions),
             scene.state_count == 1,
         )
         return cls(
@@ -132,10 +132,10 @@ class CriticalPath(NamedTuple):
             scene.dynamics.radiated_stress(x),
             begin,
             slow.parameters,
-            scalar_function_for_engine(tangency, engine, x, x, slow.parameters)
+            prepare_scalar_function_for_engine(tangency, engine, x, x, slow.parameters)
             if planar
             else tangency,
-            build_point_evaluator(slow.rate_function, slow.point_function),
+            build_motion_point_evaluator(slow.rate_function, slow.point_function),
             MotionDriver(slow, engine=engine),
             engine,
             planar,
@@ -160,26 +160,28 @@ class CriticalPath(NamedTuple):
         return self._replace(parameters=tuple(p))
 
     @property
-    def tangency_point(self) -> tuple[float, float] | None:
+    def tangency_point_at_instability_norm(self) -> tuple[float, float] | None:
         """Spring stress f and state Psi at the tangency point.
 
         At the tangency point, ln V equals the instability norm, and the time derivative of ln V is
         zero. The spring stress is the sum of frictional stress and radiated stress. The result is
         None if the scene has no tangency point, or if the scene has several states.
         """
-        if not self.has_single_state:
+        if not self.has_single_state_variable:
             return None
-        g, psi = self.solve_tangency(
-            self.log_slip_rate_at_norm, (1.0 - 1e-6) * self.min_frictional_stress, self.parameters
+        g, psi = self.tangency_point_solver(
+            self.log_slip_rate_at_instability_norm,
+            (1.0 - 1e-6) * self.min_frictional_stress,
+            self.parameters,
         )
-        return None if math.isnan(g) else (g + self.radiated_stress_at_norm, psi)
+        return None if math.isnan(g) else (g + self.radiated_stress_at_instability_norm, psi)
 
     def find_start_point(
         self,
         tolerance: float,
         work_meter: WorkMeter,
         crossing_quantity_and_level: tuple[str, float],
-        is_start: Callable[[MotionPoint], bool],
+        is_start_of_step: Callable[[MotionPoint], bool],
     ) -> MotionPoint | None:
         """Integrate the path backwards to the start of a step.
 
@@ -191,7 +193,7 @@ class CriticalPath(NamedTuple):
             Counter of right-hand-side evaluations.
         crossing_quantity_and_level : tuple of str and float
             Quantity and level that define the start.
-        is_start : callable
+        is_start_of_step : callable
             Function that returns True if a point at the crossing is the start of the requested
             step.
 
@@ -203,7 +205,7 @@ class CriticalPath(NamedTuple):
         """
         above = rise(
             "log_slip_rate",
-            self.log_slip_rate_at_norm + _LOG_RATE_OFFSET_ABOVE_NORM,
+            self.log_slip_rate_at_instability_norm + _LOG_RATE_OFFSET_ABOVE_INSTABILITY_NORM,
             terminal=True,
             may_defer=True,
         )
@@ -215,7 +217,7 @@ class CriticalPath(NamedTuple):
             fall(*crossing_quantity_and_level),
         )
         for event in self._iterate_events_along_path(tolerance, work_meter, specs, backward=True):
-            if event.specification in specs[2:] and is_start(event.point):
+            if event.specification in specs[2:] and is_start_of_step(event.point):
                 return event.point
         return None
 
@@ -233,10 +235,10 @@ class CriticalPath(NamedTuple):
         exceeded. This budget depends on the tolerance in the same way as the number of evaluations
         of an order-eight integrator.
         """
-        start = self.tangency_point
+        start = self.tangency_point_at_instability_norm
         if start is None:
             return
-        enough = round(_PATH_EVALUATION_BUDGET * math.pow(1e-5 / tolerance, 0.125))
+        enough = round(_MAX_EVALUATIONS_OF_PATH_START_SEARCH * math.pow(1e-5 / tolerance, 0.125))
         try:
             yield from self.motion_driver.iterate_events(
                 start,
@@ -251,7 +253,9 @@ class CriticalPath(NamedTuple):
             if halt.status is Status.WORK_BUDGET_SPENT:
                 raise
 
-    def state_misfit_at_start(self, tolerance: float, work_meter: WorkMeter) -> float | None:
+    def compute_state_misfit_at_path_start(
+        self, tolerance: float, work_meter: WorkMeter
+    ) -> float | None:
         """Compute the misfit of the state at the start of the path.
 
         The misfit is the value of Psi/a where the path passes the initial slip rate of the motion.
@@ -271,8 +275,10 @@ class CriticalPath(NamedTuple):
             Misfit, or None if the path does not pass the initial slip rate in the same direction as
             the motion.
         """
-        given = self.unknowns_after_step, self.parameters
-        begin = scalar_function_for_engine(self.evaluate_point, self.engine, *given)(*given)
+        given = self.spring_stress_and_states_after_step, self.parameters
+        begin = prepare_scalar_function_for_engine(
+            self.motion_point_evaluator, self.engine, *given
+        )(*given)
         if begin.log_slip_rate_derivative == 0.0:
             return None
         start = self.find_start_point(
@@ -283,7 +289,9 @@ class CriticalPath(NamedTuple):
         )
         return None if start is None else start.psi / self.parameters[A]
 
-    def norm_misfit_of_next_peak(self, tolerance: float, work_meter: WorkMeter) -> float | None:
+    def compute_next_peak_height_above_norm(
+        self, tolerance: float, work_meter: WorkMeter
+    ) -> float | None:
         """Compute the height of the next ln V peak above the instability norm.
 
         The motion starts at the tangency point and is integrated forwards for one orbit. The misfit
@@ -301,12 +309,12 @@ class CriticalPath(NamedTuple):
         float or None
             Misfit, or None if ln V has no further peak.
         """
-        for event in self._iterate_return_events(tolerance, work_meter):
+        for event in self._iterate_events_after_fall_below_load_rate(tolerance, work_meter):
             if event.kind is EventKind.MAXIMUM:
-                return event.point.log_slip_rate - self.log_slip_rate_at_norm
+                return event.point.log_slip_rate - self.log_slip_rate_at_instability_norm
         return None
 
-    def exceeds_norm_on_return(self, tolerance: float, work_meter: WorkMeter) -> bool:
+    def next_peak_exceeds_norm(self, tolerance: float, work_meter: WorkMeter) -> bool:
         """Return True if the next peak of ln V exceeds the instability norm.
 
         If the next peak of ln V exceeds the instability norm, other motions may reach the norm at
@@ -324,17 +332,20 @@ class CriticalPath(NamedTuple):
         bool
             True if ln V rises above the norm after the motion has left the tangency point.
         """
-        beyond = rise("log_slip_rate", self.log_slip_rate_at_norm + _LOG_RATE_OFFSET_ABOVE_NORM)
-        for event in self._iterate_return_events(tolerance, work_meter, beyond):
+        beyond = rise(
+            "log_slip_rate",
+            self.log_slip_rate_at_instability_norm + _LOG_RATE_OFFSET_ABOVE_INSTABILITY_NORM,
+        )
+        for event in self._iterate_events_after_fall_below_load_rate(tolerance, work_meter, beyond):
             if event.kind in (EventKind.RISE, EventKind.MAXIMUM):
                 # A time step may contain the rise above the norm and the following peak.
                 return (
                     event.kind is EventKind.RISE
-                    or event.point.log_slip_rate > self.log_slip_rate_at_norm
+                    or event.point.log_slip_rate > self.log_slip_rate_at_instability_norm
                 )
         return False
 
-    def _iterate_return_events(
+    def _iterate_events_after_fall_below_load_rate(
         self, tolerance: float, work_meter: WorkMeter, *event_specs: EventSpecification
     ) -> Iterator[Event]:
         """Yield the events of the forward motion after V has fallen below V_0.
@@ -354,7 +365,7 @@ class CriticalPath(NamedTuple):
 
 
 @cache
-def _build_tangency_solver(friction_functions: FrictionFunctions) -> Function:
+def _build_tangency_point_solver(friction_functions: FrictionFunctions) -> Function:
     r"""Build the function that solves for the tangency point.
 
     The function ``(x, weakest, p) -> (g, Psi)`` returns the frictional stress and the state at
@@ -400,7 +411,7 @@ def _build_tangency_solver(friction_functions: FrictionFunctions) -> Function:
 
 
 @cache
-def build_point_evaluator(rate_function: Function, point_function: Function) -> Function:
+def build_motion_point_evaluator(rate_function: Function, point_function: Function) -> Function:
     """Build a function ``(state, p) -> MotionPoint`` that evaluates a point."""
 
     def at(state: Numbers, p: Numbers) -> MotionPoint:
@@ -410,7 +421,7 @@ def build_point_evaluator(rate_function: Function, point_function: Function) -> 
     return at
 
 
-def scalar_function_for_engine(
+def prepare_scalar_function_for_engine(
     function: Callable[..., Any], engine: str, *arguments: float | Numbers
 ) -> Any:
     """Compile a function if the engine is the compiled engine.

@@ -20,14 +20,14 @@ from rsfstudy.motion import MIN_LOCAL_TOLERANCE, Accuracy, WorkMeter, estimate_e
 
 #: Minimum error estimate, as a fraction of the requested relative accuracy, because two
 #: integrations of a path may have the same error by chance.
-_ERROR_FLOOR_OVER_RTOL = 0.004
+_MIN_ESTIMATED_ERROR_OVER_RTOL = 0.004
 
 #: Maximum number of integrations of a path with successively smaller local tolerances.
-_MAX_TOLERANCES_PER_BOUNDARY = 5
+_MAX_LOCAL_TOLERANCES_TRIED_PER_PATH = 5
 
 
 @dataclass(frozen=True)
-class StepBoundary:
+class CriticalStepSizeEstimate:
     """Unverified boundary between stable and unstable step sizes.
 
     Parameters
@@ -36,7 +36,7 @@ class StepBoundary:
         Size of the step. See ``StepFamily``.
     relative_error : float
         Relative error of the size.
-    found_from_motions : bool, default: False
+    found_from_forward_motions : bool, default: False
         True if the boundary was computed from motions that are integrated forwards in time.
     found_from_limit_cycle : bool, default: False
         True if a limit cycle touches the instability norm at the boundary.
@@ -44,13 +44,13 @@ class StepBoundary:
 
     step_size: float
     relative_error: float
-    found_from_motions: bool = False
+    found_from_forward_motions: bool = False
     found_from_limit_cycle: bool = False
 
 
 def find_boundary_by_critical_path(
     step_family: StepFamily, accuracy: Accuracy, work_meter: WorkMeter
-) -> StepBoundary | None:
+) -> CriticalStepSizeEstimate | None:
     """Find the critical step size from the critical path.
 
     The boundary is rejected if smaller steps may be unstable. Smaller steps may be unstable if
@@ -83,7 +83,7 @@ def find_boundary_by_critical_path(
         return boundary
     return (
         None
-        if CriticalPath.from_scene(scene, work_meter.engine).exceeds_norm_on_return(
+        if CriticalPath.from_scene(scene, work_meter.engine).next_peak_exceeds_norm(
             LOCAL_TOLERANCE_OF_FIRST_ROOT, work_meter
         )
         else boundary
@@ -92,7 +92,7 @@ def find_boundary_by_critical_path(
 
 def find_boundary_by_limit_cycle(
     step_family: StepFamily, accuracy: Accuracy, work_meter: WorkMeter
-) -> StepBoundary | None:
+) -> CriticalStepSizeEstimate | None:
     """Find the step size at which a limit cycle touches the instability norm.
 
     A limit cycle can touch the instability norm if larger steps make steady sliding less stable,
@@ -131,7 +131,7 @@ def _find_boundary_with_error(
     find_sizes_by_tolerance: Callable[[Iterable[float], WorkMeter], Iterator[float]],
     accuracy: Accuracy,
     work_meter: WorkMeter,
-) -> StepBoundary | None:
+) -> CriticalStepSizeEstimate | None:
     """Find a boundary, and estimate its error from runs with several tolerances.
 
     The path is integrated with decreasing tolerances until the difference between two runs is
@@ -146,8 +146,8 @@ def _find_boundary_with_error(
     ):
         if not step_family.min_size <= size <= step_family.max_size:
             break
-        error = estimate_error(size, refined, _ERROR_FLOOR_OVER_RTOL * accuracy.rtol) / size
-        boundary = StepBoundary(size, error + of_path)
+        error = estimate_error(size, refined, _MIN_ESTIMATED_ERROR_OVER_RTOL * accuracy.rtol) / size
+        boundary = CriticalStepSizeEstimate(size, error + of_path)
         if error <= step_family.size_rtol_for_value_rtol(size, accuracy.rtol):
             break
     return boundary
@@ -155,7 +155,7 @@ def _find_boundary_with_error(
 
 def _decreasing_local_tolerances(accuracy: Accuracy) -> Iterator[float]:
     """Yield local tolerances, each a tenth of the previous tolerance."""
-    for _ in range(_MAX_TOLERANCES_PER_BOUNDARY):
+    for _ in range(_MAX_LOCAL_TOLERANCES_TRIED_PER_PATH):
         if accuracy.local_tolerance > MIN_LOCAL_TOLERANCE:
             yield accuracy.local_tolerance
         accuracy = accuracy.refined()

@@ -23,19 +23,23 @@ from scipy.optimize import toms748
 
 from rsfstudy.critical_steps import motion_after_step
 from rsfstudy.critical_steps.critical_path_solution import (
-    StepBoundary,
+    CriticalStepSizeEstimate,
     find_boundary_by_critical_path,
     find_boundary_by_limit_cycle,
 )
 from rsfstudy.critical_steps.loading_checks import (
+    build_slow_instability_norm_warning,
     check_loading_is_single_step,
     outcome_if_norm_is_below_load_velocity,
-    slow_norm_warning,
 )
 from rsfstudy.critical_steps.shooting_steps import StepFamily
 from rsfstudy.critical_steps.slow_manifold_accuracy import inertia_matters_below_norm
-from rsfstudy.critical_steps.step_types import DisplacementSteps, NormalStressSteps, RateSteps
-from rsfstudy.error_boundary import guard_methods
+from rsfstudy.critical_steps.step_types import (
+    DisplacementStepFamily,
+    LoadVelocityStepFamily,
+    NormalStressStepFamily,
+)
+from rsfstudy.error_boundary import wrap_methods_in_error_boundary
 from rsfstudy.errors import InvalidValue
 from rsfstudy.measure_base import Measure, Outcome
 from rsfstudy.motion import MIN_RTOL, RELATIVE_ROUNDING_ERROR, Accuracy, MotionStopped, WorkMeter
@@ -44,30 +48,30 @@ from rsfstudy.slider import Scene
 from rsfstudy.status import Status
 
 STEP_FAMILY_BY_QUANTITY: Mapping[str, type[StepFamily]] = {
-    "load_velocity_ratio": RateSteps,
-    "displacement_step": DisplacementSteps,
-    "normal_stress_step": NormalStressSteps,
+    "load_velocity_ratio": LoadVelocityStepFamily,
+    "displacement_step": DisplacementStepFamily,
+    "normal_stress_step": NormalStressStepFamily,
 }
 STEP_DIRECTIONS = ("up", "down")
 #: Aliases of the keys of ``STEP_FAMILY_BY_QUANTITY``, which are names of scene fields.
 QUANTITY_ALIASES: Mapping[str, str] = {"velocity_step": "load_velocity_ratio"}
 
 #: Largest relative accuracy of a boundary at which a limit cycle touches the norm.
-_CYCLE_BOUNDARY_RTOL = 1e-8
+_MAX_RTOL_OF_LIMIT_CYCLE_BOUNDARY = 1e-8
 
 #: Maximum width of a bracket that confirms a critical step, relative to the step size.
-_MAX_CONFIRMED_BRACKET_OVER_SIZE = 0.02
+_MAX_CONFIRMING_BRACKET_OVER_STEP_SIZE = 0.02
 
 #: Excess over the instability norm above which the first peak of a motion exceeds the norm before
 #: the motion can approach a limit cycle.
-_EXCESS_OF_PEAK_BEYOND_TOUCHING_CYCLE = 0.1
+_MIN_EXCESS_IF_FIRST_PEAK_REACHES_NORM = 0.1
 
 #: Slip rate norm at which the effect of inertia is negligible.
-_NORM_WITH_NEGLIGIBLE_INERTIA = 1e-3
+_INSTABILITY_NORM_WITH_NEGLIGIBLE_INERTIA = 1e-3
 
 
 @cache
-def _outputs_for_quantity(quantity: str) -> tuple[Output, ...]:
+def _build_outputs_for_step_quantity(quantity: str) -> tuple[Output, ...]:
     """Return the outputs of a critical step of a given type."""
     critical = STEP_FAMILY_BY_QUANTITY[quantity].critical_output_name
     confirmed = (f"{critical}_stable", f"{critical}_unstable")
@@ -79,7 +83,7 @@ def _outputs_for_quantity(quantity: str) -> tuple[Output, ...]:
     return Output(critical, error=True), *map(Output, beside)
 
 
-@guard_methods
+@wrap_methods_in_error_boundary
 @dataclass(frozen=True)
 class CriticalStep(Measure):
     r"""Smallest step after which slip rate reaches the instability norm.
@@ -159,7 +163,7 @@ class CriticalStep(Measure):
     @property
     def outputs(self) -> Sequence[Output]:
         """Critical step, the two confirming steps, and additional results."""
-        return _outputs_for_quantity(self.of)
+        return _build_outputs_for_step_quantity(self.of)
 
     @property
     def solved_fields(self) -> tuple[str, ...]:
@@ -245,7 +249,7 @@ class CriticalStep(Measure):
             return self._search_critical_step_upward(steps, accuracy, meter)
         if not inertia_matters_below_norm(scene, accuracy):
             # A limit cycle attracts nearby paths weakly, so its boundary needs a smaller tolerance.
-            rtols = accuracy.rtol, min(accuracy.rtol, _CYCLE_BOUNDARY_RTOL)
+            rtols = accuracy.rtol, min(accuracy.rtol, _MAX_RTOL_OF_LIMIT_CYCLE_BOUNDARY)
             for find, rtol in zip(
                 (find_boundary_by_critical_path, find_boundary_by_limit_cycle), rtols, strict=True
             ):
@@ -268,7 +272,7 @@ class CriticalStep(Measure):
     def _confirm_boundary_by_motions(
         self,
         step_family: StepFamily,
-        boundary: StepBoundary,
+        boundary: CriticalStepSizeEstimate,
         accuracy: Accuracy,
         work_meter: WorkMeter,
     ) -> Outcome:
@@ -283,35 +287,37 @@ class CriticalStep(Measure):
         """
         first = (
             boundary.relative_error
-            if boundary.found_from_motions
+            if boundary.found_from_forward_motions
             else 3.0 * boundary.relative_error
         )
         first = width = max(first, accuracy.rtol)
-        while width < _MAX_CONFIRMED_BRACKET_OVER_SIZE:
+        while width < _MAX_CONFIRMING_BRACKET_OVER_STEP_SIZE:
             inner, outer = boundary.step_size * (1.0 - width), boundary.step_size * (1.0 + width)
             below, above = (
-                _excess_after_step_of_size(step_family, size, accuracy, work_meter)
+                _compute_excess_over_norm_after_step(step_family, size, accuracy, work_meter)
                 for size in (inner, outer)
             )
             if below is not None and above is not None and above >= 0.0 > below:
-                at_once = width == first and not boundary.found_from_motions
+                at_once = width == first and not boundary.found_from_forward_motions
                 relative = boundary.relative_error if at_once else width
-                error = step_family.user_value_error(boundary.step_size, relative)
+                error = step_family.compute_field_value_error(boundary.step_size, relative)
                 values = self._output_values(
                     step_family,
                     boundary.step_size,
                     error,
-                    step_family.user_value_of_step(inner),
-                    step_family.user_value_of_step(outer),
+                    step_family.step_size_to_field_value(inner),
+                    step_family.step_size_to_field_value(outer),
                 )
                 load = step_family.scene_with_step(boundary.step_size).load_velocity
-                return Outcome(Status.OK, values, slow_norm_warning(step_family.scene, load))
-            if not (boundary.found_from_motions or boundary.found_from_limit_cycle):
+                return Outcome(
+                    Status.OK, values, build_slow_instability_norm_warning(step_family.scene, load)
+                )
+            if not (boundary.found_from_forward_motions or boundary.found_from_limit_cycle):
                 break
             if (
                 boundary.found_from_limit_cycle
                 and below is not None
-                and below > _EXCESS_OF_PEAK_BEYOND_TOUCHING_CYCLE
+                and below > _MIN_EXCESS_IF_FIRST_PEAK_REACHES_NORM
             ):
                 break
             width *= 10.0
@@ -319,7 +325,8 @@ class CriticalStep(Measure):
             Status.UNVERIFIED,
             self._output_values(step_family),
             "no bracket within 2 % confirms "
-            f"{self.primary_output} = {step_family.user_value_of_step(boundary.step_size):.9g}",
+            f"{self.primary_output} = "
+            f"{step_family.step_size_to_field_value(boundary.step_size):.9g}",
         )
 
     def _output_values(
@@ -333,7 +340,7 @@ class CriticalStep(Measure):
         """Return the results by name, with NaN for missing results."""
         of = self.primary_output
         return {
-            of: step_family.user_value_of_step(step_size),
+            of: step_family.step_size_to_field_value(step_size),
             f"{of}_error": value_error,
             f"{of}_stable": stable_value,
             f"{of}_unstable": unstable_value,
@@ -371,10 +378,11 @@ class CriticalStep(Measure):
             return Outcome(
                 Status.UNSTABLE_AT_ANY_STEP,
                 self._output_values(
-                    step_family, unstable_value=step_family.user_value_of_step(step_family.min_size)
+                    step_family,
+                    unstable_value=step_family.step_size_to_field_value(step_family.min_size),
                 ),
                 "already a step to "
-                f"{step_family.user_value_of_step(step_family.min_size):.6g} is unstable",
+                f"{step_family.step_size_to_field_value(step_family.min_size):.6g} is unstable",
             )
         return self._refine_size_bracket(step_family, (stable, unstable), accuracy, work_meter)
 
@@ -398,7 +406,7 @@ class CriticalStep(Measure):
 
         def excess(log_size: float) -> float:
             nonlocal stable, unstable
-            found = motion_after_step.motion_excess_over_norm(
+            found = motion_after_step.compute_excess_over_instability_norm(
                 step_family.scene_with_step(math.exp(log_size)), accuracy, work_meter
             )
             if found >= 0.0:
@@ -412,7 +420,7 @@ class CriticalStep(Measure):
         except MotionStopped as halt:
             if halt.status is Status.WORK_BUDGET_SPENT:
                 raise
-            if unstable - stable > _MAX_CONFIRMED_BRACKET_OVER_SIZE:
+            if unstable - stable > _MAX_CONFIRMING_BRACKET_OVER_STEP_SIZE:
                 return self._no_critical_step_outcome(
                     step_family, math.exp(log_size_bracket[0]), work_meter, f", where {halt}"
                 )
@@ -424,7 +432,7 @@ class CriticalStep(Measure):
             accuracy.rtol + step_family.size_error_if_neutrally_stable(size, accuracy.rtol),
             unstable - stable,
         )
-        boundary = StepBoundary(size, error, found_from_motions=True)
+        boundary = CriticalStepSizeEstimate(size, error, found_from_forward_motions=True)
         return self._confirm_boundary_by_motions(
             step_family, boundary, accuracy.refined(), work_meter
         )
@@ -444,12 +452,12 @@ class CriticalStep(Measure):
             return Outcome(
                 Status.NORM_UNREACHABLE,
                 self._output_values(
-                    step_family, stable_value=step_family.user_value_of_step(largest_size)
+                    step_family, stable_value=step_family.step_size_to_field_value(largest_size)
                 ),
                 f"mass keeps every slip rate below the norm {step_family.scene.instability_norm:g}",
             )
         if step_family.largest_step_reaches_norm and not step_family.scene.has_mass and not reason:
-            value = step_family.user_value_of_step(largest_size)
+            value = step_family.step_size_to_field_value(largest_size)
             values = self._output_values(
                 step_family, largest_size, largest_size * RELATIVE_ROUNDING_ERROR, value, value
             )
@@ -459,14 +467,14 @@ class CriticalStep(Measure):
         return Outcome(
             Status.STABLE_FOR_ALL_STEPS,
             self._output_values(
-                step_family, stable_value=step_family.user_value_of_step(largest_size)
+                step_family, stable_value=step_family.step_size_to_field_value(largest_size)
             ),
             "stable for every step up to "
-            f"{step_family.user_value_of_step(largest_size):.6g}{reason}",
+            f"{step_family.step_size_to_field_value(largest_size):.6g}{reason}",
         )
 
 
-def _excess_after_step_of_size(
+def _compute_excess_over_norm_after_step(
     step_family: StepFamily, step_size: float, accuracy: Accuracy, work_meter: WorkMeter
 ) -> float | None:
     """Compute the excess of ln V over the norm after a step of a given size.
@@ -474,7 +482,7 @@ def _excess_after_step_of_size(
     The result is None if the motion cannot continue.
     """
     try:
-        return motion_after_step.motion_excess_over_norm(
+        return motion_after_step.compute_excess_over_instability_norm(
             step_family.scene_with_step(step_size), accuracy, work_meter
         )
     except MotionStopped as halt:
@@ -488,7 +496,7 @@ def _critical_size_without_inertia(step_family: StepFamily, work_meter: WorkMete
 
     The estimate requires few evaluations. The result is None if there is no critical path.
     """
-    norm = min(step_family.scene.instability_norm, _NORM_WITH_NEGLIGIBLE_INERTIA)
+    norm = min(step_family.scene.instability_norm, _INSTABILITY_NORM_WITH_NEGLIGIBLE_INERTIA)
     massless = type(step_family)(
         step_family.scene.without_mass().with_(instability_norm=norm), step_family.sign
     )

@@ -1,8 +1,8 @@
 """Peak slip rate of a motion with a held load point.
 
-The main function is ``peak_log_rate_excess_over_norm``. Spring stress can only decrease while the
-load point is held. With one state variable, the first peak of ln V is also the last peak, because
-the rate at which friction weakens with slip decreases after the peak.
+The main function is ``compute_peak_excess_over_instability_norm``. Spring stress can only decrease
+while the load point is held. With one state variable, the first peak of ln V is also the last peak,
+because the rate at which friction weakens with slip decreases after the peak.
 
 With several state variables, friction may weaken repeatedly. States with b < 0, and pore pressure
 that dilatancy has lowered, weaken friction when the slip rate decreases. The motion is therefore
@@ -46,10 +46,10 @@ _TESTED_LOG_RATE_DECREASES = (0.0, 1.0, 3.0, 10.0, 30.0, 100.0, 300.0)
 _TESTED_LOG_RATE_INCREASES = (1e-4, 1e-3, 1e-2, 0.1, 1.0)
 #: Maximum weakening of friction by the states, as a fraction of the decrease of spring stress, at
 #: which no further peak is possible.
-_MAX_WEAKENING_OVER_UNLOADING = 0.5
+_MAX_WEAKENING_OVER_SPRING_UNLOADING = 0.5
 
 
-def peak_log_rate_excess_over_norm(
+def compute_peak_excess_over_instability_norm(
     scene: Scene, accuracy: Accuracy, work_meter: WorkMeter
 ) -> float:
     """Compute the height of the highest ln V peak above the instability norm.
@@ -85,7 +85,10 @@ def peak_log_rate_excess_over_norm(
     )
     try:
         for event in integrate_events(
-            scene, accuracy, work_meter, _events_at_held_load_point(scene, norm, with_inertia=heavy)
+            scene,
+            accuracy,
+            work_meter,
+            _build_event_specs_for_held_load_point(scene, norm, with_inertia=heavy),
         ):
             if event.kind is EventKind.RISE:
                 return event.point.log_slip_rate_derivative**2
@@ -100,7 +103,7 @@ def peak_log_rate_excess_over_norm(
     return highest - norm
 
 
-def _events_at_held_load_point(
+def _build_event_specs_for_held_load_point(
     scene: Scene, log_slip_rate_at_norm: float, *, with_inertia: bool
 ) -> list[EventSpecification]:
     """Return the events at which the motion is tested.
@@ -151,7 +154,7 @@ def _stays_below_norm(scene: Scene, point: MotionPoint) -> bool:
     raised, least_shift = _bound_pore_pressure_effect(scene, point)
     if point.log_slip_rate + raised >= scene.log_instability_rate:
         return False
-    fallen = scene.stiffness * slope * (1.0 - _MAX_WEAKENING_OVER_UNLOADING)
+    fallen = scene.stiffness * slope * (1.0 - _MAX_WEAKENING_OVER_SPRING_UNLOADING)
     for distance in _TESTED_LOG_RATE_DECREASES:
         x = point.log_slip_rate - distance
         rest = compute_steady_states(scene, x, shift)

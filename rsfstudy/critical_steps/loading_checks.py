@@ -13,7 +13,7 @@ from rsfstudy.status import Status
 #: without an instability.
 _MIN_NORM_OVER_LOAD_VELOCITY = 1e3
 #: Beginning of the warning that the instability norm is a slow slip rate.
-SLOW_NORM_WARNING_PREFIX = "the instability norm "
+SLOW_INSTABILITY_NORM_WARNING_PREFIX = "the instability norm "
 
 
 def check_loading_is_single_step(scene: Scene) -> None:
@@ -64,7 +64,7 @@ def outcome_if_norm_is_below_load_velocity(scene: Scene, load_velocity: float = 
     )
 
 
-def slow_norm_warning(scene: Scene, load_velocity: float) -> str:
+def build_slow_instability_norm_warning(scene: Scene, load_velocity: float) -> str:
     """Return a warning if the instability norm is a slow slip rate.
 
     The norm is slow if it is less than a thousand times the load point velocity. A motion may reach
@@ -90,7 +90,7 @@ def slow_norm_warning(scene: Scene, load_velocity: float) -> str:
     ):
         return ""
     return (
-        f"{SLOW_NORM_WARNING_PREFIX}{scene.instability_norm:g} is a slip rate of "
+        f"{SLOW_INSTABILITY_NORM_WARNING_PREFIX}{scene.instability_norm:g} is a slip rate of "
         f"{rate:.3g} V_*, only "
         f"{rate / load:.3g} times that of the load point: what reaches it may be no instability. "
         f"Give one above {_MIN_NORM_OVER_LOAD_VELOCITY * load:.3g} V_*, of a rig as a "

@@ -29,7 +29,21 @@ from rsfstudy.slider import (
 )
 
 #: Differences ln V_0 - ln V at which the motion is tested for a monotonic rise.
-_TESTED_LOG_RATE_DISTANCES = (10.0, 8.0, 7.0, 6.0, 5.0, 4.0, 3.0, 2.5, 2.0, 1.5, 1.0, 0.5, 0.2)
+_TESTED_LOG_DISTANCES_BELOW_LOAD_RATE = (
+    10.0,
+    8.0,
+    7.0,
+    6.0,
+    5.0,
+    4.0,
+    3.0,
+    2.5,
+    2.0,
+    1.5,
+    1.0,
+    0.5,
+    0.2,
+)
 #: Constants of the test for a monotonic rise. The first number is the lag of the second curve,
 #: relative to the lag that a state at rest would have after a slip of D_c. The second number is the
 #: fraction of the evolution that must remain to cross the curve. The third number is the smallest
@@ -46,10 +60,10 @@ _TESTED_LOG_RATE_DISTANCES = (10.0, 8.0, 7.0, 6.0, 5.0, 4.0, 3.0, 2.5, 2.0, 1.5,
 #: Largest change of ln V over a slip of D_c, relative to the distance from the load point velocity,
 #: at which the test for a monotonic rise is worthwhile. Such a slow motion would take hundreds of
 #: integration steps.
-_MAX_LOG_RATE_GROWTH_OVER_DISTANCE = 0.02
+_MAX_GROWTH_OVER_DISTANCE_TO_LOAD_RATE = 0.02
 
 
-def monotone_rise_events(scene: Scene) -> list[EventSpecification]:
+def build_events_testing_monotone_rise(scene: Scene) -> list[EventSpecification]:
     """Return the events at which to test for a monotonic rise.
 
     Parameters
@@ -67,11 +81,11 @@ def monotone_rise_events(scene: Scene) -> list[EventSpecification]:
     load = scene.log_load_velocity
     if scene.state_count > 1 or scene.has_mass:
         return []
-    if not scene.stiffness < _MAX_LOG_RATE_GROWTH_OVER_DISTANCE * (
+    if not scene.stiffness < _MAX_GROWTH_OVER_DISTANCE_TO_LOAD_RATE * (
         scene.a + scene.dynamics.radiated_stress_slope(load)
     ):
         return []
-    return [rise("log_slip_rate", load - below) for below in _TESTED_LOG_RATE_DISTANCES]
+    return [rise("log_slip_rate", load - below) for below in _TESTED_LOG_DISTANCES_BELOW_LOAD_RATE]
 
 
 def rises_monotonically_to_load_rate(scene: Scene, point: MotionPoint) -> bool:
@@ -93,7 +107,7 @@ def rises_monotonically_to_load_rate(scene: Scene, point: MotionPoint) -> bool:
         True if the motion is between the two curves of the module description, and if motions at
         all tested points cross the curves inwards.
     """
-    change, load = _build_rate_and_lag_change_function(scene), scene.log_load_velocity
+    change, load = _build_log_rate_and_state_lag_derivatives(scene), scene.log_load_velocity
     distance = load - point.log_slip_rate
 
     def farthest(x: float) -> float:
@@ -117,7 +131,7 @@ def rises_monotonically_to_load_rate(scene: Scene, point: MotionPoint) -> bool:
     return True
 
 
-def _build_rate_and_lag_change_function(
+def _build_log_rate_and_state_lag_derivatives(
     scene: Scene,
 ) -> Callable[[float, float], tuple[float, float]]:
     """Build a function that computes the changes of ln V and of the state lag.

@@ -1,6 +1,6 @@
 """Motion after a step, and its peak slip rate relative to the instability norm.
 
-The main functions are ``motion_reaches_norm`` and ``motion_excess_over_norm``.
+The main functions are ``motion_reaches_norm`` and ``compute_excess_over_instability_norm``.
 """
 
 from __future__ import annotations
@@ -10,9 +10,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from rsfstudy.critical_steps.critical_path import CriticalPath
-from rsfstudy.critical_steps.held_load_point import peak_log_rate_excess_over_norm
+from rsfstudy.critical_steps.held_load_point import compute_peak_excess_over_instability_norm
 from rsfstudy.critical_steps.monotone_approach_to_load_rate import (
-    monotone_rise_events,
+    build_events_testing_monotone_rise,
     rises_monotonically_to_load_rate,
 )
 from rsfstudy.critical_steps.slow_manifold_accuracy import inertia_matters_below_norm
@@ -60,7 +60,7 @@ _REQUIRED_EQUAL_PEAKS_IN_A_ROW = 4
 _ASSUMED_LOG_RATE_OVERSHOOT_OF_NORM = 1.0
 #: Distance from steady sliding below which a motion has settled, as a fraction of the largest
 #: distance.
-_SETTLED_FRACTION_OF_MAX_DISTANCE = 1e-3
+_SETTLING_TOLERANCE_OVER_MAX_DISTANCE = 1e-3
 
 _SLIP_RATE_PEAK_EVENT = maximum("log_slip_rate")
 
@@ -92,7 +92,7 @@ class _OrbitOutcome:
         Values of ln V at its peaks.
     reached_norm : bool
         True if the motion has reached the instability norm.
-    point_of_too_slow_growth : MotionPoint, optional
+    point_where_growth_was_too_slow : MotionPoint, optional
         Point at the peak of ln V at which the integration ended, because the orbit grows too
         slowly.
     initial_log_slip_rate : float, default: -inf
@@ -101,7 +101,7 @@ class _OrbitOutcome:
 
     log_slip_rate_peaks: tuple[float, ...]
     reached_norm: bool
-    point_of_too_slow_growth: MotionPoint | None = None
+    point_where_growth_was_too_slow: MotionPoint | None = None
     initial_log_slip_rate: float = -math.inf
 
 
@@ -120,12 +120,14 @@ def motion_reaches_norm(scene: Scene, accuracy: Accuracy, work_meter: WorkMeter)
     Returns
     -------
     bool
-        True if ``motion_excess_over_norm`` is not negative.
+        True if ``compute_excess_over_instability_norm`` is not negative.
     """
-    return motion_excess_over_norm(scene, accuracy, work_meter) >= 0.0
+    return compute_excess_over_instability_norm(scene, accuracy, work_meter) >= 0.0
 
 
-def motion_excess_over_norm(scene: Scene, accuracy: Accuracy, work_meter: WorkMeter) -> float:
+def compute_excess_over_instability_norm(
+    scene: Scene, accuracy: Accuracy, work_meter: WorkMeter
+) -> float:
     """Compute the excess of ln V over the instability norm after the step.
 
     The excess is negative if the slip rate never reaches the instability norm. With inertia, the
@@ -166,7 +168,7 @@ def motion_excess_over_norm(scene: Scene, accuracy: Accuracy, work_meter: WorkMe
     ``held_load_point`` handles held load points.
     """
     if scene.log_load_velocity == -math.inf:
-        return peak_log_rate_excess_over_norm(scene, accuracy, work_meter)
+        return compute_peak_excess_over_instability_norm(scene, accuracy, work_meter)
     steady = _steady_sliding_with_margin(scene)
     norm, heavy = scene.log_instability_rate, inertia_matters_below_norm(scene, accuracy)
     if may_have_closed_orbits(scene) and abs(steady.stability_margin) < accuracy.rtol:
@@ -175,12 +177,12 @@ def motion_excess_over_norm(scene: Scene, accuracy: Accuracy, work_meter: WorkMe
             return top - norm
     first = _follow_one_orbit(scene, steady, None, accuracy, work_meter, with_inertia=heavy)
     reached = first.reached_norm
-    if first.point_of_too_slow_growth is not None:
-        at = first.point_of_too_slow_growth
+    if first.point_where_growth_was_too_slow is not None:
+        at = first.point_where_growth_was_too_slow
         reached = _slow_orbit_grows_to_norm(
             scene, steady, at, accuracy, work_meter, with_inertia=heavy
         )
-    excess = _orbit_excess_over_norm(first, norm, with_inertia=heavy)
+    excess = _compute_peak_excess_of_orbit_over_norm(first, norm, with_inertia=heavy)
     return max(excess, 1e-12) if reached else min(excess, -1e-12)
 
 
@@ -357,7 +359,7 @@ def _orbit_touching_norm_shrinks(scene: Scene, accuracy: Accuracy, work_meter: W
     Paths in a plane cannot cross, so no orbit inside a shrinking orbit reaches the norm.
     """
     path = CriticalPath.from_scene(scene, work_meter.engine)
-    misfit = path.norm_misfit_of_next_peak(accuracy.local_tolerance, work_meter)
+    misfit = path.compute_next_peak_height_above_norm(accuracy.local_tolerance, work_meter)
     return misfit is not None and misfit < -100.0 * accuracy.local_tolerance
 
 
@@ -394,10 +396,10 @@ def _slow_orbit_grows_to_norm(
         )
         if orbit.reached_norm and len(orbit.log_slip_rate_peaks) == 1 and leap > _MIN_LEAP_FACTOR:
             leap = math.sqrt(leap)
-        elif orbit.point_of_too_slow_growth is None:
+        elif orbit.point_where_growth_was_too_slow is None:
             return orbit.reached_norm
         else:
-            start_point = orbit.point_of_too_slow_growth
+            start_point = orbit.point_where_growth_was_too_slow
 
 
 def _follow_one_orbit(
@@ -419,9 +421,9 @@ def _follow_one_orbit(
         if with_inertia
         else [_SLIP_RATE_PEAK_EVENT, rise("log_slip_rate", norm)]
     )
-    levels = monotone_rise_events(scene) if steady_state.is_stable else []
+    levels = build_events_testing_monotone_rise(scene) if steady_state.is_stable else []
     specs += (
-        [approach_to_steady_state(_SETTLED_FRACTION_OF_MAX_DISTANCE), *levels]
+        [approach_to_steady_state(_SETTLING_TOLERANCE_OVER_MAX_DISTANCE), *levels]
         if steady_state.is_stable
         else []
     )
@@ -524,7 +526,7 @@ def _peaks_have_stopped_growing(
     return peaks[-1] - peaks[-2] <= (-slack if linear else slack)
 
 
-def _orbit_excess_over_norm(
+def _compute_peak_excess_of_orbit_over_norm(
     orbit: _OrbitOutcome, log_slip_rate_at_norm: float, *, with_inertia: bool
 ) -> float:
     """Compute an excess over the norm that changes sign at the critical step.

@@ -1,8 +1,8 @@
 """Families of steps, and the shooting method that finds critical steps.
 
 The base class ``StepFamily`` describes all steps of one type and direction, ordered by size. The
-class ``ShootingSteps`` adds the shooting method. The module ``step_types`` contains the concrete
-classes.
+class ``ShootingStepFamily`` adds the shooting method. The module ``step_types`` contains the
+concrete classes.
 """
 
 from __future__ import annotations
@@ -24,12 +24,12 @@ from rsfstudy.slider import Scene, quasi_static_log_slip_rate
 #: Minimum step size of the search, and its maximum as a fraction of the largest step size.
 MIN_STEP_SIZE, _MIN_SIZE_FRACTION = 1e-3, 0.1
 #: Amount of ln V by which the largest step is increased if inertia delays the rise of slip rate.
-LOG_RATE_MARGIN_FOR_INERTIA = 5.0
+LOG_RATE_EXTENSION_OF_MAX_STEP_FOR_INERTIA = 5.0
 #: Largest change of step size by inertia that is neglected, as a fraction of the requested
 #: accuracy.
-INERTIA_TOLERANCE_FRACTION = 0.01
+MAX_NEGLECTED_INERTIA_EFFECT_OVER_RTOL = 0.01
 #: Number of step sizes at which stability is tested, if stability may change repeatedly with size.
-_STABILITY_TESTED_SIZE_COUNT = 24
+_COUNT_OF_STEP_SIZES_TESTED_FOR_STABILITY = 24
 #: Local tolerance of the integrations for the approximate root of the misfit.
 LOCAL_TOLERANCE_OF_FIRST_ROOT = 1e-5
 #: Smallest and largest difference of ln(step size) over which the slope of the misfit is computed.
@@ -40,7 +40,7 @@ _MAX_SECANT_ITERATIONS = 8
 #: size).
 _MAX_STRIDE, _MAX_POSITION = 0.7, 4.0
 #: Number of successive strides without a critical path after which the search is abandoned.
-_MAX_STRIDES_WITHOUT_PATH = 3
+_MAX_SEARCH_STRIDES_WITHOUT_CRITICAL_PATH = 3
 
 
 class StepFamily:
@@ -91,7 +91,7 @@ class StepFamily:
         """
         raise TypeError(f"{type(self).__name__} steps nothing")
 
-    def user_value_of_step(self, step_size: float) -> float:
+    def step_size_to_field_value(self, step_size: float) -> float:
         """Return the value of the scene field for a step of a given size.
 
         Parameters
@@ -106,7 +106,7 @@ class StepFamily:
         """
         raise TypeError(f"{type(self).__name__} steps nothing")
 
-    def user_value_error(self, step_size: float, relative_error: float) -> float:
+    def compute_field_value_error(self, step_size: float, relative_error: float) -> float:
         """Return the error of the step value that results from an error of the size.
 
         Parameters
@@ -119,7 +119,7 @@ class StepFamily:
         Returns
         -------
         float
-            Absolute error of ``user_value_of_step(step_size)``.
+            Absolute error of ``step_size_to_field_value(step_size)``.
         """
         raise TypeError(f"{type(self).__name__} steps nothing")
 
@@ -147,8 +147,8 @@ class StepFamily:
 
         .. math:: \mathrm{rtol}\,\frac{|v(s) - v(0)|}{dv/d\ln s}.
         """
-        change = abs(self.user_value_of_step(step_size) - self.user_value_of_step(0.0))
-        return min(rtol, rtol * change / self.user_value_error(step_size, 1.0))
+        change = abs(self.step_size_to_field_value(step_size) - self.step_size_to_field_value(0.0))
+        return min(rtol, rtol * change / self.compute_field_value_error(step_size, 1.0))
 
     def extra_output_values(self, step_size: float) -> dict[str, float]:
         """Return the additional results for a critical step.
@@ -261,7 +261,9 @@ class StepFamily:
         """
         sizes = [self.min_size, step_size]
         if self.scene.parts.law.steady_states is not None:
-            sizes = np.geomspace(self.min_size, step_size, _STABILITY_TESTED_SIZE_COUNT).tolist()
+            sizes = np.geomspace(
+                self.min_size, step_size, _COUNT_OF_STEP_SIZES_TESTED_FOR_STABILITY
+            ).tolist()
         return all(is_linearly_stable(self.scene_with_step(each)) for each in sizes)
 
     def _compute_max_size(self) -> float:
@@ -288,7 +290,7 @@ def slip_lag_due_to_inertia(scene: Scene) -> tuple[float, float]:
     return scene.stiffness / scene.a * (scene.inertial_time * rate) ** 2, rate
 
 
-class ShootingSteps(StepFamily):
+class ShootingStepFamily(StepFamily):
     """Base class of steps whose critical path depends on the step size.
 
     The critical path depends on the step size if the step changes friction or the load point
@@ -310,7 +312,7 @@ class ShootingSteps(StepFamily):
 
     sign_of_triggering_steps: ClassVar[int]
 
-    def user_value_error(self, step_size: float, relative_error: float) -> float:
+    def compute_field_value_error(self, step_size: float, relative_error: float) -> float:
         """Return the error of the step value, whose logarithm is the size.
 
         See the base class for the parameters.
@@ -329,7 +331,7 @@ class ShootingSteps(StepFamily):
         """
         path_at = self.build_critical_path_factory(work_meter.engine)
         loose = (
-            self._find_loose_misfit_root(path_at, work_meter)
+            self._find_misfit_root_at_loose_tolerance(path_at, work_meter)
             if self.scene.state_count == 1
             else None
         )
@@ -337,7 +339,9 @@ class ShootingSteps(StepFamily):
             yield from _refine_misfit_root(
                 *loose,
                 local_tolerances,
-                lambda size, tolerance: path_at(size).state_misfit_at_start(tolerance, work_meter),
+                lambda size, tolerance: path_at(size).compute_state_misfit_at_path_start(
+                    tolerance, work_meter
+                ),
             )
 
     def build_critical_path_factory(self, engine: str) -> Callable[[float], CriticalPath]:
@@ -368,7 +372,9 @@ class ShootingSteps(StepFamily):
 
         @cache
         def misfit(log_size: float, tolerance: float = LOCAL_TOLERANCE_OF_FIRST_ROOT) -> float:
-            higher = path_at(math.exp(log_size)).norm_misfit_of_next_peak(tolerance, work_meter)
+            higher = path_at(math.exp(log_size)).compute_next_peak_height_above_norm(
+                tolerance, work_meter
+            )
             if higher is None:
                 return math.nan
             found[log_size] = higher
@@ -383,7 +389,7 @@ class ShootingSteps(StepFamily):
                 *root, local_tolerances, lambda size, tolerance: misfit(math.log(size), tolerance)
             )
 
-    def _find_loose_misfit_root(
+    def _find_misfit_root_at_loose_tolerance(
         self, build_critical_path: Callable[[float], CriticalPath], work_meter: WorkMeter
     ) -> tuple[float, float] | None:
         """Return the root of the misfit in ln(step size), and the slope at the root.
@@ -395,11 +401,13 @@ class ShootingSteps(StepFamily):
         @cache
         def misfit(log_size: float) -> float:
             size = math.exp(log_size)
-            state = build_critical_path(size).state_misfit_at_start(
+            state = build_critical_path(size).compute_state_misfit_at_path_start(
                 LOCAL_TOLERANCE_OF_FIRST_ROOT, work_meter
             )
             if state is None:
-                return self._misfit_without_path(self.scene_with_step(size), work_meter)
+                return self._find_misfit_sign_without_critical_path(
+                    self.scene_with_step(size), work_meter
+                )
             found[log_size] = state
             return state
 
@@ -424,13 +432,13 @@ class ShootingSteps(StepFamily):
             fraction = min(max(size, self.min_size) / self.max_size, 0.5)
             return math.log(fraction / (1.0 - fraction))
 
-        lowest, guess = position(self.min_size), position(self._guess_size())
+        lowest, guess = position(self.min_size), position(self._guess_critical_size())
 
         def outwards(*ways: int) -> tuple[float, float] | None:
             ends = dict.fromkeys(ways, (guess, misfit_function(log_size(guess))))
             last = {1: _MAX_POSITION, -1: lowest}
             stride, failures = 0.2, 0
-            while failures < _MAX_STRIDES_WITHOUT_PATH and any(
+            while failures < _MAX_SEARCH_STRIDES_WITHOUT_CRITICAL_PATH and any(
                 ends[way][0] != last[way] for way in ways
             ):
                 for way, (at, value) in ends.items():
@@ -456,11 +464,11 @@ class ShootingSteps(StepFamily):
             return 0
         return int(math.copysign(1.0, misfit_at_guess))
 
-    def _guess_size(self) -> float:
+    def _guess_critical_size(self) -> float:
         """Return the step size at which the search starts."""
         raise TypeError(f"{type(self).__name__} steps nothing")
 
-    def _misfit_without_path(self, scene: Scene, work_meter: WorkMeter) -> float:
+    def _find_misfit_sign_without_critical_path(self, scene: Scene, work_meter: WorkMeter) -> float:
         """Return the sign of the misfit if there is no critical path.
 
         The sign is positive if the motion after the step is stable. The result is NaN if the sign

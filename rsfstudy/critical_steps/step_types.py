@@ -17,11 +17,11 @@ from rsfstudy.critical_steps.motion_after_step import (
     stability_margin,
 )
 from rsfstudy.critical_steps.shooting_steps import (
-    INERTIA_TOLERANCE_FRACTION,
     LOCAL_TOLERANCE_OF_FIRST_ROOT,
-    LOG_RATE_MARGIN_FOR_INERTIA,
+    LOG_RATE_EXTENSION_OF_MAX_STEP_FOR_INERTIA,
+    MAX_NEGLECTED_INERTIA_EFFECT_OVER_RTOL,
     MIN_STEP_SIZE,
-    ShootingSteps,
+    ShootingStepFamily,
     StepFamily,
     slip_lag_due_to_inertia,
 )
@@ -41,7 +41,7 @@ from rsfstudy.status import Status
 MIN_LOAD_VELOCITY = 1e-20
 #: Minimum value of b/a - 1 in the formula of the first guess. The minimum is necessary because some
 #: laws weaken friction although b < a.
-_MIN_B_OVER_A_EXCESS_FOR_GUESS = 1e-6
+_MIN_B_OVER_A_MINUS_ONE_IN_SIZE_GUESS = 1e-6
 #: Largest spring stress after a step, in units of sigma_*.
 _MAX_SPRING_STRESS = 1e6
 _LOG_OF_MAX_FLOAT = math.log(sys.float_info.max)
@@ -54,7 +54,7 @@ _RTOL_OF_MAX_STEP_SIZE = 1e-6
 _MIN_EFFECTIVE_FRICTION_OVER_MU_STAR = 0.1
 
 
-class RateSteps(ShootingSteps):
+class LoadVelocityStepFamily(ShootingStepFamily):
     """Steps of load point velocity with the size ``|ln(V_0/V_*)|``.
 
     Parameters
@@ -73,7 +73,7 @@ class RateSteps(ShootingSteps):
 
         See the base class for the parameters.
         """
-        return self.scene.with_(load_velocity_ratio=self.user_value_of_step(step_size))
+        return self.scene.with_(load_velocity_ratio=self.step_size_to_field_value(step_size))
 
     def build_critical_path_factory(self, engine: str) -> Callable[[float], CriticalPath]:
         """Return a function that computes the critical path after a step.
@@ -82,24 +82,24 @@ class RateSteps(ShootingSteps):
         parameters.
         """
         path = CriticalPath.from_scene(self.scene, engine)
-        return lambda size: path.with_load_velocity(self.user_value_of_step(size))
+        return lambda size: path.with_load_velocity(self.step_size_to_field_value(size))
 
-    def user_value_of_step(self, step_size: float) -> float:
+    def step_size_to_field_value(self, step_size: float) -> float:
         """Return the velocity ratio V_0/V_* of a step of a given size.
 
         See the base class for the parameters.
         """
         return math.exp(self.sign * step_size)
 
-    def _guess_size(self) -> float:
+    def _guess_critical_size(self) -> float:
         """Return a guess based on the closed forms of Gu et al. (1984).
 
         The closed forms apply to the slip law.
         """
-        weakening = max(self.scene.parts.law.b_over_a - 1.0, _MIN_B_OVER_A_EXCESS_FOR_GUESS)
+        weakening = max(self.scene.parts.law.b_over_a - 1.0, _MIN_B_OVER_A_MINUS_ONE_IN_SIZE_GUESS)
         return float(np.logaddexp(0.0, self.scene.stiffness_ratio - 1.0 - math.log(weakening)))
 
-    def _misfit_without_path(self, scene: Scene, work_meter: WorkMeter) -> float:
+    def _find_misfit_sign_without_critical_path(self, scene: Scene, work_meter: WorkMeter) -> float:
         """Return the sign of the misfit, computed by integration forwards in time.
 
         The result is NaN for downward steps.
@@ -126,7 +126,7 @@ class RateSteps(ShootingSteps):
         )
 
 
-class DisplacementSteps(StepFamily):
+class DisplacementStepFamily(StepFamily):
     """Steps of load point displacement with the size ``|d|`` in units of D_c.
 
     The load point is held after the step, unless the scene specifies a load point velocity.
@@ -152,16 +152,16 @@ class DisplacementSteps(StepFamily):
 
         See the base class for the parameters.
         """
-        return self.scene.with_(displacement_step=self.user_value_of_step(step_size))
+        return self.scene.with_(displacement_step=self.step_size_to_field_value(step_size))
 
-    def user_value_of_step(self, step_size: float) -> float:
+    def step_size_to_field_value(self, step_size: float) -> float:
         """Return the displacement of a step of a given size, in units of D_c.
 
         See the base class for the parameters.
         """
         return self.sign * step_size
 
-    def user_value_error(self, step_size: float, relative_error: float) -> float:
+    def compute_field_value_error(self, step_size: float, relative_error: float) -> float:
         """Return the error of the displacement, in units of D_c.
 
         See the base class for the parameters.
@@ -182,7 +182,9 @@ class DisplacementSteps(StepFamily):
         behind, rate = slip_lag_due_to_inertia(self.scene_with_step(step_size))
         missed = 0.5 * scene.a * scene.parts.law.state_change_over_a / scene.stiffness
         loaded = scene.load_velocity / rate if rate else 0.0
-        return behind * (loaded + missed) > INERTIA_TOLERANCE_FRACTION * rtol * step_size
+        return (
+            behind * (loaded + missed) > MAX_NEGLECTED_INERTIA_EFFECT_OVER_RTOL * rtol * step_size
+        )
 
     def motions_after_smaller_steps_decay(self, step_size: float) -> bool:
         """Return True if steady sliding is stable after every smaller step.
@@ -206,7 +208,9 @@ class DisplacementSteps(StepFamily):
 
         weakening = self.scene.parts.law.b_over_a - 1.0
         closed_form = after(self.sign / weakening) if weakening > 0.0 else math.nan
-        critical = math.nan if math.isnan(step_size) else after(self.user_value_of_step(step_size))
+        critical = (
+            math.nan if math.isnan(step_size) else after(self.step_size_to_field_value(step_size))
+        )
         return dict(zip(self.extra_output_names, (critical, closed_form), strict=True))
 
     def find_sizes_by_critical_path(
@@ -240,7 +244,7 @@ class DisplacementSteps(StepFamily):
         if self.sign < 0:
             weakest = scene.parts.normal_stress.min_frictional_stress(scene)
             return min(scene.mu_star, -weakest) / scene.stiffness
-        farther = LOG_RATE_MARGIN_FOR_INERTIA if scene.has_mass else 0.0
+        farther = LOG_RATE_EXTENSION_OF_MAX_STEP_FOR_INERTIA if scene.has_mass else 0.0
         friction = frictional_stress_after_jump(
             scene, scene.a * (scene.log_instability_rate + farther)
         )
@@ -252,7 +256,7 @@ class DisplacementSteps(StepFamily):
         ) / scene.stiffness
 
 
-class NormalStressSteps(ShootingSteps):
+class NormalStressStepFamily(ShootingStepFamily):
     """Steps of imposed normal stress with the size ``|ln(1 + step/sigma_*)|``.
 
     The load point is held after the step, unless the scene specifies a load point velocity. The
@@ -285,9 +289,9 @@ class NormalStressSteps(ShootingSteps):
 
         See the base class for the parameters.
         """
-        return self.scene.with_(normal_stress_step=self.user_value_of_step(step_size))
+        return self.scene.with_(normal_stress_step=self.step_size_to_field_value(step_size))
 
-    def user_value_of_step(self, step_size: float) -> float:
+    def step_size_to_field_value(self, step_size: float) -> float:
         """Return the change of normal stress of a step, in units of sigma_*.
 
         See the base class for the parameters.
@@ -305,7 +309,10 @@ class NormalStressSteps(ShootingSteps):
             slip_lag_due_to_inertia(self.scene_with_step(step_size))[0] if scene.has_mass else 0.0
         )
         missed = max(1.0, 0.5 * scene.parts.law.state_change_over_a) * behind
-        return missed > INERTIA_TOLERANCE_FRACTION * rtol * step_size * scene.mu_star / scene.a
+        return (
+            missed
+            > MAX_NEGLECTED_INERTIA_EFFECT_OVER_RTOL * rtol * step_size * scene.mu_star / scene.a
+        )
 
     def size_error_if_neutrally_stable(self, step_size: float, rtol: float) -> float:
         """Return the size error if steady sliding is nearly neutral.
@@ -329,7 +336,7 @@ class NormalStressSteps(ShootingSteps):
         )
         return dict(zip(self.extra_output_names, (rate,), strict=True))
 
-    def _guess_size(self) -> float:
+    def _guess_critical_size(self) -> float:
         """Return a guess of the critical size.
 
         For a decrease of normal stress, the guess is the change of Coulomb stress that reaches the
@@ -344,7 +351,7 @@ class NormalStressSteps(ShootingSteps):
         friction = max(abs(friction), _MIN_EFFECTIVE_FRICTION_OVER_MU_STAR * scene.mu_star)
         return scene.a * scene.stiffness_ratio / friction
 
-    def _misfit_without_path(self, scene: Scene, work_meter: WorkMeter) -> float:
+    def _find_misfit_sign_without_critical_path(self, scene: Scene, work_meter: WorkMeter) -> float:
         """Return the sign of the misfit, computed by integration forwards in time.
 
         The result is NaN for increases of normal stress, or if the motion cannot continue.
@@ -375,7 +382,7 @@ class NormalStressSteps(ShootingSteps):
         if max(0.0, scene.log_load_velocity) >= scene.log_instability_rate:
             return 0.0
         level = scene.log_instability_rate + (
-            LOG_RATE_MARGIN_FOR_INERTIA if scene.has_mass else 0.0
+            LOG_RATE_EXTENSION_OF_MAX_STEP_FOR_INERTIA if scene.has_mass else 0.0
         )
 
         def excess(size: float) -> float:

@@ -6,12 +6,12 @@ from dataclasses import dataclass
 from typing import ClassVar
 
 from rsfstudy.critical_steps.loading_checks import (
+    build_slow_instability_norm_warning,
     check_loading_is_single_step,
     outcome_if_norm_is_below_load_velocity,
-    slow_norm_warning,
 )
 from rsfstudy.critical_steps.motion_after_step import is_neutrally_stable, motion_reaches_norm
-from rsfstudy.error_boundary import guard_methods
+from rsfstudy.error_boundary import wrap_methods_in_error_boundary
 from rsfstudy.measure_base import Measure, Outcome
 from rsfstudy.motion import Accuracy, WorkMeter
 from rsfstudy.quantities import Output
@@ -19,7 +19,7 @@ from rsfstudy.slider import Scene
 from rsfstudy.status import Status
 
 
-@guard_methods
+@wrap_methods_in_error_boundary
 @dataclass(frozen=True)
 class Triggered(Measure):
     r"""Flag that is 1 if the step of a scene triggers an instability.
@@ -93,4 +93,6 @@ class Triggered(Measure):
                 Status.UNVERIFIED, message="the tolerance decides: ask for a smaller rtol"
             )
         values = {"unstable": float(answer), "unstable_error": 0.0}
-        return Outcome(Status.OK, values, slow_norm_warning(scene, scene.load_velocity))
+        return Outcome(
+            Status.OK, values, build_slow_instability_norm_warning(scene, scene.load_velocity)
+        )

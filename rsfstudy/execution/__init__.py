@@ -10,21 +10,21 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from rsfstudy._lazy_exports import lazy_exports
+from rsfstudy._lazy_exports import build_lazy_export_functions
 
 if TYPE_CHECKING:
-    from rsfstudy.execution.cell_plan import CellPlan, estimate_cost
+    from rsfstudy.execution.cell_plan import CellPlan, estimate_evaluations_and_time
     from rsfstudy.execution.clusters import connect_to_cluster
     from rsfstudy.execution.preparation import prepare_study_run
     from rsfstudy.execution.provenance import provenance_attributes, run_fingerprint
     from rsfstudy.execution.study_run import OutputOptions, ProgressCallback
     from rsfstudy.execution.worker_pool import WorkerPool
 else:
-    __getattr__, __dir__ = lazy_exports(
+    __getattr__, __dir__ = build_lazy_export_functions(
         __name__,
         {
             "execution.clusters": ("connect_to_cluster",),
-            "execution.cell_plan": ("CellPlan", "estimate_cost"),
+            "execution.cell_plan": ("CellPlan", "estimate_evaluations_and_time"),
             "execution.preparation": ("prepare_study_run",),
             "execution.provenance": ("provenance_attributes", "run_fingerprint"),
             "execution.study_run": ("OutputOptions", "ProgressCallback"),
@@ -38,7 +38,7 @@ __all__ = [
     "ProgressCallback",
     "WorkerPool",
     "connect_to_cluster",
-    "estimate_cost",
+    "estimate_evaluations_and_time",
     "prepare_study_run",
     "provenance_attributes",
     "run_fingerprint",

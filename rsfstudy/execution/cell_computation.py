@@ -40,7 +40,7 @@ if TYPE_CHECKING:
 
 #: Ratio of the wall time limit to the CPU time limit of a cell. The wall time limit ends cells that
 #: sleep or wait.
-WALL_OVER_CPU_TIME_LIMIT = 10.0
+WALL_TIME_LIMIT_OVER_CPU_TIME_LIMIT = 10.0
 #: Time in s after which finished cells are passed to the journal. Writing the cells to disk may
 #: take 30 ms.
 _FINISHED_CELLS_HANDOVER_INTERVAL = 0.5
@@ -365,7 +365,8 @@ class _CpuTimeLimits:
         signal.setitimer(signal.ITIMER_PROF, 0.0)
         if seconds:
             faulthandler.dump_traceback_later(
-                WALL_OVER_CPU_TIME_LIMIT * seconds + _FINISHED_CELLS_HANDOVER_INTERVAL, exit=True
+                WALL_TIME_LIMIT_OVER_CPU_TIME_LIMIT * seconds + _FINISHED_CELLS_HANDOVER_INTERVAL,
+                exit=True,
             )
             faulthandler.register(signal.SIGPROF, chain=True)  # The signal ends the process.
             signal.setitimer(

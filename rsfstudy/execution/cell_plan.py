@@ -206,7 +206,7 @@ class CellBatchIterator(Iterator[np.ndarray]):
             ),
         )
 
-    def record_time(self, seconds: float) -> None:
+    def record_cell_time(self, seconds: float) -> None:
         """Record the wall time of a finished cell.
 
         Parameters
@@ -242,7 +242,7 @@ def order_cells_by_golden_section(cell_numbers: np.ndarray) -> np.ndarray:
     return np.asarray(cell_numbers[np.arange(count) * stride % max(1, count)])
 
 
-def estimate_cost(plan: CellPlan) -> tuple[int, float]:
+def estimate_evaluations_and_time(plan: CellPlan) -> tuple[int, float]:
     """Estimate the cost of the distinct cells of a study.
 
     The estimate is approximate, because it uses a typical number of right-hand-side evaluations of

@@ -146,21 +146,23 @@ class _DigestTextCollector:
         if isinstance(value, _TYPES_DIGESTED_BY_REPR):
             yield repr(value)
         elif isinstance(value, ModuleType):
-            yield from self._module_texts(value, used_names)
+            yield from self._iterate_texts_of_module(value, used_names)
         elif isinstance(value, CodeType):
-            yield from self._code_texts(value)
+            yield from self._iterate_texts_of_code_object(value)
         elif isinstance(value, tuple):  # Equal tuples may or may not be the same object.
             for part in value:
                 yield from self.collect_texts(part, used_names)
         elif id(value) not in self._visited:
             self._visited[id(value)] = value
-            yield from self._texts_of_new_object(value, used_names)
+            yield from self._iterate_texts_of_unvisited_object(value, used_names)
 
-    def _texts_of_new_object(self, value: Any, used_names: Iterable[str]) -> Iterator[str]:
+    def _iterate_texts_of_unvisited_object(
+        self, value: Any, used_names: Iterable[str]
+    ) -> Iterator[str]:
         if isinstance(value, FunctionType):
-            yield from self._function_texts(value)
+            yield from self._iterate_texts_of_function(value)
         elif isinstance(value, type):
-            yield from self._class_texts(value)
+            yield from self._iterate_texts_of_class(value)
         elif isinstance(value, set | frozenset):
             yield from sorted(map(repr, value))
         elif type(value) is np.ndarray and value.dtype.kind != "O":
@@ -172,12 +174,14 @@ class _DigestTextCollector:
         elif hasattr(value, "__wrapped__"):  # The value is a cached function.
             yield from self.collect_texts(value.__wrapped__, used_names)
         else:
-            yield from self._class_texts(type(value))
-            yield from self._texts_of_instance_state(value, used_names)
+            yield from self._iterate_texts_of_class(type(value))
+            yield from self._iterate_texts_of_instance_state(value, used_names)
 
-    def _module_texts(self, module: ModuleType, used_names: Iterable[str]) -> Iterator[str]:
+    def _iterate_texts_of_module(
+        self, module: ModuleType, used_names: Iterable[str]
+    ) -> Iterator[str]:
         """Yield the strings that represent the used members of a module."""
-        if not _is_digested_by_used_names(module.__name__):
+        if not _are_only_used_members_digested(module.__name__):
             yield module.__name__
             return
         asked = (id(module), *used_names)
@@ -186,11 +190,11 @@ class _DigestTextCollector:
             used = [name for name in used_names if name in vars(module)]
             yield from self.collect_texts(tuple(vars(module)[name] for name in used), used_names)
 
-    def _function_texts(self, function: FunctionType) -> Iterator[str]:
+    def _iterate_texts_of_function(self, function: FunctionType) -> Iterator[str]:
         yield function.__qualname__
-        if not _is_digested_by_used_names(function.__module__):
+        if not _are_only_used_members_digested(function.__module__):
             return
-        yield from self._code_texts(function.__code__)
+        yield from self._iterate_texts_of_code_object(function.__code__)
         cells = [cell.cell_contents for cell in function.__closure__ or () if cell != CellType()]
         names = tuple(_names_used_by_code(function.__code__))
         yield from self.collect_texts(
@@ -201,13 +205,13 @@ class _DigestTextCollector:
                 yield name
                 yield from self.collect_texts(function.__globals__[name], names)
 
-    def _code_texts(self, code: CodeType) -> Iterator[str]:
+    def _iterate_texts_of_code_object(self, code: CodeType) -> Iterator[str]:
         yield from (code.co_name, code.co_code.hex(), *code.co_names, *code.co_varnames)
         yield from self.collect_texts(code.co_consts[_has_docstring_slot(code) :], ())
 
-    def _class_texts(self, digested_class: type) -> Iterator[str]:
+    def _iterate_texts_of_class(self, digested_class: type) -> Iterator[str]:
         yield digested_class.__qualname__
-        if not _is_digested_by_used_names(digested_class.__module__):
+        if not _are_only_used_members_digested(digested_class.__module__):
             return
         yield from self.collect_texts(digested_class.__bases__, ())
         for name, value in sorted(vars(digested_class).items()):
@@ -215,8 +219,10 @@ class _DigestTextCollector:
                 yield name
                 yield from self.collect_texts(value, ())
 
-    def _texts_of_instance_state(self, value: Any, used_names: Iterable[str]) -> Iterator[str]:
-        if _is_digested_by_used_names(type(value).__module__):
+    def _iterate_texts_of_instance_state(
+        self, value: Any, used_names: Iterable[str]
+    ) -> Iterator[str]:
+        if _are_only_used_members_digested(type(value).__module__):
             yield from self.collect_texts(_state_without_caches(value), used_names)
             return
         content = io.BytesIO()
@@ -284,7 +290,7 @@ def _names_used_by_code(code: CodeType) -> Iterator[str]:
             yield from _names_used_by_code(constant)
 
 
-def _is_digested_by_used_names(module_name: str | None) -> bool:
+def _are_only_used_members_digested(module_name: str | None) -> bool:
     """Return True if only the used members of a module are digested."""
     return _is_study_module(module_name) or _is_user_module(module_name)
 

@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 
 _PACKAGE_DIRECTORY = Path(__file__).parent.parent
 #: Packages of rsfstudy that affect the results of cells.
-_PACKAGES_THAT_DECIDE_NUMBERS = (
+_PACKAGES_AFFECTING_CELL_RESULTS = (
     "slider",
     "motion",
     "measure_base",
@@ -53,7 +53,7 @@ def read_physics_sources(package_directory: Path) -> dict[str, bytes]:
     """
     files = [
         file
-        for part in _PACKAGES_THAT_DECIDE_NUMBERS
+        for part in _PACKAGES_AFFECTING_CELL_RESULTS
         for file in sorted((package_directory / part).rglob("*.py"))
     ]
     return {file.relative_to(package_directory).as_posix(): file.read_bytes() for file in files}

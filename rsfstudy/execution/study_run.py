@@ -36,7 +36,7 @@ from rsfstudy.study import Study
 
 #: Names of the statuses of cells whose worker process ended during the computation.
 _STATUSES_OF_LOST_CELLS = (Status.WORKER_LOST.name, Status.TIME_LIMIT_SPENT.name)
-_STATUSES_WITH_ANSWER = frozenset(status.name for status in Status if status.is_answer)
+_NAMES_OF_ANSWER_STATUSES = frozenset(status.name for status in Status if status.is_answer)
 #: Number of failed cells after which a run ends early if no cell has succeeded.
 _MAX_FAILURES_WITHOUT_SUCCESS = 10
 
@@ -200,14 +200,14 @@ class StudyRun:
         fingerprint, layout = self.provenance["fingerprint"], self.task.output_packer
         with CellJournal(path, fingerprint, layout, fresh=keeping.fresh) as journal:
             try:
-                self._compute_missing(journal, cell_batch_mapper, progress_callback)
+                self._compute_missing_cells(journal, cell_batch_mapper, progress_callback)
                 return self._write_results(journal)
             except (KeyboardInterrupt, RunError) as error:
                 raise self._save_partial_results(journal, error) from error
             except DataError as error:
                 raise DataError(f"{error} {self._describe_how_to_resume(journal)}") from error
 
-    def _compute_missing(
+    def _compute_missing_cells(
         self,
         journal: CellJournal,
         cell_batch_mapper: CellBatchMapper,
@@ -230,8 +230,8 @@ class StudyRun:
                 journal.add_cells(finished)
                 self._warn_of_lost_cells(finished)
                 for row in finished:
-                    batches.record_time(row[4])
-                    failed += row[1] not in _STATUSES_WITH_ANSWER
+                    batches.record_cell_time(row[4])
+                    failed += row[1] not in _NAMES_OF_ANSWER_STATUSES
                 done += len(finished)
                 progress_callback(done, total)
                 if (
@@ -266,7 +266,7 @@ class StudyRun:
             results = (
                 self._write_zarr_in_slabs(journal)
                 if zarr
-                else self._apply_reductions(self.assemble_lattice(journal))
+                else self._apply_reductions(self.assemble_lattice_dataset(journal))
             )
         except RsfStudyError:
             raise
@@ -279,7 +279,7 @@ class StudyRun:
             self.output_path(stale).unlink(missing_ok=True)
         return written
 
-    def assemble_lattice(self, journal: CellJournal) -> xr.Dataset:
+    def assemble_lattice_dataset(self, journal: CellJournal) -> xr.Dataset:
         """Assemble the dataset of the journal, without reductions.
 
         Parameters
@@ -310,7 +310,7 @@ class StudyRun:
         """Write the finished cells to a file, and return the error to raise."""
         why = f"{self.study.name}: {str(error) or 'interrupted'}. "
         if self.options.output is not None and self.options.format == "netcdf":
-            lattice = self.assemble_lattice(journal)
+            lattice = self.assemble_lattice_dataset(journal)
             with contextlib.suppress(Exception):  # Reductions may fail for missing cells.
                 lattice = self._apply_reductions(lattice)
             try:

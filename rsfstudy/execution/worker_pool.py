@@ -25,7 +25,7 @@ import numpy as np
 from rsfstudy.defaults import CELL_TIME_LIMIT
 from rsfstudy.errors import InvalidValue, RunError
 from rsfstudy.execution.cell_computation import (
-    WALL_OVER_CPU_TIME_LIMIT,
+    WALL_TIME_LIMIT_OVER_CPU_TIME_LIMIT,
     CellBatchMapper,
     CellTask,
     StoredCellRows,
@@ -40,7 +40,7 @@ from rsfstudy.measures import Outcome
 from rsfstudy.status import Status
 
 #: Maximum time limit in s, about three years. The timers of the operating system accept only
-#: slightly more than ``WALL_OVER_CPU_TIME_LIMIT`` times this value.
+#: slightly more than ``WALL_TIME_LIMIT_OVER_CPU_TIME_LIMIT`` times this value.
 _MAX_TIME_LIMIT = 1e8
 #: Maximum number of worker processes per core, and on a machine with few cores.
 _MAX_WORKERS_PER_CORE, _MAX_WORKERS_ON_SMALL_MACHINES = 4, 8
@@ -266,7 +266,7 @@ def _timeout_outcome(task: CellTask) -> Outcome:
     """Build the outcome of a cell that exceeded its time limit."""
     text = (
         f"no answer within {task.time_limit:g} s of CPU time, or "
-        f"{WALL_OVER_CPU_TIME_LIMIT:g} times "
+        f"{WALL_TIME_LIMIT_OVER_CPU_TIME_LIMIT:g} times "
         "as long on the clock; the worker's log shows where it was, and --time-limit (time_limit=) "
         "allows more"
     )

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from rsfstudy._lazy_exports import lazy_exports
+from rsfstudy._lazy_exports import build_lazy_export_functions
 
 if TYPE_CHECKING:
     from rsfstudy.fitting.drop_detection import MIN_SAMPLES, Detection
@@ -31,7 +31,7 @@ if TYPE_CHECKING:
         scene_to_parameters,
     )
 else:
-    __getattr__, __dir__ = lazy_exports(
+    __getattr__, __dir__ = build_lazy_export_functions(
         __name__,
         {
             "fitting.drop_detection": ("Detection", "MIN_SAMPLES"),

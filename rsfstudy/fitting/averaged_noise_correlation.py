@@ -11,7 +11,7 @@ from scipy.linalg import cholesky_banded, solve_banded
 _UNAVERAGED_NOISE_VARIANCE_FRACTION, _MAX_ROWS_PER_AVERAGING_TIME = 0.002, 200
 
 
-class AveragingCorrelation:
+class AveragedNoiseCorrelation:
     r"""Noise correlation matrix of rows with overlapping averaging times.
 
     Parameters

@@ -109,11 +109,11 @@ class LikelihoodProfile:
 
     Parameters
     ----------
-    search : FitProblem
+    problem : FitProblem
         Problem with the model of the record.
-    found : FitSolution
+    solution : FitSolution
         Solution of the problem.
-    name : str
+    parameter_name : str
         Name of a free parameter.
 
     Attributes
@@ -162,7 +162,7 @@ class LikelihoodProfile:
         most = abs(float(bound - self.best_coordinates[self.parameter_index]))
         at, power, before = min(stderr_count * self.stderr_from_noise, most), 2.0, (0.0, 0.0)
         for number in range(_MAX_INTERVAL_END_ITERATIONS):
-            squared = self.scaled_likelihood_decrease(
+            squared = self.compute_twice_log_likelihood_decrease(
                 float(self.best_coordinates[self.parameter_index] + direction_sign * at)
             )
             if (at == most and squared < stderr_count**2) or abs(
@@ -176,7 +176,7 @@ class LikelihoodProfile:
             at, before = min(most, at * min(max(factor, 0.3), 3.0)), here
         return float(self.best_coordinates[self.parameter_index] + direction_sign * at)
 
-    def scaled_likelihood_decrease(self, coordinate: float) -> float:
+    def compute_twice_log_likelihood_decrease(self, coordinate: float) -> float:
         """Compute the squared distance between a coordinate and the best coordinate.
 
         The squared distance is twice the decrease of the log-likelihood. It equals the increase of
@@ -204,7 +204,7 @@ class LikelihoodProfile:
             self.problem.upper_bounds,
         )
         x[self.parameter_index] = coordinate
-        nearly = self._compute_linearised_excess_squares(x)
+        nearly = self._compute_linearised_excess_sum_of_squares(x)
         if (
             not math.isfinite(nearly)
             or abs(nearly - parabola) < _MAX_DEVIATION_FROM_PARABOLA * parabola
@@ -230,7 +230,7 @@ class LikelihoodProfile:
         )
         left = self._whitened_residuals(x)
         self.coordinate_change_ratios = (x - self.best_coordinates) / moved
-        return self._compute_excess_squares(left)
+        return self._compute_excess_sum_of_squares(left)
 
     def _whitened_residuals(self, coordinates: np.ndarray) -> np.ndarray:
         """Compute whitened residuals divided by the noise standard deviation.
@@ -244,11 +244,11 @@ class LikelihoodProfile:
             self.solution.noise_model.whiten_columns(left[:, None])[:, 0] / self.solution.noise_sd
         )
 
-    def _compute_excess_squares(self, residuals: np.ndarray) -> float:
+    def _compute_excess_sum_of_squares(self, residuals: np.ndarray) -> float:
         """Return the sum of squares minus the minimum sum of squares."""
         return float(residuals @ residuals - np.square(self.solution.whitened_residuals).sum())
 
-    def _compute_linearised_excess_squares(self, coordinates: np.ndarray) -> float:
+    def _compute_linearised_excess_sum_of_squares(self, coordinates: np.ndarray) -> float:
         """Compute the sum of squares minus its minimum with a linearised model.
 
         The sum of squares is minimised with respect to all parameters except the profiled
@@ -259,4 +259,6 @@ class LikelihoodProfile:
             return math.inf
         others = np.delete(self.solution.jacobian, self.parameter_index, axis=1)
         columns = self.solution.noise_model.whiten_columns(others) / self.solution.noise_sd
-        return self._compute_excess_squares(left - columns @ np.linalg.lstsq(columns, left)[0])
+        return self._compute_excess_sum_of_squares(
+            left - columns @ np.linalg.lstsq(columns, left)[0]
+        )

@@ -64,7 +64,7 @@ class DropCandidate(NamedTuple):
         Duration of the window, in the unit of the times.
     mean_difference_stderr : float
         Standard error of the difference between two window means.
-    correlation_factor : float
+    noise_correlation_factor : float
         Factor by which the correlation of the noise increases the standard error of a mean.
     """
 
@@ -72,7 +72,7 @@ class DropCandidate(NamedTuple):
     end_time: float
     window_duration: float
     mean_difference_stderr: float
-    correlation_factor: float
+    noise_correlation_factor: float
 
 
 class Detection(NamedTuple):
@@ -272,10 +272,10 @@ class _WindowMeanDifferences:
         Shear stresses of the samples.
     window_samples : int
         Window length in samples.
-    looks : float
+    threshold_sigmas : float
         Detection threshold in standard deviations, which accounts for the number of tested windows
         and samples.
-    quantum : float
+    rounding_quantum : float
         Resolution of the recorded stress.
     """
 

@@ -38,10 +38,10 @@ _SEARCH_MARGIN_IN_WINDOWS = 2.0
 #: Number of start times and of end times in each grid, and number of grid refinements.
 _SEARCH_GRID_SIZE, _SEARCH_GRID_REFINEMENTS = 16, 3
 #: Largest rate of stress decrease before and after a drop, relative to the rate during the drop.
-_MAX_SIDE_OVER_DROP_SLOPE = 0.3
+_MAX_SLOPE_BESIDE_DROP_OVER_DROP_SLOPE = 0.3
 #: Largest stress decrease before or after a drop that exceeds the decrease expected from the slope
 #: on the other side, relative to the size of the drop.
-_MAX_SIDE_FALL_OVER_DROP = 0.5
+_MAX_EXCESS_FALL_BESIDE_DROP_OVER_DROP = 0.5
 #: Difference between the sum of squares at the ends of a 95 % confidence interval and the minimum
 #: sum of squares, in noise variances. The first value, -2 ln 0.0253, applies to the time of a
 #: sudden change. The second value applies to all other parameters.
@@ -160,7 +160,7 @@ def fit_drop(
     lines = _search_drop_times(t, y, begins, ends, candidate.window_duration / scale)
     best = lines.best_pair_index
     left = float(lines.residual_sums_of_squares[best]) / max(len(t) - 6, 1)
-    variance = max(left, 0.25 * noise_sd**2 / every) * candidate.correlation_factor**2
+    variance = max(left, 0.25 * noise_sd**2 / every) * candidate.noise_correlation_factor**2
     excess = lines.residual_sums_of_squares - lines.residual_sums_of_squares[best]
     late = np.abs(
         lines.corner_time_pairs[excess <= _TIME_INTERVAL_EXCESS_SQUARES * variance]
@@ -316,15 +316,15 @@ def _fit_three_lines(
     left = stress - centre - (columns @ values[:, :, None])[:, :, 0]
     squares = np.square(left).sum(axis=1)
     drop, lasts = values[:, 0] - values[:, 1], (t1 - t0)[:, 0]
-    goes_on = (values[:, 2:].min(axis=1) < -_MAX_SIDE_OVER_DROP_SLOPE * drop / lasts) | (
-        drop <= 0.0
-    )
+    goes_on = (
+        values[:, 2:].min(axis=1) < -_MAX_SLOPE_BESIDE_DROP_OVER_DROP_SLOPE * drop / lasts
+    ) | (drop <= 0.0)
     for own, other, beside in (
         (2, 3, corner_time_pairs[:, 0] - time[0]),
         (3, 2, time[-1] - corner_time_pairs[:, 1]),
     ):
         fall = np.minimum(values[:, other], 0.0) - values[:, own]
-        goes_on |= fall * np.maximum(beside, 0.0) > _MAX_SIDE_FALL_OVER_DROP * drop
+        goes_on |= fall * np.maximum(beside, 0.0) > _MAX_EXCESS_FALL_BESIDE_DROP_OVER_DROP * drop
     values[:, :2] += centre
     squares[goes_on] += 1e3 * (float(np.square(stress - centre).sum()) + 1e-300)
     return _ThreeLineFits(corner_time_pairs, values, inverse, squares)

@@ -101,7 +101,7 @@ def read_drops(
     ends = [-math.inf, *(of.drop.end_time for of in found)]
     begins = [*(of.drop.start_time for of in found[1:]), math.inf]
     rooms = [*zip(ends, begins, strict=False)][: len(found)]
-    places = [locate_drop(times, *of) for of in zip(found, rooms, strict=True)]
+    places = [find_sample_indices_of_drop(times, *of) for of in zip(found, rooms, strict=True)]
     each = zip(found, places, rooms, strict=True)
     rows = [measure_drop(times, stress, displacement, *of) for of in each]
     is_slip = (
@@ -157,7 +157,7 @@ def displacement_follows_drops(
     )
 
 
-def locate_drop(
+def find_sample_indices_of_drop(
     times: np.ndarray, fitted_candidate: FittedDropCandidate, neighbour_limits: tuple[float, float]
 ) -> DropSampleIndices:
     """Locate a drop among the samples.

@@ -30,7 +30,7 @@ _TESTED_AVERAGE_LENGTHS_IN_ROWS, _MIN_AIC_GAIN_OF_RUNNING_MEAN, _MIN_PARAMETER_C
 #: means, because an inaccurate step time or stiffness has a similar effect to a low-pass filter.
 _MIN_AIC_GAIN_OF_LOW_PASS = 60.0
 #: Corner frequencies of the low-pass filters that are tested, relative to the sampling rate.
-_TESTED_CORNER_OVER_SAMPLING_RATES = (0.3, 0.2, 0.13, 0.09, 0.06, 0.04, 0.025, 0.015)
+_TESTED_RELATIVE_CORNER_FREQUENCIES = (0.3, 0.2, 0.13, 0.09, 0.06, 0.04, 0.025, 0.015)
 #: Largest number of rows for the filter test, and number of times that the noise and the parameters
 #: are estimated in turn.
 _MAX_ROWS_FOR_FILTER_TEST, _NOISE_ESTIMATION_PASSES = 20_000, 2
@@ -122,9 +122,9 @@ def _iterate_candidate_filters(
     """Iterate over the kinds and sizes of the filters to test."""
     for rows in _TESTED_AVERAGE_LENGTHS_IN_ROWS:
         yield "mean", rows * sampling_interval
-    if fit_solution.noise_model.order:
+    if fit_solution.noise_model.autoregressive_order:
         for kind in LOW_PASS_ORDERS:
-            for corner in _TESTED_CORNER_OVER_SAMPLING_RATES:
+            for corner in _TESTED_RELATIVE_CORNER_FREQUENCIES:
                 yield kind, corner / sampling_interval
 
 

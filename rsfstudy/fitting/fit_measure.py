@@ -14,13 +14,13 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from rsfstudy.error_boundary import guard_methods
+from rsfstudy.error_boundary import wrap_methods_in_error_boundary
 from rsfstudy.errors import InvalidValue
 from rsfstudy.fitting import posterior
 from rsfstudy.fitting.confidence_intervals import confidence_interval
 from rsfstudy.fitting.filter_detection import detect_unspecified_filter
 from rsfstudy.fitting.filters import Filter
-from rsfstudy.fitting.fit_outputs import fit_outputs
+from rsfstudy.fitting.fit_outputs import build_fit_outputs
 from rsfstudy.fitting.fit_problem import FitProblem, FitSolution
 from rsfstudy.fitting.fit_validity_checks import (
     MIN_STATISTICAL_NOISE_SD,
@@ -72,10 +72,10 @@ _SCENE_FIELDS_SET_BY_FIT = (
 )
 #: Ratio of the direct effect to its lower bound below which the direct effect counts as being at
 #: the bound.
-_AT_LOWER_BOUND_FACTOR = 1.001
+_MAX_DIRECT_EFFECT_AT_BOUND_OVER_BOUND = 1.001
 
 
-@guard_methods
+@wrap_methods_in_error_boundary
 @dataclass(frozen=True)
 class Fit(Measure):
     r"""Fit of friction parameters to a laboratory record by least squares.
@@ -278,7 +278,7 @@ class Fit(Measure):
     @property
     def outputs(self) -> Sequence[Output]:
         """Outputs of the fit, including the parameters and their errors."""
-        return fit_outputs(
+        return build_fit_outputs(
             self.parameters, self.posterior > 0, len(self._fitted_record_names_and_steps)
         )
 
@@ -429,7 +429,7 @@ class Fit(Measure):
             is_least = (
                 "a" in found.free_parameters
                 and found.parameter_values["a"]
-                < _AT_LOWER_BOUND_FACTOR * search.parameter_bounds("a")[0]
+                < _MAX_DIRECT_EFFECT_AT_BOUND_OVER_BOUND * search.parameter_bounds("a")[0]
             )
             text = describe_unidentified_parameters(
                 found, unidentified, apart, is_a_at_bound=is_least
@@ -548,7 +548,8 @@ class Fit(Measure):
             )
             values[f"{name}_stderr"] = fit_solution.parameter_stderr(name)
         covariance = fit_solution.coordinate_covariance * np.outer(
-            fit_solution.coordinate_derivatives, fit_solution.coordinate_derivatives
+            fit_solution.parameter_derivatives_by_coordinates,
+            fit_solution.parameter_derivatives_by_coordinates,
         )
         spread = np.sqrt(np.diag(covariance))
         signs = np.array(
@@ -566,11 +567,11 @@ class Fit(Measure):
             "noise_size": fit_solution.noise_sd,
             "outliers": len(fit_solution.outlier_rows),
             "friction_quantum": fit_solution.friction_rounding_quantum,
-            "noise_order": fit_solution.noise_model.order,
+            "noise_order": fit_solution.noise_model.autoregressive_order,
             "effective_samples": fit_solution.noise_model.effective_sample_size,
             "degrees_of_freedom": fit_solution.degrees_of_freedom,
             "whiteness": ljung_box_p_value(
-                fit_solution.whitened_residuals, fit_solution.noise_model.order
+                fit_solution.whitened_residuals, fit_solution.noise_model.autoregressive_order
             ),
             "r_squared": 1.0 - float(np.var(fit_solution.residuals)) / variance,
             "rows_fitted": len(rows),
@@ -580,7 +581,7 @@ class Fit(Measure):
         }
         along = {
             "fitted_friction": fit_solution.model_friction + trend,
-            "fitted_friction_stderr": fit_solution.curve_stderr,
+            "fitted_friction_stderr": fit_solution.fitted_friction_stderr,
             "detrended_friction": fit_solution.model_friction,
             "residual": fit_solution.residuals,
             "innovation": fit_solution.all_whitened_residuals,

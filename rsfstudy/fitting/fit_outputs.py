@@ -66,7 +66,7 @@ _POSTERIOR_OUTPUTS = (
 )
 
 
-def fit_outputs(
+def build_fit_outputs(
     parameter_names: Sequence[str], with_posterior: bool, window_count: int
 ) -> tuple[Output, ...]:
     """Describe the outputs of a fit.
@@ -87,7 +87,7 @@ def fit_outputs(
         Descriptions of the outputs for the parameters, for the whole fit, and for the rows of the
         record.
     """
-    found = [output for name in parameter_names for output in _parameter_outputs(name)]
+    found = [output for name in parameter_names for output in _iterate_outputs_of_parameter(name)]
     stresses = [
         Output(f"normal_stress_before_{n}", "", "Pa", f"mean normal stress before step {n}")
         for n in range(1, window_count + 1 if window_count > 1 else 1)
@@ -101,7 +101,7 @@ def fit_outputs(
     )
 
 
-def _parameter_outputs(parameter_name: str) -> Iterator[Output]:
+def _iterate_outputs_of_parameter(parameter_name: str) -> Iterator[Output]:
     """Describe the outputs of a parameter and of its errors."""
     about = PARAMETERS[strip_window_number(parameter_name)]
     optional = strip_window_number(parameter_name) in PARAMETERS_OF_SOME_LAWS_ONLY

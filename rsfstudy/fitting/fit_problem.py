@@ -106,11 +106,11 @@ class FitProblem:
     ----------
     model : JointModel
         Model of the windows.
-    coordinates_to_values : mapping of str to float
+    initial_values : mapping of str to float
         Values of all parameters. The values of the free parameters are initial guesses.
     free_parameters : sequence of str
         Names of the free parameters.
-    noise : str
+    noise_model_name : str
         Noise model (see ``rsfstudy.fitting.noise.fit_noise``).
 
     Attributes
@@ -188,7 +188,7 @@ class FitProblem:
 
         Parameters
         ----------
-        coordinates_to_values : mapping of str to float
+        values : mapping of str to float
             Values of all parameters.
 
         Returns
@@ -205,7 +205,7 @@ class FitProblem:
 
         Parameters
         ----------
-        coordinates_to_values : mapping of str to float
+        values : mapping of str to float
             Values of all parameters.
         require_stable : bool, default: False
             If True, the motion is computed only if the stiffness exceeds the critical stiffness.
@@ -243,7 +243,7 @@ class FitProblem:
             If all simulations of the record fail, if the work budget is exhausted, or if the search
             does not converge although the record constrains all parameters.
         """
-        x, noise = self._initial_coordinates(), noises.white_noise(self.model.time)
+        x, noise = self._initial_coordinates(), noises.build_white_noise_model(self.model.time)
         for number in range(
             1
             if self.noise_model_name == noises.WHITE_NOISE_NAME
@@ -410,7 +410,7 @@ class FitProblem:
         degrees = max(
             noise.degrees_of_freedom_of_slow_noise * free_of / count, _MIN_DEGREES_OF_FREEDOM
         )
-        finer = self.model.model_friction(values, refined=True) - curve
+        finer = self.model.model_friction(values, with_refined_tolerances=True) - curve
         with np.errstate(invalid="ignore"):  # The inverse is infinite if a derivative is zero.
             off = np.abs(inverse @ whitened[:, :-1].T @ noise.whiten_columns(finer[:, None])[:, 0])
         slopes = [

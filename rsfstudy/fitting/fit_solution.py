@@ -92,7 +92,7 @@ class FitSolution:
         )
 
     @property
-    def coordinate_derivatives(self) -> np.ndarray:
+    def parameter_derivatives_by_coordinates(self) -> np.ndarray:
         """Derivatives of parameters with respect to their coordinates."""
         return np.array(
             [
@@ -107,7 +107,7 @@ class FitSolution:
         return np.asarray(np.sqrt(np.diag(self.coordinate_covariance)))
 
     @property
-    def curve_stderr(self) -> np.ndarray:
+    def fitted_friction_stderr(self) -> np.ndarray:
         """Standard error of the fitted friction at each row.
 
         The standard error is the square root of the diagonal of :math:`J C J^T`, where :math:`J` is
@@ -133,7 +133,7 @@ class FitSolution:
             Standard error in the unit of the parameter.
         """
         return float(
-            (self.coordinate_stderr * self.coordinate_derivatives)[
+            (self.coordinate_stderr * self.parameter_derivatives_by_coordinates)[
                 self.free_parameters.index(parameter_name)
             ]
         )

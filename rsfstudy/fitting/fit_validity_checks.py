@@ -20,7 +20,7 @@ from rsfstudy.fitting.window_model import LOGARITHMIC_PARAMETERS
 from rsfstudy.formatting import pluralize
 
 #: Names of the parameters that are slip distances.
-SLIP_DISTANCES = ("slip_distance", "slip_distance_2")
+SLIP_DISTANCE_PARAMETER_NAMES = ("slip_distance", "slip_distance_2")
 #: Significance level of the test for autocorrelated whitened residuals.
 SIGNIFICANCE_LEVEL = 0.01
 #: Standard deviation of friction below which the residuals are numerical errors rather than noise.
@@ -183,7 +183,9 @@ def _check_outlier_count(solution: FitSolution) -> Iterator[str]:
 
 def _check_residuals_are_white(solution: FitSolution) -> Iterator[str]:
     """Yield a reason if the whitened residuals are autocorrelated."""
-    p_value = ljung_box_p_value(solution.whitened_residuals, solution.noise_model.order)
+    p_value = ljung_box_p_value(
+        solution.whitened_residuals, solution.noise_model.autoregressive_order
+    )
     if p_value < SIGNIFICANCE_LEVEL:
         yield (
             f"the whitened residuals are still autocorrelated (p = {p_value:.2g}): "
@@ -267,7 +269,7 @@ def find_unidentified_parameters(
     """
     sparse = [
         n
-        for n in SLIP_DISTANCES
+        for n in SLIP_DISTANCE_PARAMETER_NAMES
         if solution.parameter_values.get(n, math.inf)
         < _MIN_ROWS_PER_SLIP_DISTANCE * displacement_per_row
     ]

@@ -29,7 +29,7 @@ from rsfstudy.motion import MotionStopped
 from rsfstudy.slider import Scene
 from rsfstudy.status import Status
 
-T = TypeVar("T")
+ValueType = TypeVar("ValueType")
 #: Prefixes of the parameters that have a separate value in each window.
 _PER_WINDOW_PARAMETER_PREFIXES = ("mu_star", "step_time", "trend")
 
@@ -124,7 +124,7 @@ def strip_window_number(name: str) -> str:
     return split_window_number(name)[0]
 
 
-def window_values(values: Mapping[str, T], number: int) -> dict[str, T]:
+def select_values_of_window(values: Mapping[str, ValueType], number: int) -> dict[str, ValueType]:
     """Select the values of the parameters of a window.
 
     Parameters
@@ -250,7 +250,11 @@ class JointModel:
             raise MotionStopped(Status.NOT_APPLICABLE, text) from wrong
 
     def model_friction(
-        self, values: ParameterValues, *, refined: bool = False, require_stable: bool = False
+        self,
+        values: ParameterValues,
+        *,
+        with_refined_tolerances: bool = False,
+        require_stable: bool = False,
     ) -> np.ndarray:
         """Compute the friction of the model at each row of all windows.
 
@@ -260,7 +264,7 @@ class JointModel:
         ----------
         values : mapping of str to float
             Values of all parameters.
-        refined : bool, default: False
+        with_refined_tolerances : bool, default: False
             If True, all tolerances are reduced by a factor of ten.
         require_stable : bool, default: False
             If True, the motion is computed only if the stiffness exceeds the critical stiffness.
@@ -271,7 +275,10 @@ class JointModel:
             Friction of the model. If the simulation of a window fails, the friction of the window
             is NaN.
         """
-        told = {"refined": refined, "require_stable": require_stable}
+        told = {
+            "with_refined_tolerances": with_refined_tolerances,
+            "require_stable": require_stable,
+        }
         return np.concatenate(
             [part.model_friction(own, **told) for part, own in self._iterate_windows(values)]
         )
@@ -322,7 +329,7 @@ class JointModel:
         blocks = []
         places = {name: place for place, name in enumerate(free_parameters)}
         for number, (part, own) in enumerate(self._iterate_windows(values), start=1):
-            acting = window_values(places, number)
+            acting = select_values_of_window(places, number)
             block = np.zeros((len(part.time), len(free_parameters)))
             block[:, [*acting.values()]] = part.jacobian(own, [*acting], difference_scheme)
             blocks.append(block)
@@ -357,7 +364,7 @@ class JointModel:
         """Iterate over pairs of a window model and its parameter values."""
         factors = self.stiffness_factors or (1.0,) * len(self.models)
         for number, (part, factor) in enumerate(zip(self.models, factors, strict=True), start=1):
-            own = window_values(values, number)
+            own = select_values_of_window(values, number)
             yield part, own | {"stiffness": factor * own["stiffness"]}
 
 
@@ -399,5 +406,5 @@ def fitted_fields(
     values = scene_to_parameters(scene, *distances)
     if stiffness is not None:
         values["stiffness"] = stiffness
-    values |= {n: value for n, value in window_values(found, 1).items() if n in values}
+    values |= {n: value for n, value in select_values_of_window(found, 1).items() if n in values}
     return parameters_to_fields(values, velocity)

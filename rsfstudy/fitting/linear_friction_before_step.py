@@ -9,7 +9,7 @@ import numpy as np
 
 from rsfstudy.fitting.outliers import find_non_outlier_mask, find_rounding_quantum
 from rsfstudy.fitting.record import Record
-from rsfstudy.fitting.velocity_steps import RunningLineFitSums
+from rsfstudy.fitting.velocity_steps import CumulativeLineFitSums
 
 #: Size limits: the largest number of block averages of friction, the smallest number of block
 #: averages on each side of a break, and the smallest number of rows to test.
@@ -17,7 +17,7 @@ _MAX_FITTED_ROW_MEANS, _MIN_ROW_MEANS_BESIDE_BREAK, _MIN_ROWS_OF_LINEAR_PORTION 
 #: Smallest decrease of the sum of squared residuals due to a second line, divided by the residual
 #: variance and by ln n for n block averages. The residual variance is increased if the residuals
 #: are correlated.
-_MIN_SQUARES_GAIN_OF_BREAK = 15.0
+_MIN_SQUARES_REDUCTION_BY_SLOPE_BREAK = 15.0
 #: Smallest deviation of friction from the line through the later rows, as an absolute value and in
 #: standard deviations of the residuals. For comparison, a tenfold velocity step changes friction by
 #: about 0.02.
@@ -77,7 +77,7 @@ def _find_slope_break(row_times: np.ndarray, friction: np.ndarray) -> int:
         Index of the row, or 0 if a single line is sufficient.
     """
     count = len(row_times)
-    sums = RunningLineFitSums(row_times - row_times[0], friction - friction[0], np.ones(count))
+    sums = CumulativeLineFitSums(row_times - row_times[0], friction - friction[0], np.ones(count))
     places = np.arange(_MIN_ROW_MEANS_BESIDE_BREAK, count - _MIN_ROW_MEANS_BESIDE_BREAK + 1)
     both = sums.line_residual_squares(0, places) + sums.line_residual_squares(places, count)
     place = int(places[np.argmin(both)])
@@ -93,7 +93,13 @@ def _find_slope_break(row_times: np.ndarray, friction: np.ndarray) -> int:
     rho = min(max(rho, 0.0), _MAX_CORRELATION_OF_ROW_MEANS)
     gain = float(sums.line_residual_squares(0, count)) - float(both.min())
     departs = float(np.abs(moved[:place] - x1 - v1 * time[:place]).max())
-    worth = _MIN_SQUARES_GAIN_OF_BREAK * math.log(count) * size**2 * (1.0 + rho) / (1.0 - rho)
+    worth = (
+        _MIN_SQUARES_REDUCTION_BY_SLOPE_BREAK
+        * math.log(count)
+        * size**2
+        * (1.0 + rho)
+        / (1.0 - rho)
+    )
     return (
         place
         if gain > worth

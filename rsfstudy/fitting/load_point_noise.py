@@ -17,7 +17,7 @@ from rsfstudy.fitting import noise
 from rsfstudy.fitting.outliers import find_rounding_quantum
 from rsfstudy.fitting.record import Record
 from rsfstudy.fitting.velocity_steps import LoadingStep
-from rsfstudy.fitting.window_model import STEP_SHIFT_IN_STANDARD_DEVIATIONS
+from rsfstudy.fitting.window_model import LOADING_STEP_SHIFT_OVER_STANDARD_ERROR
 
 #: Largest number of block averages from which the noise is estimated. An autoregressive process of
 #: block averages also describes slow fluctuations of the load point around its set point.
@@ -55,9 +55,11 @@ def shift_steps_by_their_errors(
         return []
     speeds = np.array([steps[0].velocity_before, *(step.velocity_after for step in steps)])
     moved = []
-    for late, faster in _step_errors(record, steps, speeds):
-        v = speeds + STEP_SHIFT_IN_STANDARD_DEVIATIONS * faster
-        shifts = zip(steps, STEP_SHIFT_IN_STANDARD_DEVIATIONS * late, v[:-1], v[1:], strict=True)
+    for late, faster in _compute_step_time_and_velocity_errors(record, steps, speeds):
+        v = speeds + LOADING_STEP_SHIFT_OVER_STANDARD_ERROR * faster
+        shifts = zip(
+            steps, LOADING_STEP_SHIFT_OVER_STANDARD_ERROR * late, v[:-1], v[1:], strict=True
+        )
         moved.append(
             [
                 s._replace(
@@ -103,7 +105,7 @@ def integrate_displacement(
     return np.asarray(moved(time) - moved(np.array([zero_displacement_time])))
 
 
-def _step_errors(
+def _compute_step_time_and_velocity_errors(
     record: Record, steps: Sequence[LoadingStep], velocities: np.ndarray
 ) -> list[tuple[np.ndarray, np.ndarray]]:
     """Compute independent errors of the step times and velocities.

@@ -37,11 +37,11 @@ from scipy.optimize import minimize
 from scipy.signal import lfilter
 
 from rsfstudy.errors import InvalidValue
-from rsfstudy.fitting.averaged_noise_correlation import AveragingCorrelation
+from rsfstudy.fitting.averaged_noise_correlation import AveragedNoiseCorrelation
 from rsfstudy.fitting.uniform_sampling_runs import (
     SamplingRun,
-    count_processes,
-    find_level_changes,
+    count_noise_processes,
+    find_noise_level_changes,
     find_sampling_runs,
     repeat_run_field_per_row,
     split_runs_at_level_changes,
@@ -57,10 +57,10 @@ MAX_AUTOREGRESSIVE_ORDER, _MIN_SAMPLES_PER_COEFFICIENT = 12, 10
 #: which the search ends.
 _MAX_PARTIAL_AUTOCORRELATION, _REML_GRADIENT_TOLERANCE = 0.999, 0.02
 #: Largest number of passes that estimate the noise levels and the autoregressive process in turn.
-_NOISE_LEVEL_PASSES = 2
+_MAX_NOISE_LEVEL_REFINEMENT_PASSES = 2
 #: Smallest noise level, relative to the root mean square of the residuals. A noise level is the
 #: standard deviation of the noise in a segment of the record.
-_MIN_LEVEL_SD_OVER_TOTAL_SD = 1e-3
+_MIN_NOISE_LEVEL_SD_OVER_RESIDUAL_RMS = 1e-3
 #: Largest logarithm of the ratio of a noise level to the first noise level.
 _MAX_LOG_NOISE_LEVEL_RATIO = 30.0
 
@@ -117,10 +117,10 @@ class NoiseModel:
     partial_autocorrelations: np.ndarray
     noise_level_standard_deviations: np.ndarray
     non_outlier_mask: np.ndarray | None = None
-    averaging_correlation: AveragingCorrelation | None = None
+    averaging_correlation: AveragedNoiseCorrelation | None = None
 
     @property
-    def order(self) -> int:
+    def autoregressive_order(self) -> int:
         """Order of the autoregressive processes."""
         return int(self.partial_autocorrelations.shape[1])
 
@@ -154,7 +154,7 @@ class NoiseModel:
         )
         found = np.empty_like(columns)
         for run in self.sampling_runs:
-            known = min(run.preceding_rows, self.order)
+            known = min(run.row_count_since_clock_start, self.autoregressive_order)
             part = scaled[run.start_row - known : run.stop_row]
             found[run.start_row : run.stop_row] = _prediction_errors(
                 part, *self.prediction_coefficients_and_variances[run.noise_process_index]
@@ -194,7 +194,11 @@ class NoiseModel:
         )
         for first, last, number, before, level in self.sampling_runs:
             variances = self.prediction_coefficients_and_variances[number][1]
-            early = variances[min(before, self.order) : min(before + last - first, self.order)]
+            early = variances[
+                min(before, self.autoregressive_order) : min(
+                    before + last - first, self.autoregressive_order
+                )
+            ]
             total += math.fsum(map(math.log, early))
             total += (last - first - len(early)) * math.log(variances[-1])
             total += 2.0 * (last - first) * math.log(self.noise_level_standard_deviations[level])
@@ -249,12 +253,12 @@ class NoiseModel:
             strict=True,
         ):
             # The coefficients have the covariance matrix (innovation variance) R^-1/rows.
-            ones = _prediction_errors(np.ones((self.order, 1)), *told)
+            ones = _prediction_errors(np.ones((self.autoregressive_order, 1)), *told)
             total += count / (1.0 + 2.0 * power * float(np.square(ones).sum()))
         return total
 
 
-def white_noise(time: np.ndarray) -> NoiseModel:
+def build_white_noise_model(time: np.ndarray) -> NoiseModel:
     """Return white noise with one noise level for each sampling interval.
 
     Parameters
@@ -268,7 +272,9 @@ def white_noise(time: np.ndarray) -> NoiseModel:
         White noise model. The standard deviation is the same for all sampling intervals.
     """
     runs = find_sampling_runs(time)
-    return NoiseModel(runs, np.zeros((count_processes(runs), 0)), np.ones(count_processes(runs)))
+    return NoiseModel(
+        runs, np.zeros((count_noise_processes(runs), 0)), np.ones(count_noise_processes(runs))
+    )
 
 
 def fit_noise(
@@ -309,7 +315,7 @@ def fit_noise(
     begin, min_noise_sd = guess_noise_by_moments(
         noise_name, time, residuals, non_outlier_mask, min_noise_sd, averaging_time
     )
-    shape, order = begin.partial_autocorrelations.shape, begin.order
+    shape, order = begin.partial_autocorrelations.shape, begin.autoregressive_order
     if not order and len(begin.noise_level_standard_deviations) == 1:
         return begin
 
@@ -337,10 +343,10 @@ def fit_noise(
         if begin.averaging_correlation is None
         else begin.averaging_correlation.whiten_columns(columns)
     )
-    products = _LaggedProducts(begin.sampling_runs, columns, order)
+    products = _LaggedProductSums(begin.sampling_runs, columns, order)
 
     def misfit(x: np.ndarray) -> float:
-        return products.reml_objective(noise(x))
+        return products.compute_restricted_likelihood_objective(noise(x))
 
     x = np.append(
         np.arctanh(begin.partial_autocorrelations.ravel() / _MAX_PARTIAL_AUTOCORRELATION),
@@ -389,12 +395,12 @@ def guess_noise_by_moments(
     """
     if non_outlier_mask is not None:
         time, residuals = time[non_outlier_mask], residuals[non_outlier_mask]
-    overlap = AveragingCorrelation(time, averaging_time) if averaging_time else None
+    overlap = AveragedNoiseCorrelation(time, averaging_time) if averaging_time else None
     if overlap is not None:
         residuals = overlap.whiten_columns(residuals)
     min_noise_sd = max(
         min_noise_sd,
-        _MIN_LEVEL_SD_OVER_TOTAL_SD * math.sqrt(float(np.mean(np.square(residuals)))),
+        _MIN_NOISE_LEVEL_SD_OVER_RESIDUAL_RMS * math.sqrt(float(np.mean(np.square(residuals)))),
         1e-300,
     )
     found, first = _estimate_noise_by_moments(
@@ -422,11 +428,11 @@ def _estimate_noise_by_moments(
     """
     stated, count = (
         noise_name.removeprefix(AUTOREGRESSIVE_NOISE_NAME),
-        count_processes(sampling_runs),
+        count_noise_processes(sampling_runs),
     )
     runs, knots, innovations = sampling_runs, list[int](), residuals
     scale = np.ones(len(residuals))
-    for _ in range(1 + _NOISE_LEVEL_PASSES):
+    for _ in range(1 + _MAX_NOISE_LEVEL_REFINEMENT_PASSES):
         levels = repeat_run_field_per_row(runs, "noise_level_index")
         squares = np.bincount(levels, np.square(innovations)) / np.bincount(levels)
         scale = np.maximum(scale * np.sqrt(squares)[levels], min_noise_sd)
@@ -448,7 +454,7 @@ def _estimate_noise_by_moments(
         sizes = scale[np.unique(levels, return_index=True)[1]]
         found = NoiseModel(runs, partial, sizes)
         innovations = found.whiten_columns(residuals[:, None])[:, 0]
-        before, knots = knots, find_level_changes(innovations * scale, min_noise_sd)
+        before, knots = knots, find_noise_level_changes(innovations * scale, min_noise_sd)
         if knots == before:
             break
         runs = split_runs_at_level_changes(sampling_runs, knots)
@@ -460,7 +466,7 @@ def _estimate_noise_by_moments(
     ), first
 
 
-class _LaggedProducts:
+class _LaggedProductSums:
     """Sums of products of each row with the preceding rows.
 
     The sum of squares of whitened columns can be computed from the sums of products for any
@@ -469,11 +475,11 @@ class _LaggedProducts:
 
     Parameters
     ----------
-    runs : tuple of SamplingRun
+    sampling_runs : tuple of SamplingRun
         Runs of consecutive rows with the same noise process and noise level.
     columns : ndarray, shape (rows, columns)
         Derivatives of the model, followed by the residuals.
-    order : int
+    autoregressive_order : int
         Order of the autoregressive processes.
     """
 
@@ -505,7 +511,7 @@ class _LaggedProducts:
         self.initial_row_blocks: list[tuple[np.ndarray, int, int, np.ndarray]] = []
         levels = repeat_run_field_per_row(sampling_runs, "noise_level_index")
         for run in sampling_runs:
-            known = min(run.preceding_rows, autoregressive_order)
+            known = min(run.row_count_since_clock_start, autoregressive_order)
             rows = slice(
                 run.start_row - known, min(run.start_row + autoregressive_order, run.stop_row)
             )
@@ -530,7 +536,7 @@ class _LaggedProducts:
                     if i > j:
                         sums[j, i] += found.T
 
-    def reml_objective(self, noise: NoiseModel) -> float:
+    def compute_restricted_likelihood_objective(self, noise: NoiseModel) -> float:
         """Compute the REML objective function up to a constant.
 
         Parameters

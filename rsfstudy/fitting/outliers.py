@@ -16,7 +16,7 @@ _OUTLIER_SIGMAS, _MIN_OUTLIER_OVER_MODEL_DEPARTURE = 6.0, 2.0
 _STANDARD_DEVIATION_PER_MAD = 1.4826
 #: Largest deviation of rounded values from multiples of the rounding unit, relative to the rounding
 #: unit.
-_MAX_GRID_MISFIT_OVER_QUANTUM = 0.02
+_MAX_DEVIATION_OVER_ROUNDING_QUANTUM = 0.02
 
 
 def find_rounding_quantum(values: np.ndarray) -> float:
@@ -44,7 +44,7 @@ def find_rounding_quantum(values: np.ndarray) -> float:
     multiples = (distinct - distinct[0]) / quantum
     return (
         quantum
-        if np.abs(multiples - np.rint(multiples)).max() < _MAX_GRID_MISFIT_OVER_QUANTUM
+        if np.abs(multiples - np.rint(multiples)).max() < _MAX_DEVIATION_OVER_ROUNDING_QUANTUM
         else 0.0
     )
 

@@ -17,8 +17,8 @@ import numpy as np
 import xarray as xr
 from scipy.optimize import isotonic_regression
 
-from rsfstudy._deprecation import renamed_keywords, renamed_members
-from rsfstudy.error_boundary import guard_methods
+from rsfstudy._deprecation import accept_former_keyword_names, add_former_member_names
+from rsfstudy.error_boundary import wrap_methods_in_error_boundary
 from rsfstudy.errors import InvalidValue
 from rsfstudy.fitting.stress_steps import (
     find_stress_steps,
@@ -52,9 +52,9 @@ _STEP_COLUMNS = (
 _CONSTANT_VELOCITY_SEGMENTS_PER_RAMP = 16
 
 
-@renamed_keywords
-@renamed_members
-@guard_methods
+@accept_former_keyword_names
+@add_former_member_names
+@wrap_methods_in_error_boundary
 @dataclass(frozen=True, eq=False)
 class Record:
     """Laboratory record of a friction experiment.

@@ -70,7 +70,7 @@ def find_drops(time: np.ndarray, stress: np.ndarray) -> tuple[list[FittedDropCan
     candidates = detection.candidates
     while True:
         found = _fit_drop_candidates(time, stress, candidates, detection)
-        merged = _merge_overlapping(found)
+        merged = _merge_overlapping_drop_candidates(found)
         if len(merged) == len(candidates):
             break
         candidates = merged
@@ -102,7 +102,9 @@ def _fit_drop_candidates(
     ]
 
 
-def _merge_overlapping(fitted_candidates: list[FittedDropCandidate]) -> list[DropCandidate]:
+def _merge_overlapping_drop_candidates(
+    fitted_candidates: list[FittedDropCandidate],
+) -> list[DropCandidate]:
     """Merge the detected drops whose fits overlap."""
     merged: list[DropCandidate] = []
     reached = -np.inf
@@ -111,7 +113,7 @@ def _merge_overlapping(fitted_candidates: list[FittedDropCandidate]) -> list[Dro
             last = merged[-1]
             window = max(last.window_duration, candidate.window_duration)
             error = min(last.mean_difference_stderr, candidate.mean_difference_stderr)
-            correlation = max(last.correlation_factor, candidate.correlation_factor)
+            correlation = max(last.noise_correlation_factor, candidate.noise_correlation_factor)
             ends = max(last.end_time, candidate.end_time)
             merged[-1] = DropCandidate(last.start_time, ends, window, error, correlation)
         else:

@@ -28,7 +28,7 @@ MIN_RELATIVE_NORMAL_STRESS_CHANGE, _MIN_NORMAL_STRESS_CHANGE_SIGMAS = 0.02, 6.0
 _MAX_STRESS_LEVEL_DRIFT_OVER_CHANGE = 0.25
 #: Fraction of the smallest detectable change above which a difference between windows belongs to a
 #: step.
-_CHANGE_EXTENT_FRACTION = 0.4
+_MIN_DIFFERENCE_OVER_DETECTABLE_CHANGE = 0.4
 #: Settings of the step detection: the largest number of rows, the numbers of windows per record,
 #: and the smallest number of rows per window. Longer records are first averaged over blocks of
 #: rows.
@@ -140,7 +140,9 @@ def _find_stress_level_changes(stress: np.ndarray, window_rows: int) -> list[sli
     found: list[slice] = []
     for signed in (change, -change):
         joined: list[slice] = []
-        for (rows,) in find_objects(label(signed > _CHANGE_EXTENT_FRACTION * least)[0]):
+        for (rows,) in find_objects(
+            label(signed > _MIN_DIFFERENCE_OVER_DETECTABLE_CHANGE * least)[0]
+        ):
             # Noise may interrupt a ramp.
             if joined and rows.start < joined[-1].stop + window_rows:
                 joined[-1] = slice(joined[-1].start, rows.stop)

@@ -43,7 +43,7 @@ class SamplingRun(NamedTuple):
         Index of the first row, and index after the last row.
     noise_process_index : int
         Index of the noise process.
-    preceding_rows : int
+    row_count_since_clock_start : int
         Number of rows between the last restart of the clock and the start of the run.
     noise_level_index : int
         Index of the noise level.
@@ -52,7 +52,7 @@ class SamplingRun(NamedTuple):
     start_row: int
     stop_row: int
     noise_process_index: int
-    preceding_rows: int
+    row_count_since_clock_start: int
     noise_level_index: int
 
 
@@ -71,7 +71,7 @@ def find_sampling_runs(time: np.ndarray) -> tuple[SamplingRun, ...]:
     tuple of SamplingRun
         Runs that cover all rows. Each noise process has a single noise level with the same index.
     """
-    kinds, begins = _classify_intervals(time), np.diff(time) <= 0.0
+    kinds, begins = _classify_sampling_intervals(time), np.diff(time) <= 0.0
     bounds = (np.flatnonzero((np.diff(kinds) != 0) | begins) + 1).tolist()
     found, begun = [], 0
     for first, last in itertools.pairwise([0, *bounds, len(time)]):
@@ -115,14 +115,14 @@ def split_runs_at_level_changes(
                     first,
                     last,
                     run.noise_process_index,
-                    run.preceding_rows + first - run.start_row,
+                    run.row_count_since_clock_start + first - run.start_row,
                     level,
                 )
             )
     return tuple(found)
 
 
-def count_processes(runs: Sequence[SamplingRun]) -> int:
+def count_noise_processes(runs: Sequence[SamplingRun]) -> int:
     """Return the number of noise processes in a sequence of runs.
 
     Parameters
@@ -159,7 +159,7 @@ def repeat_run_field_per_row(runs: Sequence[SamplingRun], run_field_name: str) -
     )
 
 
-def find_level_changes(
+def find_noise_level_changes(
     whitened_residuals: np.ndarray, min_absolute_value: float = 0.0
 ) -> list[int]:
     """Find the rows at which the standard deviation of the noise changes.
@@ -241,7 +241,7 @@ def _refine_noise_level_change(
     return initial_row - reach + int(np.argmin(np.concatenate([[0.0], np.cumsum(costs)])))
 
 
-def _classify_intervals(time: np.ndarray) -> np.ndarray:
+def _classify_sampling_intervals(time: np.ndarray) -> np.ndarray:
     """Return the class of the sampling interval of each row.
 
     Returns

@@ -23,7 +23,7 @@ from typing import NamedTuple
 import numpy as np
 from scipy.ndimage import maximum_filter1d, median_filter
 
-from rsfstudy.error_boundary import guard_methods
+from rsfstudy.error_boundary import wrap_methods_in_error_boundary
 
 #: Largest number of rows that are segmented. Longer records are first averaged over blocks of rows.
 _MAX_ROWS_FOR_STEP_DETECTION = 20_000
@@ -34,9 +34,9 @@ _MAX_ROWS_FOR_STEP_DETECTION = 20_000
 _MIN_SEGMENT_ROWS, _MIN_RELATIVE_VELOCITY_CHANGE, _MIN_DISPLACEMENT_CHANGE_SIGMAS = 5, 0.2, 10.0
 #: Smallest reduction of the sum of squares by a split, divided by the noise variance and by ln n
 #: for n rows.
-_MIN_SQUARES_GAIN_OF_SEGMENT_SPLIT = 12.0
+_MIN_SQUARES_REDUCTION_BY_SEGMENT_SPLIT = 12.0
 #: Fraction of the highest velocity below which the load point is considered to be held.
-_MAX_HOLD_OVER_FASTER_VELOCITY = 0.01
+_MAX_HOLD_VELOCITY_OVER_HIGHEST_VELOCITY = 0.01
 #: Limits for combining several velocity changes into a single step: the longest duration of the
 #: step relative to the preceding segment and to the rest of the record, and the number of rows
 #: below which a segment is too short for a fit.
@@ -54,7 +54,7 @@ ResidualSquaresFunction = Callable[[np.ndarray | int, np.ndarray | int], np.ndar
 _InterceptAndSlope = tuple[float, float]
 
 
-@guard_methods
+@wrap_methods_in_error_boundary
 class LoadingStep(NamedTuple):
     """Step of load point velocity, of normal stress, or of both.
 
@@ -129,7 +129,7 @@ def detect_velocity_steps(time: np.ndarray, displacement: np.ndarray) -> tuple[L
         return ()
     t0, x0 = t[0], x[0]
     variance, louder = noise_variance(t, x), _local_noise_over_global_noise(t, x)
-    sums = RunningLineFitSums(t - t0, x - x0, 1.0 / louder**2)
+    sums = CumulativeLineFitSums(t - t0, x - x0, 1.0 / louder**2)
     knots = sorted(split_rows_into_segments(sums.line_residual_squares, 0, len(t), variance))
     knots = _merge_similar_segments(sums, knots, t, variance, louder)
     lines = [sums.fit_line(i, j) for i, j in itertools.pairwise(knots)]
@@ -145,7 +145,7 @@ def detect_velocity_steps(time: np.ndarray, displacement: np.ndarray) -> tuple[L
         ]
     fastest = max(abs(line[1]) for line in lines)
     speeds = [
-        line[1] if abs(line[1]) > _MAX_HOLD_OVER_FASTER_VELOCITY * fastest else 0.0
+        line[1] if abs(line[1]) > _MAX_HOLD_VELOCITY_OVER_HIGHEST_VELOCITY * fastest else 0.0
         for line in lines
     ]
     found = []
@@ -168,7 +168,7 @@ def detect_velocity_steps(time: np.ndarray, displacement: np.ndarray) -> tuple[L
     return tuple(found)
 
 
-class RunningLineFitSums:
+class CumulativeLineFitSums:
     """Cumulative sums for fitting lines to any range of rows.
 
     The computing time of a fit does not depend on the number of rows in the range. In all methods,
@@ -177,7 +177,7 @@ class RunningLineFitSums:
 
     Parameters
     ----------
-    t, x : ndarray, shape (rows,)
+    time, displacement : ndarray, shape (rows,)
         Independent and dependent variable.
     weights : ndarray, shape (rows,)
         Weights of the squared residuals.
@@ -380,7 +380,7 @@ def split_rows_into_segments(
         best = int(at[np.argmin(both)])
         if (
             residual_squares(i, j) - both.min()
-            > _MIN_SQUARES_GAIN_OF_SEGMENT_SPLIT * math.log(j - i) * variance_of_noise
+            > _MIN_SQUARES_REDUCTION_BY_SEGMENT_SPLIT * math.log(j - i) * variance_of_noise
         ):
             found.add(best)
             open_parts += [(i, best), (best, j)]
@@ -388,7 +388,7 @@ def split_rows_into_segments(
 
 
 def _merge_similar_segments(
-    line_fit_sums: RunningLineFitSums,
+    line_fit_sums: CumulativeLineFitSums,
     segment_boundaries: list[int],
     time: np.ndarray,
     variance_of_noise: float,
@@ -405,14 +405,14 @@ def _merge_similar_segments(
             sum(float(line_fit_sums.line_residual_squares(i, j)) for i, j in pieces)
             / segment_boundaries[-1]
         )
-        left = math.sqrt(max(squares, variance_of_noise)) * _noise_at_boundaries(
+        left = math.sqrt(max(squares, variance_of_noise)) * _compute_noise_at_segment_boundaries(
             pieces, relative_noise
         )
         change, lasts = np.abs(np.diff(speeds)), np.diff(time[[*segment_boundaries[:-1], -1]])
         faster = np.maximum(np.abs(speeds[1:]), np.abs(speeds[:-1]))
         differs = change / (
             _MIN_RELATIVE_VELOCITY_CHANGE
-            * np.maximum(faster, _MAX_HOLD_OVER_FASTER_VELOCITY * np.abs(speeds).max())
+            * np.maximum(faster, _MAX_HOLD_VELOCITY_OVER_HIGHEST_VELOCITY * np.abs(speeds).max())
         )
         moves = (
             change * np.minimum(lasts[1:], lasts[:-1]) / (_MIN_DISPLACEMENT_CHANGE_SIGMAS * left)
@@ -459,7 +459,7 @@ def _refine_line_intersection_time(
     middle = int(np.searchsorted(time, initial_time))
     i, j = max(middle - 20 * row_reach, 0), min(middle + 20 * row_reach, len(time))
     t, x = time[i:j] - initial_time, displacement[i:j]
-    sums = RunningLineFitSums(t, x - x[0], np.ones(j - i))
+    sums = CumulativeLineFitSums(t, x - x[0], np.ones(j - i))
     places = np.arange(_MIN_SEGMENT_ROWS, j - i - _MIN_SEGMENT_ROWS)
     both = sums.line_residual_squares(0, places) + sums.line_residual_squares(places, j - i)
     best = int(places[np.argmin(both)])
@@ -531,7 +531,7 @@ def _velocity_returns_after_overshoot(
     )
 
 
-def _noise_at_boundaries(
+def _compute_noise_at_segment_boundaries(
     row_segments: list[tuple[int, int]], relative_noise: np.ndarray
 ) -> np.ndarray:
     """Compute the relative noise at each boundary between segments.

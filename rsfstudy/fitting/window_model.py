@@ -81,7 +81,7 @@ QUICK_DIFFERENCE_SCHEME, ACCURATE_DIFFERENCE_SCHEME = (3e-4, 2), (5e-3, 4)
 _DIFFERENCE_AGREEMENT_TOLERANCE, _MAX_DIFFERENCE_STEP_REDUCTIONS = 2e-4, 4
 #: Shift of a load point step in a finite difference, as a fraction of the standard error of the
 #: step.
-STEP_SHIFT_IN_STANDARD_DEVIATIONS = 0.01
+LOADING_STEP_SHIFT_OVER_STANDARD_ERROR = 0.01
 #: Domains of bounded parameters. Near the ends of a domain, one-sided finite differences are used.
 _PARAMETER_DOMAINS = {"law_exponent": (0.0, 1.0), "alpha": (0.0, math.inf)}
 #: Scales of some parameters for the step sizes of finite differences. The method
@@ -192,7 +192,7 @@ class WindowModel:
         Loading history (see ``rsfstudy.fitting.record.loading_history``).
     accuracy : Accuracy
         Accuracy of the simulated motions.
-    meter : WorkMeter
+    work_meter : WorkMeter
         Counter of right-hand-side evaluations.
     loadings_with_shifted_steps : sequence of ndarray, optional
         Loading histories with shifted step times and velocities (see
@@ -207,7 +207,7 @@ class WindowModel:
     friction: np.ndarray
     loading_segments: np.ndarray
     accuracy: Accuracy
-    meter: WorkMeter
+    work_meter: WorkMeter
     loadings_with_shifted_steps: Sequence[np.ndarray] = ()
     filter: Filter | None = None
 
@@ -278,7 +278,11 @@ class WindowModel:
         return Scene(replace_field_values(parts, parameters_to_fields(values, velocity)))
 
     def model_friction(
-        self, values: ParameterValues, *, refined: bool = False, require_stable: bool = False
+        self,
+        values: ParameterValues,
+        *,
+        with_refined_tolerances: bool = False,
+        require_stable: bool = False,
     ) -> np.ndarray:
         """Compute the friction of the model at each row, without the trend.
 
@@ -290,7 +294,7 @@ class WindowModel:
         ----------
         values : mapping of str to float
             Values of all parameters, in the units of ``PARAMETERS``.
-        refined : bool, default: False
+        with_refined_tolerances : bool, default: False
             If True, all tolerances are reduced by a factor of ten.
         require_stable : bool, default: False
             If True, the motion is computed only if the stiffness exceeds the critical stiffness and
@@ -307,7 +311,7 @@ class WindowModel:
         MotionStopped
             If the work budget of the meter is exhausted.
         """
-        budget, nothing = self.meter.budget, np.full(len(self.time), math.nan)
+        budget, nothing = self.work_meter.budget, np.full(len(self.time), math.nan)
         stiff = 4.0 * values["stiffness"] * float(np.ptp(self.displacement)) / values["a"]
         most = (
             _MAX_EVALUATIONS
@@ -323,21 +327,21 @@ class WindowModel:
             scale = self.initial_velocity / values["slip_distance"]
             times = self.filter.sample_times(self.time) if self.filter else self.time
             at = np.maximum(times - late - self.loading_segments[0, 0], 0.0) * scale
-            accuracy = self.accuracy.refined() if refined else self.accuracy
+            accuracy = self.accuracy.refined() if with_refined_tolerances else self.accuracy
             recording, end = Recording(sample_times=at), float(at[-1]) * (1.0 + 1e-12)
-            self.meter.budget = min(budget, self.meter.evaluations + most)
+            self.work_meter.budget = min(budget, self.work_meter.evaluations + most)
             for _event in integrate_events(
-                scene, accuracy, self.meter, recording=recording, until=end
+                scene, accuracy, self.work_meter, recording=recording, until=end
             ):
                 pass
         except MotionStopped as halt:
-            if halt.status is Status.WORK_BUDGET_SPENT and self.meter.budget == budget:
+            if halt.status is Status.WORK_BUDGET_SPENT and self.work_meter.budget == budget:
                 raise
             return nothing
         except InvalidValue:
             return nothing
         finally:
-            self.meter.budget = budget
+            self.work_meter.budget = budget
         found = recorded_friction_coefficient(recording.as_table(scene))
         if len(found) != len(times):
             return nothing
@@ -382,7 +386,7 @@ class WindowModel:
         ]
         return (
             np.asarray(np.array(curves) - self.model_friction(values)).T
-            / STEP_SHIFT_IN_STANDARD_DEVIATIONS
+            / LOADING_STEP_SHIFT_OVER_STANDARD_ERROR
         )
 
     def jacobian(
@@ -424,10 +428,13 @@ class WindowModel:
         reduced until :math:`d(h)` and :math:`d(2 h)` agree.
         """
         return np.column_stack(
-            [self._derivative(values, name, difference_scheme) for name in free_parameters]
+            [
+                self._compute_friction_derivative(values, name, difference_scheme)
+                for name in free_parameters
+            ]
         )
 
-    def _derivative(
+    def _compute_friction_derivative(
         self, values: ParameterValues, parameter_name: str, difference_scheme: DifferenceScheme
     ) -> np.ndarray:
         """Compute the derivative of friction with respect to a parameter."""
@@ -440,7 +447,9 @@ class WindowModel:
             self._typical_parameter_size(parameter_name, values),
         )
         if order == 2:
-            return self._central_difference(values, parameter_name, part * size, 2.0, refined=False)
+            return self._central_difference(
+                values, parameter_name, part * size, 2.0, with_refined_tolerances=False
+            )
         best, least = np.full(len(self.time), math.nan), math.inf
         for _ in range(_MAX_DIFFERENCE_STEP_REDUCTIONS):
             near, far = (
@@ -467,28 +476,32 @@ class WindowModel:
         values: ParameterValues,
         parameter_name: str,
         step: float,
-        steps_from_domain_end: float,
+        min_steps_from_domain_end: float,
         *,
-        refined: bool = True,
+        with_refined_tolerances: bool = True,
     ) -> np.ndarray:
         """Compute a second-order finite difference.
 
         The difference is one-sided if the distance of the parameter from an end of its domain is
-        less than ``steps_from_domain_end`` step sizes.
+        less than ``min_steps_from_domain_end`` step sizes.
         """
         low, high = _PARAMETER_DOMAINS.get(parameter_name, (-math.inf, math.inf))
         weights = {1.0: 0.5, -1.0: -0.5}
         if (
-            not low + steps_from_domain_end * step
+            not low + min_steps_from_domain_end * step
             <= values[parameter_name]
-            <= high - steps_from_domain_end * step
+            <= high - min_steps_from_domain_end * step
         ):
-            side = 1.0 if values[parameter_name] < low + steps_from_domain_end * step else -1.0
+            side = 1.0 if values[parameter_name] < low + min_steps_from_domain_end * step else -1.0
             weights = {0.0: -1.5 * side, side: 2.0 * side, 2.0 * side: -0.5 * side}
         found = np.zeros(len(self.time))
         for place, weight in weights.items():
             moved = shift_parameter(values, parameter_name, place * step)
-            found += weight / step * self.model_friction(moved, refined=refined)
+            found += (
+                weight
+                / step
+                * self.model_friction(moved, with_refined_tolerances=with_refined_tolerances)
+            )
         return found
 
     def _typical_parameter_size(self, parameter_name: str, values: ParameterValues) -> float:

@@ -9,12 +9,12 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from rsfstudy._lazy_exports import lazy_exports
+from rsfstudy._lazy_exports import build_lazy_export_functions
 
 if TYPE_CHECKING:
     from rsfstudy.limit_cycles.limit_cycle import SLIP_MODES, LimitCycle
 else:
-    __getattr__, __dir__ = lazy_exports(
+    __getattr__, __dir__ = build_lazy_export_functions(
         __name__,
         {
             "limit_cycles.limit_cycle": ("LimitCycle", "SLIP_MODES"),

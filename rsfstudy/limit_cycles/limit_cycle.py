@@ -21,7 +21,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from rsfstudy.error_boundary import guard_methods
+from rsfstudy.error_boundary import wrap_methods_in_error_boundary
 from rsfstudy.errors import InvalidValue
 from rsfstudy.limit_cycles.limit_cycle_search import (
     LimitCycleSearch,
@@ -57,11 +57,11 @@ from rsfstudy.status import Status
 
 #: Minimum error estimate, as a fraction of the requested relative accuracy, because two runs may
 #: have the same error by chance.
-_ERROR_FLOOR_OVER_RTOL = 0.06
+_MIN_ESTIMATED_ERROR_OVER_RTOL = 0.06
 #: Displacement of the load point that starts a motion if the scene has no step, in units of D_c.
 INITIAL_PERTURBATION_DISPLACEMENT = 0.1
 #: Number of recorded points if only the two ends of an orbit are stored.
-_MAX_POINTS_WITHOUT_RECORDING = 2
+_MAX_CYCLE_POINTS_WITHOUT_RECORDING = 2
 #: Relative accuracy of the search for the limit cycle. After the search, the orbit is refined to
 #: the requested accuracy.
 _CYCLE_SEARCH_RTOL = 1e-4
@@ -74,7 +74,7 @@ _PRIMARY_OUTPUT_NAMES = (
     "max_log10_slip_rate",
 )
 #: Index of the peak slip rate in the main results.
-INDEX_OF_PEAK_OUTPUT = 4
+INDEX_OF_PEAK_SLIP_RATE_OUTPUT = 4
 
 #: Number of events after which a motion repeats itself.
 EVENTS_PER_PERIOD_OUTPUT = Output(
@@ -116,7 +116,7 @@ _OUTPUTS = (
 )
 
 
-@guard_methods
+@wrap_methods_in_error_boundary
 @dataclass(frozen=True)
 class LimitCycle(RecordingMeasure):
     r"""Limit cycle of stick-slip under a constant load point velocity.
@@ -220,7 +220,7 @@ class LimitCycle(RecordingMeasure):
                     raise
                 continue
             if found:
-                outcome = self._close_known_orbit(
+                outcome = self._refine_known_periodic_orbit(
                     scene, accuracy, meter, approach.orbit, len(approach.cycles)
                 )
                 if outcome.status is not Status.UNVERIFIED:
@@ -247,11 +247,15 @@ class LimitCycle(RecordingMeasure):
             return outcome_of_aperiodic_motion(
                 scene, motion, suggest_raising_event_limit(self.events)
             )
-        return self._close_known_orbit(
-            scene, accuracy, work_meter, motion.orbit.starting_at_largest_event, len(motion.cycles)
+        return self._refine_known_periodic_orbit(
+            scene,
+            accuracy,
+            work_meter,
+            motion.orbit.orbit_starting_at_largest_event,
+            len(motion.cycles),
         )
 
-    def _close_known_orbit(
+    def _refine_known_periodic_orbit(
         self,
         scene: Scene,
         accuracy: Accuracy,
@@ -269,7 +273,7 @@ class LimitCycle(RecordingMeasure):
             scene,
             accuracy.refined(),
             work_meter,
-            recorded=self.phases > _MAX_POINTS_WITHOUT_RECORDING,
+            recorded=self.phases > _MAX_CYCLE_POINTS_WITHOUT_RECORDING,
         )
         again = one and fine.refine_orbit(one)
         if one is None or again is None:
@@ -290,7 +294,7 @@ class LimitCycle(RecordingMeasure):
         values["slip_per_event"] -= carried if one.period > 1 else 0.0
         values |= _additional_cycle_outputs(scene, cycle)
         values["slip_mode"] = _classify_slip_mode(
-            scene, LN10 * float(one.corrected_primary_outputs[INDEX_OF_PEAK_OUTPUT])
+            scene, LN10 * float(one.corrected_primary_outputs[INDEX_OF_PEAK_SLIP_RATE_OUTPUT])
         )
         values["period_events"] = float(one.period)
         values["events_until_repeat"] = float(max_cycles)
@@ -452,7 +456,10 @@ def estimate_primary_output_errors(
     ndarray
         Error estimates in the order of the main results.
     """
-    chance, scales = _ERROR_FLOOR_OVER_RTOL * accuracy.rtol, _primary_output_error_scales(orbit)
+    chance, scales = (
+        _MIN_ESTIMATED_ERROR_OVER_RTOL * accuracy.rtol,
+        _primary_output_error_scales(orbit),
+    )
     pairs = zip(
         orbit.corrected_primary_outputs.tolist(),
         refined_orbit.corrected_primary_outputs.tolist(),

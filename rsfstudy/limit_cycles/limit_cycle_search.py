@@ -43,7 +43,7 @@ from rsfstudy.limit_cycles.return_map import (
     ORBIT_CLOSURE_TOLERANCE_OVER_RTOL,
     PeriodicOrbit,
     ReturnMap,
-    section_vector_at,
+    section_coordinates_at_point,
 )
 from rsfstudy.limit_cycles.stick_slip_cycles import (
     LN10,
@@ -61,7 +61,7 @@ from rsfstudy.status import Status
 #: second limit.
 _MIN_CONTRACTION_TO_LEAP, _MAX_CONTRACTION = 0.03, 0.98
 #: Maximum length of a leap to the extrapolated fixed point, as a fraction of the range of ln V.
-_MAX_LEAP_OVER_LOG_RATE_RANGE = 0.1
+_MAX_FIXED_POINT_LEAP_OVER_LOG_RATE_RANGE = 0.1
 #: Maximum number of cycles after which a periodic motion repeats.
 MAX_PERIOD_IN_CYCLES = 16
 #: Largest relative accuracy with which orbits are closed, because finite differences lose digits.
@@ -85,7 +85,7 @@ class LimitCycleSearch:
         Scene with one state and a moving load point.
     accuracy : Accuracy
         Requested accuracy.
-    meter : WorkMeter
+    work_meter : WorkMeter
         Counter of right-hand-side evaluations.
 
     Attributes
@@ -143,7 +143,7 @@ class LimitCycleSearch:
                     return False
                 self._work, spent = self._meter.evaluations - spent, self._meter.evaluations
                 self.cycles.append(cycle)
-                self._update_map_derivatives()
+                self._update_return_map_derivatives()
                 if self._has_converged():
                     return True
                 if len(self.cycles) >= max_cycles:
@@ -156,8 +156,8 @@ class LimitCycleSearch:
                     self._distance_at_leap = abs(
                         cycle.end_point.spring_stress - cycle.start_point.spring_stress
                     )
-                    start = self._return_map.point_at_section(
-                        section_vector_at(cycle.start_point) + np.array(self._correction)
+                    start = self._return_map.section_coordinates_to_point(
+                        section_coordinates_at_point(cycle.start_point) + np.array(self._correction)
                     )
                     break
 
@@ -191,7 +191,7 @@ class LimitCycleSearch:
         """
         return self._derivatives[0][0] + self._derivatives[1][1]
 
-    def _update_map_derivatives(self) -> None:
+    def _update_return_map_derivatives(self) -> None:
         """Update the return map derivatives and the vector to the fixed point.
 
         The derivatives of the return map are computed from the last two cycles, unless numerical
@@ -219,11 +219,11 @@ class LimitCycleSearch:
             list(map(sub, image, start)),
             1.0 - min(self._contraction_ratio_per_cycle, _MAX_CONTRACTION),
         )
-        returned = self._predict_image_change(off)
+        returned = self._predict_return_map_image_change(off)
         self._correction = off[0] + returned[0] / kept, off[1] + returned[1] / kept
-        self._image_correction = self._predict_image_change(self._correction)
+        self._image_correction = self._predict_return_map_image_change(self._correction)
 
-    def _predict_image_change(self, section_change: Sequence[float]) -> list[float]:
+    def _predict_return_map_image_change(self, section_change: Sequence[float]) -> list[float]:
         """Compute the image change caused by a change of the section."""
         by_stress, by_state = section_change
         return [x * by_stress + y * by_state for x, y in zip(*self._derivatives, strict=True)]
@@ -284,7 +284,7 @@ class LimitCycleSearch:
         slowest, fastest = self._image_correction[-2:]
         return (
             LN10 * abs(fastest - slowest)
-            < _MAX_LEAP_OVER_LOG_RATE_RANGE * cycle.log_slip_rate_range
+            < _MAX_FIXED_POINT_LEAP_OVER_LOG_RATE_RANGE * cycle.log_slip_rate_range
         )
 
 
@@ -355,7 +355,9 @@ def follow_to_periodic_orbit(
                 if off < _MAX_RECURRENCE_MISFIT:
                     by = ReturnMap(scene, fine, work_meter, counted=counted)
                     found = by.find_periodic_orbit(
-                        section_vector_at(cycle.end_point), period, cycle.log_slip_rate_range
+                        section_coordinates_at_point(cycle.end_point),
+                        period,
+                        cycle.log_slip_rate_range,
                     )
                     break
             repels = off >= _MAX_RECURRENCE_MISFIT or (

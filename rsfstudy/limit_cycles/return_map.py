@@ -63,7 +63,7 @@ from rsfstudy.status import Status
 #: Step of the finite differences of the return map, relative to a times the range of ln V. The
 #: derivatives of the return map vary on a scale of a hundredth of a times this range.
 DIFFERENCE_STEP_OVER_LOG_RATE_RANGE = 1e-4
-_DIFFERENCE_WEIGHTS = ((1, 2.0 / 3.0), (2, -1.0 / 12.0))
+_FINITE_DIFFERENCE_WEIGHTS = ((1, 2.0 / 3.0), (2, -1.0 / 12.0))
 #: Maximum distance of an orbit from the starting point of the search, relative to a times the range
 #: of ln V, and maximum number of Newton steps.
 _MAX_ORBIT_DISTANCE, _MAX_ITERATIONS = 0.1, 12
@@ -108,10 +108,10 @@ class PeriodicOrbit:
         return len(self.cycles)
 
     @property
-    def start_section(self) -> np.ndarray:
+    def start_section_coordinates(self) -> np.ndarray:
         """Section at which the closed orbit begins."""
         return np.asarray(
-            section_vector_at(self.cycles[0].start_point) + self.start_section_correction
+            section_coordinates_at_point(self.cycles[0].start_point) + self.start_section_correction
         )
 
     @cached_property
@@ -143,7 +143,7 @@ class PeriodicOrbit:
         return bool(abs(self.floquet_multipliers[0]) < 1.0)
 
     @property
-    def starting_at_largest_event(self) -> PeriodicOrbit:
+    def orbit_starting_at_largest_event(self) -> PeriodicOrbit:
         """Orbit that starts with the cycle with the highest slip rate."""
         at = max(range(self.period), key=lambda place: self.cycles[place].max_log_slip_rate)
         if not at:
@@ -157,7 +157,7 @@ class PeriodicOrbit:
         )
 
 
-def section_vector_at(point: MotionPoint) -> np.ndarray:
+def section_coordinates_at_point(point: MotionPoint) -> np.ndarray:
     """Return the section vector (spring stress and states) of a point.
 
     Parameters
@@ -173,7 +173,7 @@ def section_vector_at(point: MotionPoint) -> np.ndarray:
     return np.array((point.spring_stress, *point.psis))
 
 
-def section_and_outputs_after(cycle: Cycle) -> np.ndarray:
+def section_and_outputs_at_end_of_cycle(cycle: Cycle) -> np.ndarray:
     """Return the section at the end of a cycle, and the main results of the cycle.
 
     Parameters
@@ -225,7 +225,7 @@ class ReturnMap:
         Scene with a moving load point.
     accuracy : Accuracy
         Requested accuracy.
-    meter : WorkMeter
+    work_meter : WorkMeter
         Counter of right-hand-side evaluations.
     recorded : bool, default: False
         If True, record the motions along an orbit. Otherwise only the ends of the cycles are
@@ -254,7 +254,7 @@ class ReturnMap:
         #: Indices of the section components that contribute to the distance between sections.
         self._compared_unknowns = [0, *(1 + place for place in places)]
 
-    def point_at_section(self, section: np.ndarray) -> MotionPoint:
+    def section_coordinates_to_point(self, section: np.ndarray) -> MotionPoint:
         """Return the point of the motion at a section.
 
         The point is on the slow manifold, unless inertia is important. If inertia is important, the
@@ -314,7 +314,7 @@ class ReturnMap:
                 self.scene,
                 self.accuracy,
                 self._meter,
-                self.point_at_section(start_section),
+                self.section_coordinates_to_point(start_section),
                 recording,
             )
             for cycle in moving:
@@ -342,7 +342,7 @@ class ReturnMap:
             Image of the section, or None if the motion does not complete a cycle.
         """
         seen = self.follow_cycles(start_section, 1)
-        return section_and_outputs_after(seen[0]) if seen else None
+        return section_and_outputs_at_end_of_cycle(seen[0]) if seen else None
 
     def compute_cycle_derivatives(
         self, start_section: np.ndarray, cycle_count: int, state_scale: float
@@ -417,7 +417,7 @@ class ReturnMap:
         The derivative along the motion follows from the rates of the motion. The result is None if
         a motion does not complete the cycle.
         """
-        point = self.point_at_section(start_section)
+        point = self.section_coordinates_to_point(start_section)
         way, passed = self.compute_motion_direction_and_image_change(point)
         directions = np.linalg.qr(np.column_stack([way, np.eye(len(start_section))]))[0]
         columns = list[np.ndarray]()
@@ -426,7 +426,7 @@ class ReturnMap:
                 columns.append(np.array(passed) / (unit @ way))
                 continue
             slope = np.zeros(len(start_section) + PRIMARY_OUTPUT_COUNT_PER_CYCLE)
-            for number, weight in _DIFFERENCE_WEIGHTS:
+            for number, weight in _FINITE_DIFFERENCE_WEIGHTS:
                 ahead = self.follow_one_cycle(start_section + number * difference_step * unit)
                 behind = self.follow_one_cycle(start_section - number * difference_step * unit)
                 if ahead is None or behind is None:
@@ -472,8 +472,13 @@ class ReturnMap:
         if found is None:
             return None
         cycle_count = self._cycles_until_repeat(found.cycles, scale)
-        if np.abs(found.start_section - start_section).max() > 10.0 * self.accuracy.rtol * scale:
-            slopes = self.compute_cycle_derivatives(found.start_section, cycle_count, scale)
+        if (
+            np.abs(found.start_section_coordinates - start_section).max()
+            > 10.0 * self.accuracy.rtol * scale
+        ):
+            slopes = self.compute_cycle_derivatives(
+                found.start_section_coordinates, cycle_count, scale
+            )
         if len(slopes) < cycle_count:
             return None
         return replace(
@@ -496,7 +501,7 @@ class ReturnMap:
         if orbit.accuracy == self.accuracy:
             return orbit
         return self._solve_for_closed_orbit(
-            orbit.start_section,
+            orbit.start_section_coordinates,
             orbit.cycle_derivatives,
             self.scene.a * orbit.cycles[0].log_slip_rate_range,
             _MAX_ORBIT_DISTANCE,
@@ -541,7 +546,7 @@ class ReturnMap:
             seen = self.follow_cycles(at, len(cycle_derivatives), recording)
             if len(seen) < len(cycle_derivatives):
                 return None
-            off = section_vector_at(seen[-1].end_point) - at
+            off = section_coordinates_at_point(seen[-1].end_point) - at
             if move is not None:
                 jacobian += off[:, None] * move / (move @ move)
             move = -dgesv(jacobian, off)[2]
@@ -575,10 +580,12 @@ class ReturnMap:
 
     def _cycles_until_repeat(self, cycles: Sequence[Cycle], state_scale: float) -> int:
         """Return the number of cycles after which an orbit repeats itself."""
-        begin = section_vector_at(cycles[0].start_point)
+        begin = section_coordinates_at_point(cycles[0].start_point)
         for count in range(1, len(cycles)):
             apart = self._largest_scaled_section_change(
-                section_vector_at(cycles[count - 1].end_point) - begin, begin, state_scale
+                section_coordinates_at_point(cycles[count - 1].end_point) - begin,
+                begin,
+                state_scale,
             )
             if len(cycles) % count == 0 and apart < 1e-4 * state_scale:
                 return count

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from rsfstudy._lazy_exports import lazy_exports
+from rsfstudy._lazy_exports import build_lazy_export_functions
 
 if TYPE_CHECKING:
     from rsfstudy.measure_base._declaration_checks import OutputValue
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from rsfstudy.measure_base.measure import Measure, Outcome
     from rsfstudy.measure_base.settling_checks import steady_sliding_is_linearly_stable
 else:
-    __getattr__, __dir__ = lazy_exports(
+    __getattr__, __dir__ = build_lazy_export_functions(
         __name__,
         {
             "measure_base._declaration_checks": ("OutputValue",),

@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from rsfstudy._deprecation import renamed_names
-from rsfstudy.error_boundary import guard_methods
+from rsfstudy._deprecation import build_getattr_for_former_names
+from rsfstudy.error_boundary import wrap_methods_in_error_boundary
 from rsfstudy.errors import InvalidValue
 from rsfstudy.measure_base.measure import Measure
 from rsfstudy.quantities import Output
@@ -42,7 +42,7 @@ def create_outputs_along_phase(*names: str) -> tuple[Output, ...]:
     return tuple(Output(name, dims=("phase",)) for name in names)
 
 
-@guard_methods
+@wrap_methods_in_error_boundary
 @dataclass(frozen=True)
 class RecordingMeasure(Measure):
     """Base class of measures that store a record along ``phase``.
@@ -67,4 +67,4 @@ class RecordingMeasure(Measure):
 
 
 if not TYPE_CHECKING:
-    __getattr__ = renamed_names(__name__)
+    __getattr__ = build_getattr_for_former_names(__name__)

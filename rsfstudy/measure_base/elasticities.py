@@ -11,7 +11,7 @@ from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 
-from rsfstudy.error_boundary import guard_methods
+from rsfstudy.error_boundary import wrap_methods_in_error_boundary
 from rsfstudy.errors import InvalidValue
 from rsfstudy.measure_base.measure import Measure, Outcome, OutputValue
 from rsfstudy.motion import Accuracy, MotionStopped, WorkMeter
@@ -67,7 +67,7 @@ class _LogValueWithError(NamedTuple):
     error: float
 
 
-@guard_methods
+@wrap_methods_in_error_boundary
 @dataclass(frozen=True)
 class Elasticities(Measure):
     r"""Elasticities of the main result of a measure.

@@ -19,8 +19,8 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from rsfstudy._deprecation import adopt_former_members, renamed_members
-from rsfstudy.error_boundary import CheckedKeywords, guard_methods
+from rsfstudy._deprecation import add_former_member_names, add_new_names_for_former_members
+from rsfstudy.error_boundary import ConstructorKeywordCheckMixin, wrap_methods_in_error_boundary
 from rsfstudy.errors import InvalidValue
 from rsfstudy.measure_base import _declaration_checks
 from rsfstudy.measure_base._declaration_checks import OutputValue as OutputValue
@@ -38,7 +38,7 @@ from rsfstudy.status import Status
 from rsfstudy.vocabulary import FORMULAS_OF_DERIVED_COORDINATES
 
 
-@guard_methods
+@wrap_methods_in_error_boundary
 @dataclass(frozen=True)
 class Outcome:
     """Results of a measure for one scene.
@@ -81,10 +81,10 @@ RESERVED_NAMES = frozenset(
 )
 
 
-@renamed_members
-@guard_methods
+@add_former_member_names
+@wrap_methods_in_error_boundary
 @dataclass(frozen=True)
-class Measure(CheckedKeywords):
+class Measure(ConstructorKeywordCheckMixin):
     """Base class of all measures.
 
     To define a measure, write a frozen dataclass with the following members. The fields of the
@@ -145,7 +145,7 @@ class Measure(CheckedKeywords):
     def __init_subclass__(cls) -> None:
         """Adopt former names of members that the subclass defines."""
         super().__init_subclass__()
-        adopt_former_members(cls)
+        add_new_names_for_former_members(cls)
 
     @property
     def primary_output(self) -> str:

@@ -11,7 +11,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from rsfstudy._lazy_exports import lazy_exports
+from rsfstudy._lazy_exports import build_lazy_export_functions
 
 if TYPE_CHECKING:
     from rsfstudy.critical_steps.critical_step import CriticalStep
@@ -29,7 +29,7 @@ if TYPE_CHECKING:
     from rsfstudy.responses.velocity_step import VelocityStep
     from rsfstudy.status import Status
 else:
-    __getattr__, __dir__ = lazy_exports(
+    __getattr__, __dir__ = build_lazy_export_functions(
         __name__,
         {
             "critical_steps.critical_step": ("CriticalStep",),

@@ -7,8 +7,8 @@ from dataclasses import dataclass, replace
 from functools import lru_cache
 from numbers import Real
 
-from rsfstudy._deprecation import renamed_members
-from rsfstudy.error_boundary import guard_methods
+from rsfstudy._deprecation import add_former_member_names
+from rsfstudy.error_boundary import wrap_methods_in_error_boundary
 from rsfstudy.errors import InvalidValue
 from rsfstudy.motion.engines import SCIPY, engine_name
 
@@ -30,8 +30,8 @@ MAX_ERROR_OVER_RTOL = 100.0
 RELATIVE_ROUNDING_ERROR = 1e-13
 
 
-@renamed_members
-@guard_methods
+@add_former_member_names
+@wrap_methods_in_error_boundary
 @dataclass(frozen=True)
 class Accuracy:
     """Requested accuracy of results, and limits of the computation.

@@ -33,10 +33,10 @@ from enum import StrEnum
 from typing import TYPE_CHECKING, NamedTuple
 
 from rsfstudy._deprecation import (
-    renamed_keywords,
-    renamed_members,
-    renamed_names,
-    renamed_value,
+    accept_former_keyword_names,
+    add_former_member_names,
+    build_getattr_for_former_names,
+    translate_former_member_name,
 )
 from rsfstudy.slider import MotionPoint
 
@@ -59,7 +59,7 @@ class EventKind(StrEnum):
     __hash__ = str.__hash__
 
 
-@renamed_members
+@add_former_member_names
 class EventSpecification(NamedTuple):
     """Specification of a requested event.
 
@@ -89,7 +89,7 @@ class EventSpecification(NamedTuple):
     may_defer: bool = False
 
 
-@renamed_keywords
+@accept_former_keyword_names
 def maximum(
     quantity: str, *, terminal: bool = False, may_defer: bool = False
 ) -> EventSpecification:
@@ -115,7 +115,7 @@ def maximum(
     )
 
 
-@renamed_keywords
+@accept_former_keyword_names
 def minimum(
     quantity: str, *, terminal: bool = False, may_defer: bool = False
 ) -> EventSpecification:
@@ -141,7 +141,7 @@ def minimum(
     )
 
 
-@renamed_keywords
+@accept_former_keyword_names
 def rise(
     quantity: str, level: float, *, terminal: bool = False, may_defer: bool = False
 ) -> EventSpecification:
@@ -169,7 +169,7 @@ def rise(
     )
 
 
-@renamed_keywords
+@accept_former_keyword_names
 def fall(
     quantity: str, level: float, *, terminal: bool = False, may_defer: bool = False
 ) -> EventSpecification:
@@ -202,11 +202,11 @@ def _specify_quantity_event(
 ) -> EventSpecification:
     """Create an event specification, and accept former names of quantities."""
     return EventSpecification(
-        kind, renamed_value(MotionPoint, quantity), level, terminal, may_defer
+        kind, translate_former_member_name(MotionPoint, quantity), level, terminal, may_defer
     )
 
 
-@renamed_keywords
+@accept_former_keyword_names
 def approach_to_steady_state(fraction: float, *, terminal: bool = False) -> EventSpecification:
     """Create an event specification for the approach to steady sliding.
 
@@ -229,7 +229,7 @@ def approach_to_steady_state(fraction: float, *, terminal: bool = False) -> Even
     return EventSpecification(EventKind.SETTLED, level=fraction, terminal=terminal)
 
 
-@renamed_members
+@add_former_member_names
 class Event(NamedTuple):
     """Event of a motion.
 
@@ -265,4 +265,4 @@ class Event(NamedTuple):
 
 
 if not TYPE_CHECKING:
-    __getattr__ = renamed_names(__name__)
+    __getattr__ = build_getattr_for_former_names(__name__)

@@ -16,7 +16,7 @@ from typing import Any
 
 import numpy as np
 
-from rsfstudy._deprecation import renamed_members
+from rsfstudy._deprecation import add_former_member_names
 from rsfstudy.motion import array_layout, workspace
 from rsfstudy.motion.engine_factory import create_stepper, import_compiled_engine
 from rsfstudy.motion.engines import COMPILED
@@ -189,7 +189,7 @@ class PythonBackend:
         return advance_motion
 
 
-@partial(renamed_members, writable=True)
+@partial(add_former_member_names, writable=True)
 class PythonMotionState(SimpleNamespace):
     """State of a motion as a Python object with the fields of ``MOTION_STATE_DTYPE``."""
 

@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
-from rsfstudy._deprecation import renamed_members, renamed_names
+from rsfstudy._deprecation import add_former_member_names, build_getattr_for_former_names
 from rsfstudy.errors import RsfStudyError
 from rsfstudy.motion.engines import SCIPY
 from rsfstudy.status import Status
@@ -51,7 +51,7 @@ class MotionStopped(RsfStudyError):
         self.status = status
 
 
-@renamed_members
+@add_former_member_names
 @dataclass
 class WorkMeter:
     """Counter of right-hand side evaluations of a measurement, with a budget.
@@ -159,4 +159,4 @@ class WorkMeter:
 
 
 if not TYPE_CHECKING:
-    __getattr__ = renamed_names(__name__)
+    __getattr__ = build_getattr_for_former_names(__name__)

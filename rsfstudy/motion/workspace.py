@@ -31,7 +31,7 @@ from __future__ import annotations
 
 from typing import Any, NamedTuple
 
-from rsfstudy._deprecation import renamed_members
+from rsfstudy._deprecation import add_former_member_names
 from rsfstudy.motion.array_layout import FIRST_STATE, FUNCTION_COUNT_PER_REGIME, SLOW_REGIME
 from rsfstudy.motion.array_operations import (
     advance_pointer_by_items,
@@ -51,7 +51,7 @@ Array = Any
 REPLACEMENT_OF_ZERO_TIME_DERIVATIVE = 1e-300
 
 
-@renamed_members
+@add_former_member_names
 class Workspace(NamedTuple):
     """Arrays, functions and constants of one regime.
 

@@ -11,7 +11,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from rsfstudy._lazy_exports import lazy_exports
+from rsfstudy._lazy_exports import build_lazy_export_functions
 
 if TYPE_CHECKING:
     from rsfstudy.slider.dynamics import Dynamics
@@ -44,7 +44,7 @@ if TYPE_CHECKING:
     from rsfstudy.slider.parts import Part, flag, number
     from rsfstudy.slider.scene_view import SceneView
 else:
-    __getattr__, __dir__ = lazy_exports(
+    __getattr__, __dir__ = build_lazy_export_functions(
         __name__,
         {
             "slider.dynamics": ("Dynamics",),

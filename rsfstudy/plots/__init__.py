@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from rsfstudy._lazy_exports import lazy_exports
+from rsfstudy._lazy_exports import build_lazy_export_functions
 
 if TYPE_CHECKING:
     from rsfstudy.plots._agreement import draw_agreement
@@ -32,7 +32,7 @@ if TYPE_CHECKING:
     )
     from rsfstudy.plots._text import format_number, format_slope
 else:
-    __getattr__, __dir__ = lazy_exports(
+    __getattr__, __dir__ = build_lazy_export_functions(
         __name__,
         {
             "plots._agreement": ("draw_agreement",),

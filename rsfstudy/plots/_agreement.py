@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 
 from matplotlib.figure import Figure
 
-from rsfstudy._deprecation import renamed_keywords
+from rsfstudy._deprecation import accept_former_keyword_names
 from rsfstudy.plots._figures import NotebookFigure
 from rsfstudy.plots._style import (
     add_legend,
@@ -20,7 +20,7 @@ from rsfstudy.plots._style import (
 CurvePoints = Sequence[tuple[float, float]]
 
 
-@renamed_keywords
+@accept_former_keyword_names
 def draw_agreement(digits: Mapping[str, CurvePoints], label: str, required_digits: float) -> Figure:
     """Draw the number of correct digits of each quantity.
 

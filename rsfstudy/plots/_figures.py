@@ -21,7 +21,7 @@ import xarray as xr
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure as Figure
 
-from rsfstudy._deprecation import renamed_keywords
+from rsfstudy._deprecation import accept_former_keyword_names
 from rsfstudy.defaults import FIGURE_FORMATS
 from rsfstudy.errors import InvalidValue, RsfStudyError
 from rsfstudy.formatting import format_overrides, pluralize
@@ -106,7 +106,7 @@ class NotebookFigure(Figure):
         return image.getvalue()
 
 
-@renamed_keywords
+@accept_former_keyword_names
 def draw_figure(
     dataset: xr.Dataset, user_figure: Any = None, *, variable: str | None = None, style: Any = None
 ) -> Figure:
@@ -349,7 +349,7 @@ def _generic_figure(dataset: xr.Dataset, variable: str | None = None) -> Declare
 # ---- files --------------------------------------------------------------------------------------
 
 
-@renamed_keywords
+@accept_former_keyword_names
 def save_figure(
     dataset: xr.Dataset,
     path: Path,
@@ -423,7 +423,7 @@ def save_figure(
     write_image(image, path)
 
 
-@renamed_keywords
+@accept_former_keyword_names
 def render_figure(figure: Figure, image_format: str) -> bytes:
     r"""Render a figure as an image.
 

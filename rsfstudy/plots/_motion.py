@@ -16,7 +16,7 @@ import xarray as xr
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from rsfstudy._deprecation import renamed_keywords
+from rsfstudy._deprecation import accept_former_keyword_names
 from rsfstudy.error_boundary import error_boundary
 from rsfstudy.errors import DataError, InvalidValue
 from rsfstudy.plots._axes import set_log_scale
@@ -47,7 +47,7 @@ _MAX_RELATIVE_CHANGE_OF_HELD_LOAD_POINT = 1e-6
 _FRICTION_LABEL = r"Friction coefficient, $\mu$"
 
 
-@renamed_keywords
+@accept_former_keyword_names
 @partial(error_boundary, is_called_internally=True)
 def plot_motion(
     motion: xr.Dataset, rig: Rig | None = None, *, against: str | None = None

@@ -26,7 +26,7 @@ from matplotlib.lines import Line2D
 from matplotlib.text import Text
 from matplotlib.transforms import blended_transform_factory, offset_copy
 
-from rsfstudy._deprecation import renamed_keywords
+from rsfstudy._deprecation import accept_former_keyword_names
 from rsfstudy.error_boundary import check_regular_file
 from rsfstudy.errors import InvalidValue, RsfStudyError, shorten_text
 from rsfstudy.plots._text import visible_length, wrap_text
@@ -43,7 +43,7 @@ _MARKER_CYCLE = "os^Dv<>P*X"
 _COLOUR_BAR_FRACTION_OF_PANEL = 0.24
 
 
-@renamed_keywords
+@accept_former_keyword_names
 @contextlib.contextmanager
 def style_context(user_styles: Any = None) -> Iterator[None]:
     """Apply the style sheet of rsfstudy and any additional styles.

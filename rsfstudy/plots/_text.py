@@ -9,7 +9,7 @@ from typing import Any
 import xarray as xr
 from matplotlib.mathtext import MathTextParser
 
-from rsfstudy._deprecation import renamed_keywords
+from rsfstudy._deprecation import accept_former_keyword_names
 from rsfstudy.quantities import Quantity
 
 _MATH_PARSER = MathTextParser("path")
@@ -286,7 +286,7 @@ def format_with_error(value: float, error: float, max_decimals: int | None = Non
     return rf"${value:.{digits}f} \pm {error:.{digits}f}$"
 
 
-@renamed_keywords
+@accept_former_keyword_names
 def format_slope(row: xr.Dataset, name: str, max_decimals: int | None = None) -> str:
     r"""Format a slope and its error.
 

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from rsfstudy._lazy_exports import lazy_exports
+from rsfstudy._lazy_exports import build_lazy_export_functions
 
 if TYPE_CHECKING:
     from rsfstudy.study.reductions.application import apply_reductions
@@ -32,7 +32,7 @@ if TYPE_CHECKING:
     )
     from rsfstudy.study.reductions.unit_conversion import InUnits
 else:
-    __getattr__, __dir__ = lazy_exports(
+    __getattr__, __dir__ = build_lazy_export_functions(
         __name__,
         {
             "study.reductions.application": ("apply_reductions",),

@@ -9,14 +9,14 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from rsfstudy._lazy_exports import lazy_exports
+from rsfstudy._lazy_exports import build_lazy_export_functions
 
 if TYPE_CHECKING:
     from rsfstudy.referee.answer_comparison import AnswerComparison
     from rsfstudy.referee.problem_files import write_problems
     from rsfstudy.referee.verification import compare_file_with_known_answer, summarise_comparisons
 else:
-    __getattr__, __dir__ = lazy_exports(
+    __getattr__, __dir__ = build_lazy_export_functions(
         __name__,
         {
             "referee.answer_comparison": ("AnswerComparison",),

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from rsfstudy._lazy_exports import lazy_exports
+from rsfstudy._lazy_exports import build_lazy_export_functions
 
 if TYPE_CHECKING:
     from rsfstudy.reporting.fit_tables import (
@@ -42,7 +42,7 @@ if TYPE_CHECKING:
         summarise_verdicts,
     )
 else:
-    __getattr__, __dir__ = lazy_exports(
+    __getattr__, __dir__ = build_lazy_export_functions(
         __name__,
         {
             "reporting.fit_tables": (

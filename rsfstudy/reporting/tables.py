@@ -14,7 +14,7 @@ import numpy as np
 import pandas as pd
 import xarray as xr
 
-from rsfstudy.critical_steps import SLOW_NORM_WARNING_PREFIX
+from rsfstudy.critical_steps import SLOW_INSTABILITY_NORM_WARNING_PREFIX
 from rsfstudy.formatting import (
     format_list,
     format_nonempty_fields,
@@ -526,7 +526,7 @@ def note_on_norms_near_load_velocity(dataset: xr.Dataset) -> str:
     if read_declaration(dataset).laboratory is None:
         return ""
     ok = dataset["message"].values[dataset["status"].values == int(Status.OK)]
-    near = [text for text in ok.tolist() if text.startswith(SLOW_NORM_WARNING_PREFIX)]
+    near = [text for text in ok.tolist() if text.startswith(SLOW_INSTABILITY_NORM_WARNING_PREFIX)]
     return f"{len(near)} of {pluralize(len(ok), 'answer')}: {near[0]}" if near else ""
 
 

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from rsfstudy._lazy_exports import lazy_exports
+from rsfstudy._lazy_exports import build_lazy_export_functions
 
 if TYPE_CHECKING:
     from rsfstudy.responses._recorded_motion import (
@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from rsfstudy.responses.step_response import StepResponse
     from rsfstudy.responses.velocity_step import VelocityStep
 else:
-    __getattr__, __dir__ = lazy_exports(
+    __getattr__, __dir__ = build_lazy_export_functions(
         __name__,
         {
             "responses._recorded_motion": (

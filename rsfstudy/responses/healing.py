@@ -9,7 +9,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from rsfstudy.error_boundary import guard_methods
+from rsfstudy.error_boundary import wrap_methods_in_error_boundary
 from rsfstudy.errors import InvalidValue
 from rsfstudy.measure_base import (
     Outcome,
@@ -71,7 +71,7 @@ _OUTPUTS = (
 )
 
 
-@guard_methods
+@wrap_methods_in_error_boundary
 @dataclass(frozen=True)
 class Healing(RecordingMeasure):
     r"""Relaxation and healing of friction by the first hold of a loading.

@@ -13,7 +13,7 @@ from typing import ClassVar
 import numpy as np
 from scipy.optimize import brentq
 
-from rsfstudy.error_boundary import guard_methods
+from rsfstudy.error_boundary import wrap_methods_in_error_boundary
 from rsfstudy.measure_base import Measure, Outcome
 from rsfstudy.motion import Accuracy, WorkMeter
 from rsfstudy.quantities import Output
@@ -57,7 +57,7 @@ _OUTPUTS = (
 )
 
 
-@guard_methods
+@wrap_methods_in_error_boundary
 @dataclass(frozen=True)
 class LinearStability(Measure):
     r"""Critical stiffness of steady sliding at the load point velocity.

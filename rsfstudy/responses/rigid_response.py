@@ -9,7 +9,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from rsfstudy.error_boundary import guard_methods
+from rsfstudy.error_boundary import wrap_methods_in_error_boundary
 from rsfstudy.errors import InvalidValue
 from rsfstudy.measure_base import Measure, Outcome
 from rsfstudy.motion import (
@@ -70,7 +70,7 @@ _OUTPUTS = (
 )
 
 
-@guard_methods
+@wrap_methods_in_error_boundary
 @dataclass(frozen=True)
 class RigidResponse(Measure):
     r"""Stress as a function of slip after a slip rate step of a rigid slider.

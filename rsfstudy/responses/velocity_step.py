@@ -9,7 +9,7 @@ from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 
-from rsfstudy.error_boundary import guard_methods
+from rsfstudy.error_boundary import wrap_methods_in_error_boundary
 from rsfstudy.errors import InvalidValue
 from rsfstudy.measure_base import (
     Outcome,
@@ -103,7 +103,7 @@ class _EvaluatedVelocityStep(NamedTuple):
         return math.log(self.velocity_after / self.velocity_before)
 
 
-@guard_methods
+@wrap_methods_in_error_boundary
 @dataclass(frozen=True)
 class VelocityStep(RecordingMeasure):
     r"""Friction parameters read from the response to a velocity step.

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from rsfstudy._lazy_exports import lazy_exports
+from rsfstudy._lazy_exports import build_lazy_export_functions
 
 if TYPE_CHECKING:
     from rsfstudy.rig.axes_with_units import (
@@ -51,7 +51,7 @@ if TYPE_CHECKING:
         parse_number,
     )
 else:
-    __getattr__, __dir__ = lazy_exports(
+    __getattr__, __dir__ = build_lazy_export_functions(
         __name__,
         {
             "rig.rig_quantities": (

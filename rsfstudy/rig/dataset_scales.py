@@ -163,7 +163,7 @@ def convert_dataset_units(
         Dimensionless results of a study, or a dimensionless motion.
     si_scales : mapping of str to UnitScale
         Scales in SI units, from `read_si_scales`.
-    stress_unit, length_unit, time_unit : str
+    stress, length, time : str
         Requested units.
 
     Returns

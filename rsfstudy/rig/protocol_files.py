@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from rsfstudy._deprecation import renamed_keywords
+from rsfstudy._deprecation import accept_former_keyword_names
 from rsfstudy.error_boundary import error_boundary
 from rsfstudy.errors import InvalidValue
 from rsfstudy.rig.rig import SLIDER_UNITS_OF_SEGMENT_FIELDS, Rig
@@ -33,7 +33,7 @@ _SLIDER_UNITS_OF_RECORD_COLUMNS = {
 }  # fmt: skip
 
 
-@renamed_keywords
+@accept_former_keyword_names
 @error_boundary
 def history(
     record: Any,
@@ -219,7 +219,7 @@ def _load_point_velocity(
     )
 
 
-@renamed_keywords
+@accept_former_keyword_names
 @error_boundary
 def read_protocol(path: str | Path, rig: Rig | None = None, name: str = "protocol") -> Protocol:
     r"""Read a loading protocol from a CSV file.

@@ -14,9 +14,9 @@ from typing import Any
 
 import xarray as xr
 
-from rsfstudy._deprecation import renamed_members, renamed_names
+from rsfstudy._deprecation import add_former_member_names, build_getattr_for_former_names
 from rsfstudy.axes import Axis
-from rsfstudy.error_boundary import guard_methods
+from rsfstudy.error_boundary import wrap_methods_in_error_boundary
 from rsfstudy.errors import InvalidValue
 from rsfstudy.parts import Segment
 from rsfstudy.quantities import HtmlTableMixin, Quantity
@@ -42,7 +42,7 @@ from rsfstudy.rig.rig_quantities import (
 from rsfstudy.rig.units import convert_to_si
 from rsfstudy.slider import Protocol, Scene, add_scene_fields_to_signature, protocol
 
-__getattr__ = renamed_names(__name__)
+__getattr__ = build_getattr_for_former_names(__name__)
 
 #: Dimensionless units of the fields of a loading segment.
 SLIDER_UNITS_OF_SEGMENT_FIELDS = {
@@ -51,8 +51,8 @@ SLIDER_UNITS_OF_SEGMENT_FIELDS = {
 }  # fmt: skip
 
 
-@renamed_members
-@guard_methods
+@add_former_member_names
+@wrap_methods_in_error_boundary
 @dataclass(frozen=True, kw_only=True)
 class Rig(HtmlTableMixin):
     r"""Laboratory rig with quantities in physical units.

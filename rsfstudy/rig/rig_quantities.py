@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from rsfstudy.error_boundary import user_stacklevel
+from rsfstudy.error_boundary import find_stacklevel_of_user_code
 from rsfstudy.errors import InvalidValue, RsfStudyWarning
 from rsfstudy.rig.units import compute_conversion_factor, convert_to_si, multiply_by_exact_fraction
 from rsfstudy.slider import SCENE_FIELD_QUANTITIES
@@ -103,7 +103,7 @@ def convert_rig_value_and_warn_if_unusual(
         raise InvalidValue(quantity_name, value, "must be positive", remedy=f"Give it in {units}.")
     if not least <= found <= most:
         text = f"{quantity_name} is {found:g} {units}: unusual for a rig. Is the unit right?"
-        warnings.warn(text, RsfStudyWarning, stacklevel=user_stacklevel())
+        warnings.warn(text, RsfStudyWarning, stacklevel=find_stacklevel_of_user_code())
     return found
 
 

@@ -16,13 +16,13 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from rsfstudy._deprecation import renamed_members, renamed_names
+from rsfstudy._deprecation import add_former_member_names, build_getattr_for_former_names
 from rsfstudy.error_boundary import check_regular_file, error_boundary
 from rsfstudy.errors import DataError, InvalidValue
 from rsfstudy.quantities import split_heading_into_name_and_units
 from rsfstudy.rig.units import parse_number
 
-__getattr__ = renamed_names(__name__)
+__getattr__ = build_getattr_for_former_names(__name__)
 
 #: Characters of tables that `numpy.loadtxt` can parse.
 _CHARACTERS_OF_PLAIN_NUMERIC_TABLES = frozenset("0123456789+-.eE \t\r\n")
@@ -169,7 +169,7 @@ def parse_column_spec(column_choice: Any, headings: Collection[str]) -> ColumnSp
     return ColumnSpec(heading, units, scale, offset)
 
 
-@renamed_members
+@add_former_member_names
 class Column(NamedTuple):
     """Column of a table.
 

@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import NamedTuple
 
-from rsfstudy._deprecation import renamed_members
+from rsfstudy._deprecation import add_former_member_names
 from rsfstudy.slider.dynamics.quasi_static import QuasiStatic
 from rsfstudy.slider.motion_point import MotionPoint
 from rsfstudy.slider.parts import Function, Numbers
@@ -25,7 +25,7 @@ from rsfstudy.slider.scene_view import SceneView
 RUPTURE_REGIME, RIGID_REGIME = "inertial", "rigid"
 
 
-@renamed_members
+@add_former_member_names
 class Equations(NamedTuple):
     r"""Autonomous system of ordinary differential equations for a scene.
 

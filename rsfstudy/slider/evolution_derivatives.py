@@ -14,7 +14,7 @@ from rsfstudy.slider.steady_state import SteadySliding
 #: Largest step size of the finite differences, relative to the scale of each argument, and
 #: coefficients of central differences of order eight.
 _MAX_DIFFERENCE_STEP_OVER_SCALE = 0.05
-_DIFFERENCE_WEIGHTS = ((1, 4.0 / 5.0), (2, -1.0 / 5.0), (3, 4.0 / 105.0), (4, -1.0 / 280.0))
+_FINITE_DIFFERENCE_WEIGHTS = ((1, 4.0 / 5.0), (2, -1.0 / 5.0), (3, 4.0 / 105.0), (4, -1.0 / 280.0))
 #: Default scale of a state, divided by b, and smallest change of a steady state with ln V, relative
 #: to the default scale, that replaces the default scale.
 _STATE_SCALE_OVER_B, _MIN_STATE_CHANGE = 0.05, 1e-9
@@ -167,7 +167,7 @@ def _central_differences_at_zero(
     """
     slopes = [0.0] * len(function(0.0))
     sizes = slopes
-    for number, weight in _DIFFERENCE_WEIGHTS:
+    for number, weight in _FINITE_DIFFERENCE_WEIGHTS:
         ahead, behind = function(number * step), function(-number * step)
         changes = zip(slopes, ahead, behind, strict=True)
         slopes = [slope + weight * (more - less) / step for slope, more, less in changes]

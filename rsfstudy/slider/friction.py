@@ -38,7 +38,7 @@ import math
 from functools import cache, reduce
 from typing import NamedTuple
 
-from rsfstudy._deprecation import renamed_members
+from rsfstudy._deprecation import add_former_member_names
 from rsfstudy.slider.parameter_layout import (
     LARGEST_NORMAL_STRESS_EXCESS,
     LOADING,
@@ -61,7 +61,7 @@ from rsfstudy.slider.state_functions import (
 _MIN_NONZERO_FRICTION_COEFFICIENT = 1e-280
 
 
-@renamed_members
+@add_former_member_names
 class FrictionFunctions(NamedTuple):
     """Functions that define the friction of a scene.
 

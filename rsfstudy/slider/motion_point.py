@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from rsfstudy._deprecation import renamed_members
+from rsfstudy._deprecation import add_former_member_names
 
 
-@renamed_members
+@add_former_member_names
 class MotionPoint(NamedTuple):
     r"""Stress, slip rate and states of a motion at a point in time.
 

@@ -11,7 +11,7 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING, Protocol
 
-from rsfstudy._deprecation import renamed_names
+from rsfstudy._deprecation import build_getattr_for_former_names
 from rsfstudy.errors import InvalidValue
 from rsfstudy.slider.parts import Numbers, Part, collect_parameter_values
 from rsfstudy.slider.scene_view import SceneView
@@ -138,4 +138,4 @@ def _part_parameters_padded_with_nan(
 
 
 if not TYPE_CHECKING:
-    __getattr__ = renamed_names(__name__)
+    __getattr__ = build_getattr_for_former_names(__name__)

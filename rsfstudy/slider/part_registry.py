@@ -203,7 +203,7 @@ def find_slot_of_part_class(part_class: type[Part]) -> Slot:
 
     Parameters
     ----------
-    class_of_part : type
+    part_class : type
         Class of a part.
 
     Returns

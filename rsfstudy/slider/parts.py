@@ -31,12 +31,12 @@ from numbers import Real
 from typing import TYPE_CHECKING, Any, ClassVar
 
 from rsfstudy._deprecation import (
-    adopt_former_members,
-    renamed_keywords,
-    renamed_members,
-    renamed_names,
+    accept_former_keyword_names,
+    add_former_member_names,
+    add_new_names_for_former_members,
+    build_getattr_for_former_names,
 )
-from rsfstudy.error_boundary import guard_methods
+from rsfstudy.error_boundary import wrap_methods_in_error_boundary
 from rsfstudy.errors import InvalidValue
 from rsfstudy.quantities import Quantity
 from rsfstudy.slider.scene_view import SceneView
@@ -54,8 +54,8 @@ Function = Callable[..., Any]
 Numbers = tuple[float, ...]
 
 
-@renamed_members
-@guard_methods
+@add_former_member_names
+@wrap_methods_in_error_boundary
 @dataclass(frozen=True, kw_only=True)
 class Part:
     """Base class of all parts of a slider.
@@ -110,7 +110,7 @@ class Part:
         part.
         """
         super().__init_subclass__()
-        adopt_former_members(cls)
+        add_new_names_for_former_members(cls)
         if cls.defining_methods & vars(cls).keys():
             base = next(kind for kind in cls.__mro__ if "derived_properties" in vars(kind))
             for name in cls.derived_properties:
@@ -209,7 +209,7 @@ class Part:
         return InvalidValue(name, getattr(self, name), rule, remedy=remedy)
 
 
-@renamed_keywords
+@accept_former_keyword_names
 def number(
     default: float | None,
     symbol: str,
@@ -488,4 +488,4 @@ def discover_parts(package: str, package_path: Iterable[str]) -> dict[str, type[
 
 
 if not TYPE_CHECKING:
-    __getattr__ = renamed_names(__name__)
+    __getattr__ = build_getattr_for_former_names(__name__)

@@ -17,7 +17,7 @@ from typing import Any
 
 import numpy as np
 
-from rsfstudy.error_boundary import guard_methods
+from rsfstudy.error_boundary import wrap_methods_in_error_boundary
 from rsfstudy.errors import InvalidValue
 from rsfstudy.quantities import Quantity, is_variable_name
 from rsfstudy.slider.loading import Segment, ramp
@@ -57,7 +57,7 @@ class LazySegmentSequence(Sequence[Segment]):
         return Segment(velocity, duration=ends - begins)
 
 
-@guard_methods
+@wrap_methods_in_error_boundary
 @dataclass(frozen=True, kw_only=True)
 class SampledHistory(UserLoading):
     """Loading history that interpolates recorded samples.

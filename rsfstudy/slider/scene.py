@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 
-from rsfstudy.error_boundary import guard_methods
+from rsfstudy.error_boundary import wrap_methods_in_error_boundary
 from rsfstudy.errors import InvalidValue
 from rsfstudy.slider import (
     dynamics,
@@ -44,7 +44,7 @@ _CRITICAL_STIFFNESS_CACHE_SIZE = 4096
 SINGLE_ENDLESS_SEGMENT_TABLE = np.array([[0.0, math.inf, *[math.nan] * 4]])
 
 
-@guard_methods
+@wrap_methods_in_error_boundary
 @dataclass(frozen=True, init=False, repr=False)
 class Scene(SceneBase):
     r"""Spring-slider with rate- and state-dependent friction.

@@ -11,8 +11,8 @@ from dataclasses import replace
 from functools import cache
 from typing import Any, NamedTuple, Self
 
-from rsfstudy._deprecation import renamed_value
-from rsfstudy.error_boundary import guard_methods
+from rsfstudy._deprecation import translate_former_member_name
+from rsfstudy.error_boundary import wrap_methods_in_error_boundary
 from rsfstudy.errors import InvalidValue
 from rsfstudy.quantities import HtmlTableMixin, Quantity
 from rsfstudy.slider import dynamics, fluid, laws, loading, normal_stress
@@ -335,7 +335,7 @@ _ATTRIBUTES_HIDDEN_FROM_DIR = frozenset(
 )
 
 
-@guard_methods
+@wrap_methods_in_error_boundary
 class SceneBase(HtmlTableMixin):
     """Base class of scenes, which provides the fields of the parts.
 
@@ -374,7 +374,7 @@ class SceneBase(HtmlTableMixin):
             return getattr(self.parts, name).name
         if name in layout.values_of_inactive_fields:
             return layout.values_of_inactive_fields[name]
-        if (new := renamed_value(SceneBase, name)) == name:
+        if (new := translate_former_member_name(SceneBase, name)) == name:
             raise AttributeError(f"a {SceneBase.__name__} has no field or attribute {name!r}")
         return getattr(self, new)
 

@@ -16,7 +16,7 @@ from typing import Any
 
 import numpy as np
 
-from rsfstudy.error_boundary import error_boundary, guard_methods
+from rsfstudy.error_boundary import error_boundary, wrap_methods_in_error_boundary
 from rsfstudy.errors import InvalidValue
 from rsfstudy.quantities import is_variable_name
 from rsfstudy.slider.loading import Loading, Segment
@@ -27,7 +27,7 @@ from rsfstudy.slider.scene_view import SceneView
 SEGMENT_MAPPING_KEYS = ("velocity", "duration", "distance", "step", "normal_stress")
 
 
-@guard_methods
+@wrap_methods_in_error_boundary
 @dataclass(frozen=True, kw_only=True)
 class UserLoading(Loading, ABC):
     """Base class of protocols and sampled histories.
@@ -82,7 +82,7 @@ class UserLoading(Loading, ABC):
         """Total duration of the input segments or samples in D_c/V_*."""
 
 
-@guard_methods
+@wrap_methods_in_error_boundary
 @dataclass(frozen=True, kw_only=True)
 class Protocol(UserLoading):
     """Loading history that consists of user-defined segments.

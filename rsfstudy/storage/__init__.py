@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from rsfstudy._lazy_exports import lazy_exports
+from rsfstudy._lazy_exports import build_lazy_export_functions
 
 if TYPE_CHECKING:
     from rsfstudy.storage.cell_journal import (
@@ -55,7 +55,7 @@ if TYPE_CHECKING:
         write_store,
     )
 else:
-    __getattr__, __dir__ = lazy_exports(
+    __getattr__, __dir__ = build_lazy_export_functions(
         __name__,
         {
             "storage.comparison": (

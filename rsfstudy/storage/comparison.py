@@ -16,8 +16,8 @@ import numpy as np
 import pandas as pd
 import xarray as xr
 
-from rsfstudy._deprecation import renamed_members
-from rsfstudy.error_boundary import guard_methods
+from rsfstudy._deprecation import add_former_member_names
+from rsfstudy.error_boundary import wrap_methods_in_error_boundary
 from rsfstudy.errors import InvalidValue
 from rsfstudy.formatting import format_list
 from rsfstudy.status import STATUS_LABELS, Status
@@ -133,8 +133,8 @@ def _variable_agreement(
 # ---- side by side -------------------------------------------------------------------------------
 
 
-@renamed_members
-@guard_methods
+@add_former_member_names
+@wrap_methods_in_error_boundary
 @dataclass(frozen=True)
 class Comparison:
     """Differences between two results datasets.

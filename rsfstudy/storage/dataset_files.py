@@ -22,7 +22,7 @@ import dask
 import numpy as np
 import xarray as xr
 
-from rsfstudy.error_boundary import user_stacklevel
+from rsfstudy.error_boundary import find_stacklevel_of_user_code
 from rsfstudy.errors import DataError, RsfStudyError, RsfStudyWarning, shorten_text
 from rsfstudy.netcdf_encoding import copy_with_cf_encoding, encoding_without_fill_values
 from rsfstudy.path_checks import check_path
@@ -260,7 +260,7 @@ def read_dataset(path: Path) -> xr.Dataset:
         raise DataError(f"{where}: {error}") from error
     if not sealed and not (path.is_dir() and "layout" not in dataset.attrs):
         said = f"{where} has no digest: another program saved it, and may have changed it"
-        warnings.warn(said, RsfStudyWarning, stacklevel=user_stacklevel())
+        warnings.warn(said, RsfStudyWarning, stacklevel=find_stacklevel_of_user_code())
     return dataset
 
 

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from rsfstudy.axes import classify_rows_by_fields
+from rsfstudy.axes import classify_axis_rows_by_fields_and_texts
 from rsfstudy.quantities import Quantity
 from rsfstudy.rig import DIMENSIONLESS_PREFIX
 from rsfstudy.status import Status
@@ -146,7 +146,9 @@ def build_lattice_coordinates(study: Study) -> dict[Any, Any]:
     sample = []
     for axis, stride in zip(study.axes, strides, strict=True):
         firsts = np.unique(
-            classify_rows_by_fields(axis.rows), return_index=True, return_inverse=True
+            classify_axis_rows_by_fields_and_texts(axis.rows),
+            return_index=True,
+            return_inverse=True,
         )[1:]
         scenes = [study.scene(int(i * stride)).as_dict() for i in firsts[0]]
         sample += scenes

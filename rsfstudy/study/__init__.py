@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from rsfstudy._lazy_exports import lazy_exports
+from rsfstudy._lazy_exports import build_lazy_export_functions
 
 if TYPE_CHECKING:
     from rsfstudy.study.claims import NOT_APPLICABLE_VERDICT, VERDICTS, Claim, build_verdict_table
@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from rsfstudy.study.user_parts import find_named_user_parts
     from rsfstudy.study.verdict_table import format_verdict_row
 else:
-    __getattr__, __dir__ = lazy_exports(
+    __getattr__, __dir__ = build_lazy_export_functions(
         __name__,
         {
             "study.study_loader": ("load_study",),

@@ -16,8 +16,8 @@ import numpy as np
 import pandas as pd
 import xarray as xr
 
-from rsfstudy._deprecation import renamed_members
-from rsfstudy.error_boundary import guard_methods
+from rsfstudy._deprecation import add_former_member_names
+from rsfstudy.error_boundary import wrap_methods_in_error_boundary
 from rsfstudy.errors import InvalidValue
 from rsfstudy.rig import NAME_OF_SCALES_ATTRIBUTE
 from rsfstudy.status import Status
@@ -44,8 +44,8 @@ _TEXT_FIELDS = (
 )
 
 
-@renamed_members
-@guard_methods
+@add_former_member_names
+@wrap_methods_in_error_boundary
 @dataclass(frozen=True, kw_only=True)
 class Claim:
     """Published value to compare with a result, and the expected verdict.

@@ -14,9 +14,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from rsfstudy._deprecation import renamed_keywords, renamed_names
+from rsfstudy._deprecation import accept_former_keyword_names, build_getattr_for_former_names
 from rsfstudy.axes import check_storable_text
-from rsfstudy.error_boundary import guard_methods
+from rsfstudy.error_boundary import wrap_methods_in_error_boundary
 from rsfstudy.errors import InvalidValue
 from rsfstudy.quantities import is_variable_name
 from rsfstudy.study.study_index import study_names
@@ -24,7 +24,7 @@ from rsfstudy.study.study_index import study_names
 if TYPE_CHECKING:
     import xarray as xr
 
-__getattr__ = renamed_names(__name__)
+__getattr__ = build_getattr_for_former_names(__name__)
 
 #: Name of a variable, or a function of a dataset that computes the values.
 VariableNameOrFunction = str | Callable[["xr.Dataset"], "xr.DataArray"]
@@ -41,8 +41,8 @@ GENERIC_FIGURE_NAMES = frozenset(
 )
 
 
-@renamed_keywords
-@guard_methods
+@accept_former_keyword_names
+@wrap_methods_in_error_boundary
 @dataclass(frozen=True, kw_only=True)
 class Panel:
     """Panel of a figure, or one panel for each point of the axes in ``facet``.
@@ -153,8 +153,8 @@ class Panel:
             raise InvalidValue("log", self.log, "must name axes", choices=("x", "y", "xy"))
 
 
-@renamed_keywords
-@guard_methods
+@accept_former_keyword_names
+@wrap_methods_in_error_boundary
 @dataclass(frozen=True)
 class Figure:
     """Figure that consists of panels.

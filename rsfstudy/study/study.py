@@ -17,9 +17,9 @@ from typing import Any
 
 import numpy as np
 
-from rsfstudy._deprecation import renamed_keywords, renamed_members
+from rsfstudy._deprecation import accept_former_keyword_names, add_former_member_names
 from rsfstudy.axes import Axis, AxisRow, check_storable_text
-from rsfstudy.error_boundary import error_boundary, guard_methods
+from rsfstudy.error_boundary import error_boundary, wrap_methods_in_error_boundary
 from rsfstudy.errors import InvalidValue
 from rsfstudy.formatting import is_sequence_of_axis_values
 from rsfstudy.measures import Measure
@@ -68,9 +68,9 @@ _EQUIVALENT_FIELD_BY_FIELD_NAME = {
 }
 
 
-@renamed_keywords
-@renamed_members
-@guard_methods
+@accept_former_keyword_names
+@add_former_member_names
+@wrap_methods_in_error_boundary
 @dataclass(frozen=True, kw_only=True)
 class Study:
     """Declaration of a parameter study.

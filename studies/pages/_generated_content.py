@@ -612,7 +612,7 @@ def accessor() -> str:
     str
         Directive in Markdown.
     """
-    return _rst("autoclass:: rsfstudy.api.accessor.Accessor", "members:")
+    return _rst("autoclass:: rsfstudy.api.accessor.DatasetAccessor", "members:")
 
 
 def classes() -> str:

@@ -250,9 +250,9 @@ def call_targets(known: dict[str, Any]) -> dict[str, tuple[Callable[..., Any], d
         "Scene.segment_scene": {"number": 0},
         "Study.with_": {"b_over_a": [2.0]},
         "Axis.with_rows": {"rows": [{"b_over_a": 2.0}], "units": {}},
-        "Accessor.to_si": {"normal_stress": 5e6, "slip_distance": 1e-5},
-        "Accessor.slip_mode": {"stick_slip_from": "1 mm/s"},
-        "Accessor.sample_parameters": {"n": 3},
+        "DatasetAccessor.to_si": {"normal_stress": 5e6, "slip_distance": 1e-5},
+        "DatasetAccessor.slip_mode": {"stick_slip_from": "1 mm/s"},
+        "DatasetAccessor.sample_parameters": {"n": 3},
     }
     found: dict[str, tuple[Callable[..., Any], dict[str, Any]]] = {}
     for name in rsfstudy.__all__:

@@ -71,7 +71,7 @@ def peak_memory() -> int:
 #: Phases of a run, by the methods that execute them.
 PHASE_OF_METHOD = {
     "__init__": "planning",
-    "_compute_missing": "computing",
+    "_compute_missing_cells": "computing",
     "_write_results": "writing",
 }
 

@@ -13,7 +13,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from typing import Any, ClassVar
 
-from rsfstudy._deprecation import adopt_former_members, renamed_members
+from rsfstudy._deprecation import add_former_member_names, add_new_names_for_former_members
 from rsfstudy.slider import Equations
 
 #: Return values of ``Stepper.attempt_step`` if no step was taken: the step size is too small, or
@@ -21,7 +21,7 @@ from rsfstudy.slider import Equations
 NO_STEP, BUDGET_SPENT = 0.0, -1.0
 
 
-@renamed_members
+@add_former_member_names
 class Stepper(ABC):
     """Base class of steppers, which integrate the equations of a motion.
 
@@ -49,7 +49,7 @@ class Stepper(ABC):
     def __init_subclass__(cls) -> None:
         """Add the former names of renamed methods to the subclass."""
         super().__init_subclass__()
-        adopt_former_members(cls)
+        add_new_names_for_former_members(cls)
 
     def __init__(self, systems: tuple[Equations, ...], methods: Mapping[str, str]) -> None:
         self.systems, self.failure = systems, "no step is long enough"

@@ -10,13 +10,13 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import ClassVar
 
-from rsfstudy._deprecation import renamed_members
+from rsfstudy._deprecation import add_former_member_names
 from rsfstudy.slider.needed_quantities import QUANTITIES_A_PART_MAY_NEED
 from rsfstudy.slider.parts import Function, Part, discover_parts
 from rsfstudy.slider.scene_view import SceneView
 
 
-@renamed_members
+@add_former_member_names
 @dataclass(frozen=True, kw_only=True)
 class Dynamics(Part):
     r"""Base class of the dynamics.

@@ -18,7 +18,7 @@ import math
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, ClassVar
 
-from rsfstudy._deprecation import renamed_members, renamed_names
+from rsfstudy._deprecation import add_former_member_names, build_getattr_for_former_names
 from rsfstudy.slider.needed_quantities import QUANTITIES_RECEIVED_BY_LAWS
 from rsfstudy.slider.parts import (
     NON_NEGATIVE,
@@ -74,7 +74,7 @@ def declare_cutoff_velocity_field() -> Any:
     )
 
 
-@renamed_members
+@add_former_member_names
 @dataclass(frozen=True, kw_only=True)
 class LawBase(Part):
     r"""Base class of all state evolution laws.
@@ -263,7 +263,7 @@ class LawBase(Part):
             raise self.field_error("regularised", rule, "Leave one of them out.")
 
 
-@renamed_members
+@add_former_member_names
 @dataclass(frozen=True, kw_only=True)
 class Law(LawBase):
     r"""Base class of the laws with a single evolution effect parameter b.
@@ -417,4 +417,4 @@ def lacks_critical_stiffness(scene: SceneView) -> bool:
 BUILT_IN_PARTS = discover_parts(__name__, __path__)
 
 if not TYPE_CHECKING:
-    __getattr__ = renamed_names(__name__)
+    __getattr__ = build_getattr_for_former_names(__name__)

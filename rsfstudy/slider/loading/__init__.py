@@ -11,8 +11,8 @@ import math
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple
 
-from rsfstudy._deprecation import renamed_members
-from rsfstudy.error_boundary import guard_methods
+from rsfstudy._deprecation import add_former_member_names
+from rsfstudy.error_boundary import wrap_methods_in_error_boundary
 from rsfstudy.errors import InvalidValue
 from rsfstudy.slider.needed_quantities import SLIP_RATE
 from rsfstudy.slider.parts import NON_NEGATIVE, Numbers, Part, discover_parts, number
@@ -23,7 +23,7 @@ from rsfstudy.slider.scene_view import SceneView
 MIN_SEGMENT_DURATION = 1e-16
 
 
-@guard_methods
+@wrap_methods_in_error_boundary
 class Segment(NamedTuple):
     r"""Segment of a loading history.
 
@@ -73,8 +73,8 @@ class Segment(NamedTuple):
         return stated
 
 
-@renamed_members
-@guard_methods
+@add_former_member_names
+@wrap_methods_in_error_boundary
 @dataclass(frozen=True, kw_only=True)
 class Loading(Part):
     r"""Base class of the loading histories.

@@ -10,13 +10,13 @@ import math
 from dataclasses import dataclass
 from typing import ClassVar
 
-from rsfstudy._deprecation import renamed_members
+from rsfstudy._deprecation import add_former_member_names
 from rsfstudy.slider.needed_quantities import SHEAR_STRESS
 from rsfstudy.slider.parts import Function, Part, discover_parts
 from rsfstudy.slider.scene_view import SceneView
 
 
-@renamed_members
+@add_former_member_names
 @dataclass(frozen=True, kw_only=True)
 class NormalStress(Part):
     r"""Base class of the normal stress conditions.

@@ -15,8 +15,8 @@ from typing import Any, ClassVar, TypeVar
 import numpy as np
 import xarray as xr
 
-from rsfstudy._deprecation import adopt_former_members, renamed_members
-from rsfstudy.error_boundary import CheckedKeywords, guard_methods
+from rsfstudy._deprecation import add_former_member_names, add_new_names_for_former_members
+from rsfstudy.error_boundary import ConstructorKeywordCheckMixin, wrap_methods_in_error_boundary
 from rsfstudy.errors import InvalidValue
 from rsfstudy.quantities import Quantity
 from rsfstudy.status import Status
@@ -44,10 +44,10 @@ _STATISTICAL_SUFFIXES = ("_stderr", "_low", "_high", "covariance", "correlation"
 COORDINATE_RANGE_RTOL = 1e-9
 
 
-@renamed_members
-@guard_methods
+@add_former_member_names
+@wrap_methods_in_error_boundary
 @dataclass(frozen=True)
-class Reduction(CheckedKeywords):
+class Reduction(ConstructorKeywordCheckMixin):
     """Base class of all reductions.
 
     If you call a reduction, as in ``reduction(dataset)``, it returns a dataset with the new
@@ -109,7 +109,7 @@ class Reduction(CheckedKeywords):
     def __init_subclass__(cls) -> None:
         """Set the default ``kind`` of a subclass and accept former member names."""
         super().__init_subclass__()
-        adopt_former_members(cls)
+        add_new_names_for_former_members(cls)
         if "kind" not in vars(cls) and not cls.__name__.startswith("_"):
             cls.kind = cls.__name__
 

@@ -14,7 +14,7 @@ import numpy as np
 import xarray as xr
 from scipy.interpolate import PchipInterpolator
 
-from rsfstudy.error_boundary import guard_methods
+from rsfstudy.error_boundary import wrap_methods_in_error_boundary
 from rsfstudy.quantities import Quantity
 from rsfstudy.study.reductions._level_crossing import (
     MIN_SAMPLES_OF_CURVE,
@@ -33,7 +33,7 @@ from rsfstudy.study.reductions.base import (
 _LOG_STEP_OF_DERIVATIVES = 1e-6
 
 
-@guard_methods
+@wrap_methods_in_error_boundary
 @dataclass(frozen=True)
 class Boundary(Reduction):
     """Boundary between cells with values below and above a threshold.
@@ -159,7 +159,7 @@ class Boundary(Reduction):
         return *ends, float(changes.size)
 
 
-@guard_methods
+@wrap_methods_in_error_boundary
 @dataclass(frozen=True)
 class Inverse(Reduction):
     """Coordinate value at which a monotone variable reaches a level.

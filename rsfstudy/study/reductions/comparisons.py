@@ -12,7 +12,7 @@ from typing import ClassVar
 import numpy as np
 import xarray as xr
 
-from rsfstudy.error_boundary import guard_methods
+from rsfstudy.error_boundary import wrap_methods_in_error_boundary
 from rsfstudy.errors import InvalidValue
 from rsfstudy.slider import CLOSED_FORMS
 from rsfstudy.study.reductions.base import (
@@ -27,7 +27,7 @@ from rsfstudy.study.reductions.base import (
 ValueAndReferenceDerivatives = tuple[xr.DataArray, xr.DataArray]
 
 
-@guard_methods
+@wrap_methods_in_error_boundary
 @dataclass(frozen=True)
 class Difference(Reduction):
     """Difference between a variable and its value at a reference point.
@@ -162,7 +162,7 @@ class Difference(Reduction):
         return [(own.where(apart, 0.0), {}), (others.where(apart, 0.0), place)]
 
 
-@guard_methods
+@wrap_methods_in_error_boundary
 @dataclass(frozen=True)
 class RelativeDifference(Difference):
     """Relative difference between a variable and its reference value.
@@ -237,7 +237,7 @@ class RelativeDifference(Difference):
         return -xr.ones_like(values) / reference, values / reference**2
 
 
-@guard_methods
+@wrap_methods_in_error_boundary
 @dataclass(frozen=True)
 class Range(Reduction):
     """Difference between the largest and the smallest value along a dimension.
@@ -349,7 +349,7 @@ class Range(Reduction):
         return dimension, select_coordinate_range(dataset, self.over, self.within)
 
 
-@guard_methods
+@wrap_methods_in_error_boundary
 @dataclass(frozen=True)
 class ClosedFormRatio(Reduction):
     """Ratio of a variable to a published closed-form solution.

@@ -12,7 +12,7 @@ from typing import ClassVar
 import numpy as np
 import xarray as xr
 
-from rsfstudy.error_boundary import guard_methods
+from rsfstudy.error_boundary import wrap_methods_in_error_boundary
 from rsfstudy.study.reductions.base import (
     DerivativesByVariable,
     Reduction,
@@ -23,7 +23,7 @@ from rsfstudy.study.reductions.base import (
 )
 
 
-@guard_methods
+@wrap_methods_in_error_boundary
 @dataclass(frozen=True)
 class LinearFit(Reduction):
     """Linear fit of a variable along one coordinate.
@@ -211,7 +211,7 @@ class LinearFit(Reduction):
         return on
 
 
-@guard_methods
+@wrap_methods_in_error_boundary
 @dataclass(frozen=True)
 class ProportionalFit(LinearFit):
     """Linear fit with a fixed intercept.
@@ -285,7 +285,7 @@ class ProportionalFit(LinearFit):
         return values - self.minus
 
 
-@guard_methods
+@wrap_methods_in_error_boundary
 @dataclass(frozen=True)
 class SemilogFit(LinearFit):
     """Linear fit of a variable against the decimal logarithm of a coordinate.
@@ -342,7 +342,7 @@ class SemilogFit(LinearFit):
         return logarithms
 
 
-@guard_methods
+@wrap_methods_in_error_boundary
 @dataclass(frozen=True)
 class PowerLaw(SemilogFit):
     """Fit of a power law to a variable as a function of a coordinate.

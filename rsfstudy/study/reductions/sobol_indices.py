@@ -13,7 +13,7 @@ from typing import Any, ClassVar
 import numpy as np
 import xarray as xr
 
-from rsfstudy.error_boundary import guard_methods
+from rsfstudy.error_boundary import wrap_methods_in_error_boundary
 from rsfstudy.errors import InvalidValue
 from rsfstudy.quantities import Quantity
 from rsfstudy.study.reductions.base import Reduction, refused_result_mask
@@ -25,7 +25,7 @@ _INTERVAL_QUANTILES = (0.025, 0.975)
 _SOBOL_INDEX_NAMES = ("first_order", "total")
 
 
-@guard_methods
+@wrap_methods_in_error_boundary
 @dataclass(frozen=True)
 class SobolIndices(Reduction):
     """First-order and total Sobol indices.

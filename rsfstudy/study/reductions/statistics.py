@@ -19,7 +19,7 @@ from typing import ClassVar
 import numpy as np
 import xarray as xr
 
-from rsfstudy.error_boundary import guard_methods
+from rsfstudy.error_boundary import wrap_methods_in_error_boundary
 from rsfstudy.errors import InvalidValue
 from rsfstudy.quantities import Quantity
 from rsfstudy.status import Status
@@ -147,7 +147,7 @@ def standard_deviation(
         return values.std(sample_dimension, ddof=degrees_of_freedom_lost)
 
 
-@guard_methods
+@wrap_methods_in_error_boundary
 @dataclass(frozen=True)
 class Mean(_SampleStatistic):
     """Mean of a variable over samples.
@@ -217,7 +217,7 @@ class Mean(_SampleStatistic):
         return [(has / has.sum(self.over), {})]
 
 
-@guard_methods
+@wrap_methods_in_error_boundary
 @dataclass(frozen=True)
 class StandardDeviation(_SampleStatistic):
     """Standard deviation of a variable over at least three samples.
@@ -310,7 +310,7 @@ class StandardDeviation(_SampleStatistic):
         return [(by.fillna(0.0), {})]
 
 
-@guard_methods
+@wrap_methods_in_error_boundary
 @dataclass(frozen=True)
 class Quantile(_SampleStatistic):
     """Quantile of a variable over samples.
@@ -450,7 +450,7 @@ def _interpolated_quantile(
     return (weights * values.where(weights > 0.0, 0.0)).sum(sample_dimension)
 
 
-@guard_methods
+@wrap_methods_in_error_boundary
 @dataclass(frozen=True)
 class StatusShares(Reduction):
     """Share of the samples that ended with each status, including failures.
@@ -542,7 +542,7 @@ class StatusShares(Reduction):
         return xr.Dataset({name: values.where(known) for name, values in found.items()})
 
 
-@guard_methods
+@wrap_methods_in_error_boundary
 @dataclass(frozen=True)
 class Logarithm(Reduction):
     """Natural logarithm of a variable.

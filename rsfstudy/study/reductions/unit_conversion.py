@@ -8,14 +8,14 @@ from typing import ClassVar
 
 import xarray as xr
 
-from rsfstudy.error_boundary import guard_methods
+from rsfstudy.error_boundary import wrap_methods_in_error_boundary
 from rsfstudy.errors import InvalidValue
 from rsfstudy.quantities import Quantity
 from rsfstudy.rig import compute_conversion_factor, find_scale_of_variable, read_si_scales
 from rsfstudy.study.reductions.base import DerivativesByVariable, Reduction
 
 
-@guard_methods
+@wrap_methods_in_error_boundary
 @dataclass(frozen=True)
 class InUnits(Reduction):
     """Variable converted to units of a rig, with the scales of each cell.
