@@ -10,7 +10,7 @@ matrix of the parameters is
 
 where :math:`J` is the Jacobian of the model, :math:`n` is the number of rows, and :math:`p` is the
 number of parameters. Errors of the step times and step velocities change the model by the columns
-of a matrix :math:`G` (see ``load_point_errors``). Step errors add :math:`A A^T` to the covariance
+of a matrix :math:`G` (see ``load_point_noise``). Step errors add :math:`A A^T` to the covariance
 matrix, with :math:`A = (J^T R^{-1} J)^{-1} J^T R^{-1} G`. The noise is estimated by restricted
 maximum likelihood [2]_.
 

@@ -1,7 +1,7 @@
 """Storage of results: cell journals, results files, schema and comparison.
 
 A results file is written completely or not at all, and is checked when it is read. A study can be
-rebuilt from the declaration in its results file. Add new file formats to this package. The package
+rebuilt from the declaration in its results file. Add new formats of result files to this package. The package
 never computes cells.
 """
 
