@@ -1,8 +1,8 @@
 """Storage of results: cell journals, results files, schema and comparison.
 
 A results file is written completely or not at all, and is checked when it is read. A study can be
-rebuilt from the declaration in its results file. Add new formats of result files to this package. The package
-never computes cells.
+rebuilt from the declaration in its results file. Add new formats of results files to this package;
+exports to other formats are in ``rsfstudy.cli.export_files``. The package never computes cells.
 """
 
 from __future__ import annotations
