@@ -412,7 +412,20 @@ def _build_tangency_point_solver(friction_functions: FrictionFunctions) -> Funct
 
 @cache
 def build_motion_point_evaluator(rate_function: Function, point_function: Function) -> Function:
-    """Build a function ``(state, p) -> MotionPoint`` that evaluates a point."""
+    """Build a function ``(state, p) -> MotionPoint`` that evaluates a point.
+
+    Parameters
+    ----------
+    rate_function : callable
+        Function ``(state, p) -> rates`` that evaluates the derivatives of the unknowns.
+    point_function : callable
+        Function ``(state, rates, p) -> MotionPoint``.
+
+    Returns
+    -------
+    callable
+        Function ``(state, p) -> MotionPoint``.
+    """
 
     def at(state: Numbers, p: Numbers) -> MotionPoint:
         now: MotionPoint = point_function(state, rate_function(state, p), p)

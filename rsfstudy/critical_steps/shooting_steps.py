@@ -315,7 +315,7 @@ class ShootingStepFamily(StepFamily):
     def compute_field_value_error(self, step_size: float, relative_error: float) -> float:
         """Return the error of the step value, whose logarithm is the size.
 
-        See the base class for the parameters.
+        See ``StepFamily.compute_field_value_error``.
         """
         return math.exp(self.sign * step_size) * step_size * relative_error
 
@@ -326,8 +326,8 @@ class ShootingStepFamily(StepFamily):
 
         The critical path of the critical step begins with the state before the step. An approximate
         root and its slope are computed first, with a loose tolerance. For each smaller tolerance,
-        one to three paths are integrated. With several states, there are no critical paths. See the
-        base class for the parameters.
+        one to three paths are integrated. With several states, there are no critical paths. See
+        ``StepFamily.find_sizes_by_critical_path``.
         """
         path_at = self.build_critical_path_factory(work_meter.engine)
         loose = (
@@ -365,8 +365,8 @@ class ShootingStepFamily(StepFamily):
         """Yield the size of the step whose limit cycle touches the instability norm.
 
         The method searches for the smallest step after which an orbit that touches the norm does
-        not shrink. The computation of each misfit requires the integration of one orbit. See the
-        base class for the parameters.
+        not shrink. The computation of each misfit requires the integration of one orbit. See
+        ``StepFamily.find_sizes_by_limit_cycle``.
         """
         found, path_at = dict[float, float](), self.build_critical_path_factory(work_meter.engine)
 

@@ -71,15 +71,15 @@ class LoadVelocityStepFamily(ShootingStepFamily):
     def scene_with_step(self, step_size: float) -> Scene:
         """Return the scene with a step of a given size.
 
-        See the base class for the parameters.
+        See ``StepFamily.scene_with_step``.
         """
         return self.scene.with_(load_velocity_ratio=self.step_size_to_field_value(step_size))
 
     def build_critical_path_factory(self, engine: str) -> Callable[[float], CriticalPath]:
         """Return a function that computes the critical path after a step.
 
-        Only the load point velocity of the path depends on the size. See the base class for the
-        parameters.
+        Only the load point velocity of the path depends on the size. See
+        ``ShootingStepFamily.build_critical_path_factory``.
         """
         path = CriticalPath.from_scene(self.scene, engine)
         return lambda size: path.with_load_velocity(self.step_size_to_field_value(size))
@@ -87,7 +87,7 @@ class LoadVelocityStepFamily(ShootingStepFamily):
     def step_size_to_field_value(self, step_size: float) -> float:
         """Return the velocity ratio V_0/V_* of a step of a given size.
 
-        See the base class for the parameters.
+        See ``StepFamily.step_size_to_field_value``.
         """
         return math.exp(self.sign * step_size)
 
@@ -150,21 +150,21 @@ class DisplacementStepFamily(StepFamily):
     def scene_with_step(self, step_size: float) -> Scene:
         """Return the scene with a step of a given size.
 
-        See the base class for the parameters.
+        See ``StepFamily.scene_with_step``.
         """
         return self.scene.with_(displacement_step=self.step_size_to_field_value(step_size))
 
     def step_size_to_field_value(self, step_size: float) -> float:
         """Return the displacement of a step of a given size, in units of D_c.
 
-        See the base class for the parameters.
+        See ``StepFamily.step_size_to_field_value``.
         """
         return self.sign * step_size
 
     def compute_field_value_error(self, step_size: float, relative_error: float) -> float:
         """Return the error of the displacement, in units of D_c.
 
-        See the base class for the parameters.
+        See ``StepFamily.compute_field_value_error``.
         """
         return step_size * relative_error
 
@@ -173,8 +173,8 @@ class DisplacementStepFamily(StepFamily):
 
         With inertia, the slider follows the critical path with a delay, which changes the critical
         size in two ways. The load point moves during the delay, and the state evolves less because
-        the slip rate is lower. The effect on the state is b/2 times the delay in slip. See the base
-        class for the parameters.
+        the slip rate is lower. The effect on the state is b/2 times the delay in slip. See
+        ``StepFamily.inertia_shifts_critical_size``.
         """
         scene = self.scene
         if not scene.has_mass:
@@ -189,8 +189,8 @@ class DisplacementStepFamily(StepFamily):
     def motions_after_smaller_steps_decay(self, step_size: float) -> bool:
         """Return True if steady sliding is stable after every smaller step.
 
-        A displacement step does not change the stability of steady sliding. See the base class for
-        the parameters.
+        A displacement step does not change the stability of steady sliding. See
+        ``StepFamily.motions_after_smaller_steps_decay``.
         """
         return is_linearly_stable(self.scene)
 
@@ -199,7 +199,7 @@ class DisplacementStepFamily(StepFamily):
 
         The first step is the critical step. The second step is the displacement D_c a/(b - a) of
         the closed form (eq. 13 of doi:10.1007/s11589-014-0098-4). The slip rate is infinite if it
-        exceeds the floating-point range. See the base class for the parameters.
+        exceeds the floating-point range. See ``StepFamily.extra_output_values``.
         """
 
         def after(step: float) -> float:
@@ -220,7 +220,7 @@ class DisplacementStepFamily(StepFamily):
 
         A displacement step changes only spring stress and leaves Psi = 0. The critical step is
         therefore the point of the path at which Psi = 0, and each tolerance needs only one
-        integration. See the base class for the parameters.
+        integration. See ``StepFamily.find_sizes_by_critical_path``.
         """
         path, sign = CriticalPath.from_scene(self.scene, work_meter.engine), self.sign
         for tolerance in local_tolerances:
@@ -287,14 +287,14 @@ class NormalStressStepFamily(ShootingStepFamily):
     def scene_with_step(self, step_size: float) -> Scene:
         """Return the scene with a step of a given size.
 
-        See the base class for the parameters.
+        See ``StepFamily.scene_with_step``.
         """
         return self.scene.with_(normal_stress_step=self.step_size_to_field_value(step_size))
 
     def step_size_to_field_value(self, step_size: float) -> float:
         """Return the change of normal stress of a step, in units of sigma_*.
 
-        See the base class for the parameters.
+        See ``StepFamily.step_size_to_field_value``.
         """
         return math.expm1(self.sign * step_size)
 
@@ -302,7 +302,8 @@ class NormalStressStepFamily(ShootingStepFamily):
         """Return True if inertia changes the critical size significantly.
 
         With inertia, the slip rate rises with a delay after the step. The effect on the size
-        depends on the slip rate immediately after the step. See the base class for the parameters.
+        depends on the slip rate immediately after the step. See
+        ``StepFamily.inertia_shifts_critical_size``.
         """
         scene = self.scene
         behind = (
@@ -318,7 +319,7 @@ class NormalStressStepFamily(ShootingStepFamily):
         """Return the size error if steady sliding is nearly neutral.
 
         The critical stiffness is proportional to normal stress, and the size is the logarithm of
-        normal stress. See the base class for the parameters.
+        normal stress. See ``StepFamily.size_error_if_neutrally_stable``.
         """
         scene = self.scene_with_step(step_size)
         near = may_have_closed_orbits(scene) and abs(stability_margin(scene)) < 10.0 * rtol
@@ -327,7 +328,7 @@ class NormalStressStepFamily(ShootingStepFamily):
     def extra_output_values(self, step_size: float) -> dict[str, float]:
         """Return the slip rate immediately after the critical step.
 
-        The slip rate is in units of V_*. See the base class for the parameters.
+        The slip rate is in units of V_*. See ``StepFamily.extra_output_values``.
         """
         rate = (
             math.nan

@@ -573,6 +573,18 @@ def relative_work_at_rtol(rtol: float, work_by_digits: Mapping[float, float]) ->
     """Return the cost of an accuracy relative to the cost of the default accuracy.
 
     The function interpolates costs that were measured for several numbers of digits.
+
+    Parameters
+    ----------
+    rtol : float
+        Relative accuracy of the cells.
+    work_by_digits : mapping of float to float
+        Relative cost by number of digits ``-log10(rtol)``.
+
+    Returns
+    -------
+    float
+        Ratio of the two costs.
     """
     known = sorted(work_by_digits)
     digits = min(-math.log10(rtol), known[-1] + 2.0)

@@ -233,7 +233,24 @@ def advance_motion(
 
 
 def are_tables_full(motion, event_spec_count, event_table, recording_table):
-    """Return True if the output tables may be too small for one more step."""
+    """Return True if the output tables may be too small for one more step.
+
+    Parameters
+    ----------
+    motion : record
+        State of the motion.
+    event_spec_count : int
+        Number of event specifications.
+    event_table : array of shape (rows, EVENT_POINT + FIRST_STATE + states)
+        Output table of events.
+    recording_table : array of shape (rows, FIRST_STATE_COLUMN + states)
+        Output table of recorded samples.
+
+    Returns
+    -------
+    bool
+        True if a table has fewer free rows than one step may fill.
+    """
     full = len(event_table) - motion.event_rows < 2 * event_spec_count + 4
     return full or (
         len(recording_table) > 0
@@ -242,7 +259,21 @@ def are_tables_full(motion, event_spec_count, event_table, recording_table):
 
 
 def start_next_segment(motion, workspace, last_point, kinks, recording_table):
-    """Replace the loading parameters by the parameters of the next segment."""
+    """Replace the loading parameters by the parameters of the next segment.
+
+    Parameters
+    ----------
+    motion : record
+        State of the motion.
+    workspace : Workspace
+        Arrays of the regime at the end of the previous segment.
+    last_point : array of shape (FIRST_STATE + states,)
+        Output array of the last point of the previous segment.
+    kinks : array of shape (segments, 6)
+        Rows of the segment table for the loading segments after the first segment.
+    recording_table : array of shape (rows, FIRST_STATE_COLUMN + states)
+        Output table of recorded samples.
+    """
     n, p, relief = (
         len(kinks) - motion.kinks_ahead,
         workspace.parameters,
@@ -285,7 +316,22 @@ def enter_initial_regime(
 ):
     """Choose the regime at the initial point, and set the unknowns of this regime.
 
-    The function uses ``slow_manifold_values`` as memory for the values on the slow manifold.
+    Parameters
+    ----------
+    motion : record
+        State of the motion.
+    y : array of shape (2 * unknowns,)
+        Output array of the unknowns.
+    last_point : array of shape (FIRST_STATE + states,)
+        Initial point of the motion or of the loading segment.
+    functions : array of shape (2, FUNCTION_COUNT_PER_REGIME)
+        Function table with one row per regime.
+    slow_manifold_values : array
+        Memory for the values on the slow manifold, ln(V/V_*) and friction.
+    switch_thresholds : SwitchThresholds
+        Thresholds for changes between the regimes.
+    parameters : array
+        Parameters of the scene.
     """
     motion.starts_at_point, motion.regime = 0, SLOW_REGIME
     set_unknowns_of_regime(motion, y, last_point)
@@ -312,6 +358,15 @@ def set_unknowns_of_regime(motion, y, last_point):
 
     Spring stress, states and time are continuous. If the new regime is the slow manifold, ln V and
     friction may jump, because they are computed from spring stress and states.
+
+    Parameters
+    ----------
+    motion : record
+        State of the motion.
+    y : array of shape (2 * unknowns,)
+        Output array of the unknowns.
+    last_point : array of shape (FIRST_STATE + states,)
+        Last point of the previous regime.
     """
     y[0] = last_point[SPRING_STRESS]
     if motion.regime == FAST_REGIME:
@@ -328,7 +383,30 @@ def set_unknowns_of_regime(motion, y, last_point):
 def integrate_one_regime(
     motion, workspace, last_point, requested_samples, event_table, recording_table
 ):
-    """Integrate one regime, and return a code for the reason why it ended."""
+    """Integrate one regime, and return a code for the reason why it ended.
+
+    Parameters
+    ----------
+    motion : record
+        State of the motion.
+    workspace : Workspace
+        Arrays of the regime.
+    last_point : array of shape (FIRST_STATE + states,)
+        Last point of the previous regime. If the regime ends, the function overwrites the array
+        with the last point of the regime.
+    requested_samples : array
+        Times in D_c/V_* or slips in D_c at which to record the motion, in increasing order.
+    event_table : array of shape (rows, EVENT_POINT + FIRST_STATE + states)
+        Output table of events.
+    recording_table : array of shape (rows, FIRST_STATE_COLUMN + states)
+        Output table of recorded samples.
+
+    Returns
+    -------
+    int
+        ``REGIME_ENDED``, ``SEGMENT_ENDED``, ``MOTION_ENDED``, ``TERMINATED``, ``PAUSED``, or the
+        return code of a step that could not be taken. See ``step_integration.take_step``.
+    """
     if motion.pending_start:
         motion.time_per_step = 0.0
         begin_regime(motion, workspace)
@@ -410,6 +488,18 @@ def is_step_end_valid(motion, workspace):
 
     If the motion terminates within the step, the function truncates the step at the time of
     termination.
+
+    Parameters
+    ----------
+    motion : record
+        State of the motion.
+    workspace : Workspace
+        Arrays of the regime.
+
+    Returns
+    -------
+    bool
+        False if the motion is already invalid at the beginning of the step.
     """
     columns, velocity = workspace.point_at_end, workspace.parameters[LOAD_VELOCITY]
     motion.final_normal_stress = columns[NORMAL_STRESS_RATIO]
@@ -438,6 +528,13 @@ def is_step_end_valid(motion, workspace):
 
 def truncate_step_at_end_of_regime_or_segment(motion, workspace):
     """Truncate the step at the end of the regime or of the loading segment.
+
+    Parameters
+    ----------
+    motion : record
+        State of the motion.
+    workspace : Workspace
+        Arrays of the regime.
 
     Returns
     -------
@@ -475,9 +572,17 @@ def truncate_step_at_end_of_regime_or_segment(motion, workspace):
 def end_step_at_end_time(motion, workspace, clock):
     """Repeat the step so that it ends at the end time of the segment.
 
-    The argument ``clock`` is an estimate of the end of the step from dense output. If stability
-    limits the step size, dense output is much less accurate than the end of the step. The function
-    therefore corrects the estimate by the remaining time and repeats the step.
+    If stability limits the step size, dense output is much less accurate than the end of the step.
+    The function therefore corrects the estimate by the remaining time and repeats the step.
+
+    Parameters
+    ----------
+    motion : record
+        State of the motion.
+    workspace : Workspace
+        Arrays of the regime.
+    clock : float
+        Estimate of the independent variable at the end time, from dense output.
     """
     for _ in range(CORRECTION_COUNT_OF_SEGMENT_END_CLOCK):
         retake_step(motion, workspace, clock)
@@ -493,7 +598,24 @@ def end_step_at_end_time(motion, workspace, clock):
 
 
 def has_rupture_regime_ended(motion, workspace):
-    """Return True if the motion can return to the slow manifold."""
+    """Return True if the motion can return to the slow manifold.
+
+    If the slip rate is small enough, the function evaluates the slow manifold at the spring stress
+    and the states at the end of the step.
+
+    Parameters
+    ----------
+    motion : record
+        State of the motion.
+    workspace : Workspace
+        Arrays of the regime.
+
+    Returns
+    -------
+    bool
+        True if the motion is in a rupture, and if the slip rate and the inertia effect are small
+        enough for the slow manifold. See ``regime_switching.should_switch_back_to_slow_manifold``.
+    """
     if motion.regime == SLOW_REGIME or not is_slip_slow_enough_for_slow_manifold(
         workspace.point_at_end[LOG_SLIP_RATE], workspace.switch_thresholds
     ):
@@ -516,7 +638,15 @@ def has_rupture_regime_ended(motion, workspace):
 
 
 def advance_to_step_end(motion, workspace):
-    """Copy the end of the step to the beginning of the next step."""
+    """Copy the end of the step to the beginning of the next step.
+
+    Parameters
+    ----------
+    motion : record
+        State of the motion.
+    workspace : Workspace
+        Arrays of the regime.
+    """
     motion.clock = motion.end
     copy_values(workspace.y_end, workspace.y, workspace.unknown_count)
     copy_values(workspace.rates_at_end, workspace.rates, workspace.unknown_count)

@@ -89,6 +89,20 @@ def evaluate_event_quantity(event_spec, point_columns, parameters):
 
     For an extremum, the result is the derivative of the requested quantity. For a crossing, the
     result is the difference between the requested quantity and the level.
+
+    Parameters
+    ----------
+    event_spec : array
+        Row of the table of event specifications.
+    point_columns : array of shape (FIRST_STATE + states,)
+        Point of the motion. The columns are numbered in ``array_layout``.
+    parameters : array
+        Parameters of the scene.
+
+    Returns
+    -------
+    float
+        Derivative or difference. The sign changes at the event.
     """
     if event_spec[SPEC_KIND] == MAXIMUM or event_spec[SPEC_KIND] == MINIMUM:
         if event_spec[SPEC_QUANTITY] == LOG_SLIP_RATE:
@@ -100,14 +114,38 @@ def evaluate_event_quantity(event_spec, point_columns, parameters):
 
 
 def get_event_specification(workspace, spec_index):
-    """Return the table row of an event specification."""
+    """Return the table row of an event specification.
+
+    Parameters
+    ----------
+    workspace : Workspace
+        Arrays of the regime.
+    spec_index : int
+        Index of the event specification.
+
+    Returns
+    -------
+    array
+        Row of the table. The columns are ``array_layout.EVENT_SPECIFICATION_COLUMNS``.
+    """
     return advance_pointer_by_items(
         workspace.event_specs, len(EVENT_SPECIFICATION_COLUMNS) * spec_index
     )
 
 
 def has_deferrable_event(workspace):
-    """Return True if the report of any requested event may be deferred."""
+    """Return True if the report of any requested event may be deferred.
+
+    Parameters
+    ----------
+    workspace : Workspace
+        Arrays of the regime.
+
+    Returns
+    -------
+    bool
+        True if at least one event specification has the flag ``SPEC_MAY_DEFER``.
+    """
     found = False
     for w in range(workspace.event_spec_count):
         found = found or get_event_specification(workspace, w)[SPEC_MAY_DEFER] != 0.0
@@ -119,6 +157,20 @@ def compute_excess_over_switch_threshold(motion, workspace, point_columns):
 
     The excess is at least zero if the motion must leave the slow manifold. In ruptures, and for
     motions without inertia, the function returns -1.
+
+    Parameters
+    ----------
+    motion : record
+        State of the motion.
+    workspace : Workspace
+        Arrays of the regime.
+    point_columns : array of shape (FIRST_STATE + states,)
+        Point of the motion. The columns are numbered in ``array_layout``.
+
+    Returns
+    -------
+    float
+        Ratio of the inertia effect to its limit, minus 1.
     """
     if motion.regime != SLOW_REGIME or not motion.has_mass:
         return -1.0
@@ -132,7 +184,24 @@ def compute_excess_over_switch_threshold(motion, workspace, point_columns):
 
 
 def has_event_occurred(event_spec, quantity_before, quantity_after, clock_direction):
-    """Return True if a quantity changes sign in the direction of an event."""
+    """Return True if a quantity changes sign in the direction of an event.
+
+    Parameters
+    ----------
+    event_spec : array
+        Row of the table of event specifications.
+    quantity_before : float
+        Value of ``evaluate_event_quantity`` at the beginning of the interval.
+    quantity_after : float
+        Value of ``evaluate_event_quantity`` at the end of the interval.
+    clock_direction : float
+        Direction of the independent variable, 1 or -1.
+
+    Returns
+    -------
+    bool
+        True if the event occurs between the two values.
+    """
     upwards = event_spec[SPEC_KIND] == RISE or event_spec[SPEC_KIND] == MINIMUM
     # If the integration runs backward, derivatives change sign in the opposite direction.
     if clock_direction < 0.0 and (
@@ -147,8 +216,18 @@ def has_event_occurred(event_spec, quantity_before, quantity_after, clock_direct
 def evaluate_condition_at_clock(clock, condition_context):
     """Evaluate a condition within the step, for the root finder.
 
-    The condition is the index of an event specification, ``SWITCH_CONDITION``, ``TIME_CONDITION``
-    or ``TERMINATION_CONDITION``.
+    Parameters
+    ----------
+    clock : float
+        Independent variable, between the beginning and the end of the step.
+    condition_context : tuple of (float, record, Workspace)
+        Condition, state of the motion and arrays of the regime. The condition is the index of an
+        event specification, ``SWITCH_CONDITION``, ``TIME_CONDITION`` or ``TERMINATION_CONDITION``.
+
+    Returns
+    -------
+    float
+        Value of the condition, which is zero at the root.
     """
     what, motion, workspace = condition_context
     if what == TIME_CONDITION:
@@ -180,6 +259,25 @@ def locate_sign_change(condition, value_at_begin, value_at_end, motion, workspac
 
     The tolerance of the root is 1e-15 of the step size for ``TIME_CONDITION``, and 1e-13 of the
     step size for all other conditions.
+
+    Parameters
+    ----------
+    condition : float
+        Index of an event specification, ``SWITCH_CONDITION``, ``TIME_CONDITION`` or
+        ``TERMINATION_CONDITION``.
+    value_at_begin : float
+        Value of the condition at the beginning of the step.
+    value_at_end : float
+        Value of the condition at the end of the step.
+    motion : record
+        State of the motion.
+    workspace : Workspace
+        Arrays of the regime.
+
+    Returns
+    -------
+    float
+        Independent variable at the root.
     """
     width = abs(motion.end - motion.clock)
     finest, relative = (
@@ -192,7 +290,25 @@ def locate_sign_change(condition, value_at_begin, value_at_end, motion, workspac
 
 
 def append_event_row(motion, event_table, event_code, clock, time, point_columns, parameters):
-    """Append an event to the event table."""
+    """Append an event to the event table.
+
+    Parameters
+    ----------
+    motion : record
+        State of the motion.
+    event_table : array of shape (rows, EVENT_POINT + FIRST_STATE + states)
+        Output table of events.
+    event_code : float
+        Index of an event specification, or a code such as ``START_CODE``.
+    clock : float
+        Independent variable at the event.
+    time : float
+        Time of the event since the start of the loading segment, in D_c/V_*.
+    point_columns : array of shape (FIRST_STATE + states,)
+        Point of the motion at the event.
+    parameters : array
+        Parameters of the scene.
+    """
     n = motion.event_rows
     event_table[n, EVENT_CODE], event_table[n, EVENT_REGIME], event_table[n, EVENT_CLOCK] = (
         event_code,
@@ -210,7 +326,19 @@ def append_event_row(motion, event_table, event_code, clock, time, point_columns
 
 
 def append_step_end_event(motion, workspace, event_table, event_code):
-    """Append an event at the end of the step to the event table."""
+    """Append an event at the end of the step to the event table.
+
+    Parameters
+    ----------
+    motion : record
+        State of the motion.
+    workspace : Workspace
+        Arrays of the regime.
+    event_table : array of shape (rows, EVENT_POINT + FIRST_STATE + states)
+        Output table of events.
+    event_code : int
+        Code of the event, ``END_CODE`` or ``SAMPLED_CODE``.
+    """
     passed = time_at_step_end(motion, workspace)
     append_event_row(
         motion,
@@ -228,6 +356,24 @@ def slip_since_start(motion, clock, time, spring_stress, parameters):
 
     Slip is the independent variable of a rigid slider. For other sliders, slip is computed from the
     spring stress :math:`f = f_0 + K (V_0 t - \delta)`.
+
+    Parameters
+    ----------
+    motion : record
+        State of the motion.
+    clock : float
+        Independent variable at the point.
+    time : float
+        Time since the start of the loading segment, in D_c/V_*.
+    spring_stress : float
+        Spring stress at the point, in sigma_*.
+    parameters : array
+        Parameters of the scene.
+
+    Returns
+    -------
+    float
+        Slip in D_c.
     """
     if motion.slip_is_clock:
         return clock
@@ -242,7 +388,23 @@ def append_start_events(motion, workspace, last_point, event_table):
 
     The first event is the start of the regime or segment, unless the start of the segment is not
     reported. The function also appends requested events that occur at the jump between the previous
-    and the new regime or segment. The function returns True if an appended event ends the motion.
+    and the new regime or segment.
+
+    Parameters
+    ----------
+    motion : record
+        State of the motion.
+    workspace : Workspace
+        Arrays of the regime.
+    last_point : array of shape (FIRST_STATE + states,)
+        Last point of the motion before the start of the regime or segment.
+    event_table : array of shape (rows, EVENT_POINT + FIRST_STATE + states)
+        Output table of events.
+
+    Returns
+    -------
+    bool
+        True if an appended event ends the motion.
     """
     p, passed = workspace.parameters, time_at_step_begin(motion, workspace)
     p_before = workspace.parameters_before if motion.pending_start == KINK_CODE else p
@@ -315,6 +477,18 @@ def locate_events_in_step(motion, workspace):
 
     The function fills ``workspace.event_clocks`` with the values of the independent variable at the
     events, or NaN for events that do not occur.
+
+    Parameters
+    ----------
+    motion : record
+        State of the motion.
+    workspace : Workspace
+        Arrays of the regime.
+
+    Returns
+    -------
+    int
+        Number of events in the step.
     """
     count, p = 0, workspace.parameters
     for w in range(workspace.event_spec_count):
@@ -361,6 +535,15 @@ def append_events_in_step(motion, workspace, event_table):
 
     The events are appended in the order of their occurrence.
 
+    Parameters
+    ----------
+    motion : record
+        State of the motion.
+    workspace : Workspace
+        Arrays of the regime.
+    event_table : array of shape (rows, EVENT_POINT + FIRST_STATE + states)
+        Output table of events.
+
     Returns
     -------
     int
@@ -404,7 +587,17 @@ def append_events_in_step(motion, workspace, event_table):
 
 
 def record_regime_start(motion, workspace, recording_table):
-    """Record the beginning of a regime."""
+    """Record the beginning of a regime.
+
+    Parameters
+    ----------
+    motion : record
+        State of the motion.
+    workspace : Workspace
+        Arrays of the regime.
+    recording_table : array of shape (rows, FIRST_STATE_COLUMN + states)
+        Output table of recorded samples.
+    """
     if motion.recording_mode == RECORD_WITHIN_STEPS:
         append_recorded_row(
             motion,
@@ -418,7 +611,23 @@ def record_regime_start(motion, workspace, recording_table):
 
 
 def is_step_recorded(motion, workspace, requested_samples):
-    """Return True if samples are recorded within the step."""
+    """Return True if samples are recorded within the step.
+
+    Parameters
+    ----------
+    motion : record
+        State of the motion.
+    workspace : Workspace
+        Arrays of the regime.
+    requested_samples : array
+        Times in D_c/V_* or slips in D_c at which to record the motion, in increasing order.
+
+    Returns
+    -------
+    bool
+        In the mode ``RECORD_AT_TIMES``, True if the next requested time is before the end of the
+        step. In the modes ``RECORD_WITHIN_STEPS`` and ``RECORD_AT_CLOCKS``, always True.
+    """
     if motion.recording_mode != RECORD_AT_TIMES:
         return motion.recording_mode != RECORD_NEVER
     end = time_at_step_end(motion, workspace) + motion.time
@@ -431,8 +640,24 @@ def is_step_recorded(motion, workspace, requested_samples):
 def record_step(motion, workspace, recording_table, requested_samples, is_motion_over):
     """Record samples of the step, and return True after the last requested sample.
 
-    If ``is_motion_over`` is true, requested times up to ``motion.end_time`` are recorded in spite
-    of rounding errors.
+    Parameters
+    ----------
+    motion : record
+        State of the motion.
+    workspace : Workspace
+        Arrays of the regime.
+    recording_table : array of shape (rows, FIRST_STATE_COLUMN + states)
+        Output table of recorded samples.
+    requested_samples : array
+        Times in D_c/V_* or slips in D_c at which to record the motion, in increasing order.
+    is_motion_over : bool
+        True if the motion or the loading segment ends with the step. Requested times up to
+        ``motion.end_time`` are then recorded in spite of rounding errors.
+
+    Returns
+    -------
+    bool
+        True if the last requested sample was recorded in this step.
     """
     if motion.recording_mode == RECORD_WITHIN_STEPS:
         record_step_evenly_spaced(motion, workspace, recording_table)
@@ -446,6 +671,15 @@ def record_step_evenly_spaced(motion, workspace, recording_table):
     """Record ``SAMPLES_PER_STEP`` samples of the step.
 
     The last sample is the end of the step.
+
+    Parameters
+    ----------
+    motion : record
+        State of the motion.
+    workspace : Workspace
+        Arrays of the regime.
+    recording_table : array of shape (rows, FIRST_STATE_COLUMN + states)
+        Output table of recorded samples.
     """
     for sample in range(1, SAMPLES_PER_STEP):
         clock = motion.clock + (motion.end - motion.clock) * (sample / SAMPLES_PER_STEP)
@@ -461,7 +695,19 @@ def record_step_evenly_spaced(motion, workspace, recording_table):
 def record_requested_samples(motion, workspace, recording_table, requested_samples, is_motion_over):
     """Record the requested samples within the step.
 
-    The requested times or slips must increase.
+    Parameters
+    ----------
+    motion : record
+        State of the motion.
+    workspace : Workspace
+        Arrays of the regime.
+    recording_table : array of shape (rows, FIRST_STATE_COLUMN + states)
+        Output table of recorded samples.
+    requested_samples : array
+        Times in D_c/V_* or slips in D_c at which to record the motion, in increasing order.
+    is_motion_over : bool
+        If True, the function also records the requested times between the end of the step and
+        ``motion.end_time``.
     """
     at_begin, at_end = motion.clock, motion.end
     if motion.recording_mode == RECORD_AT_TIMES:
@@ -505,7 +751,19 @@ def record_requested_samples(motion, workspace, recording_table, requested_sampl
 
 
 def record_at_clock(motion, workspace, recording_table, clock):
-    """Record a sample at a value of the independent variable within the step."""
+    """Record a sample at a value of the independent variable within the step.
+
+    Parameters
+    ----------
+    motion : record
+        State of the motion.
+    workspace : Workspace
+        Arrays of the regime.
+    recording_table : array of shape (rows, FIRST_STATE_COLUMN + states)
+        Output table of recorded samples.
+    clock : float
+        Independent variable, between the beginning and the end of the step.
+    """
     evaluate_point_at_clock(motion, workspace, clock)
     passed = motion.regime_start_time + time_since_regime_start(
         motion, workspace, workspace.y_within
@@ -519,6 +777,21 @@ def append_recorded_row(motion, recording_table, clock, time, point_columns, par
     """Append a point of the motion to the recording table.
 
     The columns of the new row are in the order of ``recording.pack_recorded_row``.
+
+    Parameters
+    ----------
+    motion : record
+        State of the motion.
+    recording_table : array of shape (rows, FIRST_STATE_COLUMN + states)
+        Output table of recorded samples.
+    clock : float
+        Independent variable at the point.
+    time : float
+        Time since the start of the loading segment, in D_c/V_*.
+    point_columns : array of shape (FIRST_STATE + states,)
+        Point of the motion. The columns are numbered in ``array_layout``.
+    parameters : array
+        Parameters of the scene.
     """
     n = motion.recorded_rows
     recording_table[n, 0] = motion.time + (motion.end_time if time > motion.end_time else time)

@@ -40,7 +40,19 @@ MAX_SLOPE_ERROR, MAX_HALVINGS, GROWTH_FACTOR, SLOPE_SPACING = 300.0, 6, 1.3, 5e-
 def time_since_regime_start(motion, workspace, y):
     """Return the time since the start of the regime.
 
-    The result is NaN if time is not one of the unknowns ``y``.
+    Parameters
+    ----------
+    motion : record
+        State of the motion.
+    workspace : Workspace
+        Arrays of the regime.
+    y : array of shape (unknown_count,)
+        Unknowns, or their derivatives.
+
+    Returns
+    -------
+    float
+        Time in D_c/V_*, or NaN if time is not an unknown.
     """
     if not motion.has_clock:
         return math.nan
@@ -49,17 +61,50 @@ def time_since_regime_start(motion, workspace, y):
 
 
 def time_at_step_begin(motion, workspace):
-    """Return the time at the beginning of the step, since the segment start."""
+    """Return the time at the beginning of the step, since the segment start.
+
+    Parameters
+    ----------
+    motion : record
+        State of the motion.
+    workspace : Workspace
+        Arrays of the regime.
+
+    Returns
+    -------
+    float
+        Time in D_c/V_*, or NaN if time is not an unknown.
+    """
     return motion.regime_start_time + time_since_regime_start(motion, workspace, workspace.y)
 
 
 def time_at_step_end(motion, workspace):
-    """Return the time at the end of the step, since the segment start."""
+    """Return the time at the end of the step, since the segment start.
+
+    Parameters
+    ----------
+    motion : record
+        State of the motion.
+    workspace : Workspace
+        Arrays of the regime.
+
+    Returns
+    -------
+    float
+        Time in D_c/V_*, or NaN if time is not an unknown.
+    """
     return motion.regime_start_time + time_since_regime_start(motion, workspace, workspace.y_end)
 
 
 def take_step(motion, workspace):
     """Take one step whose local error is within the tolerance.
+
+    Parameters
+    ----------
+    motion : record
+        State of the motion.
+    workspace : Workspace
+        Arrays of the regime.
 
     Returns
     -------
@@ -98,8 +143,20 @@ def take_step(motion, workspace):
 def take_step_to_next_loading_kink(motion, workspace, max_length):
     """Take a step to the next kink of the loading, and return the step size.
 
-    Return 0 if the kink is farther away than ``max_length``, or if the stepper cannot take this
-    step.
+    Parameters
+    ----------
+    motion : record
+        State of the motion.
+    workspace : Workspace
+        Arrays of the regime.
+    max_length : float
+        Maximum step size.
+
+    Returns
+    -------
+    float
+        Size of the step, ``BUDGET_SPENT``, or 0 if no step was taken. The function takes no step if
+        the kink is farther away than ``max_length``, or if the stepper cannot take this step.
     """
     left = motion.end_time - time_at_step_begin(motion, workspace)
     length = left / time_since_regime_start(motion, workspace, workspace.rates)
@@ -111,6 +168,13 @@ def halve_step_until_dense_output_is_accurate(motion, workspace):
 
     The event loop calls this function for steps that are recorded. If stability limits the step
     size, dense output is much less accurate than the end of the step.
+
+    Parameters
+    ----------
+    motion : record
+        State of the motion.
+    workspace : Workspace
+        Arrays of the regime.
     """
     for _ in range(MAX_HALVINGS):
         if is_dense_output_accurate(motion, workspace):
@@ -127,6 +191,18 @@ def is_dense_output_accurate(motion, workspace):
     the step. Let h be the step size and e the error of dense output. The derivatives then differ by
     a few times e/h, and by the effect of e on the right-hand side. If stability limits the step
     size, the two contributions are comparable.
+
+    Parameters
+    ----------
+    motion : record
+        State of the motion.
+    workspace : Workspace
+        Arrays of the regime.
+
+    Returns
+    -------
+    bool
+        True if the derivatives agree within ``MAX_SLOPE_ERROR`` times the tolerance.
     """
     for i in range(workspace.unknown_count):
         workspace.rates_within[i] = 0.0
@@ -153,7 +229,17 @@ def is_dense_output_accurate(motion, workspace):
 
 
 def evaluate_point_at_clock(motion, workspace, clock):
-    """Evaluate ``workspace.point_within`` at an independent variable in the step."""
+    """Evaluate ``workspace.point_within`` at an independent variable in the step.
+
+    Parameters
+    ----------
+    motion : record
+        State of the motion.
+    workspace : Workspace
+        Arrays of the regime.
+    clock : float
+        Independent variable, between the beginning and the end of the step.
+    """
     interpolate_unknowns(motion, workspace, clock)
     count_evaluations(motion, 1)
     evaluate_function_into_array(
@@ -173,7 +259,17 @@ def evaluate_point_at_clock(motion, workspace, clock):
 
 
 def truncate_step_at_clock(motion, workspace, clock):
-    """Truncate the step at a value of the independent variable within the step."""
+    """Truncate the step at a value of the independent variable within the step.
+
+    Parameters
+    ----------
+    motion : record
+        State of the motion.
+    workspace : Workspace
+        Arrays of the regime.
+    clock : float
+        Independent variable, between the beginning and the end of the step.
+    """
     if clock != motion.end:
         evaluate_point_at_clock(motion, workspace, clock)
         copy_values(workspace.point_within, workspace.point_at_end, FIRST_STATE + motion.states)

@@ -57,7 +57,17 @@ class NumbaBackend:
     def initial_state_values(self, field_values: tuple[tuple[str, float], ...]) -> bytes:
         """Return the initial values of all motion state fields as bytes.
 
-        See ``motion_driver.PythonBackend``.
+        See ``motion_driver.PythonBackend.initial_state_values``.
+
+        Parameters
+        ----------
+        field_values : tuple of (str, float)
+            Names and values of the fields with nonzero initial values.
+
+        Returns
+        -------
+        bytes
+            Memory of a record of MOTION_STATE_DTYPE.
         """
         return _pack_initial_state_bytes(field_values)
 
@@ -66,28 +76,70 @@ class NumbaBackend:
     ) -> NumbaMotionState:
         """Create the state of a motion.
 
-        See ``motion_driver.PythonBackend``.
+        See ``motion_driver.PythonBackend.create_motion_state``.
+
+        Parameters
+        ----------
+        initial_state : bytes
+            Initial values of the fields, from ``initial_state_values``.
+        call_arguments : tuple of float
+            Values of the fields in ``array_layout.MOTION_STATE_FIELDS_SET_BY_CALLER``.
+
+        Returns
+        -------
+        NumbaMotionState
+            State of the motion.
         """
         return NumbaMotionState(initial_state, call_arguments)
 
     def build_function_table(self, equations_by_regime: tuple[Equations, ...]) -> np.ndarray:
         """Build the table of function addresses.
 
-        See ``motion_driver.PythonBackend``.
+        See ``motion_driver.PythonBackend.build_function_table``.
+
+        Parameters
+        ----------
+        equations_by_regime : tuple of Equations
+            Equations on the slow manifold and, with inertia, in ruptures.
+
+        Returns
+        -------
+        ndarray of int, shape (2, FUNCTION_COUNT_PER_REGIME)
+            Addresses of the functions, one row per regime.
         """
         return _build_function_table(*map(compiled_function_addresses, equations_by_regime))
 
     def as_loop_arguments(self, *arrays: np.ndarray) -> Sequence[np.ndarray]:
         """Return the arrays unchanged.
 
-        See ``motion_driver.PythonBackend``.
+        See ``motion_driver.PythonBackend.as_loop_arguments``.
+
+        Parameters
+        ----------
+        *arrays : ndarray
+            Arrays that the loop reads or fills.
+
+        Returns
+        -------
+        tuple of ndarray
+            Arrays without a conversion.
         """
         return arrays
 
     def as_loop_parameters(self, parameters: Sequence[float]) -> Any:
         """Convert the parameters of a scene to an array.
 
-        See ``motion_driver.PythonBackend``.
+        See ``motion_driver.PythonBackend.as_loop_parameters``.
+
+        Parameters
+        ----------
+        parameters : sequence of float
+            Parameters of the scene.
+
+        Returns
+        -------
+        ndarray
+            Parameters as an array of floats.
         """
         return np.array(parameters)
 

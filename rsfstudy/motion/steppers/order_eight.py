@@ -42,6 +42,13 @@ def begin_regime(motion, workspace):
     """Evaluate the initial derivatives, and select the first step size.
 
     See ``Stepper.begin_regime``.
+
+    Parameters
+    ----------
+    motion : record
+        State of the motion.
+    workspace : Workspace
+        Arrays of the regime.
     """
     motion.clock = 0.0
     evaluate_function_into_array(
@@ -60,6 +67,20 @@ def attempt_step(motion, workspace, max_length):
     """Take one step whose local error is within the tolerance.
 
     See ``Stepper.attempt_step``.
+
+    Parameters
+    ----------
+    motion : record
+        State of the motion.
+    workspace : Workspace
+        Arrays of the regime.
+    max_length : float
+        Maximum step size.
+
+    Returns
+    -------
+    float
+        Size of the step, ``NO_STEP`` or ``BUDGET_SPENT``.
     """
     towards = math.nextafter(motion.clock, motion.direction * math.inf)
     shortest = 10.0 * abs(towards - motion.clock)
@@ -83,7 +104,15 @@ def attempt_step(motion, workspace, max_length):
 
 
 def take_step_without_error_test(motion, workspace):
-    """Take one step of size ``motion.step_length`` without an error test."""
+    """Take one step of size ``motion.step_length`` without an error test.
+
+    Parameters
+    ----------
+    motion : record
+        State of the motion.
+    workspace : Workspace
+        Arrays of the regime.
+    """
     workspace.order_eight_step_block[LENGTH_INDEX] = motion.step_length
     evaluate_function_into_array(
         workspace.attempt_step,
@@ -101,8 +130,21 @@ def step_to_segment_end(motion, workspace, approximate_length):
     Time is the last unknown, and its value at the end of the segment is known. The function
     therefore integrates this step with an independent variable that is proportional to time. At the
     beginning of the step, the new independent variable advances at the same rate as the usual
-    independent variable. The function returns 0 if the error of the step exceeds the tolerance. See
-    ``Stepper.step_to_segment_end``.
+    independent variable. See ``Stepper.step_to_segment_end``.
+
+    Parameters
+    ----------
+    motion : record
+        State of the motion.
+    workspace : Workspace
+        Arrays of the regime.
+    approximate_length : float
+        Estimate of the step size.
+
+    Returns
+    -------
+    float
+        Size of the step, ``BUDGET_SPENT``, or 0 if the error of the step exceeds the tolerance.
     """
     motion.time_per_step, motion.step_length = (
         workspace.rates[workspace.unknown_count - 1],
@@ -123,7 +165,20 @@ def step_to_segment_end(motion, workspace, approximate_length):
 
 
 def take_step_with_time_as_clock(motion, workspace):
-    """Take one step in time, and return the error divided by the tolerance."""
+    """Take one step in time, and return the error divided by the tolerance.
+
+    Parameters
+    ----------
+    motion : record
+        State of the motion.
+    workspace : Workspace
+        Arrays of the regime.
+
+    Returns
+    -------
+    float
+        Local error divided by the tolerance. The step is accurate enough if the value is below 1.
+    """
     count, y, new, stages, length = (
         workspace.unknown_count,
         workspace.y,
@@ -157,6 +212,15 @@ def retake_step(motion, workspace, clock):
     """Repeat the step with an earlier end.
 
     See ``Stepper.retake_step``.
+
+    Parameters
+    ----------
+    motion : record
+        State of the motion.
+    workspace : Workspace
+        Arrays of the regime.
+    clock : float
+        Independent variable at the new end of the step.
     """
     motion.end, motion.step_length, motion.is_dense = clock, clock - motion.clock, 0
     motion.time_per_step = 0.0
@@ -167,6 +231,15 @@ def interpolate_unknowns(motion, workspace, clock):
     """Interpolate the unknowns within the step with dense output.
 
     See ``Stepper.interpolate_unknowns``.
+
+    Parameters
+    ----------
+    motion : record
+        State of the motion.
+    workspace : Workspace
+        Arrays of the regime.
+    clock : float
+        Independent variable, between the beginning and the end of the step.
     """
     if not motion.is_dense:
         prepare_dense_output(motion, workspace, motion.step_length)

@@ -83,7 +83,7 @@ class SciPyStepper(Stepper):
     def begin_regime(self, motion: Any, workspace: Any) -> None:
         """Create a solver for the regime.
 
-        See the base class.
+        See ``Stepper.begin_regime``.
         """
         ends = 0.0, motion.direction * np.inf
         # The solver estimates the first step with a trial step, which may leave the domain.
@@ -95,7 +95,7 @@ class SciPyStepper(Stepper):
     def attempt_step(self, motion: Any, workspace: Any, max_length: float) -> float:
         """Take one step with the solver.
 
-        See the base class.
+        See ``Stepper.attempt_step``.
         """
         motion.time_per_step = 0.0
         if self._solver.status == "finished":  # The previous step was repeated.
@@ -126,7 +126,7 @@ class SciPyStepper(Stepper):
     def step_to_segment_end(self, motion: Any, workspace: Any, approximate_length: float) -> float:
         """Take one step with the stepper of order eight.
 
-        If the solver is not DOP853, the method returns 0. See the base class.
+        If the solver is not DOP853, the method returns 0. See ``Stepper.step_to_segment_end``.
         """
         if not isinstance(self._solver, DOP853):
             return 0.0
@@ -137,7 +137,7 @@ class SciPyStepper(Stepper):
     def interpolate_unknowns(self, motion: Any, workspace: Any, clock: float) -> None:
         """Interpolate the unknowns with the dense output of the solver.
 
-        See the base class.
+        See ``Stepper.interpolate_unknowns``.
         """
         if motion.time_per_step > 0.0:
             order_eight.interpolate_unknowns(motion, workspace, clock)  # type: ignore[no-untyped-call]
@@ -150,7 +150,7 @@ class SciPyStepper(Stepper):
     def retake_step(self, motion: Any, workspace: Any, clock: float) -> None:
         """Repeat the step with a new solver.
 
-        The solver may need several steps to reach the new end. See the base class.
+        The solver may need several steps to reach the new end. See ``Stepper.retake_step``.
         """
         begin, motion.time_per_step = np.array(workspace.y[: workspace.unknown_count]), 0.0
         # A SciPy solver rejects an interval of zero length, which can result from rounding.
