@@ -1,4 +1,7 @@
-"""Tables of datasets, and recomputation of stored motions."""
+"""Tables of datasets, and recomputation of stored motions.
+
+The module does not write files. CSV and MATLAB files are written by ``rsfstudy.cli.export_files``.
+"""
 
 from __future__ import annotations
 

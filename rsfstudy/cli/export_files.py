@@ -1,4 +1,9 @@
-"""Export of results files to CSV and MATLAB."""
+"""Export of results files to CSV and MATLAB.
+
+A new export format needs a function in this module, an entry in the dictionary ``writers`` of
+``commands.export``, and an option of the command ``export`` in ``command_line``. The formats in
+``rsfstudy.defaults.RESULT_FORMATS`` are formats of results files, not export formats.
+"""
 
 from __future__ import annotations
 

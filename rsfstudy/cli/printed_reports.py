@@ -1,7 +1,8 @@
 """Printed output of the commands.
 
 The module prints study declarations, run reports, results, verdicts of claims, and comparisons of
-two results files.
+two results files. The function ``print_claims_and_failed_cells`` also returns the exit status of a
+check.
 """
 
 from __future__ import annotations

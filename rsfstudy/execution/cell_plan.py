@@ -34,7 +34,8 @@ _SECONDS_PER_RHS_EVALUATION = {SCIPY: 1.2e-5, PYTHON: 8e-6, COMPILED: 5e-7}
 def compute_cell_key(scene: Scene, measure: Measure) -> bytes:
     """Compute the key that identifies a cell.
 
-    The key is a digest of the exact values of the scene fields and the measure fields.
+    The key is a digest of the exact values of the scene fields and the measure fields. The cell
+    number and the axes do not affect the key, so equal cells of a study have the same key.
 
     Parameters
     ----------

@@ -1,4 +1,8 @@
-"""Solution of a fit: parameters, covariance matrix and noise."""
+"""Solution of a fit: parameters, covariance matrix and noise.
+
+The standard errors are computed from the covariance matrix. The module ``confidence_intervals``
+computes intervals from the profile likelihood instead.
+"""
 
 from __future__ import annotations
 

@@ -142,8 +142,8 @@ def select_values_of_window(values: Mapping[str, ValueType], number: int) -> dic
 
     Examples
     --------
-    >>> from rsfstudy.fitting.joint_model import window_values
-    >>> window_values({"a": 0.01, "mu_star_1": 0.6, "mu_star_2": 0.62}, 2)
+    >>> from rsfstudy.fitting.joint_model import select_values_of_window
+    >>> select_values_of_window({"a": 0.01, "mu_star_1": 0.6, "mu_star_2": 0.62}, 2)
     {'a': 0.01, 'mu_star': 0.62}
     """
     names = {name: split_window_number(name) for name in values}

@@ -14,6 +14,11 @@ white noise :math:`w`. The process is stationary if all partial autocorrelations
 1, so the search varies the partial autocorrelations [2]_. The Burg method [3]_ provides the initial
 guess.
 
+The REML search does not change the order :math:`m`. The noise model "ar" selects the order before
+the search, by minimising the Akaike information criterion (AIC) of the Burg coefficients. All
+sampling intervals have the same order. The function ``fit_solution.compute_aic`` computes another
+quantity, the corrected AIC of the complete fit.
+
 Each sampling interval has a separate noise process, with its own standard deviation and
 correlation. Noise is predicted from earlier rows even if the sampling interval changes. The rows
 before the change are then scaled by the ratio of the two standard deviations.
@@ -573,7 +578,11 @@ class _LaggedProductSums:
 
 
 def _select_autoregressive_order(residual_runs_per_process: Sequence[Sequence[np.ndarray]]) -> int:
-    """Return the autoregressive order that minimises the AIC."""
+    r"""Return the autoregressive order that minimises the AIC.
+
+    For each noise process with :math:`n` samples and Burg coefficients :math:`k_i`, the AIC is
+    :math:`n \sum_{i=1}^m \ln(1 - k_i^2) + 2 m`. The criterion is summed over the noise processes.
+    """
     shortest = min(max(map(len, part)) for part in residual_runs_per_process)
     highest = min(MAX_AUTOREGRESSIVE_ORDER, shortest // _MIN_SAMPLES_PER_COEFFICIENT)
     criterion = np.zeros(highest + 1)

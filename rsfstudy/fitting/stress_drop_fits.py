@@ -1,4 +1,8 @@
-"""Detection and fitting of drops of shear stress in a record."""
+"""Detection and fitting of drops of shear stress in a record.
+
+The module ``drop_detection`` detects the drops, and the module ``drop_fit`` fits straight lines to
+each drop. The function ``find_drops`` calls both modules.
+"""
 
 from __future__ import annotations
 

@@ -2,8 +2,11 @@
 
 With inertia, a motion alternates between the slow manifold and the full equations. The slow
 manifold approximates the effect of inertia by a series in the inertia weight :math:`(K/a) w^2`,
-with the slip rate norm :math:`w`. The event loop uses the full equations in ruptures. Most criteria
-are functions of floats, so all engines can call them.
+with the slip rate norm :math:`w`. The event loop uses the full equations in ruptures. The function
+``starts_on_slow_manifold`` chooses the regime at the beginning of a motion or loading segment. A
+rupture begins if ``compute_inertia_effect_over_limit`` reaches 1, and ends if
+``should_switch_back_to_slow_manifold`` returns True. Most criteria are functions of floats, so all
+engines can call them.
 """
 
 from __future__ import annotations
@@ -300,8 +303,8 @@ def should_switch_back_to_slow_manifold(
     Returns
     -------
     bool
-        True if the remaining slip is below its threshold, inertia is small, and no extremum of the
-        slip rate follows.
+        True if the remaining slip is below its threshold, the slip rate norm and the inertia effect
+        are below half of their limits, and no extremum of the slip rate follows.
 
     Notes
     -----

@@ -2,7 +2,7 @@
 
 The function ``panels`` builds one map for each point of the other axes of the study. A map shows
 the variable as colours with labelled contours. Lattice cells without a value are hatched according
-to their status.
+to their status. The module ``_figures`` chooses between maps, lines and scatter matrices.
 """
 
 from __future__ import annotations

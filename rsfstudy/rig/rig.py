@@ -254,7 +254,8 @@ class Rig(HtmlTableMixin):
         Returns
         -------
         Axis
-            Axis in the units of its first value.
+            Axis in the units of its first value. An axis with labels is in SI units, because the
+            first value of a labelled axis does not determine the units.
 
         Raises
         ------

@@ -1,4 +1,8 @@
-"""Quantities of a rig, and scene fields with dimensionless units."""
+"""Quantities of a rig, and scene fields with dimensionless units.
+
+The function ``convert_rig_value_to_si`` converts quantities of a rig. It calls
+``units.convert_to_si``, and also converts stiffness in units of friction divided by displacement.
+"""
 
 from __future__ import annotations
 

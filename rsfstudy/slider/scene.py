@@ -52,7 +52,8 @@ class Scene(SceneBase):
     The slider slides steadily at the reference velocity :math:`V_*` until the loading starts. A
     scene is immutable, and its values are checked when it is created. Quantities are dimensionless,
     with stress in :math:`\sigma_*`, slip in :math:`D_c`, time in :math:`D_c/V_*` and slip rate in
-    :math:`V_*`.
+    :math:`V_*`. The method ``as_dict``, which returns the values of the fields, is inherited from
+    ``SceneBase`` in ``slider.scene_assembly``.
 
     Parameters
     ----------

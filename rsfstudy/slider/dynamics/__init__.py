@@ -1,8 +1,9 @@
 """Dynamics of the slider.
 
-Each module of this package defines one choice of dynamics. The dynamics define the forces that
-balance the spring in addition to friction. The balance of forces determines how the slip rate
-depends on spring stress and state. The base class is ``Dynamics``.
+Each module of this package defines one choice of dynamics. The function ``discover_parts`` finds
+the modules automatically. The dynamics define the forces that balance the spring in addition to
+friction. The balance of forces determines how the slip rate depends on spring stress and state. The
+base class is ``Dynamics``.
 """
 
 from __future__ import annotations

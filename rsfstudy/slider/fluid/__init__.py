@@ -1,7 +1,8 @@
 r"""Pore fluids of the fault.
 
-Each module of this package defines one pore fluid. Stress is normalised by the effective normal
-stress :math:`\sigma_* = \sigma - p_\infty` of steady sliding at :math:`V_*`. The pore pressure is
+Each module of this package defines one pore fluid. The function ``discover_parts`` finds the
+modules automatically. Stress is normalised by the effective normal stress
+:math:`\sigma_* = \sigma - p_\infty` of steady sliding at :math:`V_*`. The pore pressure is
 :math:`P = (p - p_\infty)/\sigma_*`, so the fluids do not depend on :math:`p_\infty` itself. The
 base class is ``Fluid``.
 """

@@ -1,7 +1,9 @@
 r"""State evolution laws of rate- and state-dependent friction.
 
-Each module of this package defines one law. In all laws, the state variable :math:`\Theta` is a
-contribution to the friction coefficient:
+Each module of this package defines one law. The function ``discover_parts`` finds the modules
+automatically, so a new law needs no entry in a list. Modules with a leading underscore contain code
+that several laws share. In all laws, the state variable :math:`\Theta` is a contribution to the
+friction coefficient:
 
 .. math::
 

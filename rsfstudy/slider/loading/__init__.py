@@ -1,8 +1,9 @@
 """Loading histories of the load point.
 
-Each module of this package defines one loading history. A loading history is a sequence of
-segments. Before the first segment, the slider slides steadily at the reference velocity
-:math:`V_*`. The base classes are ``Loading`` and ``LoadingWithFinalLoadVelocity``.
+Each module of this package defines one loading history. The function ``discover_parts`` finds the
+modules automatically. A loading history is a sequence of segments. Before the first segment, the
+slider slides steadily at the reference velocity :math:`V_*`. The base classes are ``Loading`` and
+``LoadingWithFinalLoadVelocity``.
 """
 
 from __future__ import annotations

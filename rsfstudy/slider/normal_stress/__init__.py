@@ -1,7 +1,8 @@
 """Normal stress conditions of the fault.
 
-Each module of this package defines one normal stress condition. A normal stress condition defines
-how normal stress depends on shear stress and on the loading. The base class is ``NormalStress``.
+Each module of this package defines one normal stress condition. The function ``discover_parts``
+finds the modules automatically. A normal stress condition defines how normal stress depends on
+shear stress and on the loading. The base class is ``NormalStress``.
 """
 
 from __future__ import annotations

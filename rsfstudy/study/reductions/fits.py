@@ -112,7 +112,8 @@ class LinearFit(Reduction):
         -------
         xarray.Dataset
             Slope, standard error, largest residual and number of points. The dataset is empty if
-            there are no points in the range.
+            there are no points in the range. The propagated error ``<name>_error`` is added by
+            ``apply_reductions``.
 
         Raises
         ------
