@@ -164,7 +164,7 @@ def test_a_time_limit_is_one_of_cpu_time():
     script = """
 import collections, itertools, time
 from rsfstudy.execution import cell_computation as cells
-cells.WALL_OVER_CPU_TIME_LIMIT = 1e6
+cells.WALL_TIME_LIMIT_OVER_CPU_TIME_LIMIT = 1e6
 with cells._cpu_time_limits.enforce_in_this_thread(0.1):
     time.sleep(1.5)
 print("slept")

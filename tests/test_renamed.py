@@ -172,7 +172,7 @@ def test_new_names_win_and_other_fields_keep_theirs():
 def test_helpers_leave_other_names_alone(monkeypatch):
     kind = type("Kind", (SimpleNamespace,), {"__module__": "somewhere", "new": 3})
     tables = {"somewhere:Kind": {"old": "new"}, "somewhere:Kind()": {"old": "new"}}
-    monkeypatch.setattr("rsfstudy._deprecation.RENAMED", tables)
+    monkeypatch.setattr("rsfstudy._deprecation.NEW_NAME_BY_OWNER_AND_FORMER_NAME", tables)
     accept_former_keyword_names(add_former_member_names(kind))
     with pytest.warns(DeprecationWarning, match="'old' of Kind is now called 'new'"):
         assert kind.old == 3

@@ -273,7 +273,12 @@ def print_run_summaries(run_summaries: Sequence[RunSummary]) -> None:
         Summaries of the runs.
     """
     rows = [
-        {n: getattr(end, n) for n in ("study", "time", "verdicts", "status")}
+        {
+            "study": end.study,
+            "time": end.elapsed_time_text,
+            "verdicts": end.verdicts,
+            "status": end.status,
+        }
         for end in run_summaries
     ]
     colours = [end.colour for end in run_summaries]
