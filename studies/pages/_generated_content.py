@@ -219,7 +219,7 @@ def scene_fields() -> str:
         )
         for name, about in ((name, abouts[name]) for name in part_registry.SCENE_FIELD_NAMES)
     )
-    return markdown_table(("field", "symbol", "unit", "default", "rule", "meaning", "of"), rows)
+    return markdown_table(("field", "symbol", "unit", "default", "rule", "meaning", "part"), rows)
 
 
 def _default(name: str, defaults: Mapping[str, Any]) -> object:
@@ -281,11 +281,11 @@ def _slot(slot: part_registry.Slot) -> str:
          ", ".join(f"`{own}`" for own in field_names(part)), f"`{SCENES[name]}`")
         for name, part in slot.built_in_parts.items()
     )  # fmt: skip
-    made = markdown_table(("choice", "what it is", "equation", "its fields", "example"), rows)
+    made = markdown_table(("choice", "description", "equation", "fields", "example"), rows)
     called = (
         ""
         if not slot.part_class_by_selecting_field
-        else " A field of the choice, stated, calls for it."
+        else " A choice is selected if you pass one of its fields."
     )
     return f"### {slot.name}\n\n{slot.long_name.capitalize()}.{called}\n\n{made}"
 
@@ -347,7 +347,7 @@ def rig() -> str:
         (f"`{name}`", units, must[name], f"{least:g} to {most:g}")
         for name, (units, least, most, *_words) in rig_quantities.RIG_QUANTITIES.items()
     )
-    return markdown_table(("quantity", "SI unit", "must be stated", "usual, in that unit"), rows)
+    return markdown_table(("quantity", "SI unit", "required", "usual range in SI units"), rows)
 
 
 # ---- measures, reductions, statuses --------------------------------------------------------------
@@ -394,11 +394,13 @@ def _measure(kind: type[Measure], example: Measure | None) -> str:
     """Format the section of a measure."""
     taken = markdown_table(("field", "default", "meaning"), _describe_fields(kind))
     given = markdown_table(
-        ("number", "symbol", "unit", "error estimate", "over", "meaning"),
+        ("output", "symbol", "unit", "error estimate", "dimensions", "meaning"),
         map(_output, example.outputs if example else ()),
     )
     headline = (
-        f"Headline: `{example.primary_output}`." if example else "Its numbers follow its fields."
+        f"Primary output: `{example.primary_output}`."
+        if example
+        else "The outputs depend on the fields."
     )
     source = measures if kind.__name__ in measures.__all__ else sys.modules[kind.__module__]
     home = f"`from {source.__name__} import {kind.__name__}`"
@@ -437,7 +439,7 @@ def _describe_fields(kind: type[Any]) -> Iterator[tuple[object, ...]]:
     told = parameters(kind)
     for one in fields(kind):
         if one.init:
-            value = one.default if one.default is not MISSING else "must be stated"
+            value = one.default if one.default is not MISSING else "required"
             shown = f"`{value!r}`" if one.default is not MISSING else value
             yield f"`{one.name}`", shown, told.get(one.name, "")
 
