@@ -123,7 +123,7 @@ def test_error_of_the_slow_manifold_goes_with_the_third_power_of_the_weight():
         max_inertia_weight = property(lambda self: self.weight)
         max_inertia_correction = property(lambda _self: math.inf)
         max_remaining_slip = property(lambda _self: 1e-9)
-        solver = property(lambda _self: 1e-11)
+        local_tolerance = property(lambda _self: 1e-11)
 
     exact, _drop = REFERENCES["slip"]
     errors = {

@@ -144,7 +144,7 @@ def with_marks(it: Problem, rtol: float) -> Problem:
         leave=leave,
         rupture=rupture,
         rest=rest,
-        lasts=passed["land"] - passed["leave"],
+        duration=passed["land"] - passed["leave"],
         fall=passed["fall"],
         creep=passed["landed"] - passed["lowest"] - loaded,
     )
