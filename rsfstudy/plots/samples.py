@@ -62,6 +62,8 @@ def panels(dataset: xr.Dataset, variable: str | None = None) -> Sequence[Panel]:
         does not vary along an axis with numbered points.
     """
     fields = _sampled_fields(dataset)
+    if variable is not None and variable not in dataset:
+        return []
     along = next((d for d in fields if variable is None or d in dataset[variable].dims), None)
     if along is None or (variable is not None and not is_numeric_variable(dataset[variable])):
         return []
