@@ -67,8 +67,8 @@ class CellTask:
     accuracy : Accuracy
         Accuracy of each cell.
     time_limit : float, optional
-        CPU time in s that a cell may use on a worker. The time is not limited if cells are computed
-        in the process of the user. The default is ``CELL_TIME_LIMIT``.
+        CPU time in s that a cell may use on a worker. The CPU time is not limited if cells are
+        computed in the process of the user. The default is ``CELL_TIME_LIMIT``.
     user_parts : tuple of UserPart, default: ()
         User-defined parts of the slider.
     user_stepper_classes : tuple of type, default: ()
@@ -103,8 +103,8 @@ def compute_serially(task: CellTask, batches: CellBatchIterator) -> Generator[St
     """Compute cells one after the other in this process.
 
     Finished cells are yielded in groups, because writing each cell separately may take longer than
-    the computation of the cell. Each group is as large as all previous groups together, unless a
-    group takes longer than 0.5 s.
+    the computation of the cell. The groups contain 1, 1, 2, 4, 8, ... cells. A group ends early if
+    the computation of its cells takes longer than 0.5 s.
 
     Parameters
     ----------
@@ -138,7 +138,7 @@ def serialize_task(task: CellTask) -> bytes:
     """Serialise a task for the workers.
 
     Code that workers cannot import is included in the serialised task. The serialised task also
-    includes the modules of named studies, because importing these modules on a worker would load
+    includes the modules of named studies. If a worker imported these modules, the worker would load
     all code that declares and reduces studies.
 
     Parameters
@@ -200,7 +200,8 @@ def pack_cell_batch(plan: CellPlan, cell_numbers: np.ndarray) -> bytes:
     """Pack a batch of cells into as few bytes as possible.
 
     The batches are compressed because the Dask scheduler keeps all batches in memory. User-defined
-    parts are packed by name, because the task contains their code.
+    parts of the slider are packed by name, because the serialised task contains the code of the
+    parts.
 
     Parameters
     ----------
@@ -321,8 +322,9 @@ class _CpuTimeLimits:
     a slow or busy machine needs more wall time for the same computation.
 
     Because the operating system measures the CPU time of the whole process, the limit is multiplied
-    by the number of computing threads. The limit is set once per batch, because all cells of a
-    batch except the last cell finish within ``_FINISHED_CELLS_HANDOVER_INTERVAL``.
+    by the number of computing threads. The CPU time limit is set once per batch instead of once per
+    cell. All cells of a batch except the last cell finish within
+    ``_FINISHED_CELLS_HANDOVER_INTERVAL``.
     """
 
     def __init__(self) -> None:
@@ -339,7 +341,7 @@ class _CpuTimeLimits:
             self._update_threads_and_timers(-1, seconds)
 
     def _update_threads_and_timers(self, thread_ids: int, seconds: float) -> None:
-        """Change the number of computing threads, and restart the timers."""
+        """Change the number of computing threads, and restart the CPU timers."""
         with self._lock:
             self._active_threads += thread_ids
             self._process_cpu_limit = self._active_threads * seconds

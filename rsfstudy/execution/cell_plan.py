@@ -87,7 +87,8 @@ class CellPlan:
     keys : ndarray of bytes, shape (n,)
         Key of each cell. Equal cells have equal keys.
     unique_cell_numbers : ndarray of int
-        Numbers of the distinct cells. If several cells are equal, only the first cell is included.
+        Numbers of the distinct cells. If several cells are equal, only the first of these cells is
+        included.
     example_scenes : list of Scene
         One scene for each combination of slider parts in the lattice.
 
@@ -135,8 +136,8 @@ def _add_failure_counts_to_error(
 ) -> InvalidValue:
     """Add the number of invalid axis points to the error message of a cell.
 
-    The number is added only if the lattice has an axis with numbered points, such as random
-    samples.
+    The number of invalid points is added only if the lattice has an axis with numbered points, such
+    as random samples.
     """
     if cell_number == study.size:
         return first_error
@@ -160,8 +161,9 @@ def _add_failure_counts_to_error(
 class CellBatchIterator(Iterator[np.ndarray]):
     """Iterator over batches of cell numbers.
 
-    The size of each batch is chosen so that a batch takes about 0.3 s, according to the times of
-    the cells that have finished. The measured times affect only the batches and never the results.
+    The size of each batch is chosen so that the computation of the batch takes about 0.3 s. The
+    computation time is estimated from the wall times of the finished cells. The wall times affect
+    only the sizes of the batches, and never the results.
 
     Parameters
     ----------
@@ -223,8 +225,9 @@ class CellBatchIterator(Iterator[np.ndarray]):
 def order_cells_by_golden_section(cell_numbers: np.ndarray) -> np.ndarray:
     """Reorder cells so that the first few cells represent all cells.
 
-    The order follows strides of the golden section. The computation times and failures of the first
-    few cells are therefore typical of the remaining cells.
+    If there are ``n`` cells, the position in ``cell_numbers`` advances by about ``0.618 * n``
+    (modulo ``n``) from one cell of the new order to the next. The computation times and failures of
+    the first few cells are therefore typical of the remaining cells.
 
     Parameters
     ----------
@@ -246,8 +249,8 @@ def order_cells_by_golden_section(cell_numbers: np.ndarray) -> np.ndarray:
 def estimate_evaluations_and_time(plan: CellPlan) -> tuple[int, float]:
     """Estimate the cost of the distinct cells of a study.
 
-    The estimate is approximate, because it uses a typical number of right-hand-side evaluations of
-    the measure and does not depend on the scenes.
+    The estimate uses a typical number of right-hand-side evaluations for the measure. The estimate
+    does not depend on the scenes of the cells.
 
     Parameters
     ----------

@@ -29,9 +29,9 @@ _SIGNALS_THAT_END_RUN = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 def check_script_has_main_guard(worker_count: int) -> None:
     """Check that worker processes would not run the main script again.
 
-    Worker processes import the main script. The line of the script that leads to this call must
-    therefore be inside a condition, such as ``if __name__ == "__main__":``. Notebooks and commands
-    are not checked, because workers do not import them.
+    Worker processes import the main script. The line of the main script that starts the computation
+    must therefore be inside a condition, such as ``if __name__ == "__main__":``. Notebooks and
+    commands are not checked, because workers do not import them.
 
     Parameters
     ----------
@@ -41,7 +41,7 @@ def check_script_has_main_guard(worker_count: int) -> None:
     Raises
     ------
     InvalidValue
-        If the calling line of the main script is not inside a condition.
+        If the line of the main script that starts the computation is not inside a condition.
     """
     main = sys.modules["__main__"]
     frame: FrameType | None = sys._getframe()
@@ -63,11 +63,11 @@ def check_script_has_main_guard(worker_count: int) -> None:
 
 @contextlib.contextmanager
 def _delay_interrupts() -> Iterator[None]:
-    """Delay the signals that end a run until the end of the block.
+    """Delay signals such as Ctrl-C until the end of the ``with`` block.
 
-    A second Ctrl-C is not delayed. Processes that are started in the block do not receive Ctrl-C or
-    the signal that a terminal sends when it closes. The main process ends the run first, and then
-    ends its workers.
+    A second Ctrl-C is not delayed. Processes that are started in the ``with`` block do not receive
+    Ctrl-C. These processes also do not receive the signal that a terminal sends when the terminal
+    closes. The main process ends the run first, and then ends its workers.
     """
     held: list[int] = []
     found = {int(number): signal.getsignal(number) for number in _SIGNALS_THAT_END_RUN}

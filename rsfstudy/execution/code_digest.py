@@ -44,7 +44,8 @@ _INSTALLATION_DIRECTORIES = tuple(
     }
 )
 _TYPES_DIGESTED_BY_REPR = (int, float, complex, str, bytes, bool, type(None), type(Ellipsis))
-#: Functions that return the contents of a container or the function inside a wrapper, by type.
+#: Functions by type of object. Each function returns the contents of a container or the function
+#: inside a wrapper.
 _GETTERS_OF_CONTAINER_PARTS: tuple[tuple[Any, Callable[[Any], Any]], ...] = (
     (property, lambda value: (value.fget, value.fset)),
     (functools.cached_property, lambda value: value.func),
@@ -265,7 +266,7 @@ def _state_without_caches(value: Any) -> dict[str, Any]:
 
 
 def _has_docstring_slot(code: CodeType) -> bool:
-    """Return True if the first constant of a code object is for a docstring."""
+    """Return True if the first constant of a code object can be a docstring."""
     if sys.version_info >= (3, 13):
         return bool(code.co_flags & inspect.CO_HAS_DOCSTRING)
     return bool(code.co_flags & inspect.CO_NEWLOCALS) and not code.co_name.startswith("<")

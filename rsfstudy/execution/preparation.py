@@ -25,7 +25,7 @@ def prepare_study_run(study: Study, options: OutputOptions, workers: WorkerPool)
     Returns
     -------
     StudyRun
-        Run, which starts when you call it as a function.
+        Run of the study. The run starts when you call the ``StudyRun`` object as a function.
 
     Raises
     ------

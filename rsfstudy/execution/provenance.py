@@ -59,8 +59,8 @@ def read_physics_sources(package_directory: Path) -> dict[str, bytes]:
     return {file.relative_to(package_directory).as_posix(): file.read_bytes() for file in files}
 
 
-#: Source files as they were at the time of the import, because later changes of the files do not
-#: affect the running code.
+#: Contents of the source files at the time of the import. Later changes of the files do not affect
+#: the running code.
 _PHYSICS_SOURCES_AT_IMPORT = read_physics_sources(_PACKAGE_DIRECTORY)
 
 
@@ -98,8 +98,8 @@ def _physics_digest() -> str:
 def run_fingerprint(study: Study) -> dict[str, Any]:
     """Collect all settings, versions and digests that affect the results.
 
-    The scene fields and the plain fields of the measure are excluded, because they form the keys of
-    the cells.
+    The scene fields and the plain fields of the measure are excluded, because the keys of the cells
+    are computed from these fields.
 
     Parameters
     ----------
@@ -196,7 +196,7 @@ _PACKAGES_WITH_RECORDED_VERSION = (
 
 
 def read_git_commit_and_state(checkout_directory: Path) -> str:
-    """Return the commit and the state of a checkout.
+    """Return the commit and the state of a Git checkout.
 
     Only changes of the package, the named studies and ``pyproject.toml`` are considered, because
     other files do not affect the results.

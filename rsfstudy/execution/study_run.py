@@ -52,14 +52,14 @@ class OutputOptions:
     output : Path or None, default: None
         Directory of the results file and the journal. If None, no files are written.
     format : {"netcdf", "zarr"}, default: "netcdf"
-        Format of the results. A Zarr store is written in slabs, for lattices that do not fit in
-        memory.
+        Format of the results. A Zarr store is written in slabs, so the lattice does not need to fit
+        in memory.
     fresh : bool, default: False
         If True, delete the journal and compute all cells again.
     keep_going : bool, default: False
         If True, continue even if all of the first cells fail.
     despite_failures : bool, default: False
-        If True, apply reductions to the remaining cells if some cells have failed.
+        If True and some cells have failed, apply reductions to the remaining cells.
     command_line : str, default: "rsfstudy.run"
         Command line or Python call of the user, for the history of the file.
 
@@ -190,8 +190,8 @@ class StudyRun:
             If the run cannot continue. The finished cells remain in the journal and, for NetCDF
             output, in the file ``NAME.partial.nc``.
         Interrupted
-            If the user interrupts the run. The finished cells are saved in the same way as for a
-            ``RunError``.
+            If the user interrupts the run. The finished cells remain in the journal and, for NetCDF
+            output, in the file ``NAME.partial.nc``.
         """
         keeping = self.options
         if keeping.format == "zarr":

@@ -2,7 +2,7 @@
 
 ``WorkerPool`` starts worker processes on this machine, or uses a Dask cluster. If a worker dies,
 its batch is lost, and other batches that were waiting on that worker may be lost too. The pool
-computes all lost cells again, one at a time, while no other cell is running, so that a cell is
+computes all lost cells again, one at a time, while no other cell is running. Therefore, a cell is
 recorded as lost only if the cell itself kills a worker.
 """
 
@@ -39,12 +39,14 @@ from rsfstudy.execution.clusters import check_script_has_main_guard, start_local
 from rsfstudy.measures import Outcome
 from rsfstudy.status import Status
 
-#: Maximum time limit in s, about three years. The timers of the operating system accept only
-#: slightly more than ``WALL_TIME_LIMIT_OVER_CPU_TIME_LIMIT`` times this value.
+#: Maximum value of the time limit of a cell in s, about three years. The timers of the operating
+#: system accept only slightly more than ``WALL_TIME_LIMIT_OVER_CPU_TIME_LIMIT`` times this value.
 _MAX_TIME_LIMIT = 1e8
-#: Maximum number of worker processes per core, and on a machine with few cores.
+#: Maximum number of worker processes per core, and maximum number of worker processes on a machine
+#: with one core or two cores.
 _MAX_WORKERS_PER_CORE, _MAX_WORKERS_ON_SMALL_MACHINES = 4, 8
-#: Times in s without a worker after which a run issues a warning, and after which the run ends.
+#: Durations in s during which a run has no worker. After the first duration, the run issues a
+#: warning. After the second duration, the run ends.
 WARN_AFTER_SECONDS_WITHOUT_WORKER, GIVE_UP_AFTER_SECONDS_WITHOUT_WORKER = 30.0, 600.0
 _POLL_INTERVAL = 2.0
 #: Number of times that a cell may kill its worker before the cell is recorded as lost.
@@ -63,11 +65,11 @@ class WorkerPool(contextlib.ExitStack):
     process_count : int, default: 2
         Number of worker processes on this machine. If 0, cells are computed in this process.
     dask_client : distributed.Client, optional
-        Client of a Dask cluster, which is used instead of local processes.
+        Client of a Dask cluster. The cluster is used instead of worker processes on this machine.
     cell_time_limit : float, optional
         CPU time in s that a cell may use on a worker. The default is ``CELL_TIME_LIMIT``.
     log_path : Path, optional
-        File to which the worker processes on this machine write errors, for all runs. By default,
+        File to which the worker processes on this machine write the errors of all runs. By default,
         each run has its own log file.
 
     Raises
@@ -139,8 +141,8 @@ class WorkerPool(contextlib.ExitStack):
         Parameters
         ----------
         log_path : Path, optional
-            File to which the worker processes on this machine write errors, unless the pool has a
-            log file.
+            File to which the worker processes on this machine write errors. If the pool has its own
+            log file, this file is not used.
 
         Returns
         -------
@@ -186,7 +188,7 @@ def make_dask_batch_mapper(
     dask_client : distributed.Client
         Client of the cluster.
     log_path : str, optional
-        File to which the workers write errors, which is named in error messages.
+        File to which the workers write errors. Error messages contain the name of this file.
 
     Returns
     -------

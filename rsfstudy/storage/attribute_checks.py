@@ -48,9 +48,9 @@ def check_variable_attributes(dataset: xr.Dataset) -> None:
 
 
 def check_motion_variables_are_numeric(dataset: xr.Dataset) -> None:
-    """Check that the variables along a motion are numeric.
+    """Check that all variables with the dimensions of ``slip`` are numeric.
 
-    The variables along a motion have the same dimensions as the variable ``slip``.
+    In the dataset of a motion, these variables contain one value for each sample of the motion.
 
     Parameters
     ----------

@@ -47,7 +47,7 @@ SELECT type || ' ' || name FROM sqlite_master
 WHERE type NOT IN ('table', 'index') OR tbl_name NOT IN ('fingerprint', 'cells')
 """
 _KEYS_PER_QUERY = 900
-#: Time to wait until another run releases the journal, in s.
+#: Maximum time in s to wait until another run releases the journal.
 _LOCK_TIMEOUT = 5.0
 _UNUSABLE_JOURNAL_REMEDY = "Choose another --output, or start over with --fresh."
 
@@ -375,7 +375,7 @@ class CellJournal:
     ) -> Iterator[tuple[list[int], list[Any]]]:
         """Yield the stored rows of the cells that are in the journal, in groups.
 
-        Each group is a list of indices into ``cell_keys`` and a list of rows.
+        Each group consists of two lists: indices into ``cell_keys``, and the corresponding rows.
         """
         for start in range(0, len(cell_keys), _KEYS_PER_QUERY):
             wanted: list[bytes] = cell_keys[start : start + _KEYS_PER_QUERY].tolist()
@@ -512,7 +512,8 @@ def find_fingerprint_differences(
     Returns
     -------
     dict of str to tuple of (object, object)
-        First and second value of each entry that differs. The value of a missing entry is None.
+        Each entry that differs, with its values in the first and in the second fingerprint. The
+        value of a missing entry is None.
     """
     first, second = (json.loads(json.dumps(fingerprint)) for fingerprint in (first, second))
     return {

@@ -40,8 +40,8 @@ def compare_same_lattice(first: xr.Dataset, second: xr.Dataset) -> pd.DataFrame:
     """Compare two datasets of the same study, variable by variable.
 
     Only cells that are finished in both datasets are compared. Variables without the dimensions of
-    the lattice, such as reductions, are compared only if all cells are finished in both datasets.
-    Measured times are not compared.
+    the lattice, such as results of reductions, are compared only if all cells are finished in both
+    datasets. Measured times are not compared.
 
     Parameters
     ----------
@@ -142,19 +142,20 @@ class Comparison:
     Parameters
     ----------
     declaration : mapping of str to tuple of (object, object)
-        First and second value of each declaration entry that differs, by the path of the entry. The
-        value of a missing entry is None.
+        Each declaration entry that differs, with its values in the first and in the second dataset.
+        The keys of the mapping are the paths of the entries. The value of a missing entry is None.
     origin : mapping of str to tuple of (object, object)
         Versions, code digests and machines that differ.
     differing_axis_points : mapping of str to tuple of (list, list)
-        Points that only the first dataset has, and points that only the second dataset has, for
-        each axis that differs.
+        For each axis that differs, the points that only the first dataset has, and the points that
+        only the second dataset has.
     finished_cell_counts : tuple of int
         Number of cells that are finished in both datasets, only in the first dataset, and only in
         the second dataset.
     statuses : pandas.DataFrame
-        Table of the cells that are finished in both datasets with different statuses. The columns
-        are the coordinates of the cell, ``first`` and ``second``.
+        Table of the cells that are finished in both datasets with different statuses. The table has
+        one column for each coordinate of the cell. The columns ``first`` and ``second`` contain the
+        status in each dataset.
     agreement_table : pandas.DataFrame
         Comparison of the variables in the cells that are finished in both datasets. The columns are
         documented in ``compare_same_lattice``. If the main result has no error estimates, every
@@ -189,8 +190,8 @@ class Comparison:
 def compare_results(first: xr.Dataset, second: xr.Dataset) -> Comparison:
     """Compare two results datasets in the cells with equal coordinates.
 
-    If only one dataset has an axis, only the cells at the fixed value of the other dataset are
-    compared.
+    A coordinate may be an axis in one dataset and have a fixed value in the other dataset. In this
+    case, only the cells at the fixed value are compared.
 
     Parameters
     ----------
@@ -205,9 +206,9 @@ def compare_results(first: xr.Dataset, second: xr.Dataset) -> Comparison:
     Raises
     ------
     InvalidValue
-        If a dataset has neither an axis of the other dataset nor a fixed value of this coordinate,
-        or if points with the same label have different field values. For example, two different
-        random samples have numbered points with different values.
+        If one dataset has an axis for which the other dataset has neither an axis nor a fixed
+        value, or if points with the same label have different field values. For example, two
+        different random samples have numbered points with different values.
     """
     both = [
         _add_axes_of_other_dataset(one, other) for one, other in ((first, second), (second, first))
@@ -244,7 +245,7 @@ def compare_results(first: xr.Dataset, second: xr.Dataset) -> Comparison:
 
 
 def _add_axes_of_other_dataset(dataset: xr.Dataset, other: xr.Dataset) -> xr.Dataset:
-    """Add the axes that another dataset has in addition to this dataset's axes.
+    """Add the axes that only the other dataset has.
 
     Each added axis has one point, which is the fixed value of the coordinate in the dataset.
     """
@@ -281,7 +282,7 @@ def _round_coordinates_for_alignment(dataset: xr.Dataset) -> dict[str, Any]:
 def _check_same_axis_points(first: xr.Dataset, second: xr.Dataset) -> None:
     """Check that points with the same label have the same field values.
 
-    Rounding errors are ignored.
+    Differences due to rounding errors are ignored.
     """
     for name, one in first.coords.items():
         if not one.dims or name in one.dims or name not in second.coords:

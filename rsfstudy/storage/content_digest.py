@@ -2,9 +2,10 @@
 
 The digest covers the numbers, the strings and the declaration of the dataset. A second digest, at
 the end of the file, covers all bytes of the file. The second digest is lost if the file is
-truncated or if another program saves the file, whereas the digest of the contents is an attribute
-and is preserved. HDF5 stores checksums of small attributes, names and shapes. HDF5 does not store
-checksums of the data, nor of attributes larger than 4 kB, such as a long declaration.
+truncated or if another program saves the file. The digest of the contents is an attribute, and is
+preserved if another program saves the file. HDF5 stores checksums of small attributes, names and
+shapes. HDF5 does not store checksums of the data, nor of attributes larger than 4 kB, such as a
+long declaration.
 """
 
 from __future__ import annotations

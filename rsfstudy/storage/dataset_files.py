@@ -1,10 +1,11 @@
 """Reading and writing of results files.
 
 A NetCDF file is written under a temporary name, read back and compared with the dataset. The file
-is renamed only if the contents are identical. Each NetCDF file ends with a digest of all its bytes,
-which HDF5 ignores. The digest is checked before HDF5 opens the file, because HDF5 may hang on
-damaged bytes. If the digest is missing, because another program saved the file or because the file
-was truncated, the file is checked against the digest of its contents (see ``content_digest``).
+is renamed only if the contents are identical. Each NetCDF file ends with a digest of all bytes of
+the file. HDF5 ignores this digest. The digest is checked before HDF5 opens the file, because HDF5
+may hang on damaged bytes. If the digest is missing, because another program saved the file or
+because the file was truncated, the file is checked against the digest of its contents (see
+``content_digest``).
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
 """Assembly of finished cells into a self-describing dataset.
 
-``assemble_dataset`` builds the variables, the coordinates and the root attributes. The Zarr writer
-calls the same builders for blocks of cells.
+``assemble_dataset`` builds the variables, the coordinates and the root attributes. To write a Zarr
+store, the same functions are called for blocks of cells.
 """
 
 from __future__ import annotations
@@ -217,7 +217,7 @@ def _to_storable_array(values: list[Any]) -> np.ndarray:
 
 
 def _first_value_not_none(values: list[Any]) -> Any:
-    """Return the first value that is not None, or None."""
+    """Return the first value that is not None, or None if all values are None."""
     return next((value for value in values if value is not None), None)
 
 
@@ -226,8 +226,8 @@ def _variable_attributes(
 ) -> dict[str, Any]:
     """Build the attributes of a variable from the vocabulary or the study.
 
-    The argument ``example_value`` is a value of the variable, which determines if the variable has
-    units or flags.
+    The argument ``example_value`` is one value of the variable. The type of this value determines
+    if the variable has units or flags.
     """
     about = find_quantity(variable_name, study_quantities)
     attrs: dict[str, Any] = {"long_name": about.long_name}

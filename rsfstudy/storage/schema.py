@@ -47,13 +47,13 @@ from rsfstudy.vocabulary import QUANTITY_BY_NAME
 #: Version of the file layout. Files without a version have layout 1, in which the digests of
 #: variables were stored as attributes.
 FILE_LAYOUT_VERSION = 2
-#: Maximum number of claims and of points per axis. Larger files would take minutes to check, or
-#: would not fit in memory.
+#: Maximum number of claims of a study, and maximum number of points of an axis. Larger files would
+#: take minutes to check, or would not fit in memory.
 MAX_CLAIMS, MAX_AXIS_POINTS_OF_FILE = 10_000, 10_000_000
 
 
 class RootAttributes(TypedDict):
-    """Root attributes of results files that are read by rsfstudy.
+    """Root attributes that rsfstudy reads from results files.
 
     Attributes
     ----------
@@ -148,7 +148,7 @@ class StoredReduction(TypedDict):
 
 
 class StoredDeclaration(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """Declaration of the study, which is the attribute ``declaration``.
+    """Declaration of the study, as stored in the attribute ``declaration``.
 
     Parameters
     ----------
@@ -201,14 +201,15 @@ class StoredDeclaration(msgspec.Struct, frozen=True, forbid_unknown_fields=True)
 class StoredFingerprint(TypedDict):
     """Code digests and versions that affect the results.
 
-    Additional entries of a fingerprint are only compared, so the entries need no declared type.
+    Other entries of a fingerprint are only compared with the entries of another fingerprint.
+    Therefore, the other entries need no declared type.
     """
 
     own_code: str
 
 
 class StoredProvenance(TypedDict):
-    """Provenance of the results, which is the attribute ``provenance``.
+    """Provenance of the results, as stored in the attribute ``provenance``.
 
     Attributes
     ----------
@@ -239,7 +240,8 @@ class StoredProvenance(TypedDict):
 
 #: NumPy dtype kinds that are allowed in variables, and their description.
 _ALLOWED_DTYPE_KINDS = ("iufbOUT", "numbers or texts")
-#: Default values for scenes in older files, which were written before pore fluids were supported.
+#: Default values of scene fields that are missing in older files. The older files were written
+#: before pore fluids were supported.
 _SCENE_DEFAULTS_FOR_OLDER_FILES: Mapping[str, Any] = {
     **{name: None for part in BUILT_IN_PARTS.values() for name in field_names(part)},
     "fluid": "drained",

@@ -232,9 +232,9 @@ def check_override_of_partly_set_field(
 ) -> None:
     """Reject an override of a field that is set at only some axis points.
 
-    At the axis points that do not set the field, the field has the value of the base scene, which
-    the override would not change. The override is accepted if the field has no value or no meaning
-    at the points that do not set the field.
+    At the axis points that do not set the field, the field has the value of the base scene. The
+    override would not change this value. The override is accepted if the field has no value or no
+    meaning at the points that do not set the field.
 
     Parameters
     ----------
@@ -275,7 +275,7 @@ def check_override_of_partly_set_field(
 
 
 def check_axes_are_distinct(axes: Sequence[Axis]) -> None:
-    """Raise InvalidValue if two axes have the same dimension or vary one field.
+    """Raise InvalidValue if two axes have the same dimension or the same field.
 
     Parameters
     ----------
@@ -328,7 +328,7 @@ def unknown_name_error(
 
 
 def _describe_measure_outputs(measure: Measure) -> str:
-    """Describe the results of a measure and the fields for which it solves.
+    """Describe the results of a measure and the fields that the measure solves for.
 
     The description is a string, because two NaN values are equal only as strings.
     """

@@ -82,8 +82,8 @@ class Panel:
         Function that receives the data of one curve and returns its legend entry. By default, the
         legend entry contains the coordinates of the curve on the axes of ``hue``.
     annotation : str, optional
-        Name of a slope that is shown in the legend entry of each curve, with its standard error.
-        The slope is omitted if the standard error is not finite.
+        Name of a slope. The slope and its standard error are shown in the legend entry of each
+        curve. The slope is omitted if the standard error is not finite.
     overlays : sequence of callable, optional
         Functions ``draw(dataset, axes)`` that add elements to the panel.
     title : str or callable, optional
@@ -268,8 +268,8 @@ def name_of_figure(plot: Any, study_name: str) -> str:
     Returns
     -------
     str
-        Name of the study for a `Figure` of panels, the string itself for a string, and the name of
-        the function or module otherwise.
+        If ``plot`` is a `Figure`, the name of the study. If ``plot`` is a string, the string
+        itself. Otherwise, the name of the function or module.
     """
     if isinstance(plot, Figure):
         return study_name
@@ -287,8 +287,8 @@ def check_figure(plot: Any) -> None:
     Raises
     ------
     InvalidValue
-        If the object cannot draw, or if a user-defined function or module has the name of a figure
-        of the package.
+        If the object cannot draw a figure, or if a user-defined function or module has the name of
+        a figure of the package.
     """
     if isinstance(plot, str):
         check_storable_text("plot", plot)

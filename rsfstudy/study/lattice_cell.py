@@ -11,7 +11,7 @@ from rsfstudy.slider import Scene
 
 
 class Cell(NamedTuple):
-    """Scene of a lattice cell, and the measure fields that the axes change.
+    """Cell of a lattice, with a scene and with changes of measure fields.
 
     Parameters
     ----------
@@ -26,7 +26,7 @@ class Cell(NamedTuple):
 
 
 class CellChanges(NamedTuple):
-    """Field values of a lattice cell that differ from the base scene and measure.
+    """Values of the scene fields and measure fields that the axes change in a cell.
 
     Parameters
     ----------

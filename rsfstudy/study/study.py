@@ -59,8 +59,8 @@ from rsfstudy.study.user_parts import find_named_user_parts, user_field_quantiti
 _MAX_NAME_BYTES = 200
 #: Scene fields that select a part of the slider, such as the friction law.
 _SLOT_AND_PART_SELECTING_FIELDS = frozenset({*SLOT_NAMES, *PART_SELECTING_FIELDS})
-#: Pairs of equivalent fields. A slip rate can be given as a velocity or as a ratio, and the spring
-#: as a stiffness or as a ratio to the critical stiffness.
+#: Pairs of equivalent fields. A slip rate can be given as a velocity or as a ratio to the reference
+#: velocity. The spring can be given as a stiffness or as a ratio to the critical stiffness.
 _EQUIVALENT_FIELD_BY_FIELD_NAME = {
     **RATIO_FIELD_BY_DIMENSIONAL_NAME,
     **{ratio: name for name, ratio in RATIO_FIELD_BY_DIMENSIONAL_NAME.items()},
@@ -313,7 +313,7 @@ class Study:
         Yields
         ------
         Cell
-            Scene of the cell, and measure fields that the axes change.
+            Cell with its scene and with the changed values of measure fields.
 
         Raises
         ------
@@ -342,7 +342,7 @@ class Study:
         Returns
         -------
         Cell
-            Scene of the cell, and measure fields that the axes change.
+            Cell with its scene and with the changed values of measure fields.
         """
         return self._build_cell(self._axis_rows_of_cell(number))
 
@@ -603,7 +603,7 @@ class Study:
         return self._make_axis(field_name, values)
 
     def _make_axis(self, field_name: str, values: Sequence[Any], units: str = "") -> Axis:
-        """Create an axis of a field.
+        """Create an axis that varies one field.
 
         In a study with a rig, numbers without units are interpreted in ``units``.
         """

@@ -102,7 +102,7 @@ def _import_study_file(study_file: Path) -> ModuleType:
 
 
 def _is_module_in_directory_of(module_name: str, study_file: Path) -> bool:
-    """Return True if a module or its package is next to a study file."""
+    """Return True if a module or its package is in the directory of a study file."""
     top = sys.modules.get(module_name.partition(".")[0])
     places = [getattr(top, "__file__", None), *getattr(top, "__path__", ())]
     return any(Path(place).parent == study_file.parent for place in places if place)

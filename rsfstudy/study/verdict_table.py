@@ -11,7 +11,8 @@ from rsfstudy.errors import escape_control_characters
 from rsfstudy.quantities import html_table
 
 _SIGN_BY_CLAIM_RELATION = {"equals": "", "below": "< ", "above": "> "}
-#: Widths of a line and of the column with the identifiers on a terminal, in characters.
+#: Width of a line on a terminal, and width of the column with the identifiers of the claims, in
+#: characters.
 _TERMINAL_LINE_WIDTH, _CLAIM_ID_WIDTH = 100, 12
 #: Columns that must be present in a table that is printed on a terminal.
 _COLUMNS_PRINTED_ON_TERMINAL = (
@@ -77,7 +78,7 @@ class VerdictTable(pd.DataFrame):
 
     @property
     def _constructor(self) -> type[pd.DataFrame]:
-        """Class of the objects that are selected from the table."""
+        """Class of the data frames that result from selections in the table."""
         return pd.DataFrame
 
     def __repr__(self) -> str:

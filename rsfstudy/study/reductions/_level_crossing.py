@@ -67,25 +67,27 @@ def find_crossing(x: np.ndarray, y: np.ndarray, level: float) -> Crossing:
     -------
     Crossing
         The position and the bounds are NaN unless the samples cross the level exactly once. The
-        status is ``UNRESOLVED`` if a hidden oscillation could reach the level in other intervals.
+        status is ``UNRESOLVED`` if the curve could oscillate between two samples and thereby reach
+        the level in another interval.
 
     Notes
     -----
     The bounds allow for curves that differ from the straight chord between two samples. If the
     slope changes by :math:`T` in total within an interval of width :math:`h`, the distance between
-    the curve and the chord at a distance :math:`u` from the first sample is at most
+    the curve and the chord at a distance :math:`u` from the first sample of the interval is at most
 
     .. math:: \frac{T u (h - u)}{h}.
 
     :math:`T` is estimated by the change of slope from the previous chord to the next chord. The
     estimate is exact for a single kink. For a parabola, the estimate is twice the true value. In
-    the first and the last interval, the kink may also be located next to the end of the curve. In
-    this case, the curve follows the extrapolated chord of the neighbouring interval.
+    the first and the last interval, the kink may also be located next to the end of the curve. If
+    the kink is next to the end of the curve, the curve follows the extrapolated chord of the
+    neighbouring interval.
 
-    If the slope does not vary monotonically over the neighbouring intervals, changes of opposite
-    sign partly cancel. In this case, the largest :math:`T` of the neighbouring intervals is doubled
-    and used for all intervals. If the changes of slope alternate in sign, the samples may hide an
-    oscillation, and the bounds enclose at least the whole interval.
+    If the slope does not vary monotonically over the neighbouring intervals, changes of slope with
+    opposite signs partly cancel. In this case, the largest :math:`T` of the neighbouring intervals
+    is doubled and used for all intervals. If the changes of slope alternate in sign, the samples
+    may hide an oscillation, and the bounds enclose at least the whole interval.
     """
     if x.size < MIN_SAMPLES_OF_CURVE:
         return _build_result_without_crossing(CrossingStatus.TOO_FEW_POINTS)
@@ -252,8 +254,9 @@ def _crossing_bounds_at_end(
     """Return the bounds of a crossing in the first or last interval.
 
     The curve may have one kink in the first or last interval. The distance between the curve and
-    the chord of the interval is at most the difference between the slopes of this chord and the
-    neighbouring chord, multiplied by the distance from the inner sample.
+    the chord of the interval is at most ``T * u``. ``T`` is the difference between the slope of
+    this chord and the slope of the neighbouring chord. ``u`` is the distance from the inner sample
+    of the interval to the position on the curve.
     """
     slope, following = (slopes[0], slopes[1]) if is_first_interval else (slopes[-1], slopes[-2])
     width = float(interval_widths[0] if is_first_interval else interval_widths[-1])

@@ -24,12 +24,12 @@ from rsfstudy.vocabulary import QUANTITY_BY_NAME
 
 DatasetOrArray = TypeVar("DatasetOrArray", xr.Dataset, xr.DataArray)
 
-#: Pairs of the derivative of a result with respect to cell values, and the coordinates of these
-#: cells along some dimensions.
+#: Pairs of two items. The first item is the derivative of a result with respect to the values of
+#: some cells. The second item contains coordinates of these cells along some dimensions.
 DerivativesByVariable = Sequence[tuple[xr.DataArray, Mapping[str, Any]]]
 
-#: Names of the reduction fields that contain the variables from which the units of a result are
-#: derived, by the suffix of the result name.
+#: Names of reduction fields, by the suffix of the result name. The fields contain the names of
+#: variables. The units of a result are derived from the units of these variables.
 UnitFieldsByResultSuffix = Mapping[str, Sequence[str]]
 
 #: Value of the attribute ``comment`` of propagated errors.
@@ -65,8 +65,9 @@ class Reduction(ConstructorKeywordCheckMixin):
         derivatives(self, dataset) -> Sequence[tuple[xarray.DataArray, Mapping]]
 
     ``kind`` is the name of the reduction in files, by default the class name. ``long_names`` and
-    ``unit_fields`` define the long names and the units of the results. ``derivatives`` returns the
-    derivatives with which the numerical errors of cells are propagated to ``<name>_error``.
+    ``unit_fields`` define the long names and the units of the results. ``derivatives`` returns
+    derivatives of the result. The derivatives are used to compute ``<name>_error`` from the
+    numerical errors of the cells.
 
     Parameters
     ----------
@@ -155,8 +156,8 @@ class Reduction(ConstructorKeywordCheckMixin):
         """Return the status of the cells on which the results depend.
 
         The base class returns the status of all cells. A subclass that uses only some of the cells
-        overrides this method. The status of a result is the largest of the returned status codes
-        along the dimensions that the result does not have.
+        overrides this method. If several cells contribute to one value of the result, the status of
+        this value is the largest status code of these cells.
 
         Parameters
         ----------
@@ -229,9 +230,9 @@ def failed_cell_mask(status: xr.DataArray) -> xr.DataArray:
 def worst_status_along_other_dims(
     status: xr.DataArray, kept_dimensions: Collection[Hashable]
 ) -> xr.DataArray:
-    """Return the worst cell status along the dimensions that are not kept.
+    """Return the largest status code along the dimensions that are not kept.
 
-    The worst status is the maximum, because failures have the largest status codes.
+    Failures have the largest status codes.
 
     Parameters
     ----------
@@ -251,7 +252,7 @@ def worst_status_along_other_dims(
 def mask_unusable_values(
     dataset: xr.Dataset, variable_name: str, status: xr.DataArray
 ) -> xr.Dataset:
-    """Replace values that must not be used by NaN.
+    """Replace the values of failed cells and invalid error bounds by NaN.
 
     The values of failed cells are replaced by NaN. If ``variable_name`` is the name of a standard
     error or of a bound of a confidence interval, standard errors and bounds that are not valid are
@@ -270,7 +271,7 @@ def mask_unusable_values(
     Returns
     -------
     xarray.Dataset
-        Copy in which the values that must not be used are NaN.
+        Copy in which the values of failed cells and invalid error bounds are NaN.
     """
     bad = failed_cell_mask(status)
     if variable_name.endswith(_STATISTICAL_SUFFIXES):
@@ -468,7 +469,8 @@ def add_propagated_errors(
 
     with the rounding error :math:`\epsilon` of double precision. Absolute values are added because
     the errors of a solver are systematic, so the errors of neighbouring cells do not cancel. To
-    first order, the sum is an upper bound of the error if the errors of the cells are upper bounds.
+    first order, the sum is an upper bound of the error of the result if the error estimate of each
+    cell is an upper bound of the error of the cell.
     """
     of, name = f"{reduction.of}_error", f"{reduction.name}_error"
     if of not in dataset or reduction.name not in reduction_results:

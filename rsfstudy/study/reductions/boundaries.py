@@ -40,7 +40,7 @@ class Boundary(Reduction):
 
     The boundary is not interpolated. The result only shows that the boundary is between two
     neighbouring cells. A cell is ignored if the difference between its value and the threshold does
-    not exceed its numerical error.
+    not exceed the numerical error of the value.
 
     Parameters
     ----------
@@ -125,8 +125,8 @@ class Boundary(Reduction):
         -------
         stable, unstable : xarray.DataArray
             Coordinates of the cells on either side of the first crossing. If there is no crossing,
-            the last cell below the threshold or the first cell above the threshold is returned, and
-            the other coordinate is NaN.
+            the coordinate of the last cell below the threshold or of the first cell above the
+            threshold is returned, and the other coordinate is NaN.
         crossings : xarray.DataArray
             Number of crossings, or NaN if there are no values.
         """
@@ -170,12 +170,14 @@ class Inverse(Reduction):
     ----------
     name : str
         Name of the result. Two more variables are returned. ``<name>_error`` is the sum of three
-        contributions: the uncertainty of the level, the distance to the farthest position at which
-        a curve through the values may reach the level, and the numerical errors of the cells.
-        ``<name>_status`` is ``ok`` or the reason why the result is NaN. ``out_of_reach`` means that
-        the variable does not reach the level. ``not_unique`` means that the variable reaches the
-        level several times. ``unresolved`` means that the variable may oscillate between the cells.
-        ``too_few_points`` means that there are too few cells for an interpolation.
+        contributions: the contribution of the uncertainty of the level, the contribution of the
+        interpolation, and the contribution of the numerical errors of the cells. The contribution
+        of the interpolation is the distance from the result to the farthest position at which a
+        curve through the values may reach the level. ``<name>_status`` is ``ok`` or the reason why
+        the result is NaN. ``out_of_reach`` means that the variable does not reach the level.
+        ``not_unique`` means that the variable reaches the level several times. ``unresolved`` means
+        that the variable may oscillate between the cells. ``too_few_points`` means that there are
+        too few cells for an interpolation.
     of : str
         Name of the variable that reaches the level. The variable must be positive.
     on : str
@@ -229,7 +231,8 @@ class Inverse(Reduction):
         Returns
         -------
         xarray.Dataset
-            Coordinate value, error and status. Empty if the dimension has fewer than four points.
+            Coordinate value, error and status. The dataset is empty if the dimension has fewer than
+            four points.
 
         Raises
         ------

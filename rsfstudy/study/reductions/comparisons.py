@@ -103,7 +103,7 @@ class Difference(Reduction):
         return xr.ones_like(values), -xr.ones_like(values)
 
     def support_status(self, status: xr.DataArray) -> xr.DataArray:
-        """Return the worse of the statuses at each point and the reference point.
+        """Return the larger status code of each point and the reference point.
 
         Parameters
         ----------
@@ -251,7 +251,8 @@ class Range(Reduction):
     over : str
         Dimension to reduce, or a numeric coordinate along this dimension.
     within : tuple of (float, float), optional
-        Range of the coordinate ``over``, including both ends. The default is the whole coordinate.
+        Range of the coordinate ``over``, including both ends. By default, all values of the
+        coordinate are included.
 
     Examples
     --------

@@ -43,8 +43,8 @@ class LinearFit(Reduction):
     on : str
         Name of a one-dimensional coordinate.
     within : tuple of (float, float), optional
-        Range of coordinate values that are fitted, including both ends. The default is the whole
-        coordinate.
+        Range of coordinate values that are fitted, including both ends. By default, all values of
+        the coordinate are fitted.
 
     Examples
     --------
@@ -230,8 +230,8 @@ class ProportionalFit(LinearFit):
     on : str
         Name of a one-dimensional coordinate.
     within : tuple of (float, float), optional
-        Range of coordinate values that are fitted, including both ends. The default is the whole
-        coordinate.
+        Range of coordinate values that are fitted, including both ends. By default, all values of
+        the coordinate are fitted.
     minus : float, default: 0.0
         Value of the variable at the origin of the coordinate.
 
@@ -306,8 +306,8 @@ class SemilogFit(LinearFit):
     on : str
         Name of a one-dimensional coordinate.
     within : tuple of (float, float), optional
-        Range of coordinate values that are fitted, including both ends. The default is the whole
-        coordinate.
+        Range of coordinate values that are fitted, including both ends. By default, all values of
+        the coordinate are fitted.
 
     Examples
     --------
@@ -361,8 +361,8 @@ class PowerLaw(SemilogFit):
     on : str
         Name of a one-dimensional coordinate.
     within : tuple of (float, float), optional
-        Range of coordinate values that are fitted, including both ends. The default is the whole
-        coordinate.
+        Range of coordinate values that are fitted, including both ends. By default, all values of
+        the coordinate are fitted.
 
     Examples
     --------

@@ -28,11 +28,13 @@ def describe_reduction_results(
 ) -> dict[str, Quantity]:
     """Determine the quantities of the results of a reduction.
 
-    The units and the scale of a result are the quotient of the units and scales of the variables
-    that ``Reduction.unit_fields`` names. Results without an entry in ``Reduction.unit_fields`` are
-    dimensionless. If the scale varies between the cells that were combined, the result has no
-    scale, and a note is appended to the attribute ``comment`` of the result. The description in the
-    vocabulary is used only if its units and scale agree with the units and scale of the result.
+    ``Reduction.unit_fields`` names one variable or two variables for each result. If one variable
+    is named, the result has the units and the scale of this variable. If two variables are named,
+    the units and the scale of the first variable are divided by the units and the scale of the
+    second variable. Results without an entry in ``Reduction.unit_fields`` are dimensionless. If the
+    scale varies between the cells that were combined, the result has no scale, and a note is
+    appended to the attribute ``comment`` of the result. The description in the vocabulary is used
+    only if its units and scale agree with the units and scale of the result.
 
     Parameters
     ----------
@@ -91,8 +93,8 @@ def find_varying_scale(
     Returns
     -------
     str
-        Symbol of the first scale in the expression that varies along the reduced dimensions. Empty
-        if no scale varies.
+        Symbol of the first scale in the expression that varies along the reduced dimensions. The
+        string is empty if no scale varies.
     """
     held = {
         part: dataset[n].dims

@@ -1,6 +1,6 @@
 """Sobol indices of sampled quantities.
 
-A Sobol index is the share of the variance of a result that one sampled quantity causes.
+A Sobol index is the share of the variance of a result that is caused by one sampled quantity.
 """
 
 from __future__ import annotations

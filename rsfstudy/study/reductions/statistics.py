@@ -316,8 +316,8 @@ class Quantile(_SampleStatistic):
     """Quantile of a variable over samples.
 
     The quantile is interpolated linearly between two neighbouring samples. The standard error is
-    half the difference between two quantiles, whose levels are one binomial standard deviation
-    above and below ``level``.
+    half the difference between two other quantiles. The levels of these two quantiles are ``level``
+    plus and minus one binomial standard deviation.
 
     Parameters
     ----------
@@ -365,8 +365,8 @@ class Quantile(_SampleStatistic):
     def min_samples(self) -> int:  # type: ignore[override]
         """Minimum number of samples for the standard error.
 
-        With fewer samples, the level plus or minus one binomial standard deviation would be outside
-        of the range from 0 to 1.
+        With fewer samples, the level of the quantile plus or minus one binomial standard deviation
+        would be outside of the range from 0 to 1.
         """
         rarer = min(self.level, 1.0 - self.level)
         return max(2, math.ceil((1.0 - rarer) / rarer - 1e-9))
@@ -402,9 +402,10 @@ class Quantile(_SampleStatistic):
     def __call__(self, dataset: xr.Dataset) -> xr.Dataset:
         """Compute the statistic along the dimension of the samples.
 
-        If the variable has error estimates, the error of the quantile is computed from two bounds,
-        which are the quantiles of the values plus and minus their errors. The quantile of the exact
-        values is between the two bounds, even if the errors change the order of the samples.
+        If the variable has error estimates, the error of the quantile is computed from two bounds.
+        The upper bound is the quantile of the values plus their errors, and the lower bound is the
+        quantile of the values minus their errors. The quantile of the exact values is between the
+        two bounds, even if the errors change the order of the samples.
 
         Parameters
         ----------
@@ -461,8 +462,8 @@ class StatusShares(Reduction):
     Parameters
     ----------
     name : str
-        Name of the shares, which have the dimension ``ended``, whose labels are the statuses. The
-        standard error is returned as ``<name>_stderr``.
+        Name of the shares. The shares have the dimension ``ended``. The labels of this dimension
+        are the statuses. The standard error is returned as ``<name>_stderr``.
     of : str
         Name of a measured variable.
     over : str, default: "sample"
@@ -609,7 +610,7 @@ def _select_sampled_variable(
 ) -> xr.DataArray:
     """Return the variable to reduce, without auxiliary coordinates.
 
-    Auxiliary coordinates are dropped because sums over the samples would keep them.
+    Auxiliary coordinates are dropped because sums over the samples would keep these coordinates.
     """
     of = dataset[reduction.of].reset_coords(drop=True)
     if reduction.over not in of.dims:
