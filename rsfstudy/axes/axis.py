@@ -38,7 +38,7 @@ class Axis:
         field. The field may belong to the scene or to the measure of the study. If both the scene
         and the measure have a field with this name, the axis varies the field of the scene.
     values : sequence, mapping of str to mapping, or mapping of str to sequence
-        Values of a single field, which may include classes of user-defined parts. For a zipped
+        Values of a single field. The values may include classes of user-defined parts. For a zipped
         axis, pass a mapping from labels to the fields at each point, for example
         ``{"constant": {"normal_stress": "constant"}, ...}``, or a mapping from labels to rigs. For
         numbered points, pass a mapping from field names to lists of values. See also `samples` and
@@ -128,12 +128,13 @@ class Axis:
         ----------
         distribution : mapping of str to distribution or float
             Frozen `scipy.stats` distribution of each sampled quantity, for example
-            ``{"ln_a": norm(math.log(0.01), 0.1)}``. A float is the mean of a normal distribution
-            with a variance from `covariance`.
+            ``{"ln_a": norm(math.log(0.01), 0.1)}``. A float is the mean of a normal distribution,
+            whose variance is a diagonal element of `covariance`.
         n : int
             Number of samples. The methods "sobol" and "saltelli" require a power of two. If you
             increase n and keep the seed, the existing samples do not change, so a larger study only
-            computes the additional samples. The method "latin_hypercube" is an exception.
+            computes the additional samples. With the method "latin_hypercube", an increase of n
+            changes all samples.
         seed : int, default: 0
             Seed of the random number generator.
         method : {"sobol", "latin_hypercube", "random", "saltelli"}
@@ -203,8 +204,8 @@ class Axis:
             Fields that the axis sets, in the format that `samples` accepts. By default, each column
             sets the field of the same name.
         units : mapping of str to str, optional
-            Units of the fields, in a study of a rig. The default is the units of the table, or SI
-            units.
+            Units of the fields, in a study of a rig. By default, the units of the table are used,
+            or SI units if the table has no units.
         dimension : str, default: "case"
             Name of the dimension.
 
@@ -274,7 +275,7 @@ class Axis:
 
     @property
     def is_single_field(self) -> bool:
-        """True if the points are values of the field that names the axis."""
+        """True if the axis varies a single field and has the name of this field."""
         return self.labels is None and not self.has_numbered_points
 
     def with_rows(

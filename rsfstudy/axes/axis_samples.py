@@ -27,7 +27,8 @@ _SOBOL_METHODS = ("sobol", "saltelli")
 #: Smallest probability at which quantiles are computed. The quantiles of unbounded distributions
 #: are infinite at the probabilities 0 and 1.
 _MIN_SAMPLED_PROBABILITY = 2.0**-40
-#: Tolerance for negative eigenvalues of a correlation matrix, which result from rounding errors.
+#: Tolerance for negative eigenvalues of a correlation matrix. Small negative eigenvalues result
+#: from rounding errors.
 _EIGENVALUE_ROUNDING_ERROR = 1e-10
 
 
@@ -147,8 +148,8 @@ def _compute_sds_and_correlation_matrix(
 def _matrix_square_root(correlation: np.ndarray) -> np.ndarray:
     """Compute the symmetric square root of a matrix.
 
-    Unlike other factors, the symmetric square root is unique, so all machines return the same
-    samples.
+    Unlike other matrix factorisations, the symmetric square root is unique, so all machines return
+    the same samples.
     """
     values, vectors = np.linalg.eigh(correlation)
     return np.asarray((vectors * np.sqrt(np.maximum(values, 0.0))) @ vectors.T)

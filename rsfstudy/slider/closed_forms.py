@@ -11,8 +11,8 @@ from dataclasses import dataclass
 
 from scipy.optimize import brentq
 
-#: Grid for the search of the critical normal stress step: number of points, and the smallest and
-#: largest values of sigma_*/sigma - 1.
+#: Grid of values of sigma_*/sigma - 1 for the search of the critical normal stress step: the number
+#: of values, the smallest value and the largest value.
 _STRESS_FALL_COUNT, _MIN_STRESS_FALL, _MAX_STRESS_FALL = 400, 1e-9, 1e3
 
 
@@ -55,7 +55,7 @@ def critical_stiffness(
         Derivative of normal stress with respect to shear stress, :math:`\cot\phi`. It is 0 if the
         normal stress is constant.
     alpha : float
-        Effect of normal stress on the state variable.
+        Coefficient of the effect of normal stress on the state variable.
 
     Returns
     -------
@@ -99,18 +99,20 @@ def critical_displacement_step(
     Returns
     -------
     float
-        Critical step in units of :math:`D_c`. NaN if there is no critical step.
+        Critical displacement step in units of :math:`D_c`. The result is NaN if no displacement
+        step is critical.
 
     Notes
     -----
-    The formula assumes constant normal stress, a load point that does not move after the step, and
-    an infinite instability norm. The critical step is
+    The formula assumes that normal stress is constant, that the load point does not move after the
+    displacement step, and that the limit of the slip rate (instability norm) is infinite. The
+    critical displacement step is
 
     .. math::
 
         \frac{a}{b - a} \, \frac{-\ln(1 - \epsilon r)}{\epsilon r}.
 
-    For the slip law, :math:`\epsilon = 0`, the critical step is :math:`a/(b - a)`.
+    For the slip law, :math:`\epsilon = 0`, the critical displacement step is :math:`a/(b - a)`.
 
     References
     ----------
@@ -136,18 +138,19 @@ def critical_velocity_step(b_over_a: float, law_exponent: float = 0.0) -> float:
     Returns
     -------
     float
-        Critical velocity ratio :math:`V_0/V_*`. NaN if there is no critical velocity.
+        Critical velocity ratio :math:`V_0/V_*`. The result is NaN if no velocity step is critical.
 
     Notes
     -----
-    The formula assumes constant normal stress and an infinite instability norm. The critical
-    velocity ratio is
+    The formula assumes that normal stress is constant and that the limit of the slip rate
+    (instability norm) is infinite. The critical velocity ratio is
 
     .. math:: \frac{V_0}{V_*} = 1 + \frac{a}{(1 - \epsilon)(b - a)}.
 
-    With :math:`q = \exp(-\epsilon u)` and :math:`y = V_0/V`, the motion follows Lotka-Volterra
-    equations. The straight line from :math:`V_*` through the saddle point :math:`(1 - \epsilon, 0)`
-    is an invariant line of these Lotka-Volterra equations.
+    Let :math:`u = \Theta/b + \ln V` be the offset from steady state. The variables
+    :math:`q = \exp(-\epsilon u)` and :math:`y = V_0/V` obey Lotka-Volterra equations. The straight
+    line from :math:`V_*` through the saddle point :math:`(1 - \epsilon, 0)` is an invariant line of
+    these Lotka-Volterra equations.
 
     References
     ----------
@@ -168,7 +171,7 @@ def effective_friction(mu_star: float, b_over_a: float, alpha: float) -> float:
     b_over_a : float
         Ratio :math:`b/a`.
     alpha : float
-        Effect of normal stress on the state variable.
+        Coefficient of the effect of normal stress on the state variable.
 
     Returns
     -------
@@ -201,9 +204,10 @@ def steady_state_offset_at_instability(law_exponent: float, stiffness_ratio: flo
     Returns
     -------
     float
-        Offset :math:`u = \Theta/b + \ln V` that solves :math:`h(u) = -k/k_{cr}`. At this offset
-        from steady state, friction decreases with slip as fast as the spring stress. The offset is
-        infinite if the equation has no solution.
+        Offset :math:`u = \Theta/b + \ln V` that solves :math:`h(u) = -k/k_{cr}` with
+        :math:`h(u) = [\exp(-\epsilon u) - 1]/\epsilon`. At this offset from steady state, friction
+        decreases with slip as fast as the spring stress. The offset is infinite if the equation for
+        :math:`u` has no solution.
     """
     product = law_exponent * stiffness_ratio
     if product >= 1.0:
@@ -225,9 +229,10 @@ def steady_state_offset_after_normal_stress_fall(
     b_over_a : float
         Ratio :math:`b/a`.
     alpha : float
-        Effect of normal stress on the state variable.
+        Coefficient of the effect of normal stress on the state variable.
     normal_stress_ratio : float
-        Ratio :math:`q = \sigma_*/\sigma` of the normal stresses before and after the drop.
+        Ratio :math:`q = \sigma_*/\sigma` of the normal stress before the drop to the normal stress
+        after the drop.
 
     Returns
     -------
@@ -263,7 +268,7 @@ def critical_normal_stress_step(
     b_over_a : float
         Ratio :math:`b/a`.
     alpha : float
-        Effect of normal stress on the state variable.
+        Coefficient of the effect of normal stress on the state variable.
     law_exponent : float
         Exponent of the family of laws, from 0 (slip law) to 1 (slowness law).
     stiffness_ratio : float
@@ -272,15 +277,16 @@ def critical_normal_stress_step(
     Returns
     -------
     float
-        Critical change of the imposed normal stress in units of :math:`\sigma_*`, which is
-        negative. NaN if no drop of normal stress causes an instability.
+        Critical change of the imposed normal stress in units of :math:`\sigma_*`, a negative
+        number. The result is NaN if no drop of normal stress causes an instability.
 
     Notes
     -----
     While the load point does not move, the offset :math:`u` from steady state obeys
-    :math:`du/d\delta = (1 - b/a) [h(u) + q k/k_{cr}]/D_c`. If the offset after the drop exceeds the
-    root of :math:`h(u) = -q k/k_{cr}`, the slip rate grows without bound. The function searches for
-    the smallest drop of normal stress after which the offset reaches this root.
+    :math:`du/d\delta = (1 - b/a) [h(u) + q k/k_{cr}]/D_c` with
+    :math:`h(u) = [\exp(-\epsilon u) - 1]/\epsilon`. If the offset after the drop exceeds the root
+    of :math:`h(u) = -q k/k_{cr}`, the slip rate grows without bound. The function searches for the
+    smallest drop of normal stress after which the offset reaches this root.
     """
 
     def excess_over_threshold(growth: float) -> float:

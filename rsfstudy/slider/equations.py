@@ -29,7 +29,7 @@ RUPTURE_REGIME, RIGID_REGIME = "inertial", "rigid"
 class Equations(NamedTuple):
     r"""Autonomous system of ordinary differential equations for a scene.
 
-    The rates do not depend on the independent variable.
+    The derivatives of the unknowns do not depend explicitly on the independent variable.
 
     Parameters
     ----------
@@ -50,8 +50,8 @@ class Equations(NamedTuple):
         Number of states of the scene.
     force_balance_function : callable, optional
         Function ``force_balance_function(spring, psis, p)`` that returns :math:`\ln(V/V_*)`, the
-        frictional stress and the decrease of the state due to stress. The function is None in
-        ruptures and for rigid sliders.
+        frictional stress and the decrease of the state due to stress. The attribute is None in the
+        equations for ruptures and for rigid sliders.
     """
 
     regime: str
@@ -178,7 +178,7 @@ def _append_time_if_requested(
     *,
     with_time: bool,
 ) -> tuple[tuple[str, ...], Numbers, Function]:
-    """Return the unknowns, scales and rates, with time if requested."""
+    """Return the unknowns, scales and rates. Append time if it is requested."""
     if not with_time:
         return unknown_names, unknown_scales, regime_functions.rates_along_path
     return (
@@ -322,8 +322,8 @@ def build_friction_relation(
     scene : Scene
         Scene with friction parameters.
     states : tuple of float, optional
-        States, which determine the pore pressure. By default the pore pressure is the pore pressure
-        of steady sliding.
+        States of the scene, from which the pore pressure is read. By default, the function uses the
+        pore pressure of steady sliding.
 
     Returns
     -------
@@ -348,10 +348,10 @@ def effective_normal_stress_at(
     scene : Scene
         Scene with friction parameters.
     frictional_stress : float
-        Deviation of frictional stress in :math:`\sigma_*`.
+        Deviation of the frictional stress from :math:`\tau_*`, in units of :math:`\sigma_*`.
     states : tuple of float, optional
-        States, which determine the pore pressure. By default the pore pressure is the pore pressure
-        of steady sliding.
+        States of the scene, from which the pore pressure is read. By default, the function uses the
+        pore pressure of steady sliding.
 
     Returns
     -------
@@ -375,7 +375,7 @@ def quasi_static_log_slip_rate(scene: SceneView, spring_stress: float, state_sum
     scene : Scene
         Scene with friction parameters.
     spring_stress : float
-        Deviation of the spring stress in :math:`\sigma_*`.
+        Deviation of the spring stress from :math:`\tau_*`, in units of :math:`\sigma_*`.
     state_sum : float
         State :math:`\Psi`, or the sum of the states of a law with several states.
 
@@ -402,8 +402,8 @@ def build_state_evolution_function(scene: SceneView) -> Callable[[float, Numbers
     Returns
     -------
     callable
-        Function ``(log_slip_rate, psis, shift)`` that returns the change of each state per unit
-        slip in :math:`D_c`.
+        Function ``(log_slip_rate, psis, shift)`` that returns the change of each state per slip
+        distance of :math:`D_c`.
     """
     evolutions, p = (
         scene.equation_functions.friction_functions.evolutions,

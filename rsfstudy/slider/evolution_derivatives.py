@@ -11,15 +11,16 @@ from rsfstudy.slider.parts import Numbers
 from rsfstudy.slider.scene_view import SceneView
 from rsfstudy.slider.steady_state import SteadySliding
 
-#: Largest step size of the finite differences, relative to the scale of each argument, and
-#: coefficients of central differences of order eight.
+#: Largest step size of the finite differences, divided by the scale of the argument. The second
+#: constant contains the coefficients of central differences of order eight.
 _MAX_DIFFERENCE_STEP_OVER_SCALE = 0.05
 _FINITE_DIFFERENCE_WEIGHTS = ((1, 4.0 / 5.0), (2, -1.0 / 5.0), (3, 4.0 / 105.0), (4, -1.0 / 280.0))
-#: Default scale of a state, divided by b, and smallest change of a steady state with ln V, relative
-#: to the default scale, that replaces the default scale.
+#: Default scale of a state, divided by b. If a steady state changes with ln V by more than the
+#: second constant (a fraction of the default scale), this change is the scale of the state.
 _STATE_SCALE_OVER_B, _MIN_STATE_CHANGE = 0.05, 1e-9
-#: Maximum number of step halvings, convergence tolerance for the relative difference between two
-#: successive estimates, and relative rounding error of a finite difference.
+#: Maximum number of halvings of the step size of the finite differences. The second constant is the
+#: tolerance for the relative difference between two successive estimates of a derivative. The third
+#: constant is the relative rounding error of a finite difference.
 _MAX_HALVINGS, _CONVERGENCE_TOLERANCE, _ROUNDING_ERROR = 9, 1e-12, 8.0 * 2.0**-52
 
 NestedListMatrix = list[list[float]]
@@ -31,10 +32,10 @@ class StateEvolutionDerivatives(NamedTuple):
     Parameters
     ----------
     with_respect_to_log_slip_rate, with_respect_to_state_shift : list of float
-        Derivatives with respect to :math:`\ln V` and to the stress-induced decrease of the state
-        (shift), of shape (states,).
+        Derivatives of the state evolution with respect to :math:`\ln V`, and with respect to the
+        stress-induced decrease of the state (shift). Each list has one element per state.
     with_respect_to_states : list of list of float
-        Derivatives with respect to each state, of shape (states, states).
+        Derivatives of the state evolution with respect to each state, as a square matrix.
     relative_error : float
         Largest relative error estimate among the derivatives.
     """
@@ -78,8 +79,8 @@ def compute_state_evolution_derivatives(
     r"""Compute the derivatives of the state evolution in steady sliding.
 
     The step size of the finite differences is halved until two successive estimates agree. The
-    derivatives are therefore accurate even if the evolution of a law varies over a fraction of a
-    unit of :math:`\ln V`.
+    derivatives are therefore accurate even if the state evolution of a law varies strongly when
+    :math:`\ln V` changes by less than 1.
 
     Parameters
     ----------
@@ -127,11 +128,11 @@ def _differentiate_at_zero(
 ) -> tuple[list[float], float]:
     """Differentiate a function at zero, and estimate the relative error.
 
-    The step is halved until the derivatives of two successive steps differ by no more than the
-    rounding error. If two steps agree, the function returns the derivatives for the longer step,
-    which has the smaller rounding error. If no two successive steps agree, the function selects the
-    pair of steps with the smallest difference, and returns the derivatives for the shorter step of
-    the pair.
+    The step size is halved until the derivatives for two successive step sizes agree within the
+    rounding error. The function then returns the derivatives for the larger step size, because
+    their rounding error is smaller. If the derivatives never agree for two successive step sizes,
+    the function selects the two successive step sizes whose derivatives differ least. In this case
+    the function returns the derivatives for the smaller step size.
     """
     (coarse, _sizes), best, smallest = (
         _central_differences_at_zero(function, initial_step),
@@ -162,8 +163,8 @@ def _central_differences_at_zero(
     derivatives : list of float
         Derivative of each component of the function.
     sizes : list of float
-        Largest ratio of a function value to the distance of its argument from zero, for each
-        component. Rounding errors are proportional to this ratio.
+        For each component, the largest ratio of a function value to the magnitude of the argument
+        of the function. The rounding errors of the derivatives are proportional to this ratio.
     """
     slopes = [0.0] * len(function(0.0))
     sizes = slopes

@@ -11,21 +11,21 @@ law :math:`\tau = \sigma [\mu_* + a \ln(V/V_*) + \Theta]` becomes
     \mathrm{strength}(g) = \frac{\mu_* + g}{s(g)} - \mu_* + \mathrm{shift}(g).
 
 The shift is the decrease of the state variable :math:`\Theta` due to stress, for example
-:math:`\alpha \ln s`. The state :math:`\Psi` is continuous across any sudden change of stress, and
-its evolution depends only on the evolution law. If a law has several states, :math:`\Psi` is the
-sum of all states.
+:math:`\alpha \ln s`. The state :math:`\Psi` does not change when stress changes suddenly. The
+evolution of :math:`\Psi` depends only on the evolution law. If a law has several states,
+:math:`\Psi` is the sum of all states.
 
 The pore pressure :math:`P`, divided by :math:`\sigma_*`, reduces the effective normal stress, so
 :math:`s = \sigma/\sigma_* - P`. Friction and the effects of stress on the state depend on the
 effective normal stress only. The pressure :math:`P` is the last element of the tuple of states,
-after the states of the law. A loading that imposes stress adds an unknown pressure in the same way.
-If the scene also has a fluid, the pressure around the fault is the first element after the states
-of the law.
+after the states of the law. A loading that imposes normal stress also adds an unknown to the
+states. This unknown acts like a pore pressure. If the scene also has a fluid, the pressure around
+the fault is the first element after the states of the law.
 
 If the displacement of the load point exceeds its mean motion by :math:`D`, the spring adds the
-shear stress :math:`K D`. The variables f and g exclude the stress :math:`K D`, and the friction
-functions add :math:`K D`. Inertia and radiation damping depend only on the difference f - g, in
-which the added stress cancels.
+shear stress :math:`K D`. The spring stress f and the frictional stress g exclude the stress
+:math:`K D`. The friction functions add :math:`K D` to g. Inertia and radiation damping depend only
+on the difference f - g. This difference is the same with and without :math:`K D`.
 
 This module combines the functions that the parts of a scene define. Each combination contains only
 the effects that are active in the scene. The combined functions take floats and the parameter tuple
@@ -56,8 +56,8 @@ from rsfstudy.slider.state_functions import (
     build_sum_function,
 )
 
-#: Smallest magnitude of the friction coefficient if slip may reverse. The limit keeps the logarithm
-#: finite at zero stress.
+#: Smallest magnitude of the friction coefficient in scenes in which slip may reverse. The limit
+#: keeps the logarithm of the slip rate finite at zero stress.
 _MIN_NONZERO_FRICTION_COEFFICIENT = 1e-280
 
 
@@ -69,7 +69,8 @@ class FrictionFunctions(NamedTuple):
     ----------
     strength : callable
         Function ``(g, psis, p) -> (strength, slope, shift, shift_slope)``. The slopes are
-        derivatives with respect to g. The first state may be missing from ``psis``.
+        derivatives with respect to the frictional stress g. The tuple ``psis`` may omit the first
+        state.
     effective_normal_stress : callable
         Function ``(g, psis, p) -> (s - 1, slope)`` of the effective normal stress.
     rig_normal_stress : callable
@@ -79,7 +80,7 @@ class FrictionFunctions(NamedTuple):
         Function ``(psis) -> P`` of the pore pressure outside the fault.
     evolutions : callable
         Function ``(log_slip_rate, psis, shift, fraction, p)`` that returns the change of all states
-        per unit slip in :math:`D_c`, multiplied by ``fraction``.
+        per slip distance of :math:`D_c`, multiplied by ``fraction``.
     steady_states : callable
         Function ``(log_slip_rate, shift, p)`` that returns all states in steady sliding.
     state_sum : callable
@@ -94,13 +95,15 @@ class FrictionFunctions(NamedTuple):
         Function ``(strength, log_slip_rate, others, p)`` that returns all states. The first state
         follows from the strength and the other states.
     load_point_stress : callable
-        Function ``(psis, p)`` that returns the shear stress :math:`K D`, which g excludes.
+        Function ``(psis, p)`` that returns the shear stress :math:`K D`. The frictional stress g
+        excludes this stress.
     load_point_stress_change : callable
         Function ``(changes)`` that returns the change of the shear stress :math:`K D`.
     state_count : int
         Number of states.
     indices_of_states_in_distance : tuple of int
-        Indices of the states that contribute to the distance from steady sliding.
+        Indices of the states that are compared with their steady values to compute the distance
+        from steady sliding.
     """
 
     strength: Function
@@ -128,7 +131,8 @@ def zero_normal_stress_excess(frictional_stress: float, p: Numbers) -> tuple[flo
     Parameters
     ----------
     frictional_stress : float
-        Deviation of frictional stress in :math:`\sigma_*`. This argument is ignored.
+        Deviation of the frictional stress from :math:`\tau_*`, in units of :math:`\sigma_*`. This
+        argument is ignored.
     p : tuple of float
         Parameters of the scene. This argument is ignored.
 
@@ -223,7 +227,7 @@ def friction_relation_at_constant_normal_stress(
     Parameters
     ----------
     frictional_stress : float
-        Deviation of frictional stress in :math:`\sigma_*`.
+        Deviation of the frictional stress from :math:`\tau_*`, in units of :math:`\sigma_*`.
     states : tuple of float
         States of the scene. This argument is ignored.
     p : tuple of float
@@ -248,7 +252,7 @@ def zero_state_effect(
     Parameters
     ----------
     frictional_stress : float
-        Deviation of frictional stress in :math:`\sigma_*`.
+        Deviation of the frictional stress from :math:`\tau_*`, in units of :math:`\sigma_*`.
     normal_stress_ratio : float
         Normal stress ratio :math:`s`.
     normal_stress_derivative : float
@@ -316,7 +320,7 @@ def shear_stress_effect_on_state(
     Parameters
     ----------
     frictional_stress : float
-        Deviation of frictional stress in :math:`\sigma_*`.
+        Deviation of the frictional stress from :math:`\tau_*`, in units of :math:`\sigma_*`.
     normal_stress_ratio : float
         Normal stress ratio :math:`s`.
     normal_stress_derivative : float
@@ -328,7 +332,8 @@ def shear_stress_effect_on_state(
     Returns
     -------
     shift, slope : float
-        Decrease of the state variable due to the present shear stress, and its derivative.
+        Decrease of the state variable due to the present shear stress, and the derivative of this
+        decrease with respect to frictional stress.
 
     Notes
     -----
@@ -383,8 +388,8 @@ def extend_relation_to_reversed_slip(forward_relation: Function) -> Function:
 
     Notes
     -----
-    The regularised law :math:`V = 2 V_* \exp[-(\mu_* + \Theta)/a] \sinh[\tau/(a \sigma)]` gives the
-    slip rate the sign of the shear stress. The friction relation becomes
+    In the regularised law :math:`V = 2 V_* \exp[-(\mu_* + \Theta)/a] \sinh[\tau/(a \sigma)]`, the
+    slip rate has the same sign as the shear stress. The friction relation becomes
 
     .. math::
 
@@ -489,12 +494,13 @@ def wrap_with_load_point_stress(friction_function: Function) -> Function:
     Parameters
     ----------
     friction_function : callable
-        Function ``(g, psis, p)`` of the total frictional stress.
+        Function ``(g, psis, p)`` whose argument g is the total frictional stress.
 
     Returns
     -------
     callable
-        Function ``(g, psis, p)`` in which g excludes the stress of `load_point_stress`.
+        Function ``(g, psis, p)`` whose argument g excludes the stress that `load_point_stress`
+        returns.
     """
 
     def function_with_load_point_stress(g: float, psis: Numbers, p: Numbers) -> Numbers:
@@ -543,10 +549,11 @@ class FrictionTerms(NamedTuple):
     allows_reversed_slip : bool
         True if slip may reverse.
     normal_stress : callable or None
-        Function of the normal stress condition. None if shear stress does not change normal stress.
+        Function that the normal stress condition defines. The attribute is None if shear stress
+        does not change normal stress.
     auxiliary_unknown_count : int
-        Number of unknowns of the fluid or the loading. The last unknown is the pore pressure, or
-        the stress of the load point.
+        Number of unknowns of the fluid or the loading. The last of these unknowns is the pore
+        pressure, or the shear stress due to an oscillation of the load point.
     auxiliary_rates, auxiliary_steady_states : callable or None
         Functions that compute the rates and the steady values of the auxiliary unknowns.
     boundary_pressure_index : int
@@ -556,7 +563,7 @@ class FrictionTerms(NamedTuple):
     has_load_point_unknown : bool, default: False
         True if the last unknown is the shear stress :math:`K D` instead of a pressure.
     state_indices_excluded_from_distance : tuple of int, optional
-        Indices of the states that do not contribute to the distance from steady sliding.
+        Indices of the states that are ignored when the distance from steady sliding is computed.
     """
 
     law_state_count: int

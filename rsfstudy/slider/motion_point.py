@@ -11,7 +11,8 @@ from rsfstudy._deprecation import add_former_member_names
 class MotionPoint(NamedTuple):
     r"""Stress, slip rate and states of a motion at a point in time.
 
-    The attributes are the same for all equations of motion, regardless of the integrated unknowns.
+    A motion has the same attributes for all equations of motion, although the unknowns of the
+    equations differ.
 
     Parameters
     ----------
@@ -25,12 +26,14 @@ class MotionPoint(NamedTuple):
     frictional_stress : float
         Deviation :math:`g` of the frictional stress from :math:`\tau_*`, in :math:`\sigma_*`.
     psi : float
-        Sum of the states :math:`\Psi` of the law, which exclude the effect of stress.
+        Sum of the states :math:`\Psi_i` of the law. The effect of stress is removed from these
+        states.
     state : float
         State variable :math:`\Theta`. If the law has several states, ``state`` is their sum.
     steady_state_offset : float
-        Difference between ``state`` and its steady value at this slip rate. For most laws, the
-        difference is :math:`\Theta + b \ln(V/V_*)`.
+        Difference between the state variable and the value of the state variable in steady sliding
+        at the same slip rate. For most laws, the steady-state offset is
+        :math:`\Theta + b \ln(V/V_*)`.
     distance_from_steady_state : float
         Largest absolute difference between a state and its steady value. Unknowns in
         ``excluded_from_distance`` are ignored.

@@ -35,7 +35,8 @@ QUANTITIES_A_PART_MAY_NEED: Mapping[str, str] = {
 #: Quantities that the functions of a law receive. The friction coefficient is computed from the
 #: slip rate and the state.
 QUANTITIES_RECEIVED_BY_LAWS = frozenset({SLIP_RATE, STATE, FRICTION_COEFFICIENT})
-#: Mapping from each quantity that can be computed to the quantities in its formula.
+#: Quantities that can be computed from other quantities. The value of each key is the set of
+#: quantities that the formula for the key contains.
 _QUANTITIES_COMPUTED_FROM_OTHERS: Mapping[str, frozenset[str]] = {
     EFFECTIVE_NORMAL_STRESS: frozenset({NORMAL_STRESS, PORE_PRESSURE}),
     SHEAR_STRESS: frozenset({FRICTION_COEFFICIENT, NORMAL_STRESS, PORE_PRESSURE}),
@@ -43,7 +44,7 @@ _QUANTITIES_COMPUTED_FROM_OTHERS: Mapping[str, frozenset[str]] = {
 
 
 def check_names_of_needed_quantities(slot_name: str, part_class: type[Part]) -> None:
-    """Raise ``InvalidValue`` if ``needs`` of a part is invalid.
+    """Raise ``InvalidValue`` if the attribute ``needs`` of a part is invalid.
 
     The attribute ``needs`` must be a set of names of known quantities.
 
@@ -93,7 +94,7 @@ def quantities_known_to_part(scene: SceneView, part: Part) -> frozenset[str]:
     """Return the quantities that are known to the functions of a part.
 
     The result contains the quantities that the functions receive, the quantities that are constant
-    in the scene, and all quantities that can be computed from received or constant quantities.
+    in the scene, and the quantities that can be computed from the first two groups.
 
     Parameters
     ----------

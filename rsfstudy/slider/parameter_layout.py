@@ -32,8 +32,8 @@ from rsfstudy.slider.scene_view import SceneView
 ) = range(8)
 
 #: Index of the first parameter of each slot. A loading with unknowns stores its parameters in the
-#: elements of the fluid. The parameter tuple is kept short, because compiled functions copy all of
-#: its elements in each call.
+#: elements that are reserved for the parameters of the fluid. The parameter tuple is kept short,
+#: because compiled functions copy all of its elements in each call.
 NORMAL_STRESS, FLUID, DYNAMICS, LAW = 8, 10, 13, 15
 LOADING = FLUID
 #: Index of the rate of the imposed pressure if both the loading and the fluid have parameters.
@@ -54,10 +54,11 @@ BOUNDARY_PRESSURE_RATE = DYNAMICS - 1
 #: Upper limit of ln(V/V_*). Larger slip rates occur only in trial steps that the integrator
 #: rejects, because a motion ends at ln(V/V_*) = 276 with the status ``slip_rate_unbounded``.
 LARGEST_LOG_SLIP_RATE = 300.0
-#: Upper limit of ln(V_*/V). Slip without loading stops at 10^-290 V_*.
+#: Upper limit of ln(V_*/V). Without loading, slip is treated as stopped at a slip rate of 10^-290
+#: V_*.
 LARGEST_LOG_SLOWNESS = 680.0
-#: Limits of the normal stress ratio minus one. Values outside these limits occur only in trial
-#: steps of the integrator.
+#: Limits of the normal stress ratio minus one. Normal stress ratios outside these limits occur only
+#: in trial steps of the integrator.
 SMALLEST_NORMAL_STRESS_EXCESS, LARGEST_NORMAL_STRESS_EXCESS = 1e-12 - 1.0, 1e12
 
 
@@ -99,8 +100,8 @@ def pack_friction_parameter_values(scene: SceneView) -> Numbers:
     Returns
     -------
     tuple of float
-        Parameters in the order that the constants of ``parameter_layout`` define. The elements for
-        the spring and the load point are NaN.
+        Parameters in the order that the constants of ``parameter_layout`` define. The elements that
+        describe the spring and the load point are NaN.
     """
     parts, slider, law = scene.parts, scene.parts.slider, scene.parts.law
     size = slider.a * law.state_change_over_a

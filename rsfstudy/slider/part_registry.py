@@ -1,9 +1,10 @@
 """Registry of the slots, parts and fields of scenes.
 
 The registry lists the parts that can fill each slot, and the fields that the parts add to a scene.
-A user-defined part is a class that is derived from the base class of a slot. The part is registered
-by its name when it is first used in a process. If a notebook cell with the class is run again, the
-new class replaces the old class. The registry rejects a name that belongs to another part.
+A user-defined part is a class that is derived from the base class of a slot. A user-defined part is
+registered by its name when the part is first used in a process. If a notebook cell with the class
+is run again, the new class replaces the old class. The registry rejects a name that belongs to
+another part.
 """
 
 from __future__ import annotations
@@ -31,7 +32,7 @@ UserPart = type[Part] | UserLoading
 
 @dataclass(frozen=True)
 class Slot:
-    """Slot of a scene, which is filled by one part.
+    """Slot of a scene. Each slot of a scene contains one part.
 
     Parameters
     ----------
@@ -58,7 +59,7 @@ class Slot:
 
     @property
     def field_quantity(self) -> Quantity:
-        """Description of the field that selects the part, as a ``Quantity``."""
+        """``Quantity`` that describes the field whose value selects the part."""
         return Quantity(self.name, "", "", self.long_name)
 
     @cached_property
@@ -128,7 +129,8 @@ def scene_field_defaults() -> dict[str, Any]:
     Returns
     -------
     dict of str to object
-        Default values by field name. The default of a slot is None if other fields select the part.
+        Default values by field name. The default of a slot such as ``dynamics`` is None if fields
+        such as ``inertia`` select the part.
     """
     choices = {
         slot.name: slot.default_part_name if slot in SLOTS_WITH_PART_CHOSEN_BY_NAME else None
@@ -312,7 +314,7 @@ def _module_and_qualified_name(part: UserPart) -> tuple[str, str]:
 def _check_part_fields(slot: Slot, part: type[Part]) -> None:
     """Raise ``InvalidValue`` if a field of a part is invalid.
 
-    A field must have a description, and its name must not be in use.
+    A field of a part must have a description. The name of the field must not be in use.
     """
     what = f"field of {part.__qualname__}"
     for stated in fields(part):

@@ -41,8 +41,8 @@ from rsfstudy.errors import InvalidValue
 from rsfstudy.quantities import Quantity
 from rsfstudy.slider.scene_view import SceneView
 
-#: Validation rules that most fields use. The upper limit of integers bounds the number of loading
-#: segments.
+#: Validation rules that most fields use. The upper limit in the rules for integers limits the
+#: number of loading segments.
 POSITIVE, NON_NEGATIVE = "must be greater than 0", "must be 0 or greater"
 NON_NEGATIVE_INTEGER, POSITIVE_INTEGER = (
     f"must be a whole number from {least} to 100,000" for least in (0, 1)
@@ -133,7 +133,8 @@ class Part:
         Returns
         -------
         tuple of float
-            Values that precede the appended fields. The base class returns an empty tuple.
+            Values that precede the values of the appended fields. The base class returns an empty
+            tuple.
         """
         return ()
 
@@ -367,7 +368,7 @@ def _fields_appended_to_parameter_values(part_class: type[Part]) -> tuple[str, .
 
 
 def collect_parameter_values(part: Part, scene: SceneView) -> Numbers:
-    """Return the values of ``part.parameter_values``, followed by the appended fields.
+    """Return the values of ``part.parameter_values`` and then the appended fields.
 
     Parameters
     ----------

@@ -75,8 +75,8 @@ class SampledHistory(UserLoading):
         If True, the samples include normal stress or pore pressure.
     of_pressure : bool, default: False
         If True, the samples include pore pressure but not normal stress. If the scene has a fluid
-        with pore pressure, the samples are the pressure around the fault, and fluid flows until the
-        pore pressure in the fault equals the pressure around the fault.
+        with pore pressure, the samples are the pressure around the fault. Fluid then flows until
+        the pore pressure in the fault equals the pressure around the fault.
     first_reversal : tuple of (str, float, str), optional
         Name, value and position of the first sample that moves the load point backwards, for error
         messages.
@@ -95,8 +95,8 @@ class SampledHistory(UserLoading):
     def unknowns(self) -> tuple[Quantity, ...]:  # type: ignore[override]
         """Unknowns of the loading.
 
-        If normal stress is sampled, its decrease is an unknown. Otherwise the loading has no
-        unknowns.
+        If normal stress is sampled, the decrease of normal stress is an unknown of the loading.
+        Otherwise the loading has no unknowns.
         """
         return _NORMAL_STRESS_UNKNOWNS if self.of_stress else ()
 
@@ -150,12 +150,12 @@ class SampledHistory(UserLoading):
 
     @property
     def segments(self) -> Any:
-        """Segments between the samples, with an infinite last segment."""
+        """Segments between the samples. The last segment has no end."""
         return LazySegmentSequence(self.segment_table)
 
     @property
     def jump_mask(self) -> np.ndarray:
-        """False for every segment, because the record has no jumps."""
+        """False for every segment, because a record is continuous."""
         return np.zeros(len(self.sample_table), dtype=bool)
 
     @property
@@ -219,7 +219,7 @@ def build_sampled_history(
         Sampling times in :math:`D_c/V_*`. The history starts at the first sample.
     velocity : ndarray
         Load point velocity between each sample and the next sample, in :math:`V_*`. The last
-        velocity applies without end.
+        velocity also applies after the end of the record.
     normal_stress_fall : ndarray or None
         Decrease of normal stress from :math:`\sigma_*` at the samples, in :math:`\sigma_*`. After
         the last sample, normal stress remains constant.

@@ -67,19 +67,19 @@ class Scene(SceneBase):
         driving stress that is inclined at the angle ``phi``. A user-defined class is also accepted.
     fluid : str or type, default: "drained"
         Pore fluid. "drained" is constant pore pressure. With "dilatant", pore pressure falls when
-        pores open because the slip rate increases. A user-defined class is also accepted. Stress is
-        normalised by the effective normal stress of steady sliding at :math:`V_*`. Pore pressure is
-        measured from the pressure of the surroundings, which is also its initial value. A history
-        of pore pressure changes the pressure of the surroundings.
+        the slip rate increases, because the pores open. A user-defined class is also accepted.
+        Stress is normalised by the effective normal stress of steady sliding at :math:`V_*`. Pore
+        pressure is measured from the pressure of the surroundings, which is also its initial value.
+        A history of pore pressure changes the pressure of the surroundings.
     a : float, default: 0.0145
         Direct effect parameter.
     mu_star : float, default: 0.76
         Steady-state friction coefficient at :math:`V_*`.
     stiffness_ratio : float, optional
         Ratio of the stiffness to the critical stiffness at :math:`V_*` without radiation damping.
-        Steady sliding is stable at ratios above 1 and, with radiation damping, also at ratios
-        slightly below 1. With several states, steady sliding may also be stable at lower ratios.
-        The default is 1 if ``stiffness`` is not given.
+        Steady sliding is stable at stiffness ratios above 1. With radiation damping, steady sliding
+        is also stable at stiffness ratios slightly below 1. With several states, steady sliding may
+        also be stable at lower stiffness ratios. The default is 1 if ``stiffness`` is not given.
     stiffness : float, optional
         Stiffness :math:`k D_c/\sigma_*`, as an alternative to ``stiffness_ratio``.
     period : float, default: 5.0
@@ -99,8 +99,8 @@ class Scene(SceneBase):
         Coefficient :math:`c` of Nagata et al. (2012). Shear stress decreases the state variable by
         :math:`c \, d\tau/\sigma`.
     regularised : bool, default: False
-        If True, slip reverses with the sign of shear stress (arcsinh form of the friction law).
-        Only quasi-static motions support reversed slip.
+        If True, the slip rate has the same sign as the shear stress, so slip can reverse (arcsinh
+        form of the friction law). Only quasi-static motions support reversed slip.
     b_over_a : float, default: 2.0
         Ratio :math:`b/a` of the evolution effect to the direct effect. Rate weakening requires
         :math:`b > a`. Without rate weakening, there is no critical stiffness, and ``stiffness``
@@ -127,8 +127,8 @@ class Scene(SceneBase):
         Angle in degrees between the driving stress and the fault normal, for variable normal
         stress.
     dilatancy : float, default: 0.01
-        Dilatancy :math:`\epsilon/(\beta \sigma_*)` of the dilatant fluid, the decrease of undrained
-        pore pressure per unit of :math:`\ln V`.
+        Dilatancy :math:`\epsilon/(\beta \sigma_*)` of the dilatant fluid: the decrease of pore
+        pressure under undrained conditions if :math:`\ln V` increases by 1.
     drainage : float, default: 1.0
         Drainage rate :math:`c^* D_c/V_*` of the dilatant fluid.
     inertia : bool, default: False
@@ -153,8 +153,8 @@ class Scene(SceneBase):
         Phase of an oscillation at its start, in degrees. By default an oscillation starts as a
         sine.
     oscillation_cycles : float, optional
-        Number of cycles after which an oscillation ends, which may be fractional. By default an
-        oscillation has no end.
+        Number of cycles after which an oscillation ends. The number may be fractional. By default
+        an oscillation has no end.
     normal_stress_ramp : float, default: 0.0
         Change of imposed normal stress during a ramp, in :math:`\sigma_*`. If the driving stress is
         inclined, :math:`\sigma_3` changes. The field does not apply to constant normal stress.
@@ -306,11 +306,12 @@ class Scene(SceneBase):
 
     @cached_attribute
     def continuous_segments(self) -> tuple[tuple[Scene, np.ndarray], ...]:
-        """Sequences of segments without jumps between the segments.
+        """Sequences of loading segments that follow each other without a jump.
 
-        Each sequence is a tuple of two elements: the scene during the first segment, and an array
-        of shape (segments, 6) with the rows of the segment table. The columns of the table are
-        defined in ``parameter_layout``.
+        A jump is a sudden change of load point displacement or normal stress, or the end of a
+        segment with unknowns. Each sequence is a tuple of two elements: the scene during the first
+        segment, and an array of shape (segments, 6) with the rows of the segment table. The columns
+        of the table are defined in ``parameter_layout``.
         """
         if len(self._segments) == 1:
             return ((self, SINGLE_ENDLESS_SEGMENT_TABLE),)
@@ -344,7 +345,7 @@ class Scene(SceneBase):
     def friction_parameter_values(self) -> Numbers:
         """Parameters of functions that depend only on friction.
 
-        The elements for the spring and the load point are NaN.
+        The elements that describe the spring and the load point are NaN.
         """
         return parameter_layout.pack_friction_parameter_values(self)
 
@@ -362,7 +363,7 @@ class Scene(SceneBase):
 
     @cached_attribute
     def pressure_source(self) -> fluid.Fluid | loading.Loading | FluidWithBoundaryPressure:
-        """Part whose last unknown decreases normal stress.
+        """Part that changes the effective normal stress by its last unknown.
 
         The pressure source is the loading, if the loading has unknowns, and otherwise the fluid. If
         both the loading and the fluid have unknowns, the pressure source is a combination in which
@@ -474,15 +475,15 @@ class Scene(SceneBase):
     def inertial_time(self) -> float:
         """Time scale of inertia, T/(2 pi), in units of D_c/V_*.
 
-        The product of the time scale and the slip rate in :math:`V_*` is the slip rate norm, which
-        determines if a motion is unstable.
+        A motion is unstable if the product of this time scale and the slip rate in units of
+        :math:`V_*` reaches the instability norm.
         """
         slider = self.parts.slider
         return slider.period * slider.reference_rate / (2.0 * math.pi)
 
     @cached_attribute
     def log_instability_rate(self) -> float:
-        """Natural logarithm of the slip rate at the instability norm."""
+        """Natural logarithm of the slip rate V/V_* at which a motion is unstable."""
         return math.log(self.parts.slider.instability_norm / self.inertial_time)
 
     @cached_attribute
@@ -508,7 +509,8 @@ def _critical_stiffness(
 ) -> float:
     """Compute the critical stiffness of all sliders with the same friction.
 
-    The stiffness of the slider does not affect the critical stiffness and is set to the value of a.
+    The stiffness of the slider does not affect the critical stiffness. The function sets the
+    stiffness of the slider to the value of a.
     """
     slider = SliderParameters(a=a, mu_star=mu_star, stiffness=a)
     scene = Scene(

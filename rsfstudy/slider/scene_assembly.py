@@ -202,9 +202,10 @@ class FieldIndex(NamedTuple):
     part_index_by_field : mapping of str to int
         Index of the part that owns each field.
     rejecting_part_class_by_field : mapping of str to type
-        Mapping from each field that none of the parts has to the part that rejects the field.
+        Mapping whose keys are the fields that none of the parts has. The value of each key is the
+        class of the part that rejects the field.
     values_of_inactive_fields : mapping of str to object
-        Attribute values in the scene for the fields that none of the parts has.
+        Values that the scene returns for the fields that none of its parts has.
     inapplicable_fields : frozenset of str
         Names of the fields that have no meaning in the scene, regardless of their value. Fields
         that would select another part are not included.

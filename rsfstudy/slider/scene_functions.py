@@ -13,7 +13,8 @@ independent variable :math:`\delta` is slip plus load point displacement,
     \frac{dt}{d\delta} = \frac{1}{V + V_0}.
 
 The dynamics of the scene determine the slip rate from :math:`f` and :math:`\Psi`. In ruptures, the
-independent variable of the full equations is inertial time.
+independent variable of the equations of motion with inertia is inertial time, which is time in
+units of :math:`T/(2 \pi)`.
 
 The equations between ruptures and in ruptures are both integrated along the path length
 :math:`\lambda`, which combines displacement (or inertial time) with :math:`x = \ln(V/V_*)`:
@@ -26,10 +27,11 @@ The equations between ruptures and in ruptures are both integrated along the pat
 
 While contacts heal, :math:`\ln V` decreases as the logarithm of displacement. When slip ends after
 a rupture, :math:`\ln V` decreases as the logarithm of the remaining time. If displacement or time
-were the independent variable, each step would have to be a fraction of the elapsed or remaining
-interval. Measured in path length, the whole interval is only a few units long. The factor of 6
-reduces the number of steps where slip is fastest, because the path bends over six units of
-:math:`\ln V` instead of one unit. Factors from 4 to 12 give similar results.
+were the independent variable, each integration step would have to be a fraction of the elapsed or
+remaining displacement or time. Measured in path length, the interval in which contacts heal or slip
+ends is only a few units long. The factor of 6 in the path length reduces the number of integration
+steps where slip is fastest, because the path bends over six units of :math:`\ln V` instead of one
+unit. Factors from 4 to 12 instead of 6 give similar results.
 
 The slip rate of a rigid slider is prescribed, and slip is the independent variable.
 """
@@ -56,18 +58,20 @@ from rsfstudy.slider.state_functions import (
 if TYPE_CHECKING:
     from rsfstudy.slider.dynamics import Dynamics
 
-#: Lower limit of ln(V/V_*), at 10^-290. A motion without loading ends at this slip rate.
+#: Lower limit of ln(V/V_*), the logarithm of 10^-290. A motion without loading ends at this slip
+#: rate.
 STOPPED_LOG_SLIP_RATE = -290.0 * math.log(10.0)
 
-#: Largest difference between ln V_0 and ln V that the rates resolve. At lower slip rates the
-#: contact is treated as stationary, because the remaining slip changes the state by a relative
-#: amount below exp(-100).
+#: Largest difference between ln V_0 and ln V. The rate functions replace a larger difference by
+#: this limit. At lower slip rates the contact is treated as stationary, because the remaining slip
+#: changes the state by a relative amount below exp(-100).
 MAX_LOG_LOAD_OVER_SLIP_VELOCITY = 100.0
 
 #: Change of ln V that adds as much path length as one unit of displacement (D_c) or inertial time.
 LOG_SLIP_RATE_PER_PATH_LENGTH = 6.0
-#: Largest path slope whose square is computed. Adding 1 to the square of a larger slope has no
-#: effect in double precision.
+#: Largest slope of the path whose square is computed. The slope is the derivative of ln V/6 with
+#: respect to displacement or inertial time. Adding 1 to the square of a larger slope has no effect
+#: in double precision.
 MAX_FINITE_PATH_SLOPE = 1e9
 
 
@@ -93,14 +97,15 @@ def velocity_ratios(log_slip_rate: float, p: Numbers) -> VelocityRatios:
     load_ratio : float
         Velocity ratio :math:`V_0/V`.
     slip_fraction : float
-        Fraction of slip in the total displacement, :math:`V/(V + V_0)`.
+        Ratio of slip to the sum of slip and load point displacement, :math:`V/(V + V_0)`.
 
     Notes
     -----
     Below the lower limit of :math:`\ln(V/V_*)`, the contact is treated as stationary. At low slip
-    rates, the evolution per unit slip may grow in proportion to :math:`1/V`. The product of the
-    evolution and the slip fraction remains finite, but without the lower limit of
-    :math:`\ln(V/V_*)` the evolution would overflow and the slip fraction would underflow.
+    rates, the change of the state per unit slip may grow in proportion to :math:`1/V`. The product
+    of this change and the fraction :math:`V/(V + V_0)` remains finite. Without the lower limit of
+    :math:`\ln(V/V_*)`, the change of the state per unit slip would overflow and the fraction would
+    underflow.
     """
     least = p[LOG_LOAD_VELOCITY] - MAX_LOG_LOAD_OVER_SLIP_VELOCITY
     x = least if log_slip_rate < least else log_slip_rate
@@ -130,13 +135,14 @@ def time_per_displacement(velocity_ratio_values: VelocityRatios, p: Numbers) -> 
 
 
 def displacement_per_path_length(path_slope: float) -> float:
-    """Compute the derivative of displacement with respect to path length.
+    r"""Compute the derivative of displacement with respect to path length.
 
     Parameters
     ----------
     path_slope : float
-        Slope of the path. The square of the slope may overflow when slip stops, so the function
-        does not square very large slopes.
+        Slope of the path, the derivative of :math:`\ln V/6` with respect to displacement or
+        inertial time. The square of the slope may overflow when slip stops, so the function does
+        not square very large slopes.
 
     Returns
     -------
@@ -255,7 +261,7 @@ def build_rate_functions_between_ruptures(
 def build_rate_functions_in_rupture(
     friction_functions: FrictionFunctions, rupture_rate_function: Function
 ) -> tuple[Function, Function, Function]:
-    """Return the rate functions of a scene in ruptures.
+    r"""Return the rate functions of a scene in ruptures.
 
     Parameters
     ----------
@@ -267,8 +273,9 @@ def build_rate_functions_in_rupture(
     Returns
     -------
     rates_by_time, rates_along_path, rates_along_path_with_time : callable
-        Functions ``(state, p) -> tuple`` that return the derivatives of f, x, g and all states
-        except the first. The third function appends the derivative of inertial time.
+        Functions ``(state, p) -> tuple`` that return the derivatives of the spring stress f, of
+        :math:`x = \ln(V/V_*)`, of the frictional stress g and of all states except the first. The
+        third function appends the derivative of inertial time.
     """
     end = 2 + friction_functions.state_count
     times = build_tuple_scaling_function(end)
@@ -330,10 +337,11 @@ def build_motion_point_assembling_function(friction_functions: FrictionFunctions
     Returns
     -------
     callable
-        Function ``(x, growth, forces, states, changes, shift, p) -> MotionPoint``. The arguments
-        are :math:`x = \ln(V/V_*)` and its derivative, a tuple of f, its derivative, g and its
-        derivative, the states and their derivatives, the decrease of the state due to stress, and
-        the parameters.
+        Function ``(x, growth, forces, states, changes, shift, p) ->
+        MotionPoint``. The arguments ``x`` and ``growth`` are :math:`x = \ln(V/V_*)` and its
+        derivative. The tuple ``forces`` contains f, the derivative of f, g, and the derivative of
+        g. The other arguments are the states, the derivatives of the states, the decrease of the
+        state variable due to stress, and the parameters.
 
     Notes
     -----
@@ -457,7 +465,7 @@ def build_point_function_in_rupture(
     Returns
     -------
     callable
-        Function ``(state, rates, p) -> MotionPoint`` for the full equations.
+        Function ``(state, rates, p) -> MotionPoint`` for the equations of motion with inertia.
     """
     strength, states_at, end = (
         friction_functions.strength,
@@ -507,7 +515,7 @@ def build_point_function_of_rigid_slider(
 
 
 class MotionRegimeFunctions(NamedTuple):
-    """Functions for the rates and the physical quantities in one regime.
+    """Functions for the rates and the physical quantities in a regime of motion.
 
     Parameters
     ----------
@@ -543,8 +551,8 @@ class SceneFunctions(NamedTuple):
     functions_between_ruptures : MotionRegimeFunctions
         Functions for the motion between ruptures.
     functions_in_rupture : MotionRegimeFunctions or None
-        Functions for the motion in ruptures, from the full equations. None if the scene has no
-        inertia.
+        Functions for the motion in ruptures, from the equations of motion with inertia. The
+        attribute is None if the scene has no inertia.
     rigid_rate_function : callable
         Function that computes the rates of a rigid slider with respect to slip.
     rigid_point_function : callable
@@ -605,7 +613,7 @@ def assemble_scene_functions(
 
 
 def state_indices_excluded_from_distance(scene: SceneView) -> tuple[int, ...]:
-    """Return the indices of states excluded from the steady-state distance.
+    """Return indices of states that the distance from steady sliding ignores.
 
     Parameters
     ----------
@@ -615,7 +623,7 @@ def state_indices_excluded_from_distance(scene: SceneView) -> tuple[int, ...]:
     Returns
     -------
     tuple of int
-        Indices of the states that do not contribute to the distance from steady sliding.
+        Indices of the states that are ignored when the distance from steady sliding is computed.
     """
     law, source = scene.parts.law, scene.pressure_source
     unknowns = enumerate(source.unknowns, start=law.state_count)

@@ -55,14 +55,15 @@ from rsfstudy.slider.scene_caching import cached_per_scene
 from rsfstudy.slider.scene_view import SceneView
 from rsfstudy.slider.steady_state import SteadySliding, steady_sliding
 
-#: Values below which a critical stiffness, divided by a, and a growth rate per unit slip in D_c
-#: cannot be distinguished from zero because of rounding errors.
+#: Limits below which a result cannot be distinguished from zero because of rounding errors. The
+#: first limit applies to a critical stiffness divided by a. The second limit applies to a growth
+#: rate per slip distance of D_c.
 _MIN_CRITICAL_STIFFNESS_OVER_A, _GROWTH_RATE_FLOOR = 1e-12, 1e-9
 #: Rounding error of the growth rates, relative to the largest growth rate.
 _RELATIVE_ROOT_ROUNDING_ERROR = 64.0 * 2.0**-52
 
-#: Ratio of the two leading polynomial coefficients below which the mass is treated as small, and
-#: the number of Newton iterations for a small mass.
+#: The mass is treated as small if the ratio of the two leading polynomial coefficients is below the
+#: first constant. The second constant is the number of Newton iterations for a small mass.
 _SMALL_MASS_RATIO, _NEWTON_STEPS = 1e-6, 2
 
 PolynomialCoefficients = list[float]
@@ -178,7 +179,7 @@ def _linearise_force_balance(
 def _find_critical_stiffnesses(
     linearised_balance: _LinearisedForceBalance, min_stiffness: float
 ) -> list[float]:
-    """Find all stiffnesses above a minimum at which a growth rate is imaginary.
+    """Find all stiffnesses for which a growth rate is imaginary, above a minimum.
 
     The stiffnesses are in ascending order. If no finite stiffness exists for a frequency because of
     inertia, the list of stiffnesses contains ``math.inf``.
@@ -270,12 +271,13 @@ def linear_friction_response(
     Returns
     -------
     above, below : list of float
-        Coefficients of the numerator and denominator polynomials, in ascending order.
+        Coefficients of the numerator polynomial and of the denominator polynomial of the response,
+        in ascending order.
 
     Notes
     -----
-    The response is the rational function :math:`G(p) = p \, \mathrm{above}(p)/\mathrm{below}(p)`,
-    which the module docstring defines. For a law with one state at constant normal stress,
+    The response is the rational function :math:`G(p) = p \, \mathrm{above}(p)/\mathrm{below}(p)`.
+    The module docstring defines :math:`G(p)`. For a law with one state at constant normal stress,
     :math:`G(p) = p [a - b/(p + 1)]` in units of :math:`\sigma_*/D_c`.
 
     References
@@ -426,9 +428,9 @@ def largest_linear_growth_rate(scene: SceneView, log_slip_rate: float) -> Growth
     Returns
     -------
     GrowthRate or None
-        Growth rate with its error estimate, which includes the errors of the derivatives of the law
-        and the rounding errors of the roots. None if steady sliding does not exist at this slip
-        rate.
+        Growth rate with an error estimate. The error estimate includes the errors of the
+        derivatives of the law and the rounding errors of the growth rates. The result is None if
+        steady sliding does not exist at this slip rate.
     """
     scene = scene.under_steady_loading
     steady = steady_sliding(scene, log_slip_rate)
@@ -474,7 +476,8 @@ def spring_response_to_normal_stress(
     Returns
     -------
     complex
-        Ratio of the amplitudes of spring stress and normal stress.
+        Ratio of the complex amplitude of the spring stress to the complex amplitude of the normal
+        stress.
 
     Raises
     ------
@@ -483,8 +486,8 @@ def spring_response_to_normal_stress(
 
     Notes
     -----
-    For laws with :math:`\Theta = -b \ln(V/V_*)` in steady sliding and normal stress that does not
-    depend on shear stress, the response is
+    If :math:`\Theta = -b \ln(V/V_*)` in steady sliding, and if normal stress does not depend on
+    shear stress, the response is
 
     .. math::
 

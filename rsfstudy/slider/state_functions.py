@@ -1,10 +1,10 @@
 """State variables of a scene: evolution, steady states and sums.
 
-The tuple of states starts with the states of the law, whose sum acts on friction. The unknowns of a
-loading that changes normal stress, and then the unknowns of a fluid, follow the states of the law.
-The last unknown is the pore pressure P, or the stress that the loading imposes. Most functions of
-this module return other functions, which are specialised for the number of states so that Numba can
-compile them.
+The tuple of states starts with the states of the law, whose sum acts on friction. If the loading
+changes normal stress, the unknowns of the loading follow the states of the law. The unknowns of a
+fluid are the last elements. The last unknown is the pore pressure P, or the stress that the loading
+imposes. Most functions of this module return other functions, which are specialised for the number
+of states so that Numba can compile them.
 """
 
 from __future__ import annotations
@@ -18,8 +18,9 @@ from rsfstudy.slider.parameter_layout import A, B
 from rsfstudy.slider.parts import Function, Numbers
 from rsfstudy.slider.scene_view import SceneView
 
-#: Values of ln(V/V_*) at which steady states are checked, and the largest accepted change of a
-#: steady state per unit slip in D_c, divided by a. The tolerance is far above rounding errors.
+#: Values of ln(V/V_*) at which steady states are checked. The second constant is the largest
+#: accepted change of a steady state per slip distance of D_c, divided by a. This tolerance is far
+#: above rounding errors.
 _CHECKED_LOG_SLIP_RATES, _REST_TOLERANCE = (0.0, -0.5, 0.5), 1e-6
 
 
@@ -84,7 +85,7 @@ def append_auxiliary_evolutions(
     Returns
     -------
     callable
-        Function with the arguments of ``evolutions`` that returns the changes of all states.
+        Function that has the arguments of ``evolutions`` and returns the changes of all states.
     """
 
     def all_evolutions(
@@ -113,7 +114,7 @@ def append_auxiliary_steady_states(
     Returns
     -------
     callable
-        Function with the arguments of ``steady_states`` that returns all states.
+        Function that has the arguments of ``steady_states`` and returns all steady states.
     """
 
     def all_steady_states(log_slip_rate: float, shift: float, p: Numbers) -> Numbers:
@@ -261,8 +262,8 @@ def check_steady_states(scene: SceneView) -> None:
     """Check the steady states of a user-defined law.
 
     The states must not change in steady sliding, must add up to zero at :math:`V_*` and must be
-    stable at constant slip rate. If a law violated these conditions, the critical stiffness would
-    contradict the limit cycles.
+    stable at constant slip rate. If a law violated these conditions, the computed critical
+    stiffness would contradict the computed limit cycles.
 
     Parameters
     ----------

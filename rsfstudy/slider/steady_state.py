@@ -41,7 +41,7 @@ class SteadySliding:
     spring_stress : float
         Deviation of spring stress from :math:`\tau_*`, in units of :math:`\sigma_*`.
     states : tuple of float
-        States :math:`\Psi_i`, from which the effect of stress is removed.
+        States :math:`\Psi_i`. The effect of stress is removed from these states.
     """
 
     log_slip_rate: float
@@ -151,16 +151,16 @@ def frictional_stress_for_friction(
 def frictional_stress_after_jump(
     scene: SceneView, strength: float, states: Numbers = ()
 ) -> float | None:
-    r"""Compute the frictional stress immediately after a sudden change.
+    r"""Compute the frictional stress after a sudden change of stress or slip rate.
 
     Parameters
     ----------
     scene : Scene
         Scene with friction parameters.
     strength : float
-        Strength after the change, in units of :math:`\sigma_*`.
+        Strength after the sudden change of stress or slip rate, in units of :math:`\sigma_*`.
     states : tuple of float, optional
-        States :math:`\Psi_i`, which determine the pore pressure. By default the pore pressure is
+        States :math:`\Psi_i`, from which the pore pressure is read. By default, the function uses
         the pore pressure of steady sliding.
 
     Returns
@@ -184,7 +184,7 @@ def frictional_stress_after_jump(
 def _min_frictional_stress(scene: SceneView) -> float:
     """Return the frictional stress above which slip is forward.
 
-    Normal stress is positive above the returned stress.
+    Normal stress is positive if the frictional stress exceeds the returned stress.
     """
     weakest = scene.parts.normal_stress.min_frictional_stress(scene)
     # If slip may reverse, strength increases with the magnitude of positive and negative stress.
@@ -224,7 +224,7 @@ def _find_root_of_increasing_function(
 
 
 def min_steady_log_slip_rate(scene: SceneView) -> float:
-    r"""Compute the smallest slip rate with steady sliding.
+    r"""Compute the smallest slip rate at which steady sliding exists.
 
     Parameters
     ----------
@@ -234,8 +234,8 @@ def min_steady_log_slip_rate(scene: SceneView) -> float:
     Returns
     -------
     float
-        Smallest :math:`\ln(V/V_*)`, at which the steady stress becomes infinite. The result is
-        ``-inf`` if steady sliding exists at all slip rates.
+        Smallest :math:`\ln(V/V_*)` of steady sliding. At this slip rate, the steady stress becomes
+        infinite. The result is ``-inf`` if steady sliding exists at all slip rates.
 
     Notes
     -----

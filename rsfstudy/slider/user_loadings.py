@@ -100,13 +100,14 @@ class Protocol(UserLoading):
     def describe(self) -> dict[str, Any]:
         """Return the input segments as plain data.
 
-        See ``Loading.describe``. The duration of the last segment is included if it is finite.
+        See ``Loading.describe``. The duration of the last segment is included if this duration is
+        finite.
         """
         return {"segments": [segment.as_dict() for segment in self.input_segments]}
 
     @cached_property
     def segments(self) -> tuple[Segment, ...]:
-        """Segments of the loading, with an infinite last segment."""
+        """Segments of the loading. The last segment has no end."""
         return *self.input_segments[:-1], self.input_segments[-1]._replace(duration=math.inf)
 
     @property
@@ -188,8 +189,8 @@ def protocol(segments: Sequence[Segment | Mapping[str, float]], name: str = "pro
 def _parse_segment(declared_segment: Any, previous_normal_stress: float, location: str) -> Segment:
     """Convert an input segment to a validated ``Segment``.
 
-    The argument ``previous_normal_stress`` is the value of the previous segment, and ``location``
-    is the position of the segment in error messages.
+    The argument ``previous_normal_stress`` is the normal stress of the previous segment, and
+    ``location`` is the position of the segment in error messages.
     """
     try:
         if isinstance(declared_segment, Segment):
