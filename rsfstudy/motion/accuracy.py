@@ -19,14 +19,14 @@ MIN_RTOL, MAX_RTOL = 1e-11, 1e-2
 DEFAULT_EVALUATION_BUDGET = 500_000
 #: Upper limit of ``Accuracy.budget``. Files can store this integer exactly.
 MAX_EVALUATION_BUDGET = 10**15
-#: Upper limit of ``rtol`` in the formulas for the slow-manifold thresholds. The series in the
-#: inertia weight has a turning point where inertia changes ln V by 0.08, so a motion would never
-#: reach a larger threshold.
+#: Upper limit of ``rtol`` in the formulas for the slow-manifold thresholds. The slow-manifold
+#: approximation, a series in the inertia weight, changes ln V by at most 0.08. A motion would never
+#: reach a larger threshold of this change.
 _MAX_REGIME_SWITCHING_RTOL = 2e-5
 #: Maximum ratio of an error estimate to ``rtol``. If this ratio is exceeded, the difference between
 #: two runs is not a reliable error estimate.
 MAX_ERROR_OVER_RTOL = 100.0
-#: Relative error due to rounding.
+#: Relative rounding error that each error estimate includes.
 RELATIVE_ROUNDING_ERROR = 1e-13
 
 
@@ -39,16 +39,16 @@ class Accuracy:
     Parameters
     ----------
     rtol : float, default: 1e-7
-        Relative error tolerance of the main results. It applies to ln V for slip rates, and to
-        V_0/V_* - 1 for rate steps.
+        Relative error tolerance of the main results. If the result is a slip rate V, the tolerance
+        applies to ln V. If the result is a rate step, the tolerance applies to V_0/V_* - 1.
     budget : int, default: 500_000
         Maximum number of right-hand side evaluations of one measurement. A measurement that exceeds
         the budget has the status ``work_budget_spent``.
     methods : tuple of (str, str), default: ()
         Pairs of a regime and the SciPy solver for this regime. The default solver is DOP853.
     engine : {"scipy", "python", "compiled"} or type, default: "scipy"
-        Engine that integrates motions, or a subclass of ``Stepper``. After a subclass has been
-        passed once, its name is valid too.
+        Engine that integrates motions, or a subclass of ``Stepper``. After a subclass of
+        ``Stepper`` has been passed once, its ``name`` is also a valid engine name.
     refinement : float, default: 1.0
         Factor by which all integration tolerances are multiplied. See ``refined``.
 
@@ -154,16 +154,17 @@ class Accuracy:
     def max_inertia_correction(self) -> float:
         """Maximum change of ln V due to inertia on the slow manifold.
 
-        A motion reaches this limit before ``max_inertia_weight`` if friction weakens strongly with
-        slip. If the limit is :math:`d`, the error of a limit cycle is up to :math:`0.07 d^3` in
-        random scenes, and :math:`0.0014 d^3` for the slider of the published study. The test suite
-        measures both coefficients.
+        If friction weakens strongly with slip, a motion reaches this limit of the change of ln V
+        before it reaches the limit ``max_inertia_weight``. If the maximum change of ln V is
+        :math:`d`, the error of a limit cycle is up to :math:`0.07 d^3` in random scenes, and
+        :math:`0.0014 d^3` for the slider of the published study. The test suite measures both
+        coefficients.
         """
         return math.cbrt(15.0 * min(self.rtol, _MAX_REGIME_SWITCHING_RTOL) * self.refinement)
 
     @property
     def max_remaining_slip(self) -> float:
-        """Maximum slip, in D_c, of the transition to the slow manifold."""
+        """Maximum slip in D_c during a transition to the slow manifold."""
         return 0.3 * self.rtol * self.refinement
 
 
@@ -191,8 +192,9 @@ def estimate_error(
     refined_value : float
         Result of the refined run. See ``Accuracy.refined``.
     relative_error_floor : float
-        Relative error that the estimate includes even if both runs agree by chance. The floor is a
-        small fraction of the requested accuracy, and was measured in the study ``coverage``.
+        Minimum relative error. The error estimate includes this error even if both runs agree by
+        chance. The minimum relative error is a small fraction of the requested accuracy. It was
+        measured in the study ``coverage``.
     error_scale : float, optional
         Reference value by which relative errors are multiplied. The default is ``value``. Pass a
         scale if ``value`` may be close to zero.

@@ -58,9 +58,9 @@ import struct
 
 import numpy as np
 
-#: Fields of the motion state, which persists between calls of the loop. The first fields are the
-#: arguments of the motion (``MOTION_STATE_FIELDS_SET_BY_CALLER``), and the next fields are the
-#: counters.
+#: Fields of the motion state. The motion state persists between calls of the event loop. The first
+#: fields are the arguments of the motion (``MOTION_STATE_FIELDS_SET_BY_CALLER``), and the next
+#: fields are the counters.
 MOTION_STATE_DTYPE = np.dtype(
     [
         ("end_time", "f8"),  # duration of the loading segment
@@ -108,11 +108,12 @@ MOTION_STATE_DTYPE = np.dtype(
         ("unknowns_behind_fluid", "i8"),  # number of fluid unknowns, which are last
     ]
 )
-#: Byte formats of the argument fields and the counter fields of the motion state. Packing bytes is
-#: much faster than assigning record fields.
+#: Byte formats of two groups of fields of the motion state: the arguments and the counters. Packing
+#: bytes is much faster than assigning record fields.
 CALL_FORMAT, COUNTER_FORMAT = struct.Struct("=7d4q"), struct.Struct("=6q")
 MOTION_STATE_FIELDS_SET_BY_CALLER = (MOTION_STATE_DTYPE.names or ())[:11]
-#: Row indices of the function table: slow manifold, and full equations in ruptures.
+#: Row indices of the function table. The first row contains functions for the slow manifold, and
+#: the second row contains functions for the inertial equations of motion in ruptures.
 SLOW_REGIME, FAST_REGIME = 0, 1
 #: Number of functions in each row of the function table. The functions are in the order of
 #: ``in_place_functions.InPlaceFunctions``.

@@ -2,7 +2,7 @@
 
 ``integrate_events`` is the main function. Consecutive loading segments without a jump in stress
 form a chain. The driver of the event loop integrates each chain, and ``integrate_events`` handles
-the jumps between the chains.
+the jumps in stress between the chains.
 """
 
 from __future__ import annotations
@@ -64,8 +64,8 @@ def integrate_events(
         Initial point within the last loading segment. By default, the motion starts in the first
         segment, from steady sliding at V_* or from the initial stress and state of the scene.
     with_time : bool, default: False
-        If True, time is one of the unknowns. Otherwise, times and slips of events may be NaN, and
-        the integration needs fewer evaluations.
+        If True, time is one of the unknowns. If False, the times and slips of events may be NaN,
+        and the integration needs fewer right-hand side evaluations.
     recording : Recording, optional
         Object that records the motion.
     until : float, default: inf
@@ -83,9 +83,9 @@ def integrate_events(
     MotionStopped
         If the motion cannot continue. The status is ``normal_stress_lost``,
         ``shear_stress_reversed``, ``locked``, ``slip_stopped`` or ``slip_rate_unbounded`` if the
-        slider reaches a limit of the equations. The status is ``work_budget_spent`` if the budget
-        is exhausted. The status is ``integration_failed`` if the stepper fails or a value is not
-        finite.
+        slider reaches a point beyond which the equations are not valid. The status is
+        ``work_budget_spent`` if the budget is exhausted. The status is ``integration_failed`` if
+        the stepper fails or a value is not finite.
     """
     chains: Sequence[tuple[Scene, np.ndarray]]
     chains = (
@@ -161,7 +161,7 @@ def _find_remaining_segment_chains(
 ) -> tuple[Sequence[tuple[Scene, np.ndarray]], MotionPoint]:
     """Return the segment chains after the end of a motion, and the initial point.
 
-    If the motion ended at a jump, the initial point is the point after the jump.
+    If the motion ended at a jump in stress, the initial point is the point after this jump.
     """
     first, point, left = 0, resume_from.point, []
     for acting, table in scene.continuous_segments:
@@ -194,7 +194,7 @@ def _iterate_segment_start_events(
     segment_scene: Scene,
     event_specs: Sequence[EventSpecification],
 ) -> Iterator[Event]:
-    """Yield the events at the start of any segment chain after the first.
+    """Yield the events at the start of a segment chain, except the first chain.
 
     The first event is the start of the loading segment. The following events are requested events
     that occur at the jump in stress.

@@ -9,11 +9,12 @@ event. A measure can request the following events:
     rise(quantity, level), fall(quantity, level)
                                 upward or downward crossing of a level by a quantity
     approach_to_steady_state(fraction)
-                                distance from steady sliding below a fraction of the largest
-                                distance so far. The event is reported at the end of each step that
-                                meets this condition. Only steps in the last segment of loading are
-                                checked. The event is not reported if normal stress still changes
-                                or if steady sliding is unstable.
+                                decrease of the distance between the motion and steady sliding below
+                                a fraction of the largest value of this distance so far. The event
+                                is reported at the end of each integration step that meets this
+                                condition. Only steps in the last segment of loading are checked.
+                                The event is not reported if normal stress still changes or if
+                                steady sliding is unstable.
 
 A requested event ends the motion if it is specified with ``terminal=True``. The available
 quantities are the attributes of a ``MotionPoint``. The attribute ``apparent_friction`` is the
@@ -74,8 +75,8 @@ class EventSpecification(NamedTuple):
     quantity : str, default: ""
         Attribute of ``MotionPoint``. Settling events have no quantity.
     level : float, default: 0.0
-        Level of a crossing, or, for a settling event, fraction of the largest distance from steady
-        sliding.
+        Level of a crossing. For a settling event, the level is a fraction of the largest distance
+        between the motion and steady sliding so far.
     terminal : bool, default: False
         If True, the motion ends at the event.
     may_defer : bool, default: False
@@ -211,14 +212,15 @@ def _specify_quantity_event(
 def approach_to_steady_state(fraction: float, *, terminal: bool = False) -> EventSpecification:
     """Create an event specification for the approach to steady sliding.
 
-    The event occurs if the distance from steady sliding falls below a fraction of the largest
-    distance so far. The distance is measured in ln V and in each state divided by b. Unknowns
-    listed in the attribute ``excluded_from_distance`` of a scene part are ignored.
+    The event occurs if the distance between the motion and steady sliding falls below a fraction of
+    the largest value of this distance so far. The distance between the motion and steady sliding is
+    measured in ln V and in each state divided by b. The distance does not include unknowns that are
+    listed in the attribute ``excluded_from_distance`` of a scene part.
 
     Parameters
     ----------
     fraction : float
-        Fraction of the largest distance from steady sliding so far.
+        Fraction of the largest distance between the motion and steady sliding so far.
     terminal : bool, default: False
         If True, the motion ends at the event.
 

@@ -1,9 +1,10 @@
 """Conversion of equations of motion to functions that fill arrays.
 
-The event loop calls the equations through functions that fill arrays. ``build_in_place_functions``
-converts the functions of ``slider.equations.Equations``, which take and return tuples of floats.
-Compiled functions cannot raise exceptions. Each function therefore first fills its results with
-NaN, which remain if the equations raise an exception in compiled code.
+The event loop calls the equations through functions that fill arrays. The functions of
+``slider.equations.Equations`` take and return tuples of floats. ``build_in_place_functions``
+converts these functions to functions that fill arrays. Compiled functions cannot raise exceptions.
+Each function therefore first fills its results with NaN. The values remain NaN if the equations
+raise an exception in compiled code.
 """
 
 from __future__ import annotations
@@ -21,8 +22,8 @@ from rsfstudy.slider import Equations, Function, Numbers
 class InPlaceFunctions(NamedTuple):
     """Functions of a system of equations, in the order of the function table.
 
-    Each function has the arguments ``(y, rates, p, result)``, and fills the array ``result``. The
-    exception is ``attempt_step``, which has the arguments ``(y, stages, p, step)``.
+    Each function has the arguments ``(y, rates, p, result)``, and fills the array ``result``. Only
+    the function ``attempt_step`` has other arguments: ``(y, stages, p, step)``.
 
     Parameters
     ----------
@@ -34,7 +35,7 @@ class InPlaceFunctions(NamedTuple):
         Function that attempts one step. See ``steppers.unrolled_step``.
     fill_balance : callable or None
         Function that fills in ln(V/V_*) and friction on the slow manifold. The value is None for
-        the equations in ruptures.
+        the inertial equations of motion in ruptures.
     """
 
     fill_rates: Function

@@ -32,7 +32,8 @@ def initial_point(scene: Scene) -> MotionPoint:
 
     Before the loading step, the slider slides steadily at V_*, or has the initial stress and state
     of the scene. The loading step changes the spring stress and the imposed normal stress. With
-    inertia, the slip rate does not jump, but adjusts within the inertial time.
+    inertia, the loading step does not change the slip rate immediately. The slip rate adjusts to
+    the loading step within the inertial time.
 
     Parameters
     ----------
@@ -42,7 +43,7 @@ def initial_point(scene: Scene) -> MotionPoint:
     Returns
     -------
     MotionPoint
-        Initial point. Only the fields of ``point_without_derived_values`` are computed.
+        Initial point. Only the fields that ``point_without_derived_values`` sets are computed.
 
     Raises
     ------
@@ -104,8 +105,8 @@ def point_without_derived_values(
     Returns
     -------
     MotionPoint
-        Point of the motion. All fields that are not arguments are NaN. The first event of the
-        motion contains the values of these fields.
+        Point of the motion. All fields of the point that are not arguments of the function are NaN.
+        The first event of the motion contains the computed values of all fields.
     """
     psi = scene.equation_functions.friction_functions.state_sum(states)
     known = log_slip_rate, math.nan, spring_stress, frictional_stress, psi
@@ -127,7 +128,7 @@ def compute_restart_point(scene: Scene, spring_stress: float, states: Numbers) -
     Returns
     -------
     MotionPoint
-        Initial point. Only the fields of ``point_without_derived_values`` are computed.
+        Initial point. Only the fields that ``point_without_derived_values`` sets are computed.
 
     Raises
     ------
@@ -173,9 +174,9 @@ def _find_specified_initial_states(scene: Scene, steady_states: Numbers) -> tupl
 def point_after_loading_jump(scene: Scene, point: MotionPoint) -> MotionPoint:
     """Return the point of a motion immediately after a jump in the loading.
 
-    A jump is a step of the load point, a step of imposed normal stress, or the beginning or end of
-    an oscillation. The states of the friction law do not change in a jump. With inertia, the slip
-    rate does not change either.
+    A jump in the loading is a step of the load point, a step of imposed normal stress, or the
+    beginning or end of an oscillation. A jump in the loading does not change the states of the
+    friction law. With inertia, a jump in the loading does not change the slip rate either.
 
     Parameters
     ----------
@@ -266,8 +267,8 @@ def check_forward_slip_is_possible_at_start(
     Raises
     ------
     MotionStopped
-        If normal stress vanishes. Also if shear stress changes sign, and the friction law is not
-        regularised or the load point is at rest.
+        If normal stress vanishes. The exception is also raised if shear stress changes sign, unless
+        the friction law is regularised and the load point moves.
     """
     slider = scene.parts.slider
     begins = slider.initial_stress + scene.spring_stress_step

@@ -133,7 +133,8 @@ class PythonBackend:
         Parameters
         ----------
         equations_by_regime : tuple of Equations
-            Equations on the slow manifold and, with inertia, in ruptures.
+            Equations of the slow manifold. If the scene has inertia, the second item contains the
+            inertial equations of motion in ruptures.
 
         Returns
         -------
@@ -236,9 +237,9 @@ class MotionDriver:
     Parameters
     ----------
     slow_equations : Equations
-        Equations between ruptures.
+        Equations of the slow manifold, for the motion between ruptures.
     fast_equations : Equations, optional
-        Equations in ruptures. Omit them if the scene has no inertia.
+        Inertial equations of motion in ruptures. Omit these equations if the scene has no inertia.
     engine : str
         Name of the engine.
     **fields : float
@@ -318,19 +319,21 @@ class MotionDriver:
         parameters : tuple of float, optional
             Parameters that replace the parameters of the equations.
         switch_thresholds : SwitchThresholds, optional
-            Thresholds for changes between the regimes. A motion without inertia does not need them.
+            Thresholds for changes between the regimes. A motion without inertia does not need
+            thresholds.
         evaluation_budget : float, default: inf
             Maximum number of right-hand side evaluations. The remaining budget of the work meter is
             an additional limit.
         recording : Recording, optional
             Object that receives the recorded rows.
         kinks_and_reported_count : tuple of (ndarray, int), optional
-            Rows of the segment table after the first segment, and the number n of reported
-            segments. The starts of the last n segments are reported as events.
+            Two items: the rows of the segment table for all loading segments after the first, and a
+            number n. The starts of the last n loading segments are reported as events.
         initial_imposed_stress : float, optional
             Initial value of the last unknown, if the load point oscillates. The imposed shear
-            stress is the last unknown minus its initial value. The unknown ``spring_stress``
-            excludes the imposed stress, but events and recordings include it.
+            stress is the last unknown minus its initial value. The unknown ``spring_stress`` does
+            not include the imposed shear stress. The spring stress in events and recordings
+            includes the imposed shear stress.
 
         Yields
         ------
@@ -429,7 +432,7 @@ class MotionDriver:
 
 
 def _shift_stresses_of_point(point: MotionPoint, stress_change: float) -> MotionPoint:
-    """Return a point with a change of both spring stress and frictional stress."""
+    """Add a stress change to the spring stress and frictional stress of a point."""
     return point._replace(
         spring_stress=point.spring_stress + stress_change,
         frictional_stress=point.frictional_stress + stress_change,
@@ -446,7 +449,7 @@ def iterate_events_of_equations(
     backward: bool = False,
     recording: Recording | None = None,
 ) -> Iterator[Event]:
-    """Yield the events of one system of equations, without changes of regime.
+    """Yield the events of a motion that follows a single system of equations.
 
     Parameters
     ----------

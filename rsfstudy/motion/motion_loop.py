@@ -23,18 +23,19 @@ functions are called in the following order::
 
 The header of ``array_layout`` lists the functions that write each field of ``motion``. The class
 ``Workspace`` describes the arrays of a regime, and the header of ``workspace`` lists the functions
-that write these arrays. Steppers only take steps. The loop detects and locates the events,
-whichever stepper is used.
+that write these arrays. Steppers only take integration steps. With all steppers, the event loop
+detects and locates the events.
 
 The code of this module is limited to Python features that Numba can compile. To debug a rupture,
-simulate a scene with ``inertia=True`` and ``engine="scipy"``, or ``engine="python"`` to debug the
-stages of a step. Set a breakpoint in ``truncate_step_at_end_of_regime_or_segment`` with the
-condition ``motion.regime == 1`` (``FAST_REGIME``). The debugger then stops once in every step of
-the rupture. The arrays ``workspace.point_at_begin`` and ``workspace.point_at_end`` contain the
-points of the motion at both ends of the step. The array columns are numbered by
-``array_layout.LOG_SLIP_RATE`` and the following constants. To stop at the end of a rupture, set a
-breakpoint with the same condition at ``return REGIME_ENDED`` in ``integrate_one_regime``. To stop
-at the beginning of a rupture, use the condition ``motion.regime == 0`` at this breakpoint.
+simulate a scene with ``inertia=True`` and ``engine="scipy"``. To debug the stages of an integration
+step, use ``engine="python"`` instead. Set a breakpoint in
+``truncate_step_at_end_of_regime_or_segment`` with the condition ``motion.regime == 1``
+(``FAST_REGIME``). The debugger then stops once in every step of the rupture. The arrays
+``workspace.point_at_begin`` and ``workspace.point_at_end`` contain the points of the motion at both
+ends of the step. The array columns are numbered by ``array_layout.LOG_SLIP_RATE`` and the following
+constants. To stop at the end of a rupture, set a breakpoint with the same condition at
+``return REGIME_ENDED`` in ``integrate_one_regime``. To stop at the beginning of a rupture, set a
+breakpoint at ``return REGIME_ENDED`` with the condition ``motion.regime == 0``.
 """
 
 from __future__ import annotations
@@ -124,8 +125,8 @@ from rsfstudy.parts import (
 #: Number of iterations that correct the end of the last step of a loading segment.
 CORRECTION_COUNT_OF_SEGMENT_END_CLOCK = 2
 #: Change of ln V_0 between two loading segments above which the stepper selects a new initial step
-#: size. The path length depends on V + V_0, so the former step size would be rejected several
-#: times.
+#: size. The path length depends on V + V_0, so the step size of the previous segment would be
+#: rejected several times.
 MAX_LOG_LOAD_RATE_CHANGE_KEEPING_STEP_SIZE = 3.0
 
 
@@ -268,7 +269,7 @@ def start_next_segment(motion, workspace, last_point, kinks, recording_table):
     workspace : Workspace
         Arrays of the regime at the end of the previous segment.
     last_point : array of shape (FIRST_STATE + states,)
-        Output array of the last point of the previous segment.
+        Output array for the last point of the previous segment.
     kinks : array of shape (segments, 6)
         Rows of the segment table for the loading segments after the first segment.
     recording_table : array of shape (rows, FIRST_STATE_COLUMN + states)
@@ -327,7 +328,7 @@ def enter_initial_regime(
     functions : array of shape (2, FUNCTION_COUNT_PER_REGIME)
         Function table with one row per regime.
     slow_manifold_values : array
-        Memory for the values on the slow manifold, ln(V/V_*) and friction.
+        Memory for ln(V/V_*) and friction on the slow manifold.
     switch_thresholds : SwitchThresholds
         Thresholds for changes between the regimes.
     parameters : array
@@ -356,8 +357,8 @@ def enter_initial_regime(
 def set_unknowns_of_regime(motion, y, last_point):
     """Set the unknowns of a regime from the last point of the previous regime.
 
-    Spring stress, states and time are continuous. If the new regime is the slow manifold, ln V and
-    friction may jump, because they are computed from spring stress and states.
+    A change of regime does not change spring stress, states and time. If the new regime is the slow
+    manifold, ln V and friction may jump, because they are computed from spring stress and states.
 
     Parameters
     ----------
@@ -573,7 +574,8 @@ def end_step_at_end_time(motion, workspace, clock):
     """Repeat the step so that it ends at the end time of the segment.
 
     If stability limits the step size, dense output is much less accurate than the end of the step.
-    The function therefore corrects the estimate by the remaining time and repeats the step.
+    The function therefore uses the time between the end of the step and the end of the segment to
+    correct its estimate, and repeats the step.
 
     Parameters
     ----------

@@ -38,8 +38,9 @@ from rsfstudy.slider import (
     build_equations_against_displacement,
 )
 
-#: Safety factor of the error estimate. In random scenes with thresholds three to ten times larger
-#: than usual, the error of friction is up to 1.4 times the estimate without the safety factor.
+#: Safety factor of the error estimate. Without the safety factor, the error of friction is up to
+#: 1.4 times the error estimate in random scenes. In these scenes, the thresholds for changes of
+#: regime are three to ten times larger than usual.
 _ERROR_SAFETY_FACTOR = 2.0
 _SLIP_COLUMN, _SLIP_RATE_COLUMN = (
     MOTION_VARIABLES.index("slip"),
@@ -73,14 +74,14 @@ def estimate_neglected_inertia_error(
     -----
     The error estimate is the sum of two contributions:
 
-    - The residual of the full equation of motion on the slow manifold. Let :math:`W` be the inertia
-      weight and :math:`s` the sum of slip and load point displacement. Friction is smaller than
-      spring stress by :math:`a W \, d(\ln V)/ds`. The residual divided by :math:`a` is the local
-      error :math:`e` of ln V. The resulting change of spring stress and state is at most the
+    - The residual of the inertial equation of motion on the slow manifold. Let :math:`W` be the
+      inertia weight and :math:`s` the sum of slip and load point displacement. Friction is smaller
+      than spring stress by :math:`a W \, d(\ln V)/ds`. The residual divided by :math:`a` is the
+      local error :math:`e` of ln V. The resulting change of spring stress and state is at most the
       integral of :math:`e` over :math:`(1 + K/a) \, d\delta + |d\Psi|/a`. Errors decay along the
       motion, so the largest :math:`e` is another upper bound.
-    - The slip, in units of D_c, that is neglected when ln V jumps to the slow manifold. The state
-      does not evolve over this slip.
+    - The neglected slip in D_c when the motion returns to the slow manifold and ln V jumps. The
+      state does not evolve over the neglected slip.
     """
     if not scene.has_mass:
         return np.zeros(len(recorded_rows))
@@ -113,8 +114,8 @@ def _bound_log_rate_changes_by_residuals(
 ) -> np.ndarray:
     """Compute an upper bound of the change of ln V due to residuals.
 
-    The upper bound for each row is the integrated residual or the largest residual so far,
-    whichever is smaller.
+    For each row, the upper bound is the smaller of two values: the integrated residual and the
+    largest residual so far.
     """
     residuals = np.array(
         list(_iterate_equation_of_motion_residuals(scene, recorded_rows, slip_rate_norms))
@@ -136,7 +137,7 @@ def _bound_log_rate_changes_by_residuals(
 def _iterate_equation_of_motion_residuals(
     scene: Scene, recorded_rows: np.ndarray, slip_rate_norms: np.ndarray
 ) -> Iterator[float]:
-    """Yield the residual of the equation of motion, divided by a, at each row.
+    """Yield the residual of the equation of motion at each row, divided by a.
 
     The residual is set to zero if the inertia weight is negligible.
     """

@@ -17,7 +17,7 @@ from rsfstudy.motion.recording import (
 )
 from rsfstudy.slider import Scene
 
-#: Columns of a recorded motion from which its path length is computed.
+#: Columns of a recorded motion. The path length is computed from these columns.
 _COLUMNS_DEFINING_PATH_LENGTH = tuple(
     MOTION_VARIABLES.index(name) for name in ("time", "log10_slip_rate", "shear_stress")
 )
@@ -71,9 +71,10 @@ def resample_motion_along_path(
 ) -> dict[str, np.ndarray]:
     """Resample a recorded motion at points along its path.
 
-    Half of the points are spaced evenly in path length, computed from time, ln V and stress. The
-    other half are distributed like the integration steps, which are short if the path bends. Each
-    extremum of slip rate and of stress is one of the points.
+    Half of the points are spaced evenly in path length. The path length is computed from time, ln V
+    and stress. The other half of the points are distributed like the integration steps. The
+    integration steps are short where the path bends. Each extremum of slip rate and of stress is
+    one of the points.
 
     Parameters
     ----------

@@ -117,7 +117,7 @@ class Recording:
         Parameters
         ----------
         max_time : float
-            End time of the chain, which is also assigned to the last row.
+            End time of the segment chain. The method assigns this time to the last recorded row.
         """
         if self.sample_times is not None:
             return
@@ -214,7 +214,7 @@ def pack_recorded_row(
     Returns
     -------
     tuple of float
-        Row in the units of the event loop. The sample number is 0.
+        Row in the units of the event loop. The sample number of the row is 0.
     """
     stresses = point.spring_stress, point.frictional_stress, point.normal_stress
     return (
@@ -242,7 +242,7 @@ def recorded_row(
     Returns
     -------
     ndarray
-        Row in recorded units. The sample number is 0.
+        Row in the units of recorded motions. The sample number of the row is 0.
     """
     return convert_to_recorded_units(scene, np.array(pack_recorded_row(time, slip, point, regime)))
 
@@ -313,13 +313,14 @@ def resample_along_path(  # type: ignore[no-untyped-def]
     step_sample_numbers : array of shape (rows,)
         Sample numbers within the steps.
     path_lengths : array of shape (rows,)
-        Output array of path lengths. All initial values must be 0.
+        Output array for the path length at each row. All initial values must be 0.
     row_positions : array of shape (points,)
-        Output array of fractional row numbers of the points.
+        Output array for the fractional row numbers of the points.
     work_array : array of shape (SAMPLES_PER_STEP + 1,)
         Memory for intermediate results.
     result : array of shape (result columns, points)
-        Output array, with one row of resampled values for each of the first columns.
+        Output array. Row ``i`` contains the resampled values of column ``i``. The output array may
+        have fewer rows than there are columns.
     """
     last, points, total = len(path_lengths) - 1, len(row_positions), 0.0
     for values in (time, log_slip_rate, stress):
@@ -364,7 +365,7 @@ def resample_along_path(  # type: ignore[no-untyped-def]
 
 
 def move_nearest_row_position_to(row_positions: Any, row_position: float) -> None:
-    """Replace the nearest inner row position by another row position.
+    """Change the nearest inner row position to a given row position.
 
     Parameters
     ----------
@@ -448,7 +449,8 @@ def interpolate_rows(columns: np.ndarray, row_positions: np.ndarray, result: np.
     row_positions : array of shape (points,)
         Fractional row numbers.
     result : array of shape (result columns, points)
-        Output array, with one row of interpolated values for each of the first columns.
+        Output array. Row ``i`` contains the interpolated values of column ``i``. The output array
+        may have fewer rows than there are columns.
     """
     columns, row_positions, result = map(np.asarray, (columns, row_positions, result))
     after = np.ceil(row_positions).astype(int)

@@ -1,12 +1,12 @@
 """Criteria for changes between regimes and for the termination of motions.
 
-With inertia, a motion alternates between the slow manifold and the full equations. The slow
-manifold approximates the effect of inertia by a series in the inertia weight :math:`(K/a) w^2`,
-with the slip rate norm :math:`w`. The event loop uses the full equations in ruptures. The function
-``starts_on_slow_manifold`` chooses the regime at the beginning of a motion or loading segment. A
-rupture begins if ``compute_inertia_effect_over_limit`` reaches 1, and ends if
-``should_switch_back_to_slow_manifold`` returns True. Most criteria are functions of floats, so all
-engines can call them.
+With inertia, a motion alternates between two regimes: the slow manifold, and the inertial equations
+of motion. The slow manifold approximates the effect of inertia by a series in the inertia weight
+:math:`(K/a) w^2`, where :math:`w` is the dimensionless slip rate norm. The event loop integrates
+the inertial equations of motion in ruptures. The function ``starts_on_slow_manifold`` chooses the
+regime at the beginning of a motion or loading segment. A rupture begins if
+``compute_inertia_effect_over_limit`` reaches 1, and ends if ``should_switch_back_to_slow_manifold``
+returns True. Most criteria are functions of floats, so all engines can call them.
 """
 
 from __future__ import annotations
@@ -39,7 +39,7 @@ CONTINUES, NORMAL_STRESS_VANISHED, NORMAL_STRESS_UNBOUNDED, SLIP_STOPPED, SLIP_R
 
 
 class SwitchThresholds(NamedTuple):
-    r"""Thresholds for changes between the slow manifold and the full equations.
+    r"""Thresholds for changes between slow manifold and inertial equations.
 
     Parameters
     ----------
@@ -65,7 +65,8 @@ class SwitchThresholds(NamedTuple):
     inertial_time: float
 
 
-#: Thresholds of a motion without inertia. The loop does not use their values.
+#: Thresholds of a motion without inertia. The event loop does not use the values of these
+#: thresholds.
 UNUSED_SWITCH_THRESHOLDS = SwitchThresholds(*[math.nan] * len(SwitchThresholds._fields))
 
 
@@ -177,7 +178,8 @@ def slip_during_transition(
 ) -> float:
     r"""Compute the slip during a transition between two slip rates.
 
-    If the transition is treated as a jump, the states do not evolve over this slip.
+    If the transition is treated as a jump of the slip rate, the states do not evolve over the slip
+    during the transition.
 
     Parameters
     ----------
@@ -189,12 +191,13 @@ def slip_during_transition(
     Returns
     -------
     float
-        Slip in D_c, multiplied by the change of ln V. The result is an upper bound, because the
-        formula contains the larger of the two slip rate norms.
+        Upper bound of the slip in D_c, multiplied by the change of ln V. The formula contains the
+        larger of the two slip rate norms, so the result is an upper bound.
 
     Notes
     -----
-    The slip is :math:`(K/a) w^2` in D_c, with the larger slip rate norm :math:`w`.
+    The upper bound of the slip is :math:`(K/a) w^2` in D_c, where :math:`w` is the larger of the
+    two slip rate norms.
     """
     norm = max(
         compute_slip_rate_norm(initial_log_slip_rate, switch_thresholds),
@@ -229,8 +232,8 @@ def starts_on_slow_manifold(
     Returns
     -------
     bool
-        True if inertia is small enough at both slip rates, and if the slip during the transition is
-        small enough.
+        True if the effect of inertia at both slip rates is below its limit, and if the slip during
+        the transition is below its threshold.
     """
     rate = (
         compute_slip_rate_norm(log_slip_rate, switch_thresholds)
@@ -257,8 +260,8 @@ def is_slip_slow_enough_for_slow_manifold(
 ) -> bool:
     r"""Return True if the slip rate is small enough for the slow manifold.
 
-    The limit is half of the slip rate at which the motion leaves the slow manifold. The factor of
-    two prevents repeated changes between the regimes.
+    The limit of the slip rate is half of the slip rate at which the motion leaves the slow
+    manifold. The factor of two prevents repeated changes between the regimes.
 
     Parameters
     ----------
@@ -270,7 +273,7 @@ def is_slip_slow_enough_for_slow_manifold(
     Returns
     -------
     bool
-        True if the slip rate norm is below the limit.
+        True if the slip rate norm is below half of its threshold.
     """
     return (
         compute_slip_rate_norm(log_slip_rate, switch_thresholds)
@@ -290,7 +293,7 @@ def should_switch_back_to_slow_manifold(
     Parameters
     ----------
     log_slip_rate : float
-        Value :math:`x = \ln(V/V_*)` of the full equations.
+        Value :math:`x = \ln(V/V_*)` from the inertial equations of motion.
     log_slip_rate_growth : float
         Derivative of ``log_slip_rate`` along the motion.
     manifold_log_slip_rate : float
@@ -313,8 +316,8 @@ def should_switch_back_to_slow_manifold(
 
     .. math:: \frac{K}{2a} w^2 \min(1, |x - x_s|)
 
-    in D_c, where :math:`w` is the larger slip rate norm. The states do not evolve over this slip if
-    the motion returns to the slow manifold immediately.
+    in D_c, where :math:`w` is the larger slip rate norm. If the motion returns to the slow manifold
+    immediately, the states do not evolve over this slip during the change of ln V.
 
     The function also returns False shortly before an extremum of the slip rate. If the slip rate
     rises and friction exceeds spring stress, the slip rate on the slow manifold falls. The slip
@@ -359,8 +362,8 @@ def find_termination_status(
 ) -> int:
     r"""Find the termination status of a motion.
 
-    A change of sign of the shear stress, when a rupture overshoots, does not terminate the motion,
-    because the equations remain valid.
+    The shear stress may change its sign when a rupture overshoots. A change of sign of the shear
+    stress does not terminate the motion, because the equations remain valid.
 
     Parameters
     ----------
@@ -406,8 +409,9 @@ def compute_margin_to_termination(
     Returns
     -------
     float
-        Smallest distance of ln V, or of the logarithm of normal stress, from its limit. The margin
-        is positive if the motion continues.
+        Smallest of several differences. Each difference is between ln V and a limit of ln V, or
+        between the logarithm of normal stress and a limit of this logarithm. The margin is positive
+        if the motion continues.
     """
     stress = math.log(max(normal_stress, MIN_POSITIVE_NORMAL_STRESS))
     left = min(

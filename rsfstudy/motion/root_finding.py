@@ -66,7 +66,7 @@ def root_interpolation_step(
 ) -> float:
     """Compute the distance from the best estimate of a root to the next estimate.
 
-    Linear interpolation is used if two of the three points are distinct, and inverse quadratic
+    Linear interpolation is used if only two of the three points are distinct, and inverse quadratic
     interpolation if all three points are distinct.
 
     Parameters
@@ -79,7 +79,7 @@ def root_interpolation_step(
     Returns
     -------
     float
-        Signed distance from ``best``.
+        Signed distance from ``best`` to the next estimate of the root.
     """
     if previous == other:
         return -at_best * (best - previous) / (at_best - at_previous)

@@ -71,14 +71,15 @@ from rsfstudy.motion.step_integration import (
 from rsfstudy.motion.steppers import interpolate_unknowns
 from rsfstudy.parts import LOAD_VELOCITY, LOG_LOAD_VELOCITY, STIFFNESS, B
 
-#: Conditions whose roots are located in addition to the event specifications: the end of the
-#: regime, a target time, and the termination of the motion. The values are floats because Numba
-#: would compile a separate function for each integer literal.
+#: Conditions whose roots are located in addition to the requested events: the end of the regime, a
+#: target time, and the termination of the motion. The values are floats because Numba would compile
+#: a separate function for each integer literal.
 SWITCH_CONDITION, TIME_CONDITION, TERMINATION_CONDITION = -1.0, -2.0, -3.0
-#: Factor by which the level of a SETTLED event is multiplied for the slip rate and the sum of the
-#: states. The level without this factor applies to all unknowns. Both conditions must be met. With
-#: only one condition, the decrease of one initially very large unknown could end the motion
-#: although the slip rate still changes.
+#: Factor for the level of a SETTLED event. A SETTLED event occurs if two conditions are met. The
+#: first condition compares all unknowns with the level. The second condition compares the slip rate
+#: and the sum of the states with the level multiplied by the factor. Without the second condition,
+#: the decrease of one initially very large unknown could end the motion although the slip rate
+#: still changes.
 SETTLED_LEVEL_FACTOR_FOR_RATE_AND_STATES = 10.0
 #: Return values of ``find_jump_side_of_event``.
 NO_EVENT, BEFORE_JUMP, AFTER_JUMP = range(3)
@@ -200,7 +201,7 @@ def has_event_occurred(event_spec, quantity_before, quantity_after, clock_direct
     Returns
     -------
     bool
-        True if the event occurs between the two values.
+        True if the event occurs between the beginning and the end of the interval.
     """
     upwards = event_spec[SPEC_KIND] == RISE or event_spec[SPEC_KIND] == MINIMUM
     # If the integration runs backward, derivatives change sign in the opposite direction.
@@ -227,7 +228,7 @@ def evaluate_condition_at_clock(clock, condition_context):
     Returns
     -------
     float
-        Value of the condition, which is zero at the root.
+        Value of the condition. The value is zero at the root.
     """
     what, motion, workspace = condition_context
     if what == TIME_CONDITION:

@@ -1,7 +1,7 @@
 """Integration, refinement and truncation of a single step.
 
-``take_step`` is the first call of the event loop in each step. The other functions evaluate the
-motion within the step, or change the end of the step.
+In each step, the event loop calls ``take_step`` first. The other functions evaluate the motion
+within the step, or change the end of the step.
 """
 
 from __future__ import annotations
@@ -29,10 +29,11 @@ from rsfstudy.motion.steppers import (
 from rsfstudy.motion.workspace import count_evaluations, evaluate_rates_by_step_clock
 from rsfstudy.parts import LOG_LOAD_VELOCITY
 
-#: Constants of ``halve_step_until_dense_output_is_accurate``: maximum error of the dense-output
-#: derivative, multiplied by the step size and divided by the local tolerance; maximum number of
-#: times that a step is halved; growth factor of the step size limit after a step with accurate
-#: dense output; and spacing of the finite differences of dense output, as a fraction of the step
+#: Constants of ``halve_step_until_dense_output_is_accurate``. ``MAX_SLOPE_ERROR`` limits the error
+#: of the derivative of dense output, multiplied by the step size and divided by the local
+#: tolerance. ``MAX_HALVINGS`` is the maximum number of times that a step is halved. After a step
+#: with accurate dense output, the limit of the step size is multiplied by ``GROWTH_FACTOR``.
+#: ``SLOPE_SPACING`` is the spacing of the finite differences of dense output, divided by the step
 #: size.
 MAX_SLOPE_ERROR, MAX_HALVINGS, GROWTH_FACTOR, SLOPE_SPACING = 300.0, 6, 1.3, 5e-3
 
@@ -61,7 +62,7 @@ def time_since_regime_start(motion, workspace, y):
 
 
 def time_at_step_begin(motion, workspace):
-    """Return the time at the beginning of the step, since the segment start.
+    """Return the time from the start of the segment to the start of the step.
 
     Parameters
     ----------
@@ -79,7 +80,7 @@ def time_at_step_begin(motion, workspace):
 
 
 def time_at_step_end(motion, workspace):
-    """Return the time at the end of the step, since the segment start.
+    """Return the time from the start of the segment to the end of the step.
 
     Parameters
     ----------
@@ -229,7 +230,7 @@ def is_dense_output_accurate(motion, workspace):
 
 
 def evaluate_point_at_clock(motion, workspace, clock):
-    """Evaluate ``workspace.point_within`` at an independent variable in the step.
+    """Evaluate ``workspace.point_within`` at a clock value within the step.
 
     Parameters
     ----------

@@ -146,7 +146,7 @@ class WorkMeter:
         Returns
         -------
         int
-            Number of evaluations of other motions that the meter has counted.
+            Number of right-hand side evaluations of other motions, counted by the same work meter.
         """
         others = self.evaluations - work_before[0] - work_before[1]
         if work_now[0] > work_before[0]:

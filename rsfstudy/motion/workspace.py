@@ -92,7 +92,7 @@ class Workspace(NamedTuple):
     event_spec_count : int
         Number of event specifications.
     parameters, parameters_before : array
-        Parameters of the scene, and their values before the last kink.
+        Parameters of the scene after and before the last kink of the loading.
     switch_thresholds : SwitchThresholds
         Thresholds for changes between the regimes. All thresholds are NaN if the scene has no
         inertia.
@@ -180,7 +180,7 @@ def create_workspace(
     functions : sequence
         Row of the function table.
     members_shared_by_regimes : tuple
-        Last six fields of the workspace, which are the same for both regimes.
+        Last six fields of the workspace. Both regimes share these fields.
 
     Returns
     -------

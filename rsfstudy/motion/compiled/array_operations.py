@@ -143,7 +143,8 @@ def interpolate_rows(columns, row_positions, result):
     row_positions : array of shape (points,)
         Fractional row numbers.
     result : array of shape (result columns, points)
-        Output array, with one row of interpolated values for each of the first columns.
+        Output array. Row ``i`` contains the interpolated values of column ``i``. The output array
+        may have fewer rows than there are columns.
     """
     last, weights = columns.shape[1] - 1, np.empty(SAMPLES_PER_STEP + 1)
     for i in range(len(row_positions)):
@@ -173,7 +174,7 @@ def interpolate_rows(columns, row_positions, result):
                 result[c, i] += weights[k] * columns[c, min(begin + k, last)]
 
 
-#: Replacement of each Python function in compiled code.
+#: Mapping of each Python function to the function that replaces it in compiled code.
 COMPILED_REPLACEMENT_BY_PYTHON_FUNCTION: Mapping[Any, Any] = {
     array_operations.evaluate_function_into_array: evaluate_function_into_array,
     array_operations.array_as_pointer: array_as_pointer,

@@ -68,7 +68,7 @@ def compilation_error(error: Exception) -> InvalidValue:
     Parameters
     ----------
     error : Exception
-        Numba error, whose message begins with the innermost function.
+        Numba error. Its message begins with the innermost function.
 
     Returns
     -------

@@ -41,8 +41,8 @@ from rsfstudy.motion.compiled.array_operations import COMPILED_REPLACEMENT_BY_PY
 from rsfstudy.motion.engines import compilation_log
 
 _CACHE_ENTRY_FILE_NAME = "motion.py"
-#: Modules that a digest identifies by their version, or by the version of Python, instead of their
-#: code.
+#: Modules whose code is not part of a digest. Instead of the code, the digest contains the version
+#: of the module or the version of Python.
 _PACKAGES_IDENTIFIED_BY_VERSION_ONLY = {*sys.stdlib_module_names, "numpy", "numba"}
 #: The fast-math flags permit reciprocals instead of divisions, and fused multiply-add operations.
 #: With these flags, the compiler can compute reciprocals of the parameters once per step.
@@ -283,7 +283,7 @@ def _cache_entry_folder(entry_name: str) -> Path | None:
 
 @functools.cache
 def _warn_folder_not_private(folder: Path) -> None:
-    """Log a warning, once per folder, that other users can write to a folder."""
+    """Log a warning that other users can write to a folder, once per folder."""
     _logger.warning(
         "%s: others own it or may write to it, and nothing compiled is kept there or taken from "
         "it. Remove it, or choose another place (XDG_CACHE_HOME).",
@@ -320,9 +320,10 @@ def _compile_in_temporary_folder(
 def _copy_with_compiled_globals(function: Any, cache_entry_path: str = "") -> Any:
     """Copy a function, and replace its callees by compiled functions.
 
-    The qualified name of the copy contains a digest of its content. A linker treats functions with
-    equal names as the same function, and the numbers that Numba adds to names differ between
-    processes. If ``cache_entry_path`` is given, it becomes the source file of the copy.
+    The qualified name of the copy contains a digest of its content. The digest is necessary because
+    a linker treats functions with equal names as the same function. The numbers that Numba adds to
+    function names differ between processes. If ``cache_entry_path`` is given, it becomes the source
+    file of the copy.
     """
     named = {
         name: function.__globals__.get(name) for name in _global_names_read_by(function.__code__)
@@ -364,16 +365,16 @@ def _is_function(value: Any) -> bool:
 
 
 def _compiled_replacement_of(value: Any) -> Any:
-    """Return the compiled replacement of a function, or any other value as it is."""
+    """Return the compiled function if the value is a function, or else the value."""
     return (
         COMPILED_REPLACEMENT_BY_PYTHON_FUNCTION.get(value, value) if _is_function(value) else value
     )
 
 
 def _jit_compile_callee(function: Any) -> Any:
-    """Compile a function that only compiled functions call.
+    """Compile a function that is called only by compiled functions.
 
-    A function that several systems of equations call is compiled only once.
+    A function that is called by several systems of equations is compiled only once.
     """
     return _jit_compile_callee_cached(_compiled_replacement_of(function))
 

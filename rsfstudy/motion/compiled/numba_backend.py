@@ -43,8 +43,8 @@ _NUMBA_TYPE_OF_LOOP_CONSTANTS = types.Tuple(
 )
 
 
-#: Without this call, garbage collection of Numba objects delays the exit of Python by a third of a
-#: second.
+#: Without the call of ``gc.freeze`` at exit, garbage collection of Numba objects delays the exit of
+#: Python by a third of a second.
 atexit.register(gc.freeze)
 
 
@@ -67,7 +67,7 @@ class NumbaBackend:
         Returns
         -------
         bytes
-            Memory of a record of MOTION_STATE_DTYPE.
+            Bytes of a record with the data type ``MOTION_STATE_DTYPE``.
         """
         return _pack_initial_state_bytes(field_values)
 
@@ -100,7 +100,8 @@ class NumbaBackend:
         Parameters
         ----------
         equations_by_regime : tuple of Equations
-            Equations on the slow manifold and, with inertia, in ruptures.
+            Equations of the slow manifold. If the scene has inertia, the second item contains the
+            inertial equations of motion in ruptures.
 
         Returns
         -------
@@ -122,7 +123,7 @@ class NumbaBackend:
         Returns
         -------
         tuple of ndarray
-            Arrays without a conversion.
+            The arguments, unchanged.
         """
         return arrays
 
@@ -164,7 +165,7 @@ class NumbaMotionState:
     Attributes
     ----------
     memory : ndarray of MOTION_STATE_DTYPE, shape (1,)
-        Argument ``motion_memory`` of the loop.
+        Argument ``motion_memory`` of the event loop.
     """
 
     def __init__(self, initial: bytes, called_with: tuple[float, ...]) -> None:
@@ -227,7 +228,7 @@ def compile_equations_of_scene(scene: Scene, *, with_time: bool) -> None:
 def _pack_initial_state_bytes(field_values: tuple[tuple[str, float], ...]) -> bytes:
     """Pack the initial values of the motion state into bytes.
 
-    Copying bytes is faster than copying a NumPy record, which is copied field by field.
+    Copying bytes is faster than copying a NumPy record field by field.
     """
     memory = np.zeros(1, array_layout.MOTION_STATE_DTYPE)
     for name, value in field_values:
@@ -296,7 +297,7 @@ def compile_scalar_function(function: Function, *arguments: float | Numbers) -> 
 
 @cache
 def _compile_scalar_function_cached(function: Function, *argument_lengths: int) -> Any:
-    """Compile a function of floats (length 0) and tuples of floats (length > 0)."""
+    """Compile a function whose arguments are floats or tuples of given lengths."""
     check_function_never_raises(function)
     floats = (types.UniTuple(types.float64, n) if n else types.float64 for n in argument_lengths)
     try:

@@ -23,7 +23,7 @@ NO_STEP, BUDGET_SPENT = 0.0, -1.0
 
 @add_former_member_names
 class Stepper(ABC):
-    """Base class of steppers, which integrate the equations of a motion.
+    """Base class of steppers. A stepper integrates the equations of a motion.
 
     Each motion has its own stepper instance. The arguments ``motion`` and ``workspace`` of the
     methods contain the state of the motion. See ``array_layout.MOTION_STATE_DTYPE`` and

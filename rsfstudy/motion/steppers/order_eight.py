@@ -25,8 +25,9 @@ from rsfstudy.motion.steppers.unrolled_step import (
 )
 from rsfstudy.motion.workspace import count_evaluations, evaluate_rates_by_step_clock
 
-#: Runge-Kutta weights for dense output: weights that define its additional stages, and weights of
-#: all stages in its coefficients.
+#: Runge-Kutta weights for dense output. ``_EXTRA_WEIGHTS`` defines the additional stages of dense
+#: output. ``_DENSE_WEIGHTS`` contains the weights of all stages in the coefficients of dense
+#: output.
 _EXTRA_WEIGHTS, _DENSE_WEIGHTS = (tuple(x.ravel().tolist()) for x in (DOP853.A_EXTRA, DOP853.D))
 #: Runge-Kutta weights of each stage. The last row contains the weights for the end of the step.
 _RUNGE_KUTTA_STAGE_WEIGHTS = tuple(
@@ -258,7 +259,8 @@ def increase_step_length(length, error_over_tolerance, was_rejected_before):
     error_over_tolerance : float
         Local error of the accepted step, divided by the tolerance.
     was_rejected_before : bool
-        True if a longer attempt was rejected. In this case, the step size does not increase.
+        True if an attempt with a larger step size was rejected before this step was accepted. In
+        this case, the step size does not increase.
 
     Returns
     -------

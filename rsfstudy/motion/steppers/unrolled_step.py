@@ -5,9 +5,9 @@ stages and unknowns would take as much time as the equations of a simple scene. 
 unrolled and the equations are inlined, the compiler can also share expressions between the stages.
 ``build_step_attempt_function`` is the main function.
 
-The results of a step are stored in two arrays: the derivatives in all stages, and one block. The
-block contains a header, the unknowns at the end of the step, the scales of the unknowns, and the
-coefficients of the dense output.
+The results of a step are stored in two arrays. The first array contains the derivatives in all
+stages, and the second array is called the block. The block contains a header, the unknowns at the
+end of the step, the scales of the unknowns, and the coefficients of the dense output.
 """
 
 from __future__ import annotations
@@ -26,8 +26,8 @@ from scipy.integrate import DOP853
 #: dense output coefficients.
 STAGE_COUNT, EXTRA_STAGE_COUNT, DENSE_ROW_COUNT = 12, 3, 7
 STAGE_COUNT_WITH_DENSE_OUTPUT = STAGE_COUNT + 1 + EXTRA_STAGE_COUNT
-#: Weights of the derivatives in each weighted sum. The sums are the stages, including the end of
-#: the step as the last stage, and the error estimates of order five and three.
+#: Weights of the derivatives in each weighted sum. The weighted sums are the stages and the error
+#: estimates of order five and three. The last stage is the end of the step.
 _DERIVATIVE_WEIGHTS_BY_SUM_NAME: Mapping[str, np.ndarray] = {
     **{f"stage_{s}": DOP853.A[s, :s] for s in range(1, STAGE_COUNT)},
     f"stage_{STAGE_COUNT}": DOP853.B,
