@@ -3,9 +3,9 @@
 The profile likelihood of a parameter is the likelihood at a fixed value of the parameter, maximised
 with respect to all other parameters [1]_. The squared distance between the fixed value and the best
 value is the increase of the sum of squared whitened residuals, divided by the noise variance. At
-the ends of a confidence interval, the squared distance is :math:`t^2`, where :math:`t` is a
-quantile of Student's t distribution with the degrees of freedom of the fit. If the log-likelihood
-is nearly quadratic, the interval is computed from the standard error.
+the ends of a confidence interval, the squared distance from the best value is :math:`t^2`, where
+:math:`t` is a quantile of Student's t distribution with the degrees of freedom of the fit. If the
+log-likelihood is nearly quadratic, the interval is computed from the standard error.
 
 References
 ----------
@@ -23,10 +23,12 @@ from scipy.stats import t as student
 from rsfstudy.fitting.fit_problem import FitProblem, FitSolution
 from rsfstudy.fitting.window_model import coordinate_to_parameter
 
-#: Settings of confidence intervals: the confidence level, the relative deviation from a quadratic
-#: log-likelihood above which the profile likelihood is computed, the largest number of iterations
-#: for each end of an interval, the relative tolerance of the squared distance at the ends, and the
-#: tolerance of the minimum sum of squares divided by the noise variance.
+#: Settings of confidence intervals. The first value is the confidence level. The profile likelihood
+#: is computed if the relative deviation of the log-likelihood from a quadratic function exceeds the
+#: second value. The third value is the largest number of iterations for each end of an interval.
+#: The fourth value is the relative tolerance of the squared distance between an end of the interval
+#: and the best value. The fifth value is the tolerance of the minimum sum of squares, in noise
+#: variances.
 (
     CONFIDENCE_LEVEL,
     _MAX_DEVIATION_FROM_PARABOLA,
@@ -121,9 +123,10 @@ class LikelihoodProfile:
     best_coordinates : ndarray, shape (parameters,)
         Coordinates of all free parameters at which the likelihood is highest.
     stderr_from_noise : float
-        Contribution of the friction noise to the standard error of the coordinate.
+        Contribution of the friction noise to the standard error of the coordinate of the parameter.
     coordinate_change_ratios : ndarray, shape (parameters,)
-        Change of each coordinate per unit change of the coordinate of parameter ``parameter_name``.
+        Change of the coordinate of each free parameter, per unit change of the coordinate of the
+        parameter ``parameter_name``.
     """
 
     def __init__(self, problem: FitProblem, solution: FitSolution, parameter_name: str) -> None:
@@ -154,7 +157,8 @@ class LikelihoodProfile:
         Returns
         -------
         float
-            Coordinate of the end of the interval, limited to the bounds of the search.
+            Coordinate of the parameter at the end of the confidence interval. If the interval
+            extends beyond the bounds of the search, the result is the bound.
         """
         bound = (self.problem.lower_bounds if direction_sign < 0.0 else self.problem.upper_bounds)[
             self.parameter_index
@@ -177,21 +181,23 @@ class LikelihoodProfile:
         return float(self.best_coordinates[self.parameter_index] + direction_sign * at)
 
     def compute_twice_log_likelihood_decrease(self, coordinate: float) -> float:
-        """Compute the squared distance between a coordinate and the best coordinate.
+        """Compute the squared distance of a parameter from its best value.
 
-        The squared distance is twice the decrease of the log-likelihood. It equals the increase of
-        the sum of squares divided by the noise variance. If the log-likelihood is nearly quadratic,
+        The squared distance between a value of the parameter and the best value is twice the
+        decrease of the log-likelihood. The squared distance is equal to the increase of the sum of
+        squared residuals, divided by the noise variance. If the log-likelihood is nearly quadratic,
         the method returns the quadratic approximation.
 
         Parameters
         ----------
         coordinate : float
-            Coordinate of the parameter.
+            Value of the parameter. For a slip distance or a stiffness, the coordinate is the
+            logarithm of the parameter.
 
         Returns
         -------
         float
-            Squared distance, or infinity if the simulation of the motion fails.
+            Squared distance from the best value, or infinity if the simulation of the motion fails.
         """
         moved = coordinate - self.best_coordinates[self.parameter_index]
         parabola = float(moved / self.stderr_from_noise) ** 2
@@ -245,14 +251,14 @@ class LikelihoodProfile:
         )
 
     def _compute_excess_sum_of_squares(self, residuals: np.ndarray) -> float:
-        """Return the sum of squares minus the minimum sum of squares."""
+        """Return the difference between a sum of squares and its minimum."""
         return float(residuals @ residuals - np.square(self.solution.whitened_residuals).sum())
 
     def _compute_linearised_excess_sum_of_squares(self, coordinates: np.ndarray) -> float:
-        """Compute the sum of squares minus its minimum with a linearised model.
+        """Compute the increase of the sum of squares with a linearised model.
 
-        The sum of squares is minimised with respect to all parameters except the profiled
-        parameter.
+        The result is the difference between the sum of squares and its minimum. The sum of squares
+        is minimised with respect to all parameters except the parameter of the profile likelihood.
         """
         left = self._whitened_residuals(coordinates)
         if not np.isfinite(left).all():

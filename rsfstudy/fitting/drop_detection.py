@@ -2,13 +2,13 @@
 
 The function ``detect_drops`` compares the mean stress in a window before each sample with the mean
 stress in a window after the sample. The window lengths are 4, 8, 16 and so on, in sampling
-intervals. The scaled difference is the difference between the two means, divided by the standard
-deviation of such differences. Each peak of the scaled difference above a threshold is a drop (see
-``scipy.signal.find_peaks``).
+intervals. The scaled difference is the difference between the two mean stresses, divided by the
+standard deviation of the differences during loading. If a peak of the scaled difference exceeds a
+threshold, the peak is a stress drop (see ``scipy.signal.find_peaks``).
 
-The standard deviation of the differences is estimated from the most frequent differences [1]_,
-which occur during loading. The estimate is valid if stress drops occupy at most a third of the
-record.
+The standard deviation of the differences between mean stresses is estimated from the most frequent
+differences [1]_, which occur during loading. The estimate is valid if stress drops occupy at most a
+third of the record.
 
 References
 ----------
@@ -26,30 +26,33 @@ from scipy.stats import norm
 
 #: Probability that at least one drop is detected in a record of Gaussian noise.
 FALSE_DETECTION_PROBABILITY = 1e-4
-#: Length of the shortest window in samples, and smallest ratio of the record length to the longest
-#: window length.
+#: Length of the shortest averaging window in samples, and smallest ratio of the record length to
+#: the length of the longest averaging window.
 MIN_WINDOW_SAMPLES, MIN_RECORD_OVER_WINDOW_LENGTH = 4, 100
-#: Smallest number of samples in a record.
+#: Smallest number of samples that a record must have for the detection of stress drops.
 MIN_SAMPLES = MIN_WINDOW_SAMPLES * MIN_RECORD_OVER_WINDOW_LENGTH
-#: Distance of a drop from the detection threshold at which the drop is missed with a probability of
-#: 0.001, in standard deviations.
+#: A stress drop that exceeds the detection threshold by this number of standard deviations is
+#: missed with a probability of 0.001.
 DETECTION_MARGIN_IN_STANDARD_DEVIATIONS = 3.1
-#: Scaled difference that marks the start and the end of a drop on both sides of its peak, in
-#: standard deviations.
+#: A stress drop starts and ends where the difference between the mean stresses before and after a
+#: sample is equal to this number of standard deviations.
 _DROP_EXTENT_THRESHOLD_SIGMAS = 2.0
-#: Fraction of the values from which the noise is estimated. The values are in the shortest interval
-#: that contains this fraction.
+#: The noise is estimated from the shortest interval that contains this fraction of the values.
 _FRACTION_OF_VALUES_IN_MODE = 0.4
 #: Ratio of the standard deviation to the median absolute deviation for Gaussian noise.
 _STANDARD_DEVIATION_PER_MAD = 1.4826
-#: Ratio of the longest to the shortest sampling interval above which a record is resampled.
+#: A record is resampled if the ratio of its longest to its shortest sampling interval exceeds this
+#: value.
 _MAX_SAMPLING_INTERVAL_RATIO = 3.0
-#: Ratio of detection scores above which a window is too short for a drop. The score of the window
-#: is compared with the scores of windows that are twice and four times as long.
+#: An averaging window is too short for a stress drop if the detection score of a longer window
+#: exceeds the detection score of this window by more than this factor. The longer windows are twice
+#: and four times as long.
 _MIN_SCORE_RATIO_OF_LONGER_WINDOW = 1.4
-#: Index of the shortest window, 16 samples long, from which the noise correlation is estimated.
+#: Index of the shortest averaging window from which the noise correlation is estimated. This window
+#: is 16 samples long.
 _SHORTEST_CORRELATION_WINDOW_INDEX = 2
-#: Smallest prominence of a separate peak, relative to the height of the peak.
+#: Smallest prominence of a peak that counts as a separate stress drop, relative to the height of
+#: the peak.
 _MIN_RELATIVE_PROMINENCE = 0.5
 
 
@@ -59,11 +62,12 @@ class DropCandidate(NamedTuple):
     Parameters
     ----------
     start_time, end_time : float
-        Times at which the stress decrease begins and ends, at the resolution of the window.
+        Times at which the stress decrease begins and ends. The resolution of the times is the
+        duration of the averaging window.
     window_duration : float
-        Duration of the window, in the unit of the times.
+        Duration of the averaging window, in the unit of ``start_time``.
     mean_difference_stderr : float
-        Standard error of the difference between two window means.
+        Standard error of the difference between the mean stresses of two averaging windows.
     noise_correlation_factor : float
         Factor by which the correlation of the noise increases the standard error of a mean.
     """
@@ -145,9 +149,10 @@ def find_smallest_value_step(values: np.ndarray) -> float:
 def estimate_mean_and_sd_of_mode(values: np.ndarray) -> tuple[float, float]:
     """Estimate the mean and standard deviation of the most frequent values.
 
-    The function finds the shortest interval that contains 40 % of the values. The mean and the
-    standard deviation are computed from the Gaussian distribution whose central 40 % lies in the
-    shortest interval. Values outside the interval have little effect on the estimates.
+    The function finds the shortest interval that contains 40 % of the values. The results are the
+    mean and the standard deviation of a Gaussian distribution. The central 40 % of this Gaussian
+    distribution lies in the shortest interval. Values outside the shortest interval have little
+    effect on the estimates.
 
     Parameters
     ----------
@@ -184,7 +189,8 @@ def window_mean_decreases(values: np.ndarray, window_samples: int) -> np.ndarray
     Returns
     -------
     ndarray, shape (samples - 2 * window + 1,)
-        Mean of the samples before each sample minus the mean of the samples from that sample on.
+        For each sample, the mean of the window that ends before the sample, minus the mean of the
+        window that begins at the sample.
     """
     sums = np.concatenate([[0.0], np.cumsum(values - values.mean())])
     fallen = (
@@ -273,8 +279,8 @@ class _WindowMeanDifferences:
     window_samples : int
         Window length in samples.
     threshold_sigmas : float
-        Detection threshold in standard deviations, which accounts for the number of tested windows
-        and samples.
+        Detection threshold in standard deviations. The threshold accounts for the number of tested
+        windows and samples.
     rounding_quantum : float
         Resolution of the recorded stress.
     """
@@ -316,7 +322,9 @@ class _WindowMeanDifferences:
     def compute_detection_scores(self, sample_indices: np.ndarray) -> np.ndarray:
         """Compute the detection scores of samples.
 
-        The score is the scaled difference divided by the square root of the window length.
+        The detection score of a sample is the difference between the mean stresses before and after
+        the sample, divided by the standard deviation of the differences and by the square root of
+        the window length.
 
         Parameters
         ----------
@@ -340,13 +348,13 @@ class _WindowMeanDifferences:
     def find_drops_best_seen_in_window(
         self, longer_windows: list[_WindowMeanDifferences]
     ) -> list[tuple[int, int]]:
-        """Find drops with a higher score for this window length than for longer ones.
+        """Find drops that are detected better than with longer windows.
 
         Parameters
         ----------
         longer_windows : list of _WindowMeanDifferences
-            Differences of window means for longer windows. Drops with a clearly higher score for a
-            longer window are skipped.
+            Differences of window means for longer windows. A stress drop is skipped if its
+            detection score is clearly higher for a longer window.
 
         Returns
         -------

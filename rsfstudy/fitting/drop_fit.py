@@ -3,12 +3,12 @@
 The function ``fit_drop`` models the stress before, during and after a drop by three connected
 straight lines. The lines meet at the times at which the drop begins and ends. For each pair of
 start time and end time, the lines are fitted by least squares. The fit with the smallest sum of
-squares determines the drop. The size of the drop is the difference between the highest and the
-lowest stress.
+squares determines the start and the end of the drop. The size of the drop is the difference between
+the highest and the lowest stress.
 
 The confidence intervals of the start time and the end time contain all pairs of times with a sum of
-squares close to the minimum. The largest difference from the minimum is a fixed multiple of the
-noise variance [1]_.
+squares close to the smallest sum of squares. The difference between the two sums of squares must be
+less than a fixed multiple of the noise variance [1]_.
 
 References
 ----------
@@ -23,8 +23,9 @@ import numpy as np
 
 from rsfstudy.fitting.drop_detection import DropCandidate
 
-#: Number of samples to fit on each side of a drop: the factors for the window length and for the
-#: duration of the drop, the smallest number of samples, and the largest number of samples.
+#: Settings for the number of samples to fit on each side of a drop. The samples extend over the
+#: window length times the first value, or over the duration of the drop times the second value,
+#: whichever is longer. The last two values are the smallest and the largest number of samples.
 _SIDE_LENGTH_IN_WINDOWS, _SIDE_LENGTH_IN_DROP_DURATIONS, _MIN_SIDE_SAMPLES, _MAX_SIDE_SAMPLES = (
     3.0,
     1.0,
@@ -33,24 +34,29 @@ _SIDE_LENGTH_IN_WINDOWS, _SIDE_LENGTH_IN_DROP_DURATIONS, _MIN_SIDE_SAMPLES, _MAX
 )
 #: Largest number of samples in a fit. If there are more samples, blocks of samples are averaged.
 _MAX_SAMPLES_IN_FIT = 300
-#: Longest time between a detected drop and the fitted start or end of the drop, in windows.
+#: Longest time between a detected drop and the fitted start or end of the drop, in durations of the
+#: averaging window.
 _SEARCH_MARGIN_IN_WINDOWS = 2.0
-#: Number of start times and of end times in each grid, and number of grid refinements.
+#: Number of start times in each search grid, which is also the number of end times, and number of
+#: refinements of the search grid.
 _SEARCH_GRID_SIZE, _SEARCH_GRID_REFINEMENTS = 16, 3
 #: Largest rate of stress decrease before and after a drop, relative to the rate during the drop.
 _MAX_SLOPE_BESIDE_DROP_OVER_DROP_SLOPE = 0.3
-#: Largest stress decrease before or after a drop that exceeds the decrease expected from the slope
-#: on the other side, relative to the size of the drop.
+#: Limit for the stress decrease on one side of a drop, relative to the size of the drop. The limit
+#: applies to the difference between this stress decrease and the decrease expected from the slope
+#: on the other side of the drop.
 _MAX_EXCESS_FALL_BESIDE_DROP_OVER_DROP = 0.5
 #: Difference between the sum of squares at the ends of a 95 % confidence interval and the minimum
-#: sum of squares, in noise variances. The first value, -2 ln 0.0253, applies to the time of a
-#: sudden change. The second value applies to all other parameters.
+#: sum of squares, in noise variances. The first value applies to the confidence interval of the
+#: time of a sudden change, and is equal to -2 ln 0.0253. The second value applies to the confidence
+#: intervals of all other parameters.
 _TIME_INTERVAL_EXCESS_SQUARES, _SIZE_INTERVAL_EXCESS_SQUARES = 7.4, 3.84
 #: Half width of a 95 % confidence interval in standard errors.
 STDERRS_PER_95_PERCENT_HALF_WIDTH = 1.96
 #: Error of a time that lies between two samples, relative to the sampling interval.
 _TIME_ERROR_OVER_SAMPLING_INTERVAL = 0.55
-#: Smallest number of samples before or after a drop for estimating the stress there.
+#: Smallest number of samples that are required for estimating the stress before a drop, or the
+#: stress after a drop.
 _MIN_SAMPLES_BESIDE_DROP = 3
 
 
@@ -62,9 +68,10 @@ class FittedStressDrop(NamedTuple):
     Parameters
     ----------
     start_time, end_time : float
-        Start and end of the drop, when the stress is highest and lowest.
+        Times at which the drop starts and ends. The stress is highest at the start, and lowest at
+        the end.
     stress_before, stress_after : float
-        Highest and lowest stress.
+        Highest stress at the start of the drop, and lowest stress at the end of the drop.
     start_error, end_error : float
         Errors of ``start_time`` and ``end_time``.
     stress_before_error, stress_after_error : float
@@ -113,7 +120,7 @@ class _ThreeLineFits(NamedTuple):
 
     @property
     def best_pair_index(self) -> int:
-        """Index of the pair of times with the smallest sum of squares.
+        """Index of the pair of start and end times with the smallest sum of squares.
 
         If several sums of squares are equal within rounding errors, the property contains the index
         of the first pair.
@@ -275,9 +282,9 @@ def _select_evenly_spaced_times(times: np.ndarray) -> list[float]:
 def _select_times_near_centre(
     times: np.ndarray, centre: float, search_extent: float, refinement_level: int
 ) -> np.ndarray:
-    """Select the times near the best time for the next level of the search.
+    """Select the times near the best time for the next refinement of the search.
 
-    At the last levels of the search, the nearest neighbours of the best time are selected.
+    In the last refinements of the search, the nearest neighbours of the best time are selected.
     """
     reach = search_extent / _SEARCH_GRID_SIZE * (4.0 / _SEARCH_GRID_SIZE) ** refinement_level
     place = int(np.searchsorted(times, centre))
@@ -293,13 +300,14 @@ def _select_times_near_centre(
 def _fit_three_lines(
     time: np.ndarray, stress: np.ndarray, corner_time_pairs: np.ndarray
 ) -> _ThreeLineFits:
-    """Fit three connected lines for each pair of times.
+    """Fit three connected lines for each pair of start and end times of a drop.
 
     The coefficients of a fit are the stresses at the start and the end of the drop, and the slopes
-    before and after the drop. A pair of times is rejected if it covers only a fraction of a longer
-    drop. A pair is therefore rejected if the rate of stress decrease outside the drop exceeds 0.3
-    times the rate during the drop. A pair is also rejected if the stress decrease on one side
-    exceeds the decrease expected from the slope on the other side by more than half of the drop.
+    before and after the drop. A pair of start and end times is rejected if it covers only a
+    fraction of a longer drop. For this reason, a pair of times is rejected if the rate of stress
+    decrease outside the drop exceeds 0.3 times the rate during the drop. A pair of times is also
+    rejected if the stress decrease on one side of the drop exceeds the decrease expected from the
+    slope on the other side. The limit for the difference is half of the size of the drop.
     """
     t0, t1 = corner_time_pairs[:, :1], corner_time_pairs[:, 1:]
     share = np.clip((time - t0) / (t1 - t0), 0.0, 1.0)

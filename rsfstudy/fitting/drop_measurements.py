@@ -25,7 +25,8 @@ from rsfstudy.fitting.drop_fit import STDERRS_PER_95_PERCENT_HALF_WIDTH
 from rsfstudy.fitting.stress_drop_fits import EventNumbers, FittedDropCandidate, find_drops
 
 #: Smallest difference between the displacement during the drops and the displacement in equally
-#: long intervals around the drops, in standard deviations and relative to the latter displacement.
+#: long intervals before and after the drops. The first value is in standard deviations of the
+#: difference. The second value is relative to the displacement before and after the drops.
 _MIN_EXCESS_SLIP_SIGMAS, _MIN_EXCESS_SLIP_FRACTION = 3.0, 0.1
 
 
@@ -57,8 +58,8 @@ class DropMeasurements(NamedTuple):
     detection : Detection
         Result of the detection.
     displacement_shows_slip : bool
-        False if the displacement was checked and is not faster during the drops than before and
-        after the drops.
+        False if a check found that the displacement is not faster during the drops than before and
+        after the drops. True if the displacement is faster, or if it was not checked.
     """
 
     event_rows: list[EventNumbers]

@@ -19,20 +19,22 @@ from rsfstudy.fitting.averaged_noise_correlation import apply_running_mean
 from rsfstudy.fitting.filters import LOW_PASS_ORDERS, Filter
 from rsfstudy.fitting.fit_solution import FitSolution, compute_aic
 
-#: Lengths of the tested running means in rows, and criteria for detecting a filter: the smallest
-#: decrease of the AIC, and the smallest change of a parameter in standard errors.
+#: Lengths of the tested running means in rows, and criteria for detecting a filter. The first
+#: criterion is the smallest decrease of the AIC due to the filter. The second criterion is the
+#: smallest change of a parameter due to the filter, in standard errors.
 _TESTED_AVERAGE_LENGTHS_IN_ROWS, _MIN_AIC_GAIN_OF_RUNNING_MEAN, _MIN_PARAMETER_CHANGE_IN_STDERRS = (
     range(2, 21),
     20.0,
     0.5,
 )
-#: Smallest decrease of the AIC for low-pass filters. The limit is larger than the limit for running
-#: means, because an inaccurate step time or stiffness has a similar effect to a low-pass filter.
+#: Smallest decrease of the AIC for which a low-pass filter is detected. This limit is larger than
+#: the limit for running means, because an inaccurate step time or stiffness has a similar effect to
+#: a low-pass filter.
 _MIN_AIC_GAIN_OF_LOW_PASS = 60.0
 #: Corner frequencies of the low-pass filters that are tested, relative to the sampling rate.
 _TESTED_RELATIVE_CORNER_FREQUENCIES = (0.3, 0.2, 0.13, 0.09, 0.06, 0.04, 0.025, 0.015)
-#: Largest number of rows for the filter test, and number of times that the noise and the parameters
-#: are estimated in turn.
+#: Largest number of rows for the filter test, and number of iterations. In each iteration, the
+#: noise and the parameters are estimated.
 _MAX_ROWS_FOR_FILTER_TEST, _NOISE_ESTIMATION_PASSES = 20_000, 2
 
 
@@ -57,8 +59,8 @@ def detect_unspecified_filter(
     -------
     tuple of str
         Reason why the standard errors are not valid, with the name of the filter that fits the
-        record best. The tuple is empty if no filter fits the record better than unfiltered
-        friction.
+        record best. The tuple is empty if no model with a filter fits the record better than the
+        model without a filter.
     """
     windows = np.split(np.arange(len(time)), np.flatnonzero(np.diff(time) <= 0.0) + 1)
     least = fit_solution.friction_rounding_quantum / math.sqrt(12.0)

@@ -1,8 +1,8 @@
 """Filters that a data logger applied to friction before recording.
 
-A fit applies the filter of the recorded friction to the friction of the model. A filter smooths the
-friction peak after a velocity step. If the model does not include the filter, the fitted direct
-effect is too small, and the fitted slip distance is too long.
+If the recorded friction was filtered, a fit applies the same filter to the friction of the model. A
+filter smooths the friction peak after a velocity step. If the model did not include the filter, the
+fitted direct effect would be too small, and the fitted slip distance would be too long.
 """
 
 from __future__ import annotations
@@ -21,9 +21,10 @@ MEAN, TRAILING_MEAN = "mean", "trailing_mean"
 LOW_PASS_ORDERS = {"first_order": 1, "butterworth_2": 2, "butterworth_4": 4}
 #: Names of all filters.
 FILTER_KINDS = (MEAN, TRAILING_MEAN, *LOW_PASS_ORDERS)
-#: Number of points for evaluating filters: the smallest number of points in a running mean, the
-#: number of points per period of the corner frequency, the number of periods after which a low-pass
-#: filter has settled, and the largest number of points in the time grid of a low-pass filter.
+#: Settings for evaluating filters. The first value is the smallest number of points in a running
+#: mean. The other values apply to low-pass filters. They are the number of points per period of the
+#: corner frequency, the number of periods after which the filter has settled, and the largest
+#: number of points in the time grid.
 (
     _MIN_POINTS_OF_RUNNING_MEAN,
     _GRID_POINTS_PER_CORNER_PERIOD,

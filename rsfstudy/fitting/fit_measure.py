@@ -61,17 +61,17 @@ from rsfstudy.status import Status
 #: Largest relative tolerance of the integration for which finite differences of the solution are
 #: accurate.
 _RTOL_FOR_FINITE_DIFFERENCES = 1e-9
-#: Factor of the standard error in the scale that divides a numerical error. With this factor, a
-#: numerical error of more than 1 % of the standard error is reported as too large at the default
-#: accuracy of 1e-7.
+#: The numerical error of a parameter is divided by a scale, which contains the standard error of
+#: the parameter multiplied by this factor. With this factor, a numerical error of more than 1 % of
+#: the standard error is reported as too large at the default accuracy of 1e-7.
 _NUMERICAL_ERROR_SCALE_PER_STDERR = 1000.0
-#: Scene fields whose values every fit determines.
+#: Names of the scene fields whose values are determined by every fit.
 _SCENE_FIELDS_SET_BY_FIT = (
     *("a", "b_over_a", "b1_over_a", "b2_over_a", "length_ratio", "mu_star", "stiffness"),
     *("stiffness_ratio", "reference_rate", "load_velocity_ratio"),
 )
-#: Ratio of the direct effect to its lower bound below which the direct effect counts as being at
-#: the bound.
+#: The direct effect counts as being at its lower bound if the ratio of the direct effect to its
+#: lower bound is less than this value.
 _MAX_DIRECT_EFFECT_AT_BOUND_OVER_BOUND = 1.001
 
 
@@ -107,7 +107,8 @@ class Fit(Measure):
         Load point displacements in um to fit before and after the step. If ``before`` is 0, the
         window begins halfway between the previous step and this step, or at the beginning of the
         record if there is no previous step. If ``after`` is 0, the window ends at the next step or
-        at the end of the record. In a joint fit, the window ends at the window of the next step.
+        at the end of the record. In a joint fit, the window of a step ends where the window of the
+        next step begins.
     part : float, default: 1.0
         Fraction of the displacement after the step to fit.
     noise : str, default: "ar"
@@ -115,8 +116,8 @@ class Fit(Measure):
         process with an automatic order, or "ar1", "ar2" and so on.
     loading : {"steps", "recorded"}, default: "steps"
         Loading of the model. With "steps", the load point velocity is constant between the steps.
-        With "recorded", the model follows the recorded displacement, and the recorded normal stress
-        unless the normal stress of the scene is constant.
+        With "recorded", the model follows the recorded displacement. It also follows the recorded
+        normal stress, unless the normal stress of the scene is constant.
     filter : str, optional
         Filter that was applied to friction before it was recorded, such as "mean 1.0" (see
         ``rsfstudy.fitting.Filter``). By default, friction was not filtered.
@@ -284,7 +285,7 @@ class Fit(Measure):
 
     @property
     def quantities(self) -> Sequence[Quantity]:
-        """Meanings and units of outputs, inner dimensions and options."""
+        """Meanings and units of the outputs, of their dimensions, and of the options."""
         draws = [Quantity("draw", "", "1", "number of the draw")] if self.posterior else []
         return (*super().quantities, *draws)
 
@@ -298,11 +299,12 @@ class Fit(Measure):
         return {"parameter": names, "other_parameter": names, "row": rows, **draws}
 
     def error_scales(self, scene: Scene, values: Mapping[str, Any]) -> Mapping[str, float]:
-        """Return the scale that divides the numerical error of each parameter.
+        """Return a scale for the numerical error of each parameter.
 
-        The scale of a parameter is its absolute value plus a large multiple of its standard error.
-        For parameters that may be zero, a constant is added to the scale, because the standard
-        error is zero in records without noise.
+        The numerical error of a parameter is divided by its scale. The scale is the absolute value
+        of the parameter plus a large multiple of the standard error of the parameter. If a
+        parameter may be zero, a constant is added to its scale, because the standard error is also
+        zero if the record has no noise.
 
         Parameters
         ----------

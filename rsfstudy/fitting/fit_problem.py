@@ -59,18 +59,21 @@ _PARAMETER_BOUNDS = {
 #: Largest logarithm of the ratio between the stiffness and its initial guess.
 _MAX_LOG_STIFFNESS_OVER_GUESS = math.log(1e4)
 #: Upper bound of the slip distance, relative to the load point displacement of the window. The
-#: lower bound is the mean displacement between two rows.
+#: lower bound of the slip distance is the mean load point displacement between two rows.
 _MAX_SLIP_DISTANCE_OVER_RECORD_LENGTH = 10.0
-#: Difference between the bounds of the logarithms of the first and the second slip distance.
+#: The bounds of the logarithm of the second slip distance are shifted by this value from the bounds
+#: for the first slip distance, so that the second slip distance is always longer.
 _MIN_LOG_GAP_BETWEEN_SLIP_DISTANCES = 1e-6
 #: Tested initial values of the slip distance, relative to the initial guess.
 _INITIAL_SLIP_DISTANCE_FACTORS = (0.1, 0.3, 1.0, 3.0, 10.0)
-#: Settings of the search: the largest number of passes that estimate the noise and the parameters
-#: in turn, the parameter change in standard errors below which the passes end, the largest number
-#: of model evaluations per pass, and the relative tolerance of the search. The last two settings
-#: apply to the final Gauss-Newton steps. They are the smallest number of steps, the largest number
-#: of steps that do not shrink, the largest number of all steps, and the ratio of successive step
-#: lengths below which a step shrinks.
+#: Settings of the search. The first value is the largest number of iterations. Each iteration
+#: estimates the noise and the parameters. The iterations end if the changes of the parameters in
+#: standard errors are smaller than the second value. The third value is the largest number of model
+#: evaluations per iteration, and the fourth value is the relative tolerance of the search. The last
+#: two settings apply to the final Gauss-Newton steps. The fifth setting contains the smallest
+#: number of Gauss-Newton steps, the largest number of steps that do not shrink, and the largest
+#: number of all steps. A Gauss-Newton step shrinks if the ratio of its length to the length of the
+#: previous step is less than the last value.
 (
     _MAX_NOISE_ESTIMATION_PASSES,
     _NOISE_PASS_TOLERANCE,
@@ -86,16 +89,18 @@ _LEAST_SQUARES_OPTIONS = {
     "gtol": 1e-12,
     "max_nfev": _MAX_MODEL_EVALUATIONS,
 }
-#: Length of the last Gauss-Newton step below which the fit has converged, in standard errors.
+#: The fit has converged if the length of the last Gauss-Newton step in standard errors is less than
+#: this value.
 _NEWTON_STEP_TOLERANCE_IN_STDERRS = 1e-3
 #: Lower bound for the degrees of freedom of confidence intervals.
 _MIN_DEGREES_OF_FREEDOM = 3.0
-#: Criteria for identified parameters: the largest standard error of a parameter, and the smallest
-#: evolution effect in standard errors for which the slip distance is identified. The first limit
-#: applies to the logarithm of a parameter, or to a, b, b1 and b2 divided by the largest of them.
+#: Criteria for parameters that the record constrains. The first value is the largest standard error
+#: of the logarithm of a parameter. For a, b, b1 and b2, it is the largest standard error relative
+#: to the largest of these parameters. The record constrains the slip distance only if the evolution
+#: effect in standard errors exceeds the second value.
 _MAX_STDERR_OF_IDENTIFIED_PARAMETER, _MIN_EVOLUTION_EFFECT_SIGMAS = 0.5, 2.0
-#: Smallest difference of the AIC between models without and with a response to the steps. If the
-#: difference is smaller, the record shows no response.
+#: Smallest difference between the AIC of the model without a response to the steps and the AIC of
+#: the model with a response. If the difference is smaller, the record shows no response.
 _MIN_AIC_GAIN_FROM_STEPS = 10.0
 
 
@@ -361,9 +366,9 @@ class FitProblem:
 
         First, Gauss-Newton steps :math:`(J^T R^{-1} J)^{-1} J^T R^{-1} (y - f)` with accurate
         derivatives refine the parameters. The numerical error of a parameter is the last
-        Gauss-Newton step plus three times the change due to a tenfold reduction of the integration
-        tolerances. The degrees of freedom of the fit are the degrees of freedom of the noise,
-        multiplied by (n - p)/n for p parameters and n rows.
+        Gauss-Newton step, plus three times the change of the parameter if the integration
+        tolerances are reduced by a factor of ten. The degrees of freedom of the fit are the degrees
+        of freedom of the noise, multiplied by (n - p)/n for p parameters and n rows.
         """
         change = math.inf
         for number in range(_NEWTON_STEP_COUNT_LIMITS[2]):
@@ -519,10 +524,10 @@ class FitProblem:
 
 
 def _solve_linear_least_squares(columns: np.ndarray) -> np.ndarray:
-    """Solve a linear least-squares problem.
+    """Compute the coefficients of a linear least-squares problem.
 
-    The last column of the array is the right-hand side, and the result contains the coefficients of
-    the other columns.
+    The last column of the array is approximated by a linear combination of the other columns. The
+    result contains the coefficients of the other columns.
     """
     return np.asarray(np.linalg.lstsq(columns[:, :-1], columns[:, -1])[0])
 
@@ -537,11 +542,12 @@ def _has_converged(
     Parameters
     ----------
     last_coordinate_change : ndarray, shape (parameters,)
-        Last change of the coordinates.
+        Last change of the coordinates of the free parameters.
     whitened_jacobian : ndarray, shape (rows, parameters + 1)
         Whitened derivatives, followed by the whitened residuals.
     tolerance : float
-        Largest change of a coordinate, as a fraction of its standard error.
+        Largest change of the coordinate of a parameter, as a fraction of the standard error of the
+        coordinate.
     """
     size = np.linalg.norm(whitened_jacobian[:, -1]) / math.sqrt(len(whitened_jacobian))
     spread = size * np.sqrt(np.diag(_inverse_normal_matrix(whitened_jacobian[:, :-1])))

@@ -19,9 +19,9 @@ from rsfstudy.fitting.window_model import parameter_derivative_by_coordinate
 class FitSolution:
     """Solution of a fit.
 
-    The search varies coordinates of the parameters. The coordinate of a slip distance or stiffness
-    is the logarithm of the parameter. For all other parameters, the coordinate is the parameter
-    itself.
+    The fit varies slip distances and stiffness on a logarithmic scale. The coordinate of a slip
+    distance or a stiffness is therefore the logarithm of the parameter. For all other parameters,
+    the coordinate is the parameter itself.
 
     Parameters
     ----------
@@ -32,8 +32,8 @@ class FitSolution:
     coordinate_covariance : ndarray, shape (parameters, parameters)
         Covariance matrix of the coordinates of the free parameters.
     noise_caused_covariance : ndarray, shape (parameters, parameters)
-        Contribution of the friction noise to the covariance matrix. The remainder is due to noise
-        in the load point displacement.
+        Contribution of the friction noise to the covariance matrix. The rest of the covariance
+        matrix is due to noise in the load point displacement.
     numerical_errors : dict of {str: float}
         Numerical errors of the free parameters.
     noise_model : NoiseModel
@@ -51,11 +51,11 @@ class FitSolution:
     jacobian : ndarray, shape (rows, parameters)
         Derivatives of the fitted friction with respect to the parameter coordinates.
     loading_error_sensitivity : ndarray, shape (rows, errors)
-        Change of friction due to an error of one standard deviation, for each independent error of
-        the step times and velocities.
+        Change of friction due to each independent error of the step times and step velocities. The
+        size of each error is one standard deviation.
     aic : float
-        Akaike information criterion of the fit, including the noise model. Smaller values are
-        better.
+        Akaike information criterion of the fit, including the noise model. A smaller value means a
+        better fit.
     unidentified_parameters : tuple of str
         Names of the free parameters that the record does not constrain.
     ols_residual_rms : float

@@ -25,15 +25,16 @@ SLIP_DISTANCE_PARAMETER_NAMES = ("slip_distance", "slip_distance_2")
 SIGNIFICANCE_LEVEL = 0.01
 #: Standard deviation of friction below which the residuals are numerical errors rather than noise.
 MIN_STATISTICAL_NOISE_SD = 1e-7
-#: Largest ratio of the root mean square residual to that of an ordinary least-squares fit.
+#: Largest ratio of the root mean square residual of a fit to the root mean square residual of an
+#: ordinary least-squares fit.
 _MAX_RESIDUAL_SD_OVER_LEAST_SQUARES = 2.0
-#: Ratio of the noise to the rounding unit of friction below which rounding errors depend on
-#: friction, and largest fraction of rows that may be outliers.
+#: Rounding errors depend on friction if the ratio of the noise to the rounding unit of friction is
+#: less than the first value. The second value is the largest fraction of rows that may be outliers.
 _MIN_FRICTION_NOISE_PER_QUANTUM, _MAX_OUTLIER_FRACTION = 0.4, 0.05
 #: Smallest number of rows per slip distance for which confidence intervals are reliable.
 _MIN_ROWS_PER_SLIP_DISTANCE = 1.5
-#: Largest ratio between the longer side and the shorter side of a 95 % confidence interval, for the
-#: logarithm of a parameter.
+#: Largest accepted asymmetry of a 95 % confidence interval. The asymmetry is the ratio between the
+#: longer side and the shorter side of the confidence interval of the logarithm of a parameter.
 _MAX_CONFIDENCE_INTERVAL_ASYMMETRY = 3.0
 #: Largest number of outliers that a message lists.
 _MAX_LISTED_OUTLIERS = 10
@@ -127,7 +128,7 @@ def describe_outliers(outlier_rows: np.ndarray) -> str:
 
 
 def _check_misfit_is_small(solution: FitSolution, recorded_friction: np.ndarray) -> Iterator[str]:
-    """Yield a reason if the residuals of the fit are too large."""
+    """Yield a warning message if the residuals of the fit are too large."""
     size = float(np.sqrt(np.mean(solution.noise_model.drop_outliers(solution.residuals) ** 2)))
     if not size < np.std(recorded_friction):
         yield (
@@ -143,7 +144,7 @@ def _check_misfit_is_small(solution: FitSolution, recorded_friction: np.ndarray)
 
 
 def _check_rounding_is_below_noise(solution: FitSolution) -> Iterator[str]:
-    """Yield a reason if the rounding of friction is too coarse."""
+    """Yield a warning message if the rounding of friction is too coarse."""
     if is_rounding_too_coarse(solution):
         yield (
             f"friction is rounded to {solution.friction_rounding_quantum:.2g}, more "
@@ -175,14 +176,14 @@ def is_rounding_too_coarse(solution: FitSolution) -> bool:
 
 
 def _check_outlier_count(solution: FitSolution) -> Iterator[str]:
-    """Yield a reason if too many rows of the record are outliers."""
+    """Yield a warning message if too many rows of the record are outliers."""
     count, rows = len(solution.outlier_rows), len(solution.residuals)
     if count > _MAX_OUTLIER_FRACTION * rows:
         yield f"{count} of {rows} rows are outliers: remove them from the record, or check the law"
 
 
 def _check_residuals_are_white(solution: FitSolution) -> Iterator[str]:
-    """Yield a reason if the whitened residuals are autocorrelated."""
+    """Yield a warning message if the whitened residuals are autocorrelated."""
     p_value = ljung_box_p_value(
         solution.whitened_residuals, solution.noise_model.autoregressive_order
     )
@@ -253,7 +254,8 @@ def find_unidentified_parameters(
 ) -> tuple[str, ...]:
     """Return the parameters that the record does not constrain.
 
-    A record does not constrain a slip distance if it has fewer than 1.5 rows per slip distance.
+    A record does not constrain a slip distance if the record has fewer than 1.5 rows per slip
+    distance of displacement.
 
     Parameters
     ----------

@@ -23,25 +23,27 @@ from rsfstudy.motion import Accuracy, MotionStopped, WorkMeter
 from rsfstudy.slider import Scene
 from rsfstudy.status import Status
 
-#: Fraction of the interval between the previous step and the step at which a window begins by
-#: default, and smallest number of rows per free parameter.
+#: By default, the window of a step begins at this fraction of the interval between the previous
+#: step and the step. The second value is the smallest number of rows per free parameter.
 _WINDOW_START_BEFORE_STEP_FRACTION, _MIN_ROWS_PER_PARAMETER = 0.5, 3
 #: Largest delay of the loading, relative to the time between the start of the window and the step.
 _MAX_LOADING_DELAY_FRACTION = 0.2
-#: Ratio of the actual extent of a window to its requested extent below which a remark is added.
+#: A remark is added to the result if the ratio of the actual extent of a window to its requested
+#: extent is less than this value.
 _MIN_INCLUDED_WINDOW_FRACTION = 0.98
 #: Allowed values of the option ``loading``.
 LOADING_KINDS = ("steps", "recorded")
-#: Settings for comparing recorded and modelled normal stress: the number of rows in the running
-#: median that reduces noise, the quantile of the deviations that is compared with the limit, and
-#: the allowance for noise in standard deviations.
+#: Settings for comparing the recorded normal stress with the normal stress of the model. The first
+#: value is the number of rows in a running median that reduces the noise. The second value is the
+#: quantile of the differences that is compared with a limit. The third value is the number of
+#: standard deviations of the noise that is added to the limit.
 _RUNNING_MEDIAN_ROWS_OF_STRESS, _STRESS_DEPARTURE_QUANTILE, _MAX_STRESS_DEPARTURE_NOISE_SIGMAS = (
     5,
     0.99,
     2.0,
 )
-#: Logarithm of the velocity ratio below which a step is too small for estimating initial values of
-#: a and b.
+#: A step is too small for estimating initial values of a and b if the logarithm of its velocity
+#: ratio is less than this value.
 _MIN_LOG_VELOCITY_RATIO_FOR_GUESS = 0.02
 
 
@@ -65,8 +67,8 @@ class FitWindow:
     fraction_of_displacement_after : float, default: 1.0
         Fraction of the displacement after the step to include.
     other_fitted_step_numbers : collection of int, optional
-        Numbers of the other steps in a joint fit that belong to the same record. If the number of
-        the next step is included, the window ends before the window of the next step.
+        Numbers of the other steps in a joint fit that belong to the same record. If the next step
+        is also fitted, the window of this step ends before the window of the next step begins.
 
     Notes
     -----
@@ -379,8 +381,9 @@ class FitWindow:
 def compute_stiffness_factors(windows: Sequence[FitWindow]) -> tuple[float, ...]:
     """Compute the ratio of stiffness to normal stress in each window.
 
-    The machine stiffness is the same in all windows, so the ratio depends only on the normal
-    stress. The result is relative to the ratio in the first window.
+    The machine stiffness is the same in all windows, so the ratio of stiffness to normal stress
+    depends only on the normal stress. The ratio in each window is divided by the ratio in the first
+    window.
 
     Parameters
     ----------
@@ -390,8 +393,8 @@ def compute_stiffness_factors(windows: Sequence[FitWindow]) -> tuple[float, ...]
     Returns
     -------
     tuple of float
-        One relative ratio per window. The tuple is empty if the normal stress of a window is
-        unknown.
+        Ratio in each window, divided by the ratio in the first window. The tuple is empty if the
+        normal stress of a window is unknown.
     """
     stresses = np.array([window.mean_normal_stress_before_step for window in windows])
     known = bool(np.isfinite(stresses).all() and stresses.all())

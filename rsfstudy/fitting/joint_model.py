@@ -161,8 +161,8 @@ class JointModel:
     models : tuple of WindowModel
         Models of the windows.
     stiffness_factors : tuple of float, optional
-        Stiffness divided by normal stress for each window, relative to the first window. By
-        default, all factors are 1.
+        Ratio of stiffness to normal stress in each window, divided by the ratio in the first
+        window. By default, all factors are 1.
     """
 
     models: tuple[WindowModel, ...]
@@ -225,7 +225,7 @@ class JointModel:
         Returns
         -------
         float
-            Largest delay in s for the window of the step time.
+            Largest delay of the loading in s, for the window to which the step time belongs.
         """
         return self.models[max(split_window_number(parameter_name)[1] - 1, 0)].max_loading_delay
 
@@ -346,8 +346,8 @@ class JointModel:
         Returns
         -------
         ndarray, shape (rows, errors)
-            Change of friction due to an error of one standard deviation, for each independent
-            error. An error of the loading changes friction in one window only.
+            Change of friction due to each independent error of the loading. The size of each error
+            is one standard deviation. An error of the loading changes friction in one window only.
         """
         return np.asarray(
             block_diag(

@@ -11,18 +11,21 @@ from rsfstudy.fitting.outliers import find_non_outlier_mask, find_rounding_quant
 from rsfstudy.fitting.record import Record
 from rsfstudy.fitting.velocity_steps import CumulativeLineFitSums
 
-#: Size limits: the largest number of block averages of friction, the smallest number of block
-#: averages on each side of a break, and the smallest number of rows to test.
+#: Limits for the amount of data. The first two values are the largest number of block averages of
+#: friction, and the smallest number of block averages in each of two lines. The third value is the
+#: smallest number of rows to test.
 _MAX_FITTED_ROW_MEANS, _MIN_ROW_MEANS_BESIDE_BREAK, _MIN_ROWS_OF_LINEAR_PORTION = 120, 6, 20
-#: Smallest decrease of the sum of squared residuals due to a second line, divided by the residual
-#: variance and by ln n for n block averages. The residual variance is increased if the residuals
-#: are correlated.
+#: Smallest decrease of the sum of squared residuals if two lines are fitted instead of one line.
+#: The decrease is divided by the residual variance and by ln n for n block averages. The residual
+#: variance is increased if the residuals are correlated.
 _MIN_SQUARES_REDUCTION_BY_SLOPE_BREAK = 15.0
-#: Smallest deviation of friction from the line through the later rows, as an absolute value and in
+#: Earlier rows are discarded only if their friction deviates from the line through the later rows
+#: by more than these limits. The first limit is an absolute value, and the second limit is in
 #: standard deviations of the residuals. For comparison, a tenfold velocity step changes friction by
 #: about 0.02.
 _MIN_FRICTION_DEPARTURE_FROM_LINE, _MIN_FRICTION_DEPARTURE_SIGMAS = 4e-4, 4.0
-#: Fraction of the rows from which the noise is estimated. The rows closest to the step are used.
+#: Fraction of the rows before a step from which the noise is estimated. These rows are the rows
+#: closest to the step.
 _FRACTION_OF_ROWS_FOR_NOISE = 0.4
 #: Upper bound of the estimated correlation between successive block averages.
 _MAX_CORRELATION_OF_ROW_MEANS = 0.98
@@ -32,11 +35,12 @@ _MAX_CORRELATION_OF_ROW_MEANS = 0.98
 def find_start_of_linear_friction(record: Record, start_time: float, end_time: float) -> float:
     """Find the time from which friction before a step is linear.
 
-    The earlier rows are discarded if two conditions are met. First, two separate lines must fit
-    friction far better than a single line. The comparison of the two fits accounts for the
-    correlation of the residuals. Second, friction in the earlier rows must differ noticeably from
-    the line through the later rows. The test is repeated with the remaining rows until no rows are
-    discarded. Before the test, outliers are replaced by interpolated values.
+    The earlier rows before a step are discarded if two conditions are met. First, two separate
+    lines must fit friction far better than a single line. The comparison of the two fits accounts
+    for the correlation of the residuals. Second, friction in the earlier rows must differ
+    noticeably from the line through the later rows. The test of both conditions is repeated with
+    the remaining rows until no rows are discarded. Before the test, outliers are replaced by
+    interpolated values.
 
     Parameters
     ----------
@@ -74,7 +78,7 @@ def _find_slope_break(row_times: np.ndarray, friction: np.ndarray) -> int:
     Returns
     -------
     int
-        Index of the row, or 0 if a single line is sufficient.
+        Index of the row at which the second line begins, or 0 if a single line is sufficient.
     """
     count = len(row_times)
     sums = CumulativeLineFitSums(row_times - row_times[0], friction - friction[0], np.ones(count))

@@ -22,10 +22,12 @@ from rsfstudy.fitting.window_model import LOADING_STEP_SHIFT_OVER_STANDARD_ERROR
 #: Largest number of block averages from which the noise is estimated. An autoregressive process of
 #: block averages also describes slow fluctuations of the load point around its set point.
 _MAX_ROW_MEANS_FOR_NOISE = 1000
-#: Ratio of the noise to the total displacement of the record below which the noise is neglected.
+#: The noise of the load point displacement is neglected if the ratio of the noise to the total
+#: displacement of the record is less than this value.
 _MIN_NOISE_OVER_DISPLACEMENT = 1e-7
-#: Ratio of the noise to the rounding unit of displacement below which rounding errors are not
-#: random, and number of random phases in the simulation of rounding errors.
+#: Rounding errors are not random if the ratio of the noise to the rounding unit of displacement is
+#: less than the first value. The second value is the number of random phases in the simulation of
+#: rounding errors.
 _MIN_DISPLACEMENT_NOISE_PER_QUANTUM, _ROUNDING_PHASE_DRAW_COUNT = 0.4, 200
 
 
@@ -35,8 +37,8 @@ def shift_steps_by_their_errors(
     """Return copies of the steps with shifted times and velocities.
 
     The covariance matrix of the step times and velocities is the sum of contributions of
-    statistically independent errors. In each copy, the times and velocities are shifted by 1 % of
-    one independent error.
+    statistically independent errors. In each copy of the steps, the step times and velocities are
+    shifted by 1 % of one independent error.
 
     Parameters
     ----------

@@ -15,13 +15,14 @@ white noise :math:`w`. The process is stationary if all partial autocorrelations
 guess.
 
 The REML search does not change the order :math:`m`. The noise model "ar" selects the order before
-the search, by minimising the Akaike information criterion (AIC) of the Burg coefficients. All
-sampling intervals have the same order. The function ``fit_solution.compute_aic`` computes another
-quantity, the corrected AIC of the complete fit.
+the search, by minimising the Akaike information criterion (AIC) of the Burg coefficients. The
+autoregressive order is the same for all sampling intervals. The function
+``fit_solution.compute_aic`` computes another quantity, the corrected AIC of the complete fit.
 
 Each sampling interval has a separate noise process, with its own standard deviation and
-correlation. Noise is predicted from earlier rows even if the sampling interval changes. The rows
-before the change are then scaled by the ratio of the two standard deviations.
+correlation. If the sampling interval changes, the noise after the change is still predicted from
+the rows before the change. These rows are scaled by the ratio of the standard deviations of the
+noise after and before the change.
 
 References
 ----------
@@ -58,12 +59,13 @@ from rsfstudy.fitting.whiteness_test import ljung_box_p_value as ljung_box_p_val
 WHITE_NOISE_NAME, AUTOREGRESSIVE_NOISE_NAME = "white", "ar"
 #: Highest order of the autoregressive process, and smallest number of rows per coefficient.
 MAX_AUTOREGRESSIVE_ORDER, _MIN_SAMPLES_PER_COEFFICIENT = 12, 10
-#: Largest absolute value of a partial autocorrelation, and gradient of the REML objective below
-#: which the search ends.
+#: Largest absolute value of a partial autocorrelation. The search ends if the gradient of the REML
+#: objective is less than the second value.
 _MAX_PARTIAL_AUTOCORRELATION, _REML_GRADIENT_TOLERANCE = 0.999, 0.02
-#: Largest number of passes that estimate the noise levels and the autoregressive process in turn.
+#: Largest number of iterations. Each iteration estimates the noise levels and the autoregressive
+#: process.
 _MAX_NOISE_LEVEL_REFINEMENT_PASSES = 2
-#: Smallest noise level, relative to the root mean square of the residuals. A noise level is the
+#: Smallest noise level, relative to the root mean square of the residuals. The noise level is the
 #: standard deviation of the noise in a segment of the record.
 _MIN_NOISE_LEVEL_SD_OVER_RESIDUAL_RMS = 1e-3
 #: Largest logarithm of the ratio of a noise level to the first noise level.
@@ -114,8 +116,8 @@ class NoiseModel:
     non_outlier_mask : ndarray of bool, shape (rows,), optional
         Mask that is False for outliers. By default, no rows are outliers.
     averaging_correlation : AveragingCorrelation, optional
-        Correlation due to averaging by a data logger, which is removed before the autoregressive
-        correlation.
+        Correlation due to averaging by a data logger. This correlation is removed before the
+        autoregressive correlation.
     """
 
     sampling_runs: tuple[SamplingRun, ...]
@@ -274,7 +276,8 @@ def build_white_noise_model(time: np.ndarray) -> NoiseModel:
     Returns
     -------
     NoiseModel
-        White noise model. The standard deviation is the same for all sampling intervals.
+        White noise model. The standard deviation of the noise is the same for all sampling
+        intervals.
     """
     runs = find_sampling_runs(time)
     return NoiseModel(
@@ -510,9 +513,10 @@ class _LaggedProductSums:
                 width,
             )
         )
-        #: Properties of the first rows of each run: an array with the first rows and the earlier
-        #: rows from which they are predicted, the number of earlier rows, the index of the noise
-        #: process, and the noise levels of all rows in the array.
+        #: Properties of the first rows of each run. The first item is an array with the first rows
+        #: of the run, and with the earlier rows from which the first rows are predicted. The other
+        #: items are the number of earlier rows, the index of the noise process, and the noise
+        #: levels of all rows in the array.
         self.initial_row_blocks: list[tuple[np.ndarray, int, int, np.ndarray]] = []
         levels = repeat_run_field_per_row(sampling_runs, "noise_level_index")
         for run in sampling_runs:
@@ -581,7 +585,7 @@ def _select_autoregressive_order(residual_runs_per_process: Sequence[Sequence[np
     r"""Return the autoregressive order that minimises the AIC.
 
     For each noise process with :math:`n` samples and Burg coefficients :math:`k_i`, the AIC is
-    :math:`n \sum_{i=1}^m \ln(1 - k_i^2) + 2 m`. The criterion is summed over the noise processes.
+    :math:`n \sum_{i=1}^m \ln(1 - k_i^2) + 2 m`. The AIC is summed over the noise processes.
     """
     shortest = min(max(map(len, part)) for part in residual_runs_per_process)
     highest = min(MAX_AUTOREGRESSIVE_ORDER, shortest // _MIN_SAMPLES_PER_COEFFICIENT)

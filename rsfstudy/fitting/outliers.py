@@ -5,12 +5,13 @@ from __future__ import annotations
 import numpy as np
 from scipy.ndimage import maximum_filter, rank_filter
 
-#: Number of neighbours on each side of a row from which the median is computed, and number of rows
-#: per block for estimating the local standard deviation.
+#: Number of neighbours on each side of a row for computing the median of the neighbours, and number
+#: of rows per block for estimating the local standard deviation.
 _NEIGHBOURS_PER_SIDE_FOR_MEDIAN, _ROWS_PER_RESIDUAL_SCALE_BLOCK = 3, 100
-#: Smallest deviation of an outlier from the median of its neighbours, in standard deviations and
-#: relative to the corresponding deviation of the model. The second limit excludes misfits at a peak
-#: of the model.
+#: Smallest deviation of an outlier from the median of its neighbours. The first limit is in
+#: standard deviations. The second limit is relative to the deviation of the model friction from the
+#: median of its neighbours. Because of the second limit, a misfit at a peak of the model is not an
+#: outlier.
 _OUTLIER_SIGMAS, _MIN_OUTLIER_OVER_MODEL_DEPARTURE = 6.0, 2.0
 #: Ratio of the standard deviation to the median absolute deviation for Gaussian noise.
 _STANDARD_DEVIATION_PER_MAD = 1.4826
@@ -55,9 +56,10 @@ def find_non_outlier_mask(
     """Find the rows that are not outliers.
 
     The function compares each residual with the median of the neighbouring residuals. A row is an
-    outlier if the difference exceeds six local standard deviations and twice the corresponding
-    difference of the model. The second condition is necessary because a misfit at a peak of the
-    model is not an outlier.
+    outlier if its residual differs from this median by more than six local standard deviations. The
+    difference must also exceed twice the difference between the model friction of the row and the
+    median of the neighbouring model friction. The second condition is necessary because a misfit at
+    a peak of the model is not an outlier.
 
     Parameters
     ----------

@@ -66,10 +66,10 @@ def sample_posterior_coordinates(
 ) -> tuple[np.ndarray, float]:
     """Sample the posterior distribution of the free parameters.
 
-    Half of the sampling steps are stretch moves. The other half are independent proposals from a
-    multivariate t distribution with the covariance matrix of the fit. The sampler stops when the
-    chain is longer than 50 autocorrelation times and the number of independent samples exceeds the
-    number of draws.
+    Half of the sampling steps are stretch moves. The other half of the sampling steps are
+    independent proposals from a multivariate t distribution with the covariance matrix of the fit.
+    The sampler stops when the chain is longer than 50 autocorrelation times and the number of
+    independent samples exceeds the number of draws.
 
     Parameters
     ----------

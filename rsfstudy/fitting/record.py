@@ -291,8 +291,8 @@ def loading_history(
 ) -> np.ndarray:
     """Return the loading history of a record between two times.
 
-    Before the first segment, the slider slides steadily at the load point velocity before the first
-    step.
+    Before the first segment of the loading history, the slider slides steadily. Its slip rate is
+    the load point velocity before the first step.
 
     Parameters
     ----------
@@ -302,9 +302,9 @@ def loading_history(
         Times in s.
     use_recorded_rows : bool
         If True, each row of the record begins a segment. The recorded displacement is first
-        replaced by the closest displacement that never decreases. If False, the load point velocity
-        and the normal stress are constant between the steps, and change at a constant rate during a
-        step.
+        replaced by the closest sequence of displacements that never decreases. If False, the load
+        point velocity and the normal stress are constant between the steps, and change at a
+        constant rate during a step.
 
     Returns
     -------
@@ -383,8 +383,9 @@ def _velocity_profile(step: LoadingStep) -> list[tuple[float, float]]:
     Returns
     -------
     list of (float, float)
-        Constant-velocity segments of the step. Each segment is a pair of its start, as a fraction
-        of the step duration, and its velocity in um/s. The list is empty if the step is immediate.
+        Constant-velocity segments of the step. Each segment is a pair of two numbers. The first
+        number is the start of the segment as a fraction of the step duration. The second number is
+        the velocity in um/s. The list is empty if the step is immediate.
     """
     lasts = step.end - step.start
     if not lasts > 0.0:
@@ -416,8 +417,8 @@ def _build_loading_from_rows(
     initial_velocity : float
         Load point velocity of the first segment in um/s.
     initial_normal_stress : float
-        Normal stress in Pa that normalises the recorded normal stress. If NaN, the normal stress of
-        the first row is used.
+        Normal stress in Pa by which the recorded normal stress is divided. If NaN, the normal
+        stress of the first row is used.
 
     Returns
     -------

@@ -30,10 +30,11 @@ EVENT_QUANTITIES = {
         "highest shear stress less that at peak slip rate",
     ),
 }
-#: Properties of an event and a flag for incomplete events. The properties are pairs of a value and
-#: its error, by name.
+#: Properties of an event, and a flag for incomplete events. The properties are a dictionary. For
+#: each name, the dictionary contains a value and its error.
 EventNumbers = tuple[dict[str, tuple[float, float]], int]
-#: Smallest accepted drop, relative to the half width of the 95 % confidence interval of its size.
+#: A stress drop is accepted if the ratio of its size to the half width of the 95 % confidence
+#: interval of its size exceeds this value.
 _MIN_DROP_OVER_ITS_ERROR = 1.0
 
 

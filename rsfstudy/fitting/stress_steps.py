@@ -3,9 +3,10 @@
 A step is a change from one constant normal stress to another constant normal stress. The algorithm
 compares the mean normal stress in a window of rows with the mean normal stress in the previous
 window. A step is detected if the two means differ by at least 2 % and by far more than the typical
-difference between successive windows. The typical difference includes the effects of correlated
-noise and of a drift of the whole record. A ramp between two constant normal stresses is a step with
-a finite duration. A drift that continues to the beginning or the end of the record is not a step.
+difference between successive windows. The typical difference between successive windows includes
+the effects of correlated noise and of a drift of the whole record. A ramp between two constant
+normal stresses is a step with a finite duration. A drift that continues to the beginning or the end
+of the record is not a step.
 """
 
 from __future__ import annotations
@@ -20,14 +21,16 @@ from scipy.ndimage import find_objects, label
 
 from rsfstudy.fitting.velocity_steps import LoadingStep
 
-#: Smallest change of normal stress that is detected as a step, relative to the normal stress and
-#: relative to the robust standard deviation of the differences between windows.
+#: Smallest change of normal stress that is detected as a step. The first value is relative to the
+#: normal stress. The second value is relative to a robust standard deviation of the differences
+#: between successive windows.
 MIN_RELATIVE_NORMAL_STRESS_CHANGE, _MIN_NORMAL_STRESS_CHANGE_SIGMAS = 0.02, 6.0
-#: Largest difference between the normal stresses in short and long windows next to a change, as a
-#: fraction of the change. If the difference is larger, the change is a fraction of a longer ramp.
+#: Largest difference between the normal stress in a short window and the normal stress in a long
+#: window next to a change of normal stress. The difference is relative to the change. If the
+#: difference is larger, the change belongs to a longer ramp.
 _MAX_STRESS_LEVEL_DRIFT_OVER_CHANGE = 0.25
-#: Fraction of the smallest detectable change above which a difference between windows belongs to a
-#: step.
+#: A difference between the normal stresses of successive windows belongs to a step if it exceeds
+#: this fraction of the smallest detectable change.
 _MIN_DIFFERENCE_OVER_DETECTABLE_CHANGE = 0.4
 #: Settings of the step detection: the largest number of rows, the numbers of windows per record,
 #: and the smallest number of rows per window. Longer records are first averaged over blocks of
@@ -37,8 +40,8 @@ _MAX_ROWS_FOR_STEP_DETECTION, _RECORD_PARTITION_COUNTS, _MIN_ROWS_PER_RECORD_PAR
     (400, 100, 25),
     8,
 )
-#: Lower and upper limit of the rows that are used to fit a ramp, as fractions of the change of
-#: normal stress, and smallest number of rows for the fit.
+#: A ramp is fitted to the rows in which the change of normal stress is between these two fractions
+#: of the total change. The last value is the smallest number of rows for the fit.
 _RAMP_FIT_CHANGE_FRACTIONS, _MIN_RAMP_ROWS = (0.1, 0.9), 3
 #: Ratio of the standard deviation to the median absolute deviation for Gaussian noise.
 _STANDARD_DEVIATION_PER_MAD = 1.4826
@@ -223,8 +226,8 @@ def set_stress_levels(
     Returns
     -------
     tuple of LoadingStep
-        Steps with normal stresses. An immediate change of normal stress is extended to one sampling
-        interval.
+        Steps with normal stresses. If the change of normal stress is immediate, it is replaced by a
+        change that lasts one sampling interval.
     """
     ends = [-math.inf, *(step.end for step in steps)]
     begins = [*(step.start for step in steps[1:]), math.inf]

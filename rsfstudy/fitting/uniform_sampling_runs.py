@@ -15,14 +15,14 @@ from typing import NamedTuple
 import numpy as np
 from scipy.ndimage import uniform_filter1d
 
-#: Ratio of two sampling intervals above which the intervals belong to different classes.
+#: Two sampling intervals belong to different classes if their ratio exceeds this value.
 _MAX_SAMPLING_INTERVAL_RATIO = 2.0
 #: Number of rows in the running mean of the sampling intervals, smallest number of rows of a class
 #: with a separate noise process, and smallest number of rows of a run.
 _RUNNING_MEAN_ROWS, _MIN_ROWS_PER_NOISE_PROCESS, _MIN_ROWS_PER_SAMPLING_RUN = 15, 100, 30
-#: Criteria for separate noise levels: the smallest number of rows, the smallest fraction of the
-#: record, the smallest likelihood gain divided by ln n for n rows, and the largest number of noise
-#: level changes.
+#: Criteria for separate noise levels. The first two values are the smallest number of rows, and the
+#: smallest fraction of the record. The third value is the smallest increase of the likelihood,
+#: divided by ln n for n rows. The fourth value is the largest number of changes of the noise level.
 (
     _MIN_ROWS_PER_NOISE_LEVEL,
     _MIN_RECORD_FRACTION_PER_NOISE_LEVEL,
@@ -40,7 +40,7 @@ class SamplingRun(NamedTuple):
     Parameters
     ----------
     start_row, stop_row : int
-        Index of the first row, and index after the last row.
+        Index of the first row, and index of the row after the last row.
     noise_process_index : int
         Index of the noise process.
     row_count_since_clock_start : int
@@ -69,7 +69,8 @@ def find_sampling_runs(time: np.ndarray) -> tuple[SamplingRun, ...]:
     Returns
     -------
     tuple of SamplingRun
-        Runs that cover all rows. Each noise process has a single noise level with the same index.
+        Runs that cover all rows. Each noise process has a single noise level. The index of the
+        noise level is equal to the index of the noise process.
     """
     kinds, begins = _classify_sampling_intervals(time), np.diff(time) <= 0.0
     bounds = (np.flatnonzero((np.diff(kinds) != 0) | begins) + 1).tolist()
@@ -151,7 +152,7 @@ def repeat_run_field_per_row(runs: Sequence[SamplingRun], run_field_name: str) -
     Returns
     -------
     ndarray of int, shape (rows,)
-        Index of each row.
+        Index of the noise process, or of the noise level, for each row.
     """
     return np.repeat(
         [getattr(run, run_field_name) for run in runs],
@@ -173,7 +174,7 @@ def find_noise_level_changes(
     whitened_residuals : ndarray, shape (rows,)
         Whitened residuals.
     min_absolute_value : float, default: 0.0
-        Lower bound of the absolute differences.
+        Lower bound of the absolute differences between successive residuals.
 
     Returns
     -------

@@ -27,22 +27,25 @@ from rsfstudy.error_boundary import wrap_methods_in_error_boundary
 
 #: Largest number of rows that are segmented. Longer records are first averaged over blocks of rows.
 _MAX_ROWS_FOR_STEP_DETECTION = 20_000
-#: Criteria for separate segments: the smallest number of rows of a segment, the smallest velocity
-#: change relative to the faster velocity, and the smallest displacement due to the velocity change
-#: relative to the standard deviation of the residuals. The displacement criterion is necessary
-#: because a servo-controlled load point fluctuates around its set point.
+#: Criteria for separate segments of constant velocity. The first value is the smallest number of
+#: rows of a segment. The second value is the smallest change of velocity between two segments,
+#: relative to the faster velocity. The third value is the smallest displacement due to the change
+#: of velocity, relative to the standard deviation of the residuals. The third criterion is
+#: necessary because a servo-controlled load point fluctuates around its set point.
 _MIN_SEGMENT_ROWS, _MIN_RELATIVE_VELOCITY_CHANGE, _MIN_DISPLACEMENT_CHANGE_SIGMAS = 5, 0.2, 10.0
 #: Smallest reduction of the sum of squares by a split, divided by the noise variance and by ln n
 #: for n rows.
 _MIN_SQUARES_REDUCTION_BY_SEGMENT_SPLIT = 12.0
-#: Fraction of the highest velocity below which the load point is considered to be held.
+#: The load point is considered to be held if its velocity is less than this fraction of its highest
+#: velocity.
 _MAX_HOLD_VELOCITY_OVER_HIGHEST_VELOCITY = 0.01
-#: Limits for combining several velocity changes into a single step: the longest duration of the
-#: step relative to the preceding segment and to the rest of the record, and the number of rows
-#: below which a segment is too short for a fit.
+#: Limits for combining several velocity changes into a single step. The first value is the longest
+#: duration of the step, relative to the duration of the preceding segment and to the duration of
+#: the rest of the record. A segment is too short for a fit if its number of rows is less than the
+#: second value.
 _MAX_RAMP_SEGMENT_OVER_NEIGHBOURS, _MAX_RAMP_SEGMENT_ROWS = 0.05, 15
-#: Number of rows from which the local noise is estimated, and ratio of the local noise to the
-#: typical noise above which the local noise is used.
+#: Number of rows from which the local noise is estimated. The local noise is used if the ratio of
+#: the local noise to the typical noise exceeds the second value.
 _LOCAL_NOISE_ROWS, _MIN_LOCAL_OVER_GLOBAL_NOISE = 31, 2.0
 #: Ratio of the standard deviation to the median absolute deviation for Gaussian noise.
 _STANDARD_DEVIATION_PER_MAD = 1.4826
@@ -68,9 +71,9 @@ class LoadingStep(NamedTuple):
     stress_before, stress_after : float, default: NaN
         Normal stresses in Pa, or NaN if the normal stress was not recorded.
     velocity_profile : tuple of (float, float), optional
-        Velocities during a step that overshoots, as pairs of a time in s since the start of the
-        step and the velocity in um/s from that time on. By default, the velocity changes at a
-        constant rate.
+        Velocities during a step in which the velocity overshoots. Each pair contains a time in s
+        since the start of the step, and the velocity in um/s from this time on. By default, the
+        velocity changes at a constant rate.
 
     Examples
     --------
@@ -108,9 +111,9 @@ class LoadingStep(NamedTuple):
 def detect_velocity_steps(time: np.ndarray, displacement: np.ndarray) -> tuple[LoadingStep, ...]:
     """Detect the load point velocity steps in a record.
 
-    Neighbouring segments are separate if their velocities differ by at least 20 %, and if the split
-    reduces the sum of squares by far more than expected by chance. A ramp between two velocities is
-    detected as a single step with a finite duration.
+    Two neighbouring segments are separate if their velocities differ by at least 20 %. In addition,
+    the fit of two lines must reduce the sum of squares of a single line by far more than expected
+    by chance. A ramp between two velocities is detected as a single step with a finite duration.
 
     Parameters
     ----------
@@ -209,8 +212,8 @@ class CumulativeLineFitSums:
         Returns
         -------
         tuple of ndarray
-            Five moments: the mean of t, the mean of x, and the sums of the products tt, tx and xx
-            of deviations from the means.
+            The mean of t, the mean of x, and three sums over the rows. If dt and dx are the
+            deviations from the two means, the terms of the sums are dt dt, dt dx and dx dx.
         """
         n, st, sx, stt, stx, sxx = (
             self.cumulative_sums[stop_row] - self.cumulative_sums[start_row]
@@ -275,8 +278,8 @@ class CumulativeLineFitSums:
 def _deviations_from_neighbours(time: np.ndarray, displacement: np.ndarray) -> np.ndarray:
     """Compute the deviation of each sample from the line through its neighbours.
 
-    The deviations are scaled so that white noise and its deviations have the same standard
-    deviation.
+    The deviations are multiplied by a constant factor. If the samples are white noise, the standard
+    deviation of the scaled deviations is therefore equal to the standard deviation of the noise.
     """
     share = (time[1:-1] - time[:-2]) / (time[2:] - time[:-2])
     off = displacement[1:-1] - (1.0 - share) * displacement[:-2] - share * displacement[2:]
@@ -454,7 +457,8 @@ def _refine_line_intersection_time(
 ) -> float:
     """Compute the intersection of two lines again, from all rows of the record.
 
-    The second computation is necessary if the segmentation used averages over blocks of rows.
+    The intersection is less accurate before this computation if the segmentation used averages over
+    blocks of rows.
     """
     middle = int(np.searchsorted(time, initial_time))
     i, j = max(middle - 20 * row_reach, 0), min(middle + 20 * row_reach, len(time))

@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 from scipy.stats import chi2
 
-#: Number of lags in the test minus the order of the noise model.
+#: The number of lags in the autocorrelation test is the sum of this value and the order of the
+#: noise model.
 LAG_COUNT = 20
 
 
@@ -17,7 +18,8 @@ def ljung_box_p_value(whitened_residuals: np.ndarray, autoregressive_order: int)
     whitened_residuals : ndarray, shape (rows,)
         Whitened residuals.
     autoregressive_order : int
-        Order of the autoregressive noise model, which reduces the degrees of freedom of the test.
+        Order of the autoregressive noise model. The degrees of freedom of the test are the number
+        of lags minus this order.
 
     Returns
     -------

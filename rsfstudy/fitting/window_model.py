@@ -30,8 +30,8 @@ from rsfstudy.status import Status
 
 #: Parameter values by name.
 ParameterValues = Mapping[str, float]
-#: Step size of a finite difference relative to the scale of the parameter, and order of the finite
-#: difference (2 or 4).
+#: Relative step size and order of a finite difference. The step size is relative to the scale of
+#: the parameter. The order is 2 or 4.
 DifferenceScheme = tuple[float, int]
 
 #: Parameters that a fit may determine, by name.
@@ -69,29 +69,31 @@ PARAMETER_SYNONYMS = {
 }
 #: Parameters that only some friction laws have.
 PARAMETERS_OF_SOME_LAWS_ONLY = frozenset({"b", "b1", "b2", "slip_distance_2", "law_exponent"})
-#: Parameters whose logarithm is varied by the search.
+#: Names of the parameters that the fit varies on a logarithmic scale.
 LOGARITHMIC_PARAMETERS = frozenset({"slip_distance", "slip_distance_2", "stiffness"})
-#: Finite differences for the search and for the final solution. Because simulated friction is
-#: reproducible to 1e-11, the relative error of second-order differences is 1e-5 if the motion is
-#: far from unstable, and the relative error of fourth-order differences is always less than 1e-6.
+#: Finite differences for the search and for the final solution. Simulated friction is reproducible
+#: to 1e-11. The relative error of second-order differences is therefore 1e-5 if the motion is far
+#: from unstable. The relative error of fourth-order differences is always less than 1e-6.
 QUICK_DIFFERENCE_SCHEME, ACCURATE_DIFFERENCE_SCHEME = (3e-4, 2), (5e-3, 4)
 #: Largest relative difference between the central differences with step sizes h and 2 h, and
 #: largest number of tested step sizes. The relative error of the fourth-order difference is about
 #: the square of the first value.
 _DIFFERENCE_AGREEMENT_TOLERANCE, _MAX_DIFFERENCE_STEP_REDUCTIONS = 2e-4, 4
-#: Shift of a load point step in a finite difference, as a fraction of the standard error of the
-#: step.
+#: Shift of the time or velocity of a load point step for a finite difference, as a fraction of the
+#: standard error of the time or velocity.
 LOADING_STEP_SHIFT_OVER_STANDARD_ERROR = 0.01
 #: Domains of bounded parameters. Near the ends of a domain, one-sided finite differences are used.
 _PARAMETER_DOMAINS = {"law_exponent": (0.0, 1.0), "alpha": (0.0, math.inf)}
-#: Scales of some parameters for the step sizes of finite differences. The method
-#: ``WindowModel._parameter_scale`` computes the scales of all other parameters.
+#: Scales of some parameters. The step size of a finite difference is proportional to the scale of
+#: the parameter. The method ``WindowModel._parameter_scale`` computes the scales of all other
+#: parameters.
 _TYPICAL_PARAMETER_SIZES = {"mu_star": 0.6, "alpha": 0.5, "law_exponent": 1.0}
 #: The largest number of right-hand-side evaluations of a simulation is the sum of three terms: a
 #: constant, a number for each loading segment, and a number for a stiff spring, which has an upper
 #: limit. The simulation of a motion that fits a record needs a few thousand evaluations, and about
-#: 20 for each segment. A stiff spring needs about 2 k x/a evaluations for a displacement x of the
-#: window, and the third term is twice this number.
+#: 20 for each segment. A stiff spring needs about 2 k x/a evaluations, where k is the stiffness, x
+#: is the displacement of the window, and a is the direct effect. The third term is twice this
+#: number.
 _MAX_EVALUATIONS, _MAX_EVALUATIONS_PER_SEGMENT, _MAX_EVALUATIONS_FOR_STIFF_SPRING = (
     50_000,
     60,
@@ -288,7 +290,8 @@ class WindowModel:
 
         The motion starts from steady sliding before the first step. As in an experiment, friction
         is the spring stress divided by the normal stress. If the loading is delayed by
-        ``step_time``, the simulated motion is evaluated at correspondingly earlier times.
+        ``step_time``, the simulated motion is evaluated at times that are earlier by the same
+        delay.
 
         Parameters
         ----------
@@ -375,8 +378,8 @@ class WindowModel:
         Returns
         -------
         ndarray, shape (rows, errors)
-            Change of friction due to an error of one standard deviation, for each independent error
-            of the steps. The values are NaN if a simulation fails.
+            Change of friction due to each independent error of the steps. The size of each error is
+            one standard deviation. The values are NaN if a simulation fails.
         """
         if not self.loadings_with_shifted_steps:
             return np.zeros((len(self.time), 0))
@@ -505,7 +508,7 @@ class WindowModel:
         return found
 
     def _typical_parameter_size(self, parameter_name: str, values: ParameterValues) -> float:
-        """Return the scale of a parameter for step sizes of finite differences."""
+        """Return the parameter scale for the step size of finite differences."""
         if parameter_name in LOGARITHMIC_PARAMETERS:
             return 1.0
         if parameter_name == "a":
@@ -622,7 +625,7 @@ def shift_parameter(
 
 
 def parameter_to_coordinate(parameter_name: str, parameter_value: float) -> float:
-    """Convert a parameter value to the coordinate that the search varies.
+    """Convert a parameter to its logarithm if the fit varies the logarithm.
 
     Parameters
     ----------
@@ -643,14 +646,15 @@ def parameter_to_coordinate(parameter_name: str, parameter_value: float) -> floa
 
 
 def coordinate_to_parameter(parameter_name: str, coordinate: float) -> float:
-    """Convert a coordinate that the search varies to a parameter value.
+    """Convert the logarithm of a parameter to its value if necessary.
 
     Parameters
     ----------
     parameter_name : str
         Name of the parameter.
     coordinate : float
-        Coordinate that the search varies.
+        Logarithm of the parameter for parameters in ``LOGARITHMIC_PARAMETERS``, and the value
+        itself for all other parameters.
 
     Returns
     -------
@@ -661,7 +665,7 @@ def coordinate_to_parameter(parameter_name: str, coordinate: float) -> float:
 
 
 def parameter_derivative_by_coordinate(parameter_name: str, parameter_value: float) -> float:
-    """Compute the derivative of a parameter with respect to its coordinate.
+    """Compute the derivative of a parameter with respect to its fit coordinate.
 
     Parameters
     ----------
