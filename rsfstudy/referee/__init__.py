@@ -1,8 +1,8 @@
 """Benchmark problems with known answers for checking other codes.
 
 The package ``rsfstudy.referee`` reads problem files and the answers of other codes, and counts the
-correct digits of an answer. For a user-defined problem, rsfstudy computes the known answer with two
-tolerances. The package never imports another code.
+correct digits of an answer. For a user-defined problem, rsfstudy computes the known answer twice,
+with two different integration tolerances. The package never imports another code.
 """
 
 from __future__ import annotations

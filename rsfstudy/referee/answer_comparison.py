@@ -1,7 +1,8 @@
 """Comparison of an answer with the known answer to a problem.
 
 The function ``compare_answers`` counts the correct digits. If an answer has too few correct digits,
-the function also tests whether another convention explains the difference.
+the function also tests whether another convention, such as other units, explains the difference
+from the known answer.
 """
 
 from __future__ import annotations
@@ -23,15 +24,16 @@ from rsfstudy.rig import read_table
 
 #: Default number of correct digits that an answer needs to pass.
 DEFAULT_REQUIRED_DIGITS = 6
-#: Criteria for accepting an explanation of a difference: the minimum number of correct digits after
-#: the correction, and the minimum increase of the number of correct digits.
+#: Criteria for accepting an explanation of the difference from the known answer. The first value is
+#: the minimum number of correct digits after the correction. The second value is the minimum
+#: increase of the number of correct digits.
 _MIN_EXPLAINED_DIGITS, _MIN_DIGITS_GAINED = 3.0, 1.5
 #: Maximum difference between rounded values and the known answer, in units of the last decimal
 #: place. The limit allows an error of one unit in the other code, half a unit for rounding in the
 #: file, and a small margin for rounding of the known answer.
 _MAX_DIFFERENCE_IN_LAST_PLACE_UNITS = 1.51
-#: Quantities that start at zero. Differences of these quantities are divided by the largest value
-#: of the column.
+#: Quantities that start at zero. The difference of such a quantity from the known answer is divided
+#: by the largest known value of the quantity.
 _QUANTITIES_STARTING_AT_ZERO = ("slip", "pore_pressure")
 #: Conventions for radiation damping, and the factors by which eta is multiplied.
 _RADIATION_DAMPING_CONVENTIONS = {
@@ -39,7 +41,7 @@ _RADIATION_DAMPING_CONVENTIONS = {
     "half as much": 0.5,
     "left out": 0.0,
 }
-#: Common conversion factors between units, powers of ten, angles and logarithms.
+#: Common conversion factors. The factors convert units, powers of ten, angles or logarithms.
 _COMMON_CONVERSION_FACTOR_BY_NAME = {
     "2": 2.0, "0.5": 0.5, "pi": math.pi, "1/pi": 1.0 / math.pi, "2 pi": 2.0 * math.pi,
     "1/(2 pi)": 0.5 / math.pi, "ln 10": math.log(10.0), "1/ln 10": 1.0 / math.log(10.0),
@@ -47,11 +49,12 @@ _COMMON_CONVERSION_FACTOR_BY_NAME = {
     **{f"1/{unit:g}": 1.0 / unit for unit in (60.0, 3600.0, 86400.0)},
     **{f"{10.0**power:g}": 10.0**power for power in range(-15, 16) if power},
 }  # fmt: skip
-#: Relative tolerances for recognising a conversion factor from several values and from a single
-#: value.
+#: Relative tolerances for recognising a conversion factor. The first tolerance applies to a factor
+#: from several values. The second tolerance applies to a factor from a single value.
 _FACTOR_RTOL, _SINGLE_VALUE_FACTOR_RTOL = 1e-6, 1e-3
-#: Relative tolerances of the two computed answers to a user-defined problem, and relative tolerance
-#: for computing answers with other conventions.
+#: The first constant contains the relative integration tolerances of the two computed answers to a
+#: user-defined problem. The second constant is the relative integration tolerance for answers with
+#: other conventions.
 _REFERENCE_RTOLS, _EXPLANATION_RTOL = (1e-9, 1e-11), 1e-8
 
 
@@ -64,9 +67,10 @@ class QuantityAgreement:
     quantity_name : str
         Name of the quantity.
     agreeing_digits : float
-        Smallest number of correct digits of all rows, limited to the digits of the known answer.
+        Smallest number of correct digits in any row. The number cannot exceed the number of digits
+        of the known answer.
     least_agreeing_row : int
-        Index of the row with the largest relative difference.
+        Index of the row with the largest relative difference from the known answer.
     first_failing_row : int or None
         Index of the first row with fewer correct digits than required, or None if all rows have
         enough correct digits.
@@ -97,8 +101,8 @@ class AnswerComparison:
     required_digits : float
         Number of correct digits that the answer needs to pass.
     explanation_of_disagreement : str, default: ""
-        Convention that explains the difference. The string is empty if the answer passes or if no
-        explanation was found.
+        Convention that explains the difference from the known answer. The string is empty if the
+        answer passes or if no explanation was found.
     """
 
     problem: BenchmarkProblem
@@ -162,15 +166,14 @@ def known_answer(
     problem : BenchmarkProblem
         Problem to solve.
     answer_path : Path or None
-        File of the known answer. If the path is None, rsfstudy computes the answer with two
-        tolerances.
+        File of the known answer. If the path is None, rsfstudy computes the answer twice, with two
+        different integration tolerances.
 
     Returns
     -------
     problem : BenchmarkProblem
-        Problem whose field ``digits`` is the number of known digits. The number of known digits of
-        a computed answer is the number of digits to which the answers with the two tolerances
-        agree.
+        Problem with the number of known digits in the field ``digits``. If rsfstudy computes the
+        answer twice, the known digits are the digits to which the two computed answers agree.
     answer : dict of str to ndarray
         Columns of the answer in SI units.
 
@@ -202,7 +205,7 @@ def compare_answers(
     r"""Compare the answer of another code with the known answer.
 
     If the answer has too few correct digits, the function searches for a convention that explains
-    the difference.
+    the difference from the known answer.
 
     Parameters
     ----------
@@ -231,7 +234,8 @@ def compare_answers(
     The rounding error :math:`r` is half a unit in the last digit of :math:`y`. The scale :math:`s`
     is :math:`|y|` for most quantities. For slip and pore pressure, which start at zero, the scale
     is the largest value of :math:`|y|` in the column. The number of correct digits is
-    :math:`-\log_{10} \max \Delta`, limited to the digits of the known answer.
+    :math:`-\log_{10} \max \Delta`. The number of correct digits cannot exceed the number of digits
+    of the known answer.
     """
     values = {name: column.values for name, column in reported.items()}
     places = {name: column.last_place_unit for name, column in reported.items()}
@@ -322,7 +326,7 @@ def _relative_differences(
 def _iterate_explanations_of_disagreement(
     problem: BenchmarkProblem, reported: AnswerColumnByQuantity, answer: AnswerColumnByQuantity
 ) -> Iterator[tuple[float, str]]:
-    """Iterate over conventions that may explain a difference.
+    """Iterate over conventions that may explain an incorrect answer.
 
     Each item contains the number of correct digits under a convention, and a description of the
     convention.
@@ -390,10 +394,10 @@ def _iterate_answers_in_other_conventions(
 
 
 def _find_common_conversion_factor(factor: float, tolerance: float) -> tuple[str, float] | None:
-    """Find a common conversion factor that matches a factor.
+    """Find a common conversion factor that is close to a given factor.
 
-    The relative difference between the factor and the common conversion factor must not exceed the
-    tolerance.
+    The relative difference between the given factor and the common conversion factor must not
+    exceed the tolerance.
 
     Returns
     -------

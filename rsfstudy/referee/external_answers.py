@@ -19,8 +19,8 @@ from rsfstudy.referee import reference_answers
 from rsfstudy.referee.problem_files import BenchmarkProblem
 from rsfstudy.rig import Column, convert_to_si, read_table
 
-#: Substitute for each requested quantity, with units. A file may contain the substitute instead of
-#: the requested quantity.
+#: Names and units of substitute quantities, keyed by requested quantities. A file may contain the
+#: substitute quantity instead of the requested quantity.
 _SUBSTITUTE_AND_UNITS_BY_QUANTITY = {
     "slip_rate": ("log10_slip_rate", "1"),
     "friction": ("shear_stress", "Pa"),

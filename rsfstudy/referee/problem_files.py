@@ -87,8 +87,8 @@ _NAMES_OF_LAWS_WITH_THETA_AS_STATE = (
 )  # fmt: skip
 
 
-#: Pattern of messages about wrong types from msgspec, and descriptions of types for error messages
-#: of rsfstudy.
+#: The pattern matches error messages of msgspec about wrong types. The dictionary contains
+#: descriptions of types for error messages of rsfstudy.
 _TYPE_ERROR_PATTERN = re.compile(r"Expected `(\w+)`, got `(\w+)`(?: - at `\$(.*)`)?")
 _READABLE_NAME_BY_TYPE_NAME = {
     "array": "a list", "object": "a table", "str": "a text", "int": "a whole number",
@@ -131,7 +131,7 @@ class BenchmarkProblem:
     times : list of float, optional
         Times of a series in s, in increasing order.
     count : int, default: 0
-        Number of peaks to report.
+        Number of slip rate maxima to report.
     digits : int, default: 12
         Number of significant digits of the known answer, from 1 to 15.
     number : int, default: 0
@@ -241,7 +241,7 @@ class BenchmarkProblem:
 
     @cached_property
     def si_parameters(self) -> Mapping[str, float]:
-        """SI values of the parameters that scenes contain as dimensionless fields."""
+        """SI values of the parameters that become dimensionless scene fields."""
         stated = self.parameters
         return {
             n: convert_to_si(n, stated[n], units)
@@ -337,8 +337,8 @@ class BenchmarkProblem:
     def initial_event(self) -> Event | None:
         """Initial state of the motion with the initial slip rate and theta.
 
-        The stress of the spring is chosen so that the slip rate equals the initial slip rate before
-        any step of the loading. The property is None if the problem has no initial values.
+        The stress of the spring is chosen so that the slip rate before the first step of the
+        loading is the initial slip rate. The property is None if the problem has no initial values.
         """
         if not self.initial:
             return None

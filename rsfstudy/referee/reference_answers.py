@@ -85,7 +85,8 @@ def _compute_series_answer(problem: BenchmarkProblem, accuracy: Accuracy) -> Ans
 
     The state variables :math:`\Theta` of the simulated motion are converted to :math:`\theta =
     \theta_* e^{\Theta/b}`. Before the conversion, the effect of normal stress on the state is
-    subtracted from the state variables in proportion to :math:`|b|`.
+    subtracted from the state variables. The effect is distributed to the state variables in
+    proportion to :math:`|b|`.
     """
     scene, rig = problem.scene, problem.rig
     at = np.array(problem.times) * rig.dimensionless("1 s")
@@ -172,7 +173,7 @@ def _run_measure_of_problem(
 
 
 def _compute_stability_numbers(problem: BenchmarkProblem, accuracy: Accuracy) -> tuple[float, ...]:
-    """Compute the critical stiffness, and the growth rate and frequency."""
+    """Compute the critical stiffness, the growth rate and the frequency."""
     scene, rig = problem.scene, problem.rig
     growth = linear_growth_rates(scene, scene.log_load_velocity)[0] * scene.load_velocity
     stiffness = critical_stiffness(scene, scene.log_load_velocity)

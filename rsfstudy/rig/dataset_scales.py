@@ -27,13 +27,13 @@ _DIMENSIONAL_NAME_BY_RATIO_NAME = {
     "velocity_ratio": "velocity",
     "normal_stress_ratio": "effective_normal_stress",
 }
-#: Pattern of variable names for logarithms of slip rates, and pattern of the words to remove from
-#: the start and the end of variable descriptions.
+#: The first pattern matches the variable names of logarithms of slip rates. The second pattern
+#: matches words that are removed from the start and the end of variable descriptions.
 _LOG_SLIP_RATE_PATTERN = re.compile(r"(\w+_)?log10_slip_rate")
 _LOG_SLIP_RATE_DESCRIPTION_PATTERN = re.compile(r"^decimal logarithm of (the )?| over V_star")
 
-#: Prefix for the name of a dimensionless field if an axis with units already has the name of the
-#: field.
+#: Prefix for the names of dimensionless fields. The prefix is added only if an axis with units has
+#: the same name as the field.
 DIMENSIONLESS_PREFIX = "dimensionless_"
 #: Units of stress, length and time in tables and figures of rigs.
 DISPLAY_BASE_UNITS = {"stress": "MPa", "length": "um", "time": "s"}
@@ -41,7 +41,8 @@ DISPLAY_BASE_UNITS = {"stress": "MPa", "length": "um", "time": "s"}
 NAME_OF_SCALES_ATTRIBUTE = "scales"
 
 
-#: Tolerance for the comparison of two scales, which allows for rounding errors and printed digits.
+#: Relative tolerance for the comparison of two scales. The tolerance allows for rounding errors and
+#: for the limited number of digits of printed scales.
 _RTOL_OF_EQUAL_REFERENCE_RATES = 1e-9
 
 
@@ -86,7 +87,7 @@ def read_si_scales(
     -------
     dict of str to UnitScale
         Scales by name, for example ``D_c``. If a scale varies between lattice cells, its factor is
-        a variable.
+        a variable with one value per lattice cell.
 
     Raises
     ------
@@ -291,7 +292,7 @@ def convert_to_display_units(dataset: xr.Dataset) -> xr.Dataset:
 
 
 def has_units_unexpected_by_its_figures(dataset: xr.Dataset) -> bool:
-    """Return True if results are in other units than the figures of studies.
+    """Return True if results do not have the units of the figures of studies.
 
     Parameters
     ----------

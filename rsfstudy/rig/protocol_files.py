@@ -52,9 +52,9 @@ def history(
         Arrays by name, a dataset, or the path of a CSV file whose first line contains the names and
         the units of the columns (see `read_table`). The column ``time`` is required. The column
         ``displacement`` or ``velocity`` describes the load point. If both columns are missing, the
-        load point moves at :math:`V_*`. The optional columns are ``normal_stress`` and
-        ``pore_pressure``, which contain the normal stress and the change of pore pressure relative
-        to its value before the record.
+        load point moves at :math:`V_*`. The optional column ``normal_stress`` contains the normal
+        stress. The optional column ``pore_pressure`` contains the pore pressure minus the pore
+        pressure before the record.
     rig : Rig, optional
         Rig for the conversion of units. By default, all data are dimensionless: times in
         ``D_c/V_*``, displacements in ``D_c``, velocities in ``V_*`` and stresses in ``sigma_*``.
@@ -76,8 +76,9 @@ def history(
     InvalidValue
         If units are missing, if a value is missing or not finite, if time does not increase, or if
         the normal stress is not positive. The error message contains the line and column of the
-        file, or the number of the sample. The error is not raised if the load point moves
-        backwards. In that case, only scenes with ``regularised=True`` accept the history.
+        file, or the number of the sample. A history in which the load point moves backwards causes
+        no error. Only scenes with ``regularised=True`` accept a history in which the load point
+        moves backwards.
 
     Notes
     -----
@@ -229,9 +230,9 @@ def read_protocol(path: str | Path, rig: Rig | None = None, name: str = "protoco
     path : str or Path
         Path of the file. The first line contains the names and units of the columns, for example
         ``velocity (um/s), duration (s)``. Each of the other lines describes a loading segment by
-        its velocity and either its ``duration`` or its ``distance``. Optional columns are ``step``,
-        a sudden displacement at the start of the segment, and ``normal_stress``. Fields of the
-        table may be empty.
+        its velocity and either its ``duration`` or its ``distance``. The optional column ``step``
+        contains a sudden displacement at the start of the segment. The column ``normal_stress`` is
+        also optional. Fields of the table may be empty.
     rig : Rig, optional
         Rig for the conversion of units. A rig is not needed if all columns have the dimensionless
         units ``V_*``, ``D_c``, ``D_c/V_*`` and ``sigma_*``.

@@ -48,8 +48,9 @@ _PATTERNS_OF_USUAL_HEADINGS = {
     "shear_stress": r"shear|tau",
     "normal_stress": r"(eff\w*[ _])?norm|sigma",
 }
-#: Layout of xlook files: size of the file header, size of each column header, and number of column
-#: headers. The data follow the headers.
+#: Layout of xlook files. The constants are the size of the file header in bytes, the size of each
+#: column header in bytes, and the number of column headers. The data of an xlook file follow the
+#: headers.
 _XLOOK_HEADER_BYTES, _XLOOK_COLUMN_HEADER_BYTES, _XLOOK_MAX_COLUMNS = 36, 84, 32
 _XLOOK_DATA_START_BYTE = _XLOOK_HEADER_BYTES + _XLOOK_COLUMN_HEADER_BYTES * _XLOOK_MAX_COLUMNS
 
@@ -346,9 +347,9 @@ def _is_binary(path: Path) -> bool:
 def _read_xlook_columns(path: Path, columns: Mapping[str, Any] | None) -> Mapping[str, Column]:
     """Read the columns of a binary xlook file.
 
-    The file is big-endian. After a file header and the column headers of 84 bytes, the columns
-    follow each other as float32 arrays. The column ``time`` of xlook files contains sampling
-    intervals, which the function sums.
+    The file is big-endian. The file contains a file header, column headers of 84 bytes each, and
+    one float32 array per column. The column ``time`` of xlook files contains sampling intervals,
+    which the function sums.
     """
     data = path.read_bytes()
     if len(data) < _XLOOK_DATA_START_BYTE:

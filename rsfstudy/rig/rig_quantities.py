@@ -54,16 +54,18 @@ RIG_QUANTITIES: Mapping[str, RigQuantity] = {
 }
 #: Quantities that every rig needs, because they determine the scales of all other quantities.
 REQUIRED_QUANTITIES = ("normal_stress", "slip_distance", "reference_velocity")
-#: Axis names of rig quantities whose names are also names of scene fields.
+#: Axis names that differ from the names of rig quantities. Such an axis name is needed if a scene
+#: field has the same name as the rig quantity.
 AXIS_NAME_BY_RIG_NAME = {"normal_stress": "sigma_star"}
-#: Names of rig quantities, keyed by their axis names.
+#: Names of rig quantities, keyed by the names that axes use.
 RIG_NAME_BY_AXIS_NAME = {AXIS_NAME_BY_RIG_NAME.get(name, name): name for name in RIG_QUANTITIES}
-#: SI unit for each scale, or dimensionless unit, of a scene field.
+#: SI units, keyed by the scales of scene fields. A scale is the dimensionless unit of a scene
+#: field.
 SI_UNIT_BY_SCALE = {
     "sigma_*": "Pa", "D_c": "m", "V_*": "m/s", "D_c/V_*": "s", "sigma_*/D_c": "Pa/m",
     "V_*/D_c": "1/s", "s": "s", "s-1": "1/s",
 }  # fmt: skip
-#: Unit in tables and figures for each SI unit.
+#: Units in tables and figures, keyed by SI units.
 DISPLAY_UNIT_BY_SI_UNIT = {"Pa": "MPa", "m": "um", "m/s": "um/s", "Pa/m": "MPa/um"}
 #: Descriptions of scene fields by name.
 SCENE_QUANTITY_BY_FIELD_NAME = {about.name: about for about in SCENE_FIELD_QUANTITIES}

@@ -40,8 +40,8 @@ class LatticeScenesOnRig:
     """Converter from axes with physical units to dimensionless scene fields.
 
     If an axis varies a scale such as the slip distance, fields of the base scene keep their SI
-    values, and their dimensionless values vary. In contrast, ratios keep their dimensionless
-    values.
+    values. The dimensionless values of these fields vary along the axis. In contrast, fields that
+    are ratios keep their dimensionless values.
 
     Parameters
     ----------
@@ -55,8 +55,8 @@ class LatticeScenesOnRig:
     Raises
     ------
     InvalidValue
-        If the base scene does not belong to the rig, or if a rig that is a value of an axis lacks a
-        quantity of ``rig``.
+        If the base scene does not belong to the rig. The error is also raised if an axis value is a
+        rig that lacks a quantity of ``rig``.
     """
 
     rig: Rig
@@ -150,7 +150,7 @@ class LatticeScenesOnRig:
     def _compute_base_fields_constant_in_si(
         self, scale_factors_of_cell: Mapping[str, Any]
     ) -> dict[str, Any]:
-        """Return the base scene fields whose SI values are fixed."""
+        """Return the base scene fields that have the same SI value in all cells."""
         base = scale_factors_of_rig(self.rig.as_dict())
         held = {
             name: value
@@ -246,7 +246,8 @@ def convert_scene_and_axes_to_rig(
     axes : list of Axis
         Axes with physical units.
     sizes : dict of str to float
-        Factor by which the axis values of each field were multiplied.
+        Conversion factor of each field. The axis values of the field were multiplied by this
+        factor.
     """
     sizes_of = scale_factors_of_rig(rig.as_dict())
     converted: list[Axis] = []
@@ -291,9 +292,9 @@ def replace_rig_quantity(
     base_scene : Scene
         Scene of the rig.
     quantity_name : str
-        Name of the quantity, as on an axis with units.
+        Name of the quantity, in the form that axes with units use.
     value : object
-        Value of the quantity, as on an axis with units.
+        Value of the quantity, in the form that axes with units accept.
 
     Returns
     -------

@@ -35,7 +35,7 @@ _HEADING_WITH_SCALE_AND_OFFSET_PATTERN = re.compile(
 #: Pattern of a heading with optional units in brackets.
 HEADING_PATTERN = re.compile(r"\s*([^(\[]+?)\s*(?:[(\[]([^)\]]*)[)\]])?\s*")
 #: Maximum length of a heading. The limit is necessary because the time for matching a pattern
-#: increases with the square of the length.
+#: increases with the square of the length of the heading.
 _MAX_HEADING_LENGTH = 200
 
 
@@ -51,7 +51,7 @@ class ColumnSpec(NamedTuple):
     scale : float, default: 1.0
         Factor by which raw numbers are multiplied.
     offset : float, default: 0.0
-        Offset to add after the multiplication.
+        Number to add to each value after the multiplication by ``scale``.
     """
 
     heading: str
@@ -60,8 +60,8 @@ class ColumnSpec(NamedTuple):
     offset: float = 0.0
 
 
-#: Function that takes a list of headings and a description of their location, and returns the
-#: selected columns.
+#: Function that selects columns of a file. The two arguments of the function are a list of headings
+#: and a description of the location of the headings.
 ColumnChoosingFunction = Callable[[list[str], str], dict[str, ColumnSpec]]
 
 
@@ -272,7 +272,7 @@ def select_columns_of_arrays(source: Any, columns: Mapping[str, Any]) -> dict[st
 
 
 def _to_floats_and_units(column_name: str, values: Any) -> tuple[np.ndarray, str]:
-    """Convert an array to floats, and return units if the type implies them.
+    """Convert an array to floats, and return the units that its type implies.
 
     Masked values become NaN. Times are converted to seconds. Dates are converted to seconds since
     the first date.
@@ -305,9 +305,9 @@ def read_table(
     columns : mapping of str to (str, str) or str, optional
         Heading and units of each column, for example ``{"time": ("t", "s")}`` or ``{"time": "t
         (s)"}``. By default, all columns are read, and the first line must contain their names and
-        units, as in ``velocity (um/s), distance (um)``. You can also pass a function that takes a
-        list of headings and a description of their location, and returns a mapping of column names
-        to column selections.
+        units, as in ``velocity (um/s), distance (um)``. You can also pass a function with two
+        arguments, a list of headings and a description of the location of the headings. The
+        function must return a mapping of column names to column selections.
 
     Returns
     -------
@@ -395,8 +395,9 @@ def _read_plain_numeric_table(
 ) -> tuple[np.ndarray | None, np.ndarray]:
     """Read a table that contains only finite numbers and delimiters.
 
-    The function returns the numbers and their line numbers. If the table contains other characters
-    and has to be read line by line, the function returns None instead of the numbers.
+    The function returns the numbers and their line numbers. If the table contains other characters,
+    the function returns None instead of the numbers. A table with other characters has to be read
+    line by line.
     """
     body = "".join(text.split("\n", header_line_count)[header_line_count:])
     lines = header_line_count + 1 + np.arange(body.count("\n") + (not body.endswith("\n")))

@@ -73,7 +73,7 @@ _LOG_RANGE_SYNTAX_REMEDY = (
 )
 _MAX_POINTS_OF_RANGE = 1_000_000
 #: Maximum number of characters of a quantity. The limit is necessary because the time for matching
-#: a pattern increases with the square of the length.
+#: a pattern increases with the square of the length of the string.
 _MAX_QUANTITY_TEXT_LENGTH = 200
 _PINT_INSTALL_ADVICE = "Install pint (pip install 'rsfstudy[units]')"
 
@@ -380,7 +380,7 @@ def _compute_factor_with_pint(
 
 
 def _suggest_unit_with_other_capitals(units_and_powers: Iterable[tuple[str, int]]) -> str:
-    """Suggest known units that differ only in upper-case and lower-case letters."""
+    """Suggest known units that differ from an unknown unit only in letter case."""
     for name, _power in units_and_powers:
         meant = [known for known in _KNOWN_UNITS if known.lower() == name.lower() and known != name]
         if meant:

@@ -1,9 +1,9 @@
 """Dynamics of the slider.
 
 Each module of this package defines one choice of dynamics. The function ``discover_parts`` finds
-the modules automatically. The dynamics define the forces that balance the spring in addition to
-friction. The balance of forces determines how the slip rate depends on spring stress and state. The
-base class is ``Dynamics``.
+the modules automatically. The dynamics define which forces, in addition to friction, balance the
+force of the spring. The balance of forces determines how the slip rate depends on spring stress and
+state. The base class is ``Dynamics``.
 """
 
 from __future__ import annotations
@@ -22,18 +22,20 @@ from rsfstudy.slider.scene_view import SceneView
 class Dynamics(Part):
     r"""Base class of the dynamics.
 
-    The dynamics are defined by functions that receive the friction of a scene, an instance of
-    ``rsfstudy.slider.FrictionFunctions``, and return functions of floats:
+    The dynamics are defined by functions that receive the friction of a scene and return functions
+    of floats. The friction of a scene is an instance of ``rsfstudy.slider.FrictionFunctions``. The
+    dynamics have the following functions:
 
     - ``build_slip_rate_functions(friction)`` returns two functions. The function ``balance(spring,
       psis, p)`` returns :math:`\ln(V/V_*)`, the frictional stress g and the decrease of the state
       due to stress. The function ``growth(state, rates, x, g, p)`` returns the derivative of
       :math:`x = \ln(V/V_*)` along the motion. The argument ``state`` contains the spring stress and
       the states ``psis``, and ``rates`` contains the derivatives of ``state``.
-    - ``build_rupture_rate_function(friction)`` is optional. It returns a function
-      ``rate(state, p)`` for the full equations of motion during ruptures. The function ``rate``
-      returns the derivatives of the spring stress f, of x, of g and of all states except the first
-      with respect to inertial time.
+    - ``build_rupture_rate_function(friction)`` is optional. The returned function ``rate(state,
+      p)`` contains the inertial equations of motion, which are integrated during ruptures. The
+      function ``rate`` returns derivatives with respect to inertial time. The differentiated
+      quantities are the spring stress f, the logarithm x = ln(V/V_*), the frictional stress g, and
+      all states except the first.
 
     Examples
     --------
@@ -46,7 +48,7 @@ class Dynamics(Part):
     'inertia'
     """
 
-    #: Name of the equations of motion between ruptures, as it appears in results.
+    #: Name of the equations of motion between ruptures. The name appears in results.
     regime: ClassVar[str]
     received_quantities = frozenset(QUANTITIES_A_PART_MAY_NEED)
     build_slip_rate_functions: ClassVar[Function]
@@ -108,8 +110,8 @@ class Dynamics(Part):
         Returns
         -------
         float
-            Norm :math:`w = V T/(2 \pi D_c)`. The base class returns zero, because it has no
-            inertia.
+            Norm :math:`w = V T/(2 \pi D_c)`. The base class returns zero, because the base class
+            has no inertia.
         """
         return 0.0
 

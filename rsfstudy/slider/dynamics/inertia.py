@@ -1,7 +1,7 @@
 """Inertia of the slider, defined by the period T of free oscillation.
 
-If inertia is weak, the motion follows the slow manifold of the full equations
-(``build_slip_rate_functions``). During ruptures, the full equations are integrated
+If inertia is weak, the motion follows the slow manifold of the inertial equations of motion
+(``build_slip_rate_functions``). During ruptures, the inertial equations of motion are integrated
 (``build_rupture_rate_function``).
 """
 
@@ -26,15 +26,18 @@ from rsfstudy.slider.scene_functions import velocity_ratios
 from rsfstudy.slider.scene_view import SceneView
 from rsfstudy.slider.state_functions import build_state_step_function
 
-#: Upper limit of rates per inertial time. Larger rates occur only in trial steps, because a motion
-#: returns to the slow manifold long before its slip rate relaxes this fast.
+#: Upper limit of the rates of the unknowns per unit of inertial time. Larger rates occur only in
+#: trial steps of the integrator. A motion returns to the slow manifold long before its slip rate
+#: changes at such a large rate.
 MAX_RATE_PER_INERTIAL_TIME = 1e30
-#: Values of the inertia weight below which the second-order term, and the derivative of the
-#: first-order term, are negligible. The third constant is the displacement step of difference
+#: If the inertia weight is less than the first constant, the second-order term of the slow manifold
+#: is negligible. If the inertia weight is less than the second constant, the derivative of the
+#: first-order term is negligible. The third constant is the displacement step of difference
 #: quotients, in D_c.
 NEGLIGIBLE_SECOND_ORDER_WEIGHT, NEGLIGIBLE_GROWTH_WEIGHT, DIFFERENCE_STEP = 1e-7, 1e-9, 1e-6
-#: Range of V_0/V in which the slip rate is computed from this ratio. The ratio is outside this
-#: range in extreme trial steps, for a stationary load point and for a stationary contact.
+#: Range of the ratio V_0/V in which the slip rate V is computed from the ratio. The ratio V_0/V is
+#: outside this range in extreme trial steps, if the load point is stationary, or if the contact is
+#: stationary.
 MIN_VELOCITY_RATIO, MAX_VELOCITY_RATIO = 1e-60, 1e40
 
 
@@ -59,7 +62,8 @@ def build_slip_rate_functions(friction_functions: FrictionFunctions) -> tuple[Fu
     -----
     The frictional stress :math:`g` equals the spring stress :math:`f` minus the stress that
     accelerates the mass. We write :math:`x = \ln(V/V_*)`, :math:`S` for the function ``strength``
-    and :math:`s` for the sum of slip and load point displacement. The full equations are
+    and :math:`s` for the sum of slip and load point displacement. The inertial equations of motion
+    are
 
     .. math::
 
@@ -164,7 +168,8 @@ def build_slip_rate_functions(friction_functions: FrictionFunctions) -> tuple[Fu
     def log_slip_rate_offset(spring_stress: float, psis: Numbers, p: Numbers) -> float:
         """Compute the difference of ln V from its quasi-static value.
 
-        If two values of ln V were subtracted, rounding errors would be visible in the derivative.
+        The function does not subtract two values of ln V, because rounding errors would then be
+        visible in the derivative of the difference.
         """
         taken = inertial_stress(spring_stress, psis, quasi_static_values(spring_stress, psis, p), p)
         return -strength(spring_stress - 0.5 * taken, psis, p)[1] * taken / p[A]
@@ -172,8 +177,9 @@ def build_slip_rate_functions(friction_functions: FrictionFunctions) -> tuple[Fu
     def growth(state: Numbers, rates: Numbers, x: float, g: float, p: Numbers) -> float:
         """Compute the derivative of ln V along the motion.
 
-        The derivative includes the change of ``log_slip_rate_offset``. Without this change, the
-        peak slip rate would occur too early, by a slip distance of ``(K/a) w**2`` in D_c.
+        The derivative includes the change of ``log_slip_rate_offset``. If the change of
+        ``log_slip_rate_offset`` were omitted, the peak slip rate would occur too early, by a slip
+        distance of ``(K/a) w**2`` in D_c.
         """
         spring_stress, psis = state[0], state[1:]
         slope = strength(spring_stress, psis, p)[1]
@@ -196,8 +202,8 @@ def clamped_inertial_stress(
     r"""Compute the bounded stress that accelerates the mass.
 
     The magnitude of the stress is limited to :math:`a`. A motion leaves the slow manifold long
-    before the stress reaches the limit. In trial steps that exceed the limit, the limit keeps the
-    stress finite and preserves its sign.
+    before the accelerating stress reaches this limit. Only trial steps of the integrator exceed the
+    limit. In such trial steps, the limited stress is finite and has the correct sign.
 
     Parameters
     ----------
@@ -249,7 +255,7 @@ def compute_inertia_weight(
 
 
 def build_rupture_rate_function(friction_functions: FrictionFunctions) -> Function:
-    r"""Return the rate function of the full equations of motion.
+    r"""Return the rate function of the inertial equations of motion.
 
     The unknowns are :math:`f`, :math:`x = \ln(V/V_*)`, :math:`g` and all states except the first.
     The independent variable is inertial time in units of :math:`T/(2 \pi)`. Because :math:`g` is an
@@ -375,7 +381,7 @@ class Inertia(Dynamics):
 
     @classmethod
     def rejection_error(cls, name: str, value: Any) -> InvalidValue:
-        """Return the error for a field of another dynamics class.
+        """Return the error for a field that belongs to another dynamics class.
 
         See ``Part.rejection_error``.
         """

@@ -16,11 +16,12 @@ from rsfstudy.slider.scene_view import SceneView
 
 _MAX_ITERATIONS = 200
 _RTOL_OF_ROOT_ITERATION_STEPS = 1e-15
-#: Relative tolerance of the strength for convergence. A small Newton step does not imply
-#: convergence, because slopes are very steep at the lower limit of normal stress, which only trial
-#: steps reach.
+#: Relative tolerance of the strength for the convergence of Newton's method. A small Newton step
+#: does not imply convergence, because the strength is very steep at the lower limit of normal
+#: stress. Only trial steps of the integrator reach the lower limit of normal stress.
 _STRESS_BALANCE_TOLERANCE = 1e-6
-#: Upper limit of ln V. Only trial steps reach the limit, where the radiated stress is 10^300 eta.
+#: Upper limit of ln V, at which the radiated stress is 10^300 eta. Only trial steps of the
+#: integrator reach the upper limit of ln V.
 _MAX_LOG_SLIP_RATE = 690.0
 
 
@@ -76,7 +77,8 @@ def build_slip_rate_functions(friction_functions: FrictionFunctions) -> tuple[Fu
 
     We solve the balance by Newton's method. The left side of the balance decreases with :math:`V`
     and the right side increases, so the balance has a unique root. If a Newton step leaves the
-    bracket or the steps shrink too slowly, the solver bisects the bracket.
+    interval that contains the root, or if the steps shrink too slowly, the solver bisects the
+    interval.
     """
     strength, state_sum = friction_functions.strength, friction_functions.state_sum
     contribution = friction_functions.state_contribution

@@ -20,19 +20,19 @@ from rsfstudy.slider.parts import Numbers, Part, discover_parts
 class Fluid(Part):
     """Base class of all pore fluids.
 
-    A fluid with unknowns declares them in ``unknowns``. The last unknown must be the pore pressure
-    P. A fluid with unknowns also defines two functions as static methods:
+    A fluid with unknowns declares them in ``unknowns``. The last unknown of a fluid must be the
+    pore pressure P. A fluid with unknowns also defines two functions as static methods:
 
     - ``auxiliary_rates(log_slip_rate, states, fraction, p)`` returns the changes of the unknowns
       per unit slip in :math:`D_c`, multiplied by ``fraction``, which is the slip per unit of the
       independent variable.
-    - ``auxiliary_steady_states(log_slip_rate, p)`` returns the unknowns in steady sliding, where P
-      is zero.
+    - ``auxiliary_steady_states(log_slip_rate, p)`` returns the unknowns in steady sliding, where
+      the pore pressure P is zero.
 
-    The distance from steady sliding determines if a motion has settled and if a cycle repeats. A
-    fluid can exclude unknowns from the distance by listing their names in
-    ``excluded_from_distance``. Exclude an unknown if its steady value at the slip rate of a rupture
-    is extremely large.
+    The distance between the unknowns and their values in steady sliding determines whether a motion
+    has settled and whether a cycle repeats. The attribute ``excluded_from_distance`` lists the
+    names of unknowns that do not contribute to the distance from steady sliding. Exclude an unknown
+    from the distance if its steady value at the slip rate of a rupture is extremely large.
 
     Examples
     --------
@@ -61,8 +61,8 @@ class Fluid(Part):
         Returns
         -------
         float
-            Upper bound of the pore pressure P. The base class returns infinity, because the bound
-            is unknown.
+            Upper bound of the pore pressure P. The base class returns infinity, because the base
+            class knows no upper bound of the pore pressure.
         """
         return math.inf
 

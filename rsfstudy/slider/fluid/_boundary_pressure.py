@@ -73,7 +73,8 @@ def add_boundary_pressure_steady_state(fluid_auxiliary_steady_states: Function) 
     -------
     callable
         Function ``auxiliary_steady_states`` of the fluid and its surroundings. The pressure of the
-        surroundings is zero, because pressures are measured from steady sliding before the loading.
+        surroundings is zero in steady sliding, because all pressures are relative to the pressure
+        before the loading.
     """
 
     def auxiliary_steady_states(log_slip_rate: float, p: Numbers) -> Numbers:
@@ -113,7 +114,7 @@ class FluidWithBoundaryPressure:
 
     @property
     def excluded_from_distance(self) -> tuple[str, ...]:
-        """Names of the unknowns excluded from the steady-state distance.
+        """Names of the unknowns that the distance from steady sliding excludes.
 
         The tuple includes the excluded unknowns of both the loading and the fluid.
         """

@@ -98,8 +98,8 @@ class DilatantFluid(Fluid):
     Parameters
     ----------
     dilatancy : float, default: 0.01
-        Dilatancy :math:`\epsilon/(\beta \sigma_*)`. Without drainage, the pore pressure decreases
-        by this value, in :math:`\sigma_*`, per unit increase of :math:`\ln V`.
+        Dilatancy :math:`\epsilon/(\beta \sigma_*)`. Without drainage, an increase of :math:`\ln V`
+        by 1 decreases the pore pressure by the dilatancy, in units of :math:`\sigma_*`.
     drainage : float, default: 1.0
         Drainage rate :math:`c^* D_c/V_*`.
 
@@ -158,8 +158,9 @@ class DilatantFluid(Fluid):
     def highest_pressure(self, log_slip_rate: float, states: Numbers) -> float:
         r"""Compute an upper bound of the future pore pressure.
 
-        See ``Fluid.highest_pressure``. The upper bound follows from the largest rate at which pores
-        can close, :math:`V (\varphi - \varphi_0 - \epsilon \ln(V/V_*))`, and the drainage rate.
+        See ``Fluid.highest_pressure``. The upper bound follows from the drainage rate and from the
+        largest rate at which pores can close. The largest closing rate is :math:`V (\varphi -
+        \varphi_0 - \epsilon \ln(V/V_*))`.
         """
         closing = max(states[0] - self.dilatancy * log_slip_rate, self.dilatancy)
         return max(states[1], math.exp(log_slip_rate) * closing / self.drainage)

@@ -34,8 +34,8 @@ from rsfstudy.slider.parts import (
 )
 from rsfstudy.slider.scene_view import SceneView
 
-#: Upper limit of exponents in evolution laws. Larger exponents occur only in trial steps that the
-#: integrator rejects, because the equations of motion stop at slip rates of 10^-290 V_*.
+#: Upper limit of exponents in evolution laws. A larger exponent occurs only in a trial step that
+#: the integrator rejects. Motions end before their slip rate falls below 10^-290 V_*.
 LARGEST_EVOLUTION_EXPONENT = 700.0
 
 
@@ -59,7 +59,7 @@ def fast_expm1(exponent: float) -> float:
 
 
 def declare_cutoff_velocity_field() -> Any:
-    """Declare the field ``cutoff_velocity_ratio`` of laws with a cut-off.
+    """Declare the field ``cutoff_velocity_ratio`` of laws with a cut-off velocity.
 
     Returns
     -------
@@ -87,9 +87,9 @@ class LawBase(Part):
     law. From these arguments, a function can compute the friction coefficient of forward slip,
     :math:`\tau/\sigma = \mu_* + a \ln(V/V_*) + \sum_i \Theta_i`. The functions do not receive shear
     stress, normal stress or pore pressure. If the state evolution depends on one of these
-    quantities, list the quantity in ``needs``, for example ``needs = {"shear_stress"}``. Scenes in
-    which a quantity in ``needs`` is unknown, for example because effective normal stress varies,
-    reject the law. If effective normal stress is constant, shear stress divided by :math:`\sigma_*`
+    quantities, list the quantity in ``needs``, for example ``needs = {"shear_stress"}``. A scene
+    rejects the law if a quantity in ``needs`` is unknown, for example because effective normal
+    stress varies. If effective normal stress is constant, shear stress divided by :math:`\sigma_*`
     equals the friction coefficient.
 
     A law with one state defines ``evolution(log_slip_rate, state, p)``. The function returns the
@@ -97,18 +97,18 @@ class LawBase(Part):
     steady state is :math:`\Theta = -b \ln(V/V_*)`. If the steady state of a law differs from the
     default, the law also defines ``steady_states(log_slip_rate, shift, p)``, which returns the
     states :math:`\Psi` in steady sliding. The argument ``shift`` is the decrease of the state
-    variable that stress causes. At :math:`V_*`, the states must add up to zero, because the
-    friction coefficient is :math:`\mu_*` there. A scene rejects a law if its evolution does not
-    vanish at its steady states.
+    variable that stress causes. In steady sliding at :math:`V_*`, the state variables must add up
+    to zero, because the friction coefficient is :math:`\mu_*`. A scene rejects a law if its
+    evolution does not vanish at its steady states.
 
     A law with several states sets the attribute ``state_count``, for example ``state_count = 3``. A
-    law with several states must also define ``steady_states`` and
-    ``evolutions(log_slip_rate, psis, shift, fraction, p)``. The function ``evolutions`` returns a
-    tuple with the change of each state, multiplied by ``fraction``, which is the slip per unit of
-    the independent variable. The functions ``evolutions`` and ``steady_states`` distribute the
-    shift among the states, and the contributions of the states must add up to the whole shift. The
-    field or property ``b_over_a`` is the evolution effect of all states together, divided by a. See
-    the module ``two_slip_states`` for an example.
+    law with several states must also define ``steady_states`` and ``evolutions(log_slip_rate, psis,
+    shift, fraction, p)``. The function ``evolutions`` returns a tuple with the change of each state
+    per unit slip, multiplied by ``fraction``. The argument ``fraction`` is the slip per unit of the
+    independent variable of the integration. The functions ``evolutions`` and ``steady_states``
+    distribute the decrease ``shift`` among the states. The shares of all states must add up to
+    ``shift``. The field or property ``b_over_a`` is the total evolution effect of all states,
+    divided by the direct effect a. See the module ``two_slip_states`` for an example.
 
     Any unknown that affects friction, such as temperature, can be modelled as a state. The value of
     the state must be expressed as a contribution to the friction coefficient.
@@ -160,16 +160,17 @@ class LawBase(Part):
     has_logarithmic_state: ClassVar[bool] = True
     #: True if the law contains no characteristic slip rate, so the choice of V_* is arbitrary.
     scale_free: ClassVar[bool] = False
-    #: Closed-form solution ``relaxation(rate, slip)`` at constant normal stress and constant slip
-    #: rate, with rate = ln(V/V_*) and slip in D_c: the difference between the stress and its steady
-    #: value, divided by b. If the solution uses fields of the law, ``relaxation`` is a method.
+    #: Function ``relaxation(rate, slip)``, the closed-form solution at constant normal stress and
+    #: constant slip rate. The argument ``rate`` is ln(V/V_*), and ``slip`` is the slip in D_c. The
+    #: function returns the difference between the friction coefficient and its steady value,
+    #: divided by b. If the function uses fields of the law, ``relaxation`` is a method.
     relaxation: ClassVar[Function | None] = None
     evolution: ClassVar[Function | None] = None
     evolutions: ClassVar[Function | None] = None
     steady_states: ClassVar[Function | None] = None
-    #: Function ``state_effect(friction, ratio, change, p) -> (shift, slope)``: decrease of the
-    #: state variable due to stress, and its derivative with respect to frictional stress. Most laws
-    #: do not define ``state_effect``.
+    #: Function ``state_effect(friction, ratio, change, p) -> (shift, slope)``. The value ``shift``
+    #: is the decrease of the state variable due to stress. The value ``slope`` is the derivative of
+    #: ``shift`` with respect to frictional stress. Most laws do not define ``state_effect``.
     state_effect: ClassVar[Function | None] = None
 
     @classmethod
@@ -224,7 +225,7 @@ class LawBase(Part):
 
     @property
     def effects(self) -> tuple[str, ...]:
-        """Names of the optional effects that are active."""
+        """Names of the active optional effects of the law."""
         named = {"stress_dependence": self.stress_dependence, "regularised": self.regularised}
         return tuple(name for name, acts in named.items() if acts)
 
@@ -345,7 +346,7 @@ class Law(LawBase):
     def min_weakening_b_over_a(self) -> float:
         """Smallest b/a for which steady friction decreases with slip rate.
 
-        The value refers to steady sliding at :math:`V_*`.
+        The change of friction with slip rate is evaluated in steady sliding at :math:`V_*`.
         """
         return 1.0
 
@@ -384,12 +385,12 @@ class Law(LawBase):
             raise self.field_error("b_over_a", rule, MISSING_CRITICAL_STIFFNESS_REMEDY)
 
 
-#: Value of b/a that replaces zero in equations that divide by b. The effect of the replacement is
-#: far smaller than rounding errors.
+#: Value of b/a that is used instead of zero, because equations divide by b. The value is so small
+#: that its effect is far smaller than rounding errors.
 B_OVER_A_STANDING_FOR_ZERO = 1e-60
 #: Smallest nonzero b/a. Powers and quotients of smaller values would underflow or overflow.
 MIN_B_OVER_A = 1e-30
-#: Remedy in error messages about a missing critical stiffness.
+#: Advice to the user in error messages about a missing critical stiffness.
 MISSING_CRITICAL_STIFFNESS_REMEDY = (
     "Sliding is then stable at every stiffness, or at none: give stiffness itself."
 )

@@ -14,8 +14,8 @@ from rsfstudy.slider.parameter_layout import LAW
 from rsfstudy.slider.parts import POSITIVE, Numbers, number
 from rsfstudy.slider.scene_view import SceneView
 
-#: Indices of the law parameters in ``p``: b of each state, the share of each state in the effect of
-#: stress, and L_1/L_2.
+#: Indices of the law parameters in ``p``. The parameters are b of each state, the share of each
+#: state in the effect of stress, and the ratio L_1/L_2 of the slip distances.
 FIRST_B, SECOND_B, FIRST_SHARE, SECOND_SHARE, LENGTH_QUOTIENT = range(LAW, LAW + 5)
 
 
@@ -80,8 +80,8 @@ class TwoStateLaw(LawBase):
     Effects of stress on the state, such as :math:`\alpha \ln(\sigma/\sigma_*)`, are distributed to
     the two states in proportion to :math:`\lvert b_i \rvert`. Experiments do not determine this
     distribution. With this distribution, two states with equal slip distances and coefficients
-    :math:`b_i` of the same sign are equivalent to a single state. The share of a state never
-    exceeds 1, even if :math:`b_1 + b_2` is small.
+    :math:`b_i` of the same sign are equivalent to a single state. The share of a state in the
+    effect of stress never exceeds 1, even if :math:`b_1 + b_2` is small.
 
     References
     ----------
@@ -120,8 +120,8 @@ class TwoStateLaw(LawBase):
         """Return the parameters of both states and the length ratio.
 
         See ``Part.parameter_values``. The parameters of each state are its evolution effect
-        parameter b and its share of the shift. The last value is :math:`L_1/L_2`, the inverse of
-        ``length_ratio``.
+        parameter b and its share of the effect of stress. The last value is :math:`L_1/L_2`, the
+        inverse of ``length_ratio``.
         """
         both, size = (self.b1_over_a, self.b2_over_a), self.state_change_over_a
         # If b is zero for both states, the shares are undefined. The method ``check`` rejects this
@@ -131,10 +131,10 @@ class TwoStateLaw(LawBase):
 
     @classmethod
     def rejection_error(cls, name: str, value: object) -> InvalidValue:
-        """Return the error for a field of another law.
+        """Return the error for a field that belongs to another law.
 
-        See ``Part.rejection_error``. The message for ``b_over_a`` names the two fields that replace
-        it.
+        See ``Part.rejection_error``. The error message for ``b_over_a`` names the two fields that
+        replace ``b_over_a``.
         """
         if name == "b_over_a":
             rule = f"is b1_over_a + b2_over_a for {cls.name}, and follows from them"

@@ -14,8 +14,7 @@ from rsfstudy.slider.parameter_layout import LAW
 from rsfstudy.slider.parts import Numbers
 from rsfstudy.slider.scene_view import SceneView
 
-#: Number of Halley iterations. From the initial value in ``lambert_w``, four iterations reach
-#: rounding accuracy.
+#: Number of Halley iterations. Four Halley iterations of ``lambert_w`` reach rounding accuracy.
 HALLEY_ITERATION_COUNT = 4
 
 
@@ -185,8 +184,8 @@ class CompositeLaw(Law):
     def parameter_values(self, scene: SceneView) -> Numbers:
         """Return b, the logarithm of the cut-off velocity, and the steady offset.
 
-        See ``Part.parameter_values``. The offset is the value :math:`u_*` in steady sliding at
-        :math:`V_*`.
+        See ``Part.parameter_values``. The steady offset :math:`u_*` is the value of ln(theta V/D_c)
+        in steady sliding at :math:`V_*`.
         """
         logarithm = math.log(self.cutoff_velocity_ratio)
         return (

@@ -114,8 +114,8 @@ def steady_state_over_b(
     Notes
     -----
     The function uses two equivalent formulas, one for slip rates below :math:`V_*` and one for
-    higher slip rates. Each formula avoids the cancellation of digits in its range. Exponents are
-    limited to ``LARGEST_EVOLUTION_EXPONENT`` to avoid overflow.
+    higher slip rates. Each formula avoids the cancellation of digits in its range of slip rates.
+    Exponents are limited to ``LARGEST_EVOLUTION_EXPONENT`` to avoid overflow.
     """
     if log_slip_rate < 0.0:
         exponent = min(-log_slip_rate, LARGEST_EVOLUTION_EXPONENT)
@@ -156,8 +156,8 @@ class CutOffLaw(Law):
     def parameter_values(self, scene: SceneView) -> Numbers:
         """Return b and the two velocity fractions.
 
-        See ``Part.parameter_values``. The fractions are :math:`V_c/(V_c + V_*)` and :math:`V_*/(V_c
-        + V_*)`.
+        See ``Part.parameter_values``. The velocity fractions are :math:`V_c/(V_c + V_*)` and
+        :math:`V_*/(V_c + V_*)`.
         """
         return (*super().parameter_values(scene), *self._cutoff_and_reference_velocity_fractions())
 

@@ -1,6 +1,6 @@
 """The evolution law of Perrin, Rice and Zheng (1995).
 
-The evolution is an odd function of the distance from steady sliding.
+The evolution is an odd function of the difference between the state variable and its steady value.
 """
 
 from __future__ import annotations
@@ -12,9 +12,10 @@ from rsfstudy.slider.laws import LARGEST_EVOLUTION_EXPONENT, Law
 from rsfstudy.slider.parameter_layout import LAW
 from rsfstudy.slider.parts import Numbers
 
-#: Upper limit of the distance from steady sliding. Larger distances occur only in trial steps,
-#: because a motion ends at ln(V/V_*) = 276. The limit also prevents an overflow when the integrator
-#: squares the rate to estimate the first step.
+#: Upper limit of the difference between the state variable and its steady value, divided by b. A
+#: larger difference occurs only in a trial step of the integrator, because a motion ends at
+#: ln(V/V_*) = 276. The limit also prevents an overflow when the integrator squares the rate of the
+#: state variable to estimate the first step.
 MAX_STEADY_STATE_OFFSET_OVER_B = 300.0
 
 

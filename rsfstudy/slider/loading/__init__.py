@@ -20,7 +20,7 @@ from rsfstudy.slider.parts import NON_NEGATIVE, Numbers, Part, discover_parts, n
 from rsfstudy.slider.scene_view import SceneView
 
 #: Minimum duration of a segment in D_c/V_*. The integrator cannot resolve shorter segments. At
-#: times above 1, rounding errors of the time exceed this minimum duration.
+#: times greater than D_c/V_*, rounding errors of the time exceed the minimum duration of a segment.
 MIN_SEGMENT_DURATION = 1e-16
 
 
@@ -90,8 +90,7 @@ class Loading(Part):
     loading with unknowns defines the class attributes ``unknowns``, ``auxiliary_rates`` and
     ``auxiliary_steady_states`` in the same way as ``Fluid``, and the method ``initial_unknowns``.
     All unknowns must be zero in steady sliding. The last unknown is the decrease of imposed normal
-    stress, divided by :math:`\sigma_*`. The unknowns describe the first segment of the loading, and
-    the other segments have no unknowns.
+    stress, divided by :math:`\sigma_*`. Only the first segment of the loading has unknowns.
 
     Examples
     --------
@@ -112,13 +111,14 @@ class Loading(Part):
     50.0
     """
 
-    #: True if the last unknown determines a shear stress instead of a decrease of normal stress.
-    #: The shear stress is caused by the displacement of the load point relative to its mean motion,
-    #: and is equal to the unknown minus the third element of ``parameter_values``.
+    #: True if the last unknown of the loading determines a shear stress, and False if the last
+    #: unknown is a decrease of normal stress. The displacement of the load point relative to its
+    #: mean motion causes the shear stress. The shear stress equals the last unknown minus the third
+    #: element of ``parameter_values``.
     has_load_point_unknown: ClassVar[bool] = False
     received_quantities = frozenset({SLIP_RATE})
-    #: True if the loading decreases the effective normal stress by a rise of pore pressure. If the
-    #: fluid has unknowns, the pore pressure around the fault rises.
+    #: True if the loading decreases the effective normal stress by an increase of pore pressure. In
+    #: a scene whose fluid has unknowns, the loading increases the pore pressure around the fault.
     of_pressure: ClassVar[bool] = True
 
     def initial_unknowns(self, scene: SceneView) -> Numbers:
@@ -179,7 +179,7 @@ class Loading(Part):
 
     @property
     def segments(self) -> tuple[Segment, ...]:
-        """Segments of the loading, with an infinite last segment."""
+        """Segments of the loading. The last segment has an infinite duration."""
         raise TypeError(f"{type(self).__name__} loads nothing")
 
     def describe(self) -> dict[str, Any]:
@@ -203,8 +203,9 @@ class Loading(Part):
         Returns
         -------
         Loading or Segment
-            Segment with this index. The method returns the loading itself if the loading has only
-            one segment, or if the loading has unknowns and the index is 0.
+            Segment with this index. If the loading has only one segment, the method returns the
+            loading itself. The method also returns the loading itself if the loading has unknowns
+            and the index is 0.
         """
         history = self.segments
         if len(history) == 1 or (self.unknowns and segment_index == 0):
@@ -213,9 +214,9 @@ class Loading(Part):
 
     @property
     def reported_segment_count(self) -> int:
-        """Number of segments whose start is reported as an event of a motion.
+        """Number of segment starts that are reported as events of a motion.
 
-        The reported segments are the last segments of the loading.
+        The reported segment starts belong to the last segments of the loading.
         """
         return len(self.segments) - 1
 
@@ -224,7 +225,7 @@ class Loading(Part):
         """Table of the segments, with one row per segment.
 
         The constants ``SEGMENT_START`` to ``SEGMENT_STRESS_FALL`` of ``rsfstudy.parts`` are the
-        column indices.
+        column indices of the table.
         """
         rows, begins = [], 0.0
         for velocity, _step, lasts, _stress in self.segments:
@@ -235,10 +236,10 @@ class Loading(Part):
 
     @property
     def jump_mask(self) -> Any:
-        """True for each segment that starts with a jump.
+        """True for each segment that starts with a jump of the loading.
 
-        A jump is a sudden change of load point displacement or normal stress, or the end of a
-        segment with unknowns.
+        A jump of the loading is a sudden change of load point displacement or normal stress. The
+        end of a segment with unknowns also counts as a jump of the loading.
         """
         before, found = 0.0, []
         for place, segment in enumerate(self.segments):
@@ -261,7 +262,7 @@ class Loading(Part):
 
     @classmethod
     def rejection_error(cls, name: str, value: Any) -> InvalidValue:
-        """Return the error for a field of another loading.
+        """Return the error for a field that belongs to another loading.
 
         Parameters
         ----------

@@ -53,9 +53,9 @@ def harmonic_oscillation_rates(
 
     With the initial values :math:`y = A` and :math:`P = 0`, the solution is :math:`P = -A \sin
     \omega t`. To correct numerical errors of the amplitude within about one period, the function
-    adds the term :math:`(\omega/2) [1 - (y^2 + P^2)/A^2] y` to the rate of :math:`y`, and the same
-    term with the factor :math:`P` to the rate of :math:`P`. The term vanishes for the exact
-    solution.
+    adds the term :math:`(\omega/2) [1 - (y^2 + P^2)/A^2] y` to the rate of :math:`y`. The function
+    adds the term :math:`(\omega/2) [1 - (y^2 + P^2)/A^2] P` to the rate of :math:`P`. Both terms
+    vanish for the exact solution.
     """
     ahead, relief = states
     turn = (
@@ -147,8 +147,8 @@ class OscillationBase(LoadingWithFinalLoadVelocity):
     def check(self, scene: SceneView) -> None:
         """Check that the scene has inertia if the oscillation is fast.
 
-        See ``Part.check``. Without inertia, the period must not be shorter than the period of free
-        oscillation of the slider.
+        See ``Part.check``. Without inertia, the oscillation period must not be shorter than the
+        period of free oscillation of the slider.
         """
         super().check(scene)
         free = 2.0 * math.pi * scene.inertial_time
@@ -188,16 +188,17 @@ class OscillationBase(LoadingWithFinalLoadVelocity):
     def jump_mask(self) -> list[bool]:
         """True for every segment.
 
-        Every segment starts with a jump, because only the oscillation has unknowns and because its
-        initial phase may be nonzero.
+        The loading may change suddenly at the start of the oscillation, because the initial phase
+        may be nonzero. The end of the oscillation also counts as a jump of the loading, because the
+        oscillation has unknowns.
         """
         return [True] * len(self.segments)
 
     def isolate_segment(self, segment_index: int) -> Loading | Segment:
         """Return the loading of a single segment.
 
-        See ``Loading.isolate_segment``. For the segment with the oscillation, the method returns a
-        loading that oscillates from the start and has no end.
+        See ``Loading.isolate_segment``. For the segment with the oscillation, the method returns an
+        oscillation that begins immediately and has no end.
         """
         segments = self.segments
         if segment_index % len(segments) != bool(self.oscillation_begin):

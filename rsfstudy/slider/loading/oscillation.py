@@ -35,9 +35,9 @@ class NormalStressOscillation(_oscillation_base.OscillationBase):
 
         \frac{\sigma}{\sigma_*} = 1 + A \sin\left[\frac{2 \pi (t - t_b)}{T_o} + \phi_o\right].
 
-    Before and after the oscillation, the imposed normal stress is :math:`\sigma_*`. By default the
-    oscillation begins immediately with zero phase, has no end, and the load point velocity is
-    :math:`V_*`.
+    Before and after the oscillation, the imposed normal stress is :math:`\sigma_*`. By default, the
+    oscillation begins immediately with zero phase and has no end. The default load point velocity
+    is :math:`V_*`.
 
     References
     ----------

@@ -131,7 +131,7 @@ class NormalStressRamp(LoadingWithFinalLoadVelocity):
 
     @property
     def segments(self) -> tuple[Segment, ...]:
-        """Segment of the ramp and the segment after the ramp."""
+        """Two segments: the ramp, and the constant loading after the ramp."""
         last = Segment(self.load_velocity, normal_stress=self.normal_stress_ramp)
         return last._replace(duration=self.ramp_duration), last
 

@@ -40,8 +40,8 @@ class VelocityOscillation(_oscillation_base.OscillationBase):
         D = R \left\{\cos \phi_o - \cos[\omega (t - t_b) + \phi_o]\right\}, \quad
           R = \frac{A_V V_0}{\omega}, \quad \omega = \frac{2 \pi}{T_o}.
 
-    The displacement imposes the shear stress :math:`K D`, which is represented by the last unknown
-    (see the module ``friction``).
+    The displacement :math:`D` imposes the shear stress :math:`K D`. The last unknown of the loading
+    represents this shear stress (see the module ``friction``).
     """
 
     velocity_oscillation: float | None = number(

@@ -68,7 +68,7 @@ class VelocityRamp(Loading):
 
     @property
     def segments(self) -> tuple[Segment, ...]:
-        """Segments of the velocity steps and the segment after the ramp."""
+        """One segment per velocity step, and the segment after the ramp."""
         count, change = int(self.velocity_ramp_stairs), self.velocity_ramp
         velocities = [1.0 + change * (stair + 0.5) / count for stair in range(count)]
         lasts = self.velocity_ramp_duration / count

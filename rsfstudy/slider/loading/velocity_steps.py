@@ -21,7 +21,7 @@ class VelocitySteps(Loading):
     velocity_steps : float, default: 0.0
         Number of velocity steps.
     velocity_ratio : float, default: 10.0
-        Ratio :math:`r` of the load point velocity after the first step to :math:`V_*`.
+        Load point velocity :math:`r` after the first step, in units of :math:`V_*`.
     displacement_between_steps : float, default: 20.0
         Load point displacement :math:`\Delta\delta_0` between successive steps, in :math:`D_c`.
 
