@@ -451,7 +451,7 @@ def warn_renamed(former_name: str, new_name: str, owner_name: str) -> None:
     new_name : str
         New name.
     owner_name : str
-        Name of the class, function or module, which the warning contains.
+        Name of the class, function or module. The warning contains this name.
     """
     text = (
         f"{former_name!r} of {owner_name} is now called {new_name!r}. The old name will be "
@@ -466,7 +466,7 @@ def build_getattr_for_former_names(module_name: str) -> Callable[[str], Any]:
     Parameters
     ----------
     module_name : str
-        Full name of the module, which must be a key of ``NEW_NAME_BY_OWNER_AND_FORMER_NAME``.
+        Full name of the module. The name must be a key of ``NEW_NAME_BY_OWNER_AND_FORMER_NAME``.
 
     Returns
     -------

@@ -74,9 +74,9 @@ def string_instead_of_list_error(
 ) -> InvalidValue | None:
     """Return an error if a string was passed in place of a list of strings.
 
-    A function that expects a list iterates over the characters of the string, so its own error
-    refers to a single character. If several strings were passed in place of lists, only the first
-    argument is reported.
+    A function that expects a list iterates over the characters of the string, so the error that the
+    function raises refers to a single character. If several strings were passed in place of lists,
+    only the first argument is reported.
 
     Parameters
     ----------
@@ -134,7 +134,7 @@ def type_mismatch_error(
 def unusable_value_error(
     arguments: Mapping[str, Any], error: Exception, remedy: str
 ) -> InvalidValue | None:
-    """Return an error for the first argument that explains an exception.
+    """Return an error for the first argument that may have caused an exception.
 
     The function looks for non-finite or very large numbers, strings that UTF-8 cannot encode,
     invalid file names, indices out of range, unknown names, and callables that raise exceptions.
@@ -151,7 +151,8 @@ def unusable_value_error(
     Returns
     -------
     InvalidValue or None
-        Error that names the argument. The value is None if no argument explains the exception.
+        Error that names the argument. The value is None if no argument may have caused the
+        exception.
     """
     for name, value in arguments.items():
         for part in _iterate_nested_values(value, _MAX_CHECKED_NESTING_LEVELS):

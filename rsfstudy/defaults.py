@@ -13,8 +13,8 @@ OUTPUT_DIRECTORY = Path("outputs")
 RESULT_FORMATS = ("netcdf", "zarr")
 #: Formats of figures, which are also the file name extensions. The first format is the default.
 FIGURE_FORMATS = ("png", "pdf", "svg")
-#: CPU time limit in s for one cell on a worker. The default work budget is exhausted long before
-#: this time.
+#: CPU time limit in s for one cell on a worker. A cell exhausts the default budget of
+#: right-hand-side evaluations long before this time.
 CELL_TIME_LIMIT = 600.0
 #: Maximum number of right-hand-side evaluations of a fit to a record.
 FIT_EVALUATION_BUDGET = 50_000_000

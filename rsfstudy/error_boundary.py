@@ -1,8 +1,9 @@
 """Error boundary of the public functions and classes.
 
 Every exception that leaves a public function is an instance of an error class of rsfstudy. The
-message contains the argument, the rule and the remedy. Calls from within rsfstudy bypass the
-boundary, so that the error refers to the function that the user called.
+error message contains the invalid argument, the rule that the argument breaks, and the remedy.
+Calls from within rsfstudy bypass the boundary, so that the error refers to the function that the
+user called.
 """
 
 from __future__ import annotations

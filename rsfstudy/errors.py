@@ -162,7 +162,8 @@ class Interrupted(RunError):
     def exit_status(self) -> int:
         """Exit status of the process.
 
-        The exit status is 128 plus the signal number after a signal, and 1 after Ctrl-C.
+        After a signal, the exit status is 128 plus the signal number. After Ctrl-C, the exit status
+        is 1.
         """
         return self.__cause__.exit_status if isinstance(self.__cause__, SignalInterrupt) else 1
 
@@ -202,7 +203,7 @@ class RsfStudyWarning(UserWarning):
 
 
 class NoResultWarning(RsfStudyWarning):
-    """Warning that a computation for one scene has no valid result.
+    """Warning issued if a computation for one scene has no valid result.
 
     Possible reasons are that the requested quantity has no numerical value, that the slider does
     not move, or that the motion is unphysical.
@@ -210,7 +211,7 @@ class NoResultWarning(RsfStudyWarning):
 
 
 class IncompleteWarning(RsfStudyWarning):
-    """Warning that a motion ended early or that cells of a run failed."""
+    """Warning issued if a motion ended early or if cells of a run failed."""
 
 
 def shorten_text(text: object, max_length: int = _MAX_CHARACTERS_OF_VALUE) -> str:

@@ -10,7 +10,8 @@ import numpy as np
 
 #: Maximum length of a list that is printed without abbreviation.
 _MAX_LISTED_VALUES = 8
-#: Pattern of decimal numbers with at least six decimal places, which titles and messages round.
+#: Pattern of decimal numbers with at least six decimal places. These numbers are rounded in titles
+#: and messages.
 _LONG_DECIMAL_NUMBER_PATTERN = re.compile(r"(?<![\w.])\d+\.\d{6,}(?:e[+-]?\d+)?")
 
 

@@ -255,7 +255,7 @@ def escape_html(text: object) -> str:
 
 
 class HtmlMarkup(str):
-    """String of HTML markup, which is not escaped again."""
+    """String of HTML markup that needs no further escaping."""
 
     __slots__ = ()
 

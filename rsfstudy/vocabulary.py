@@ -1,8 +1,8 @@
 """Shared vocabulary of the quantities in scenes, motions and results.
 
-Each quantity has a name, a symbol, units and a long name, which datasets, axis labels and tables
-use. Most quantities are defined in ``vocabulary.csv``. A quantity that only one measure computes is
-defined in the module of the measure.
+Each quantity has a name, a symbol, units and a long name. Datasets, axis labels and tables use
+these properties. Most quantities are defined in ``vocabulary.csv``. A quantity that only one
+measure computes is defined in the module of the measure.
 """
 
 from __future__ import annotations
@@ -20,11 +20,11 @@ from rsfstudy.slider import SCENE_FIELD_QUANTITIES as SCENE
 
 
 def _read_vocabulary() -> Iterator[Quantity]:
-    """Yield the quantities of ``vocabulary.csv``, which contains no scene fields.
+    """Yield the quantities of the file ``vocabulary.csv``.
 
-    The file lists quantities of scenes and rigs first, then quantities of measures and motions,
-    then quantities of reductions, and finally quantities that every lattice has. Datasets and pages
-    list the quantities in this order.
+    The file contains no fields of scenes. The file lists quantities of scenes and rigs first, then
+    quantities of measures and motions, then quantities of reductions, and finally quantities that
+    every lattice has. Datasets and pages list the quantities in the order of the file.
     """
     with resources.files(__package__).joinpath("vocabulary.csv").open(encoding="utf-8") as file:
         rows: Iterator[dict[str, Any]] = csv.DictReader(file)

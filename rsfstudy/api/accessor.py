@@ -105,10 +105,11 @@ class DatasetAccessor:
     @property
     @error_boundary
     def rig(self) -> Rig:
-        """Rig that converts motions of a fit to the units of the record.
+        """Rig of a fit, for the conversion of motions to the units of the record.
 
         The slip distance and the stiffness of the rig are the fitted values. The reference velocity
-        and the normal stress of the rig are the mean values before the step. For example,
+        of the rig is the load point velocity before the step. The normal stress of the rig is the
+        mean normal stress before the step. For example,
         ``dataset.rsf.rig.in_units(motion, length="um")`` converts a motion of
         ``dataset.rsf.scene``.
 
@@ -159,8 +160,8 @@ class DatasetAccessor:
         Parameters
         ----------
         **scale_values : quantity
-            Scales ``normal_stress`` (Pa), ``slip_distance`` (m) and ``reference_rate`` (1/s) that
-            the dataset does not contain. See ``rsfstudy.to_si``.
+            Scales that the dataset does not contain: ``normal_stress`` in Pa, ``slip_distance`` in
+            m, or ``reference_rate`` in 1/s. See ``rsfstudy.to_si``.
 
         Returns
         -------
@@ -359,9 +360,10 @@ class DatasetAccessor:
         Returns
         -------
         xarray.DataArray
-            Variable ``slip_mode`` of the dataset with the new limit between slow slip and
-            stick-slip. The codes are 0 (steady), 1 (damped oscillation), 2 (slow slip) and 3
-            (stick-slip). If the motion of a cell settles to steady sliding, the code is unchanged.
+            Variable ``slip_mode`` of the dataset, computed with ``stick_slip_from`` as the limit
+            between slow slip and stick-slip. The codes are 0 (steady), 1 (damped oscillation), 2
+            (slow slip) and 3 (stick-slip). If the motion of a cell settles to steady sliding, the
+            code is unchanged.
 
         Raises
         ------
@@ -401,7 +403,7 @@ class DatasetAccessor:
 
     @error_boundary
     def to_dataframe(self) -> pd.DataFrame:
-        """Convert the dataset to a table without constant columns.
+        """Convert the dataset to a table, and omit constant columns.
 
         Returns
         -------

@@ -18,7 +18,7 @@ from rsfstudy.storage import compare_same_lattice
 
 
 def to_dataframe(dataset: xr.Dataset) -> pd.DataFrame:
-    """Convert a dataset to a table without constant columns.
+    """Convert a dataset to a table, and omit constant columns.
 
     Parameters
     ----------

@@ -25,15 +25,16 @@ from rsfstudy.fitting import (
 from rsfstudy.netcdf_encoding import copy_with_cf_encoding
 from rsfstudy.rig import compute_conversion_factor, convert_to_si, read_table
 
-#: Variables of the record that determine the units of a quantity, by the scale of the quantity.
+#: Mapping from the scale of a quantity to a variable of the record. The quantity has the units of
+#: this variable.
 _VARIABLE_PROVIDING_UNITS_BY_SCALE = {"D_c/V_*": "time", "D_c": "slip", "sigma_*": "shear_stress"}
 #: Quantities of an event that can be computed only if displacement is known.
 _QUANTITIES_REQUIRING_DISPLACEMENT = ("slip", "peak_slip_rate", "dynamic_stress_drop")
 #: Meanings of the codes 0, 1, 2 and 3 of the variable ``cut``.
 _MEANINGS_OF_EVENT_TRUNCATION_FLAGS = ("whole", "begins_before", "lasts_beyond", "both")
 
-#: Ratio of the largest stress decrease to the smallest detectable drop above which an empty
-#: catalogue causes a warning.
+#: Limit of the ratio of the largest decrease of stress to the smallest detectable drop of stress.
+#: If no drop is found and the ratio exceeds the limit, the function ``events`` emits a warning.
 _SUSPICIOUS_DECREASE_OVER_DETECTABLE_DROP = 10.0
 
 
@@ -45,9 +46,9 @@ def build_event_catalogue(
     Parameters
     ----------
     event_numbers : sequence of (dict, int)
-        Quantities of each event, and the code of the missing part of the event. Each quantity is a
-        value with its error. The function adds the interval since the previous event to each
-        dictionary.
+        Quantities of each event, and the code that describes which part of the event is missing.
+        Each quantity is a value with its error. The function adds the interval since the previous
+        event to each dictionary.
     variable_attributes : mapping of str to mapping
         Attributes of the variables ``time``, ``slip`` and ``shear_stress`` from which the events
         were measured.
@@ -96,8 +97,9 @@ def _build_unit_attributes(
 ) -> dict[str, str]:
     """Return the attributes ``units`` and ``scale`` of a quantity of an event.
 
-    Times, slips and stresses have the units of the corresponding variable of the record. A slip
-    rate is in units of slip over units of time. All other quantities are dimensionless.
+    Times, slips and stresses have the units of the corresponding variable of the record. The units
+    of a slip rate are the units of slip divided by the units of time. All other quantities are
+    dimensionless.
     """
     if scale in _VARIABLE_PROVIDING_UNITS_BY_SCALE:
         source = variable_attributes[_VARIABLE_PROVIDING_UNITS_BY_SCALE[scale]]
@@ -137,14 +139,16 @@ def events(
         Arrays to use instead of ``record``. If an array has the attribute ``units``, the results
         have the same units. Otherwise, the results have no attribute ``units``.
     stiffness : quantity, optional
-        Stiffness between the fault and the point at which displacement is measured, in shear stress
-        over displacement. The stiffness is a string such as "0.05 MPa/um", or a number in the units
-        of the record. If displacement was measured at the load point, pass the stiffness of the
-        rig. If displacement is the slip of the fault, pass ``inf``. By default, displacement must
-        be the slip of the fault, and the function tests this assumption.
+        Stiffness between the fault and the point at which displacement is measured. The stiffness
+        is a change of shear stress divided by a change of displacement. The value is a string such
+        as "0.05 MPa/um", or a number in the units of the record. If displacement was measured at
+        the load point, pass the stiffness of the rig. If displacement is the slip of the fault,
+        pass ``inf``. By default, displacement must be the slip of the fault, and the function tests
+        this assumption.
     sign : {1, -1}, optional
-        Sign of shear stress in the direction of slip. Stress is multiplied by the sign, so that
-        stress falls during events. The default is -1 if all samples are negative, and 1 otherwise.
+        Sign that shear stress in the direction of slip has in the record. Shear stress is
+        multiplied by the sign, so that shear stress falls during events. The default is -1 if all
+        samples of shear stress are negative, and 1 otherwise.
 
     Returns
     -------
@@ -169,40 +173,42 @@ def events(
     Warns
     -----
     NoResultWarning
-        If displacement does not move faster during the drops than before and after the drops. In
-        this case, ``slip``, ``peak_slip_rate`` and ``dynamic_stress_drop`` are NaN, and the
+        If displacement does not increase faster during the drops than before and after the drops.
+        In this case, ``slip``, ``peak_slip_rate`` and ``dynamic_stress_drop`` are NaN, and the
         attribute ``comment`` of ``slip`` contains the reason. The function also warns if it finds
         no drop although stress falls by more than ten times ``smallest_drop``. In this case, the
-        attribute ``comment`` of the dataset contains both numbers.
+        attribute ``comment`` of the dataset contains the size of the decrease and
+        ``smallest_drop``.
 
     Notes
     -----
     The detection compares the mean stress of a window with the mean stress of the next window, at
     every sample. The window lengths are 4, 8, 16 and more sampling intervals, up to a hundredth of
-    the record. The noise is estimated from the most frequent differences between the two means,
-    because most differences occur during loading. The noise may be correlated over times that are
-    short compared with the longest window, and drops may occupy up to 40 % of the record. The
-    detection threshold corresponds to one false detection in 10,000 records of Gaussian noise. If
-    sampling intervals differ by more than a factor of three, as in triggered bursts, the samples
-    are first averaged over equal intervals of time.
+    the record. The noise is estimated from the most frequent differences between the mean stresses
+    of neighbouring windows, because most of these differences occur during loading. The noise may
+    be correlated over times that are short compared with the longest window, and drops may occupy
+    up to 40 % of the record. The detection threshold corresponds to one false detection in 10,000
+    records of Gaussian noise. If sampling intervals differ by more than a factor of three, as in
+    triggered bursts, the samples are first averaged over equal intervals of time.
 
     Three straight lines are then fitted to the samples before, during and after each drop. The
     intersections of the lines are the beginning of the event, where stress is highest, and the end
     of the event, where stress is lowest.
 
-    A drop of size ``smallest_drop`` is missed once in 1,000 cases, provided that the longest window
-    separates the drop from other drops. If the noise is white and the record has at least 3,200
-    samples, ``smallest_drop`` is less than three standard deviations of the noise. If the noise is
-    correlated, ``smallest_drop`` is larger. Spikes of single samples are not Gaussian noise and may
-    cause false detections. A relaxation of stress within a window, for example during a hold of the
-    load point, is also detected as a drop.
+    A drop of size ``smallest_drop`` is missed once in 1,000 cases, provided that the time between
+    the drop and any other drop is longer than the longest window. If the noise is white and the
+    record has at least 3,200 samples, ``smallest_drop`` is less than three standard deviations of
+    the noise. If the noise is correlated, ``smallest_drop`` is larger. Spikes of single samples are
+    not Gaussian noise and may cause false detections. A relaxation of stress within a window, for
+    example during a hold of the load point, is also detected as a drop.
 
-    Slip is displacement minus shear stress divided by ``stiffness``. If ``stiffness`` is not
-    passed, the function uses displacement as slip only if displacement moves faster during the
-    drops than before and after the drops. The difference must exceed 10 % and three standard
-    deviations of the noise of displacement. The displacement of a load point does not pass this
-    test. Displacement is read a few samples away from each drop, because noise of stress may have
-    shifted the times of the drop.
+    To compute slip, the function divides shear stress by ``stiffness``, and subtracts the quotient
+    from displacement. If ``stiffness`` is not passed, the function uses displacement as slip only
+    if displacement increases faster during the drops than before and after the drops. The increase
+    of displacement during the drops must exceed the increase in equally long intervals around the
+    drops by 10 %, and by three standard deviations of the noise of displacement. The displacement
+    of a load point does not pass this test. Displacement is read a few samples away from each drop,
+    because noise of shear stress causes errors in the times of the drop.
 
     Examples
     --------
@@ -326,9 +332,10 @@ def _record_to_dataset(record: Record) -> xr.Dataset:
 
 
 def _find_stress_sign(stress: np.ndarray, stated_sign: int | None) -> float:
-    """Return the sign of shear stress in the direction of slip.
+    """Return the sign that shear stress in the direction of slip has in a record.
 
-    If the user does not pass a sign, the sign is -1 if all samples are negative, and 1 otherwise.
+    If the user does not pass a sign, the sign is -1 if all samples of shear stress are negative,
+    and 1 otherwise.
     """
     if stated_sign is None:
         return -1.0 if stress.max() < 0.0 else 1.0

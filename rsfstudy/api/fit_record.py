@@ -50,7 +50,8 @@ DEFAULT_FREE_PARAMETERS = (
     "mu_star",
     "trend1",
 )
-#: Parameters that depend on the number of states of the law, and the remedy in error messages.
+#: Parameters that exist only for laws with a certain number of states. The second constant is a
+#: sentence for error messages about these parameters.
 _EVOLUTION_EFFECT_PARAMETERS = ("b", "b1", "b2")
 _REMEDY_FOR_WRONG_STATE_PARAMETERS = (
     "One state has b; two states have b1, b2, slip_distance and slip_distance_2."
@@ -59,15 +60,17 @@ _REMEDY_FOR_WRONG_STATE_PARAMETERS = (
 _SLIP_DISTANCE_GUESS_OVER_DISPLACEMENT = 0.05
 #: Maximum value of the argument ``windows``.
 _MAX_FIT_WINDOW_COUNT = 1000
-#: A backward jump of displacement is a reset to zero if the jump exceeds each of three limits: a
-#: multiple of the noise and of the neighbouring changes, and a fraction of the total displacement.
-#: The noise is estimated only if the record has more than 20 rows.
+#: A decrease of the load point displacement between two rows is a reset to zero if the decrease
+#: exceeds three limits: a multiple of the noise of displacement, a multiple of the changes between
+#: the neighbouring rows, and a fraction of the range of displacement. The noise is estimated only
+#: if the record has more than 20 rows.
 (
     _MIN_DISPLACEMENT_RESET_OVER_NOISE,
     _MIN_DISPLACEMENT_RESET_OVER_EXTENT,
     _MIN_ROWS_FOR_NOISE_ESTIMATE,
 ) = 10.0, 0.01, 20
-#: Length of the shortest window, as a fraction of the displacement after a step.
+#: Length of the shortest window of a fit, as a fraction of the load point displacement after a
+#: step.
 _MIN_WINDOW_LENGTH_OVER_FULL_LENGTH = 0.5
 #: Initial values of the scene fields in a fit. Values that the user passes take precedence.
 _INITIAL_SCENE_FIELDS = {"a": 0.01, "mu_star": 0.6, "normal_stress": "constant"}
@@ -128,13 +131,13 @@ def fit(
     together : bool, default: False
         If True, the steps of all records are fitted jointly. In a joint fit, all steps share the
         same ``a``, ``b`` and slip distance. The friction before the step, the trend and the step
-        time are fitted separately for each step, and their names end with the number of the step,
-        such as ``mu_star_1`` and ``mu_star_2``.
+        time are fitted separately for each step, and the names of these parameters end with the
+        number of the step, such as ``mu_star_1`` and ``mu_star_2``.
     before, after : quantity, default: 0.0
-        Load point displacement to fit before and after each step, such as "100 um", or a number in
-        um. If ``before`` is 0, the window begins halfway between the previous step and this step,
-        or at the beginning of the record. If ``after`` is 0, the window ends at the next step, or
-        at the end of the record.
+        Load point displacement over which the record is fitted before and after each step, such as
+        "100 um", or a number in um. If ``before`` is 0, the window begins halfway between the
+        previous step and this step, or at the beginning of the record. If ``after`` is 0, the
+        window ends at the next step, or at the end of the record.
     windows : int, default: 1
         Number of windows for each fit. The windows include between 50 and 100 % of the displacement
         after the step. For each parameter, ``<name>_windows`` is the range of the parameter over
@@ -143,7 +146,8 @@ def fit(
     noise : str, default: "ar"
         Noise model: "ar" for an autoregressive process with an automatic order, "ar1", "ar2" and so
         on for a fixed order, or "white" for white noise. With "white", the standard errors follow
-        from the usual formula, and the load point displacement has no noise.
+        from the formula for uncorrelated noise, and the fit assumes that the load point
+        displacement has no noise.
     loading : {"steps", "recorded"}, default: "steps"
         Loading of the model. "steps" uses constant velocities between the steps. "recorded" uses
         the recorded load point displacement, and the recorded normal stress if the normal stress of
@@ -157,18 +161,19 @@ def fit(
         "butterworth_2 2 Hz" or "butterworth_4 2 Hz". The same filter is applied to the model. By
         default, the fit assumes that friction was not filtered.
     posterior : int, default: 0
-        Number of draws from the posterior distribution, which are stored in ``posterior`` along the
-        dimension ``draw``. Sampling requires emcee. The priors are flat between the bounds of the
-        search, and the noise model is fixed. A chain requires the integration of about 1,000 to
-        10,000 motions. If the budget is exceeded before the chain is 50 autocorrelation times long,
-        the status of the fit is ``work_budget_spent``.
+        Number of draws from the posterior distribution. The draws are stored in the variable
+        ``posterior`` along the dimension ``draw``. Sampling requires emcee. The prior of each
+        parameter is uniform between the bounds of the parameter in the fit, and the noise model is
+        fixed. A Markov chain requires the integration of about 1,000 to 10,000 motions. If the
+        budget is exceeded before the chain is 50 autocorrelation times long, the status of the fit
+        is ``work_budget_spent``.
     stiffness : quantity, optional
-        Stiffness of the machine, required if there is no rig. The stiffness is a string in MPa/um,
-        a string in 1/um such as "1.6e-3 1/um" (stiffness divided by normal stress), or a number in
-        1/um. Stiffness in MPa/um is divided by the mean normal stress in the window before each
-        step. If ``free`` contains "stiffness", the argument is the initial guess. In a joint fit,
-        the stiffness in 1/um refers to the first window, and is scaled by normal stress for the
-        other windows.
+        Stiffness of the machine. The argument is required if no rig is passed. The stiffness is a
+        string in MPa/um, a string in 1/um such as "1.6e-3 1/um" (stiffness divided by normal
+        stress), or a number in 1/um. Stiffness in MPa/um is divided by the mean normal stress in
+        the window before each step. If ``free`` contains "stiffness", the argument is the initial
+        guess. In a joint fit, the stiffness in 1/um refers to the first window, and is scaled by
+        normal stress for the other windows.
     slip_distance : quantity, optional
         Initial guess of the slip distance, such as "10 um", or a number in um. The fit tries five
         values from a tenth to ten times this guess. The default is 5 % of the load point
@@ -185,9 +190,9 @@ def fit(
     command : str, default: "rsfstudy.fit"
         Command line to record in the history of the dataset.
     **scene : object
-        Values of other fields of the scene, which are not fitted. For example, ``alpha=0.3``
-        selects imposed normal stress with the coefficient 0.3, and ``a=0.01`` fixes the direct
-        effect if ``free`` does not contain "a".
+        Fixed values of other fields of the scene. For example, ``alpha=0.3`` selects imposed normal
+        stress with the coefficient 0.3, and ``a=0.01`` fixes the direct effect if ``free`` does not
+        contain "a".
 
     Returns
     -------
@@ -354,7 +359,7 @@ def _select_step_numbers(records: Sequence[Record], steps: Sequence[int]) -> tup
 def _check_displacement_was_not_reset(record: Record) -> None:
     """Raise ``InvalidValue`` if the load point displacement was reset to zero.
 
-    A reset appears as a large backward jump between two rows.
+    A reset appears as a large decrease of displacement between two successive rows.
     """
     time, moved = record.time, record.columns["displacement"]
     jumps = np.diff(moved)
@@ -528,13 +533,14 @@ def _initial_scene(laws: Sequence[str], scene_fields: Mapping[str, Any], stiffne
 def _free_parameters(
     stated_parameters: Sequence[str], laws: Sequence[str], scene: Scene
 ) -> tuple[str, ...]:
-    """Return the free parameters that at least one of the laws has.
+    """Return the free parameters that exist in at least one of the laws.
 
     Raises
     ------
     InvalidValue
         If none of the laws has a parameter that the user requests, or if a law has no free
-        parameter or no free evolution effect.
+        parameter. The error is also raised if the free parameters include evolution effects
+        (``b``, ``b1`` or ``b2``), but a law has none of these evolution effects.
     """
     free = tuple(stated_parameters) or DEFAULT_FREE_PARAMETERS
     check_free_parameters(free)

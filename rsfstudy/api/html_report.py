@@ -51,7 +51,7 @@ _PNG_SIGNATURE = b"\x89PNG\r\n\x1a\n"
 
 @dataclass(frozen=True)
 class _ResultSection:
-    """Section of the page for a results file, and its row in the summary."""
+    """Section about a results file, and the row of the file in the summary."""
 
     path: Path
     title: str = ""
@@ -62,7 +62,7 @@ class _ResultSection:
 
     @property
     def anchor(self) -> str:
-        """Anchor of the section, which the row of the summary links to."""
+        """HTML anchor of the section. The row of the summary links to the anchor."""
         return re.sub(r"\W+", "-", self.path.name)
 
 

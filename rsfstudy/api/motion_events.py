@@ -17,18 +17,19 @@ from rsfstudy.fitting import EventNumbers
 from rsfstudy.rig import slip_rate_from_log
 from rsfstudy.slider import Scene
 
-#: Slip rate above which an event is detected, as a multiple of the load point velocity. The
-#: multiple is 1 for steady sliding, and remains below this limit if a stable slider overshoots
-#: after a step of the load point velocity.
+#: Limit of the ratio of slip rate to load point velocity. An event begins when the ratio exceeds
+#: the limit. In steady sliding, the ratio is 1. If a stable slider overshoots after a step of the
+#: load point velocity, the ratio remains below the limit.
 _EVENT_SLIP_RATE_OVER_LOAD_VELOCITY = 10.0
 #: Number of rows that the interpolating polynomial uses, and number of rows that a second
 #: polynomial uses to estimate the interpolation error. A motion has six rows per integration step.
 _ROWS_PER_INTERPOLANT, _ROWS_PER_ERROR_CHECK_INTERPOLANT = 6, 4
-#: Maximum time difference between the rows before and after a jump, in spacings of floating-point
-#: numbers.
+#: Maximum time difference between the row before and the row after a discontinuity of the motion,
+#: in spacings of floating-point numbers.
 _MAX_JUMP_DURATION_IN_FLOAT_SPACINGS = 16
-#: Maximum change of log10 slip rate between rows that are interpolated. Motions with a tolerance of
-#: 1e-4 have rows that differ by up to 0.37, except at the sudden beginning or end of a rupture.
+#: Maximum change of log10 slip rate between rows that are interpolated. In motions with a tolerance
+#: of 1e-4, log10 slip rate changes by up to 0.37 between neighbouring rows, except at the sudden
+#: beginning or end of a rupture.
 _MAX_LOG10_SLIP_RATE_STEP = 0.5
 
 
@@ -91,7 +92,7 @@ class _InterpolatedMotionRows:
     times : numpy.ndarray of shape (n,)
         Times of the rows.
     values : numpy.ndarray of shape (n, 3)
-        Logarithm (base 10) of slip rate, slip and shear stress.
+        Values in each row: log10 slip rate, slip, and shear stress.
     event_slip_rate_level : float
         Logarithm (base 10) of the threshold of the slip rate.
     """
@@ -127,15 +128,16 @@ class _InterpolatedMotionRows:
         Parameters
         ----------
         first_row, last_row : int
-            First and last row above the threshold.
+            First and last row of the event in which slip rate exceeds the threshold.
 
         Returns
         -------
         quantities : dict of str to (float, float)
             Value and error of each quantity.
         cut : int
-            Code of the missing part of the event: 0 if the event is complete, 1 if the motion
-            begins within the event, 2 if the motion ends within the event, and 3 if both apply.
+            Code that describes which part of the event is missing: 0 if the event is complete, 1 if
+            the motion begins within the event, 2 if the motion ends within the event, and 3 if both
+            apply.
         """
         end, stress = len(self._times) - 1, self._values[:, 2]
         peak = first_row + int(np.argmax(self._values[first_row : last_row + 1, 0]))
@@ -175,8 +177,8 @@ class _InterpolatedMotionRows:
         """Interpolate around the interval between a row and the next row.
 
         The interpolating polynomial is a function of the time since the first row of the interval.
-        Half of the interpolated rows precede the interval. Rows on the other side of a jump are not
-        used.
+        Half of the interpolated rows precede the interval. If the motion has a discontinuity near
+        the interval, rows beyond the discontinuity are not used.
         """
         first = max(row + 1 - row_count // 2, 0)
         last = min(row + row_count // 2, len(self._times) - 1)
@@ -203,7 +205,7 @@ class _InterpolatedMotionRows:
         return float(interpolant.derivative(time)[column])
 
     def _find_level_crossing_after_row(self, row: int) -> tuple[np.ndarray, np.ndarray]:
-        """Find the threshold crossing between a row and the next row.
+        """Find the time between two rows at which slip rate crosses the threshold.
 
         Returns
         -------

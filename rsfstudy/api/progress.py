@@ -61,8 +61,9 @@ def show_progress(study_name: str, is_shown: bool) -> Iterator[ProgressCallback]
 def _print_progress_lines(study_name: str, console: Console) -> ProgressCallback:
     """Return a function that prints progress lines for log files and pipes.
 
-    The function prints at most one line per tenth of the cells, and at most one line in ten seconds
-    except for the last line. A short run therefore prints a single line.
+    The function prints at most one line per tenth of the cells. The time between two lines is at
+    least ten seconds, except that the last line is always printed. A short run therefore prints a
+    single line.
     """
     began = said = time.monotonic()
     told = 0

@@ -42,7 +42,8 @@ def find_results(study_or_file: str | Path, output_path: str | Path | None) -> P
     ----------
     study_or_file : str or Path
         Path of a results file (``.nc`` or ``.zarr``), name of a study, or path of a Python file
-        that declares a study. The function executes a Python file to obtain the name of its study.
+        that declares a study. If a Python file is passed, the function executes the file to obtain
+        the name of the study.
     output_path : str, Path or None
         Directory that contains the results. If None, the default output directory is used.
 
@@ -55,8 +56,8 @@ def find_results(study_or_file: str | Path, output_path: str | Path | None) -> P
     Raises
     ------
     DataError
-        If the directory contains results in both formats, if the run is incomplete, or if the
-        directory cannot be read.
+        If the directory contains results of the study in both formats, NetCDF and Zarr, if the run
+        is incomplete, or if the directory cannot be read.
     InvalidValue
         If ``study_or_file`` is neither a path nor the name of a study.
     """

@@ -50,8 +50,8 @@ from rsfstudy.vocabulary import find_quantity
 #: value. The times remain different when they are rounded in a conversion to other units.
 _MIN_TIME_ULPS, _MIN_TIME_DIFFERENCE = 4, 1e-290
 
-#: Default duration after a step in D_c/V_*, and load point displacement in D_c that is added after
-#: the last segment of a protocol.
+#: Default duration of a motion after a step, in D_c/V_*, and default load point displacement during
+#: the last segment of a protocol, in D_c.
 _DEFAULT_DURATION, _DISPLACEMENT_AFTER_PROTOCOL = 50.0, 20.0
 _UNPERTURBED_SCENE_MESSAGE = (
     "nothing is stepped: the motion is steady sliding at V_*. State load_velocity_ratio, "
@@ -65,9 +65,9 @@ _INSTABILITY_TIME_QUANTITY = Quantity(
 BEYOND_INSTABILITY_NORM_ATTRIBUTE_NAME = "beyond_instability_norm"
 #: Attribute that contains the time, the slip and the state of the slider at the end of a motion.
 MOTION_END_ATTRIBUTE_NAME = "end"
-#: Ratio of slip rate to load point velocity that defines instability if the load point velocity
-#: itself exceeds the instability norm. The load point velocity may exceed the norm if the period of
-#: the scene is not the period of the slider.
+#: Limit of the ratio of slip rate to load point velocity. The limit defines instability if the load
+#: point velocity exceeds the limit of the slip rate (instability norm). The load point velocity may
+#: exceed the instability norm if the period of the scene is not the period of the slider.
 _INSTABILITY_SLIP_RATE_OVER_LOAD_RATE = 1e6
 #: Variables of motions that are computed from spring stress.
 _VARIABLES_DERIVED_FROM_SPRING_STRESS = ("shear_stress", "friction_coefficient")
@@ -106,13 +106,13 @@ def simulate(
         D_c/V_* if the load point is held. If the loading has only one segment, the default is 50.
     times : array_like of shape (n,), optional
         Increasing times in D_c/V_* at which to return the motion, instead of ``duration``. With
-        inertia, slip rate adjusts to a step within the inertial time. At requested times during the
-        adjustment, the function returns the final values of the adjustment. By default, several
-        times per integration step are returned.
+        inertia, slip rate adjusts to a step within the inertial time. If a requested time is within
+        this adjustment, the function returns the values at the end of the adjustment. By default,
+        several times per integration step are returned.
     start : xarray.Dataset, optional
-        Previous motion of the same scene, from whose end the motion continues. Time, slip and
-        loading continue without interruption, and ``duration`` is counted from the end of the
-        previous motion.
+        Previous motion of the same scene. The new motion begins at the end of the previous motion.
+        Time, slip and loading continue without interruption, and ``duration`` is counted from the
+        end of the previous motion.
     rtol : float, default: 1e-7
         Relative tolerance of the motion.
     budget : int, default: 500,000
@@ -121,10 +121,10 @@ def simulate(
         Engine that integrates the motion. "compiled" is much faster, and requires Numba. A
         user-defined stepper is passed as a class.
     accuracy, meter : Accuracy and WorkMeter, optional
-        Arguments of ``Measure.compute``, which a user-defined measure passes to ``simulate``. The
-        two arguments replace ``rtol``, ``budget`` and ``engine``. If ``meter`` is passed, the
-        right-hand side evaluations are added to the count of the cell. If the motion cannot
-        continue, the cell ends with the status of the motion.
+        Arguments of ``Measure.compute``. A user-defined measure passes these arguments to
+        ``simulate``. The two arguments replace ``rtol``, ``budget`` and ``engine``. If ``meter`` is
+        passed, the right-hand side evaluations are added to the count of the cell. If the motion
+        cannot continue, the cell ends with the status of the motion.
 
     Returns
     -------
@@ -137,7 +137,8 @@ def simulate(
           normal stress causes. If normal stress does not affect the states, the sum of the states
           is ``state_variable``.
         - ``shear_stress`` is the spring stress. With radiation damping, the damping stress at V_*
-          is subtracted, so that spring stress equals frictional stress in steady sliding at V_*.
+          is subtracted from the spring stress, so that spring stress equals frictional stress in
+          steady sliding at V_*.
         - ``frictional_stress`` is the frictional resistance, and ``normal_stress_ratio`` is the
           effective normal stress in sigma_*.
         - ``load_point_displacement`` and ``friction_coefficient`` are the values that a laboratory
@@ -146,8 +147,8 @@ def simulate(
         - ``porosity`` and ``pore_pressure`` exist for a dilatant fluid.
         - ``regime`` is the code of the equations of motion. The attribute ``flag_meanings`` of
           ``regime`` lists the names of the codes.
-        - ``instability_time`` exists if the motion exceeds the instability norm without inertia or
-          radiation damping.
+        - ``instability_time`` exists if the scene has neither inertia nor radiation damping, and
+          the slip rate exceeds the limit of the slip rate (instability norm).
 
         The attributes include ``scene``, ``status``, ``message``, ``duration``, ``rtol``,
         ``budget``, ``engine`` and ``rhs_evaluations``. If the motion cannot continue, it ends
@@ -164,8 +165,8 @@ def simulate(
     IncompleteWarning
         If the motion ends early.
     NoResultWarning
-        If the scene has no step, so that the slider slides steadily at V_*, or if the motion
-        exceeds the instability norm without inertia or radiation damping.
+        If the scene has no step, so that the slider slides steadily at V_*, or if the slip rate
+        exceeds the instability norm and the scene has neither inertia nor radiation damping.
 
     See Also
     --------
@@ -175,10 +176,11 @@ def simulate(
 
     Notes
     -----
-    Time strictly increases. If a quantity jumps, the row at the time of the jump contains the value
-    before the jump, and the next row contains the value after the jump. The two times differ by a
-    few spacings of floating-point numbers. If a rupture is shorter than the floating-point
-    resolution of time, the times of its rows also differ by a few spacings.
+    Time strictly increases. If a quantity changes discontinuously, the row at the time of the
+    discontinuity contains the value before the discontinuity, and the next row contains the value
+    after the discontinuity. The times of the two rows differ by a few spacings of floating-point
+    numbers. If a rupture is shorter than the floating-point resolution of time, the times of its
+    rows also differ by a few spacings.
 
     Without inertia and radiation damping, a motion has no physical meaning after the slip rate has
     exceeded the instability norm. The variable ``instability_time`` and the attribute
@@ -395,7 +397,7 @@ def _build_loading_history_variable(history: SampledHistory) -> xr.Variable:
 
 
 def _log_slip_rate_limit_of_instability(scene: Scene) -> float:
-    """Return ln(V/V_*) above which a motion has no physical meaning."""
+    """Return the limit of ln(V/V_*) above which a motion is unphysical."""
     if scene.has_mass or scene.dynamics.radiated_stress_slope(0.0):
         return math.inf
     loads = np.asarray(scene.parts.loading.segment_table)[:, SEGMENT_VELOCITY]
@@ -449,10 +451,11 @@ def _check_requested_times(
 def make_row_times_strictly_increasing(table: np.ndarray) -> np.ndarray:
     """Return a recorded motion with strictly increasing times.
 
-    A regime or a segment of the loading begins with a row at the time at which the previous regime
-    or segment ended. If the two rows are equal, the first row is removed. Otherwise, the time of
-    the second row is increased by a few spacings of floating-point numbers. The times of a rupture
-    that is shorter than the floating-point spacing are increased as well.
+    The first row of a regime (form of the equations of motion) has the same time as the last row of
+    the previous regime. The first row of a segment of the loading has the same time as the last row
+    of the previous segment. If the two rows are equal, the first row is removed. Otherwise, the
+    time of the second row is increased by a few spacings of floating-point numbers. If a rupture is
+    shorter than the spacing of floating-point numbers, the times of its rows are also increased.
 
     Parameters
     ----------

@@ -55,8 +55,8 @@ def critical_step(
     direction : {"up", "down"}, default: "up"
         Direction of the step.
     rtol : float, default: 1e-7
-        Relative tolerance of :math:`V_0/V_* - 1`, of the displacement, or of the logarithm of the
-        normal stress ratio.
+        Relative tolerance of the critical step: of :math:`V_0/V_* - 1`, of the displacement, or of
+        the logarithm of the normal stress ratio.
     engine : {"scipy", "python", "compiled"} or type, default: "scipy"
         Engine that integrates the motions. "compiled" is much faster, and requires Numba. A
         user-defined stepper is passed as a class.
@@ -91,7 +91,7 @@ def critical_step(
 
     See Also
     --------
-    rsfstudy.measures.CriticalStep : Measure with the equations and references.
+    rsfstudy.measures.CriticalStep : Equations and references of the measure.
     rsfstudy.limit_cycle : Compute the limit cycle of a scene.
 
     Examples
@@ -162,7 +162,7 @@ def limit_cycle(
 
     See Also
     --------
-    rsfstudy.measures.LimitCycle : Measure with definitions and error estimates.
+    rsfstudy.measures.LimitCycle : Definitions and error estimates of the measure.
     rsfstudy.plot_motion : Plot the orbit.
 
     Examples

@@ -49,7 +49,7 @@ if TYPE_CHECKING:
 
 
 class StudiesByName(dict[str, Study]):
-    """Dictionary of studies with an HTML table for notebooks."""
+    """Dictionary of studies. Notebooks display the dictionary as a table."""
 
     def _repr_html_(self) -> str:
         """Return an HTML table of the studies."""
@@ -120,7 +120,8 @@ def run(
     fresh : bool, default: False
         If True, discard the finished cells of previous runs, and compute all cells.
     rtol : float, optional
-        Relative tolerance of the cells. The default is the tolerance that the study declares.
+        Relative tolerance of the computation in each cell. The default is the tolerance that the
+        study declares.
     engine : {"scipy", "python", "compiled"} or type, optional
         Engine that integrates the motions. "compiled" is much faster, and requires Numba. A
         user-defined stepper is passed as a class. The default is the engine that the study
@@ -130,8 +131,9 @@ def run(
         status of the cell is ``work_budget_spent``. If the budget is increased in a later run,
         finished cells with a result are not recomputed.
     time_limit : float, default: 600.0
-        CPU time in s after which a worker stops a cell. The limit of the wall time is ten times
-        ``time_limit``, for cells that sleep or wait. The limit does not apply if ``workers`` is 0.
+        CPU time in s after which a worker stops a cell. A worker also stops a cell after a wall
+        time of ten times ``time_limit``, because a cell may wait without using CPU time. The limits
+        do not apply if ``workers`` is 0.
     keep_going : bool, default: False
         If True, continue even if the first cells all fail.
     despite_failures : bool, default: False
@@ -449,7 +451,7 @@ def plot(
 
 @error_boundary
 def check(dataset: xr.Dataset | str | Path) -> pd.DataFrame:
-    """Compare the results of a study with the published values that it claims.
+    """Compare the results of a study with the published values in its claims.
 
     Parameters
     ----------
@@ -507,8 +509,8 @@ def rerun(
 ) -> pd.DataFrame:
     """Recompute the results in a file, and compare the values.
 
-    The function recreates the study or the scene from the file. Code is never executed from a
-    results file.
+    The function recreates the study or the scene from the file. The function never executes code
+    from a results file.
 
     Parameters
     ----------
@@ -728,7 +730,8 @@ def _find_cell_in_results_file(
     number : int
         Number of the cell in row-major order.
     differences : mapping of str to (object, object)
-        Dependencies of the results that have changed, with the stored and the current value.
+        Stored value and current value of each dependency that has changed, such as the version of
+        the code.
     """
     results = open(results_file)
     number = find_cell_number(results, cell_coordinates)

@@ -32,7 +32,8 @@ def parse_overrides(study: Study, settings: tuple[str, ...]) -> dict[str, Any]:
     Returns
     -------
     dict
-        Value or list of values by axis or field. CSV files of a loading are read.
+        Value or list of values for each axis or field. If a value is the path of a CSV file with a
+        loading, the file is read.
 
     Raises
     ------
@@ -101,8 +102,8 @@ def parse_loading_file(file_path: Any, rig: Rig | None) -> Any:
     Returns
     -------
     object
-        Loading with the name of the file if the value is the path of a CSV file. Any other value is
-        returned unchanged.
+        If the value is the path of a CSV file, the loading in this file. The name of the loading is
+        the name of the file. Any other value is returned unchanged.
     """
     path = Path(str(file_path))
     return read_loading_file(path, rig) if path.suffix.lower() == ".csv" else file_path
@@ -122,7 +123,7 @@ def read_loading_file(path: Path, rig: Rig | None) -> UserLoading:
     Returns
     -------
     UserLoading
-        Loading with the name of the file.
+        Loading. The name of the loading is the name of the file.
     """
     read = history if "time" in read_table(path) else read_protocol
     return read(path, rig, name=path.stem)

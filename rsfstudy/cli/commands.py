@@ -72,7 +72,7 @@ def show(options: CommandOptions) -> int:
     Raises
     ------
     click.UsageError
-        If options change a results file.
+        If the command has options that change a study, but prints a results file.
     """
     if Path(options.name).suffix not in _SUFFIXES_OF_RESULTS_FILES:
         printed_reports.print_study_declaration(

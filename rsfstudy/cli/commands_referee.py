@@ -79,7 +79,7 @@ def verify(options: CommandOptions) -> int:
 
 
 def _print_verdict(answer_file: Path, comparison: AnswerComparison) -> None:
-    """Print the agreement of each quantity, and a possible explanation."""
+    """Print the agreement of each quantity, and a possible cause of differences."""
     problem = comparison.problem
     name = f"problem {problem.number}" if problem.number else f"known to {problem.digits} digits"
     outcome = "passed" if comparison.has_required_digits else "not passed"

@@ -9,9 +9,11 @@ from rich.text import Text
 
 from rsfstudy.errors import RunError, escape_control_characters, shorten_text
 
-#: Maximum number of characters of a printed string, because strings in files can have any length.
+#: Maximum number of characters of a printed string. The limit is needed because strings in files
+#: can have any length.
 _MAX_PRINTED_CHARACTERS = 5000
-#: Bounds of the console width, because the environment variable can have any value.
+#: Bounds of the console width. The bounds are needed because the environment variable ``COLUMNS``
+#: can have any value.
 _MIN_WIDTH, _MAX_WIDTH = 16, 1000
 
 

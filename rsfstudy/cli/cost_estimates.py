@@ -1,7 +1,7 @@
 """Descriptions of the cost of a study.
 
-The cost is based on the measured times of earlier cells. If there are no measured times, the
-description contains a rough estimate.
+The cost is based on the measured times of cells in earlier runs. If there are no measured times,
+the description contains a rough estimate.
 """
 
 from __future__ import annotations
@@ -17,9 +17,10 @@ from rsfstudy.motion import COMPILED, SCIPY, check_engine_is_usable
 from rsfstudy.storage import CellTimings, read_timings
 
 #: Typical speed-up of the compiled engine relative to SciPy, by measure. The page of benchmarks
-#: reports factors from 7 to 12 and from 31 to 72. The factors increase with the accuracy.
+#: reports speed-ups by factors from 7 to 12 for critical steps, and from 31 to 72 for limit cycles.
+#: The speed-up increases with the accuracy of the computation.
 _COMPILED_SPEEDUP_BY_MEASURE = {"critical_step": 10, "limit_cycle": 30}
-#: Measure that compares the integrators of SciPy and therefore needs the SciPy engine.
+#: Name of the measure that compares the integrators of SciPy. The measure needs the SciPy engine.
 _NAME_OF_MEASURE_REQUIRING_SCIPY_ENGINE = "work_precision"
 #: Minimum computing time in s for which the faster engine is suggested.
 _MIN_SECONDS_FOR_FASTER_ENGINE_HINT = 60.0
@@ -130,7 +131,7 @@ def format_duration(seconds: float) -> str:
 
 
 def _timings_match_accuracy_and_engine(cell_plan: CellPlan, cell_timings: CellTimings) -> bool:
-    """Return True if the timings were measured with the same rtol and engine."""
+    """Return True if the timings were measured with the rtol and engine of a plan."""
     asked = cell_plan.study.accuracy
     return cell_timings.fingerprint.get("rtol") == asked.rtol and cell_timings.fingerprint.get(
         "engine"

@@ -134,7 +134,7 @@ def print_expected_cost(
     output_directory : Path
         Directory of results.
     accuracy_was_changed : bool
-        If True, print the cost relative to the default tolerance.
+        If True, also print the ratio of the expected work to the work at the default tolerance.
     suggest_faster_engine : bool
         If True, print a hint if the compiled engine would be much faster.
     """
@@ -237,8 +237,8 @@ def print_short_run_report(
 ) -> None:
     """Print a short report of the run of one of several studies.
 
-    The report has one line for each table of ``print_run_report``. Changed verdicts and failed
-    cells are listed in full.
+    The report has one line for each table of ``print_run_report``. Failed cells are
+    listed individually. Verdicts that differ from the expected verdicts are also listed.
 
     Parameters
     ----------
@@ -337,7 +337,7 @@ def exit_status_of_dataset(dataset: xr.Dataset) -> int:
 
 
 def print_failures(dataset: xr.Dataset, results_file: str = "") -> int:
-    """Print the failed cells and the commands that reproduce each of them.
+    """Print the failed cells, and a command that reproduces each failed cell.
 
     Parameters
     ----------
@@ -386,7 +386,8 @@ def print_recomputed_cell(
     Returns
     -------
     int
-        Exit status. The status is ``EXIT_STATUS_OK`` if the new status is an answer.
+        Exit status. The exit status is ``EXIT_STATUS_OK`` if the new status of the cell is an
+        answer.
     """
     for text in warning_texts:
         stdout_console.print(text, style="yellow")
@@ -575,7 +576,8 @@ def print_comparison(
     -------
     int
         Exit status. The status is ``EXIT_STATUS_FAILED`` if a status differs, if a number differs
-        by more than the error estimates, or if the files have no finished cell in common.
+        by more than the sum of both error estimates, or if the files have no finished cell in
+        common.
     """
     for letter, file, dataset in zip("AB", files, datasets, strict=True):
         about = read_provenance(dataset)
@@ -624,7 +626,7 @@ def print_comparison(
 
 
 def _print_differing_statuses(differing_statuses: pd.DataFrame) -> None:
-    """Print the cells with different statuses in both files."""
+    """Print the cells whose statuses in the two files differ."""
     first = differing_statuses[:_MAX_DIFFERING_CELLS]
     places = first.drop(columns=["first", "second"]).to_dict("records")
     rows = [
@@ -644,7 +646,7 @@ def _print_agreement_table(agreement_table: pd.DataFrame) -> None:
     """Print the agreement of each variable.
 
     The table lists the number of identical values, and the number of values that differ by more
-    than both error estimates.
+    than the sum of both error estimates.
     """
     rows = [
         {

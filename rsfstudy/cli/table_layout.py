@@ -98,7 +98,7 @@ def _print_row_as_list(row: Mapping[str, str], prose_columns: Collection[str], s
 
 
 def _longest_unbreakable_length(text: str, is_prose: bool) -> int:
-    """Return the length of the longest part that cannot be split across lines.
+    """Return the length of the longest part of a string that cannot be split.
 
     Prose can be split between words. Any other string must not be split.
     """

@@ -33,11 +33,14 @@ from rsfstudy.plots._text import (
 from rsfstudy.study import read_quantities_not_in_vocabulary
 from rsfstudy.vocabulary import find_coverage_content_type, find_quantity
 
-#: Ratio of the largest to the smallest value above which an axis has a log scale.
+#: If the ratio of the largest to the smallest value along an axis exceeds this limit, the axis has
+#: a log scale.
 _MIN_RATIO_FOR_LOG_SCALE = 100.0
-#: Ratio of the axis limits below which a log axis has additional tick labels between powers of ten.
+#: If the ratio of the upper to the lower limit of a log axis is less than this value, the axis has
+#: additional tick labels between powers of ten.
 _MAX_RATIO_FOR_MINOR_LABELS = 50.0
-#: Maximum number of tick labels with names, along y and along x.
+#: Maximum number of tick labels along the y axis and along the x axis, if the tick labels are
+#: names.
 _MAX_POINT_NAMES_ALONG_Y, _MAX_POINT_NAMES_ALONG_X = 45, 30
 #: Maximum number of horizontal tick labels with names along x. If there are more names, the tick
 #: labels are vertical.
@@ -137,7 +140,7 @@ def measured_variables(dataset: xr.Dataset) -> list[str]:
 
 
 def varying_variables(dataset: xr.Dataset) -> list[str]:
-    """Return the primary output and all measured variables that are not constant.
+    """Return the names of the primary output and of the variables that vary.
 
     Parameters
     ----------
@@ -166,7 +169,8 @@ def are_log_spaced(points: np.ndarray) -> bool:
     -------
     bool
         True if there are at least three points, if all points are positive and span at least a
-        factor of ten, and if the ratios of neighbouring points vary less than their differences.
+        factor of ten, and if the ratios of neighbouring points vary less than the differences of
+        neighbouring points.
     """
     at = np.sort(points.astype(float))
     if at.size < 3 or at[0] <= 0.0 or at[-1] < 10.0 * at[0]:
@@ -186,7 +190,8 @@ def are_positive_and_span_decades(values: np.ndarray) -> bool:
     Returns
     -------
     bool
-        True if the smallest value is positive and the largest value is more than 100 times larger.
+        True if the smallest value is positive and the largest value is more than 100 times the
+        smallest value.
     """
     known = values[np.isfinite(values)]
     return bool(

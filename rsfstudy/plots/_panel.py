@@ -48,8 +48,8 @@ _LINE_AND_FILL_STYLES_OF_SECOND_HUE = (
     (":", "none"),
     ("-.", "full"),
 )
-#: Number of points of a numeric axis above which the legend is replaced by a colour bar, and number
-#: of points of a curve above which markers are omitted.
+#: If a numeric axis has more points than the first value, a colour bar replaces the legend. If a
+#: curve has more points than the second value, markers are omitted.
 _MIN_POINTS_FOR_COLOUR_SCALE, _MAX_POINTS_WITH_MARKERS = 7, 60
 #: Maximum number of decimal places of a slope.
 _SLOPE_DIGITS = 6
@@ -64,7 +64,7 @@ def expand_facets(panel: Panel, dataset: xr.Dataset) -> list[Panel]:
     Parameters
     ----------
     panel : Panel
-        Panel whose field ``facet`` names lattice axes.
+        Panel. The field ``facet`` of the panel contains the names of lattice axes.
     dataset : xarray.Dataset
         Results of a study, with the variables of the panel and the variable ``status``.
 
@@ -227,7 +227,7 @@ def iterate_curves_and_styles(
     Parameters
     ----------
     panel : Panel
-        Panel whose field ``hue`` names lattice axes.
+        Panel. The field ``hue`` of the panel contains the names of lattice axes.
     panel_data : xarray.Dataset
         Data that the panel displays.
 
@@ -427,7 +427,7 @@ def _axis_label(
 def _resolve_text_or_function(
     text_or_function: Any, panel_data: xr.Dataset, default_text: str
 ) -> str:
-    """Return a label or title of a panel, or the default if it is None.
+    """Return a label or title of a panel, or a default if the text is None.
 
     If the label or title is a function, the function is called with the dataset.
     """

@@ -519,9 +519,9 @@ def freeze_tick_label_size(axes: Axes) -> None:
 def finalize_layout(figure: Figure) -> None:
     """Compute the final layout of a figure.
 
-    The function executes the layout engine twice. The first execution creates the ticks, which
-    moves the panels. Next, the function wraps long titles. The second execution adjusts the layout
-    to the wrapped titles.
+    The function executes the layout engine twice. The first execution creates the ticks, and the
+    ticks move the panels. Next, the function wraps long titles. The second execution adjusts the
+    layout to the wrapped titles.
 
     Parameters
     ----------
@@ -540,7 +540,7 @@ def finalize_layout(figure: Figure) -> None:
 
 
 def _wrap_title(axes: Axes) -> None:
-    """Wrap the title of a panel if it is too long for one line.
+    """Wrap the title of a panel if the title is too long for one line.
 
     A title must not extend beyond the figure or overlap the letter of the panel. The available
     width depends on other elements of the figure, because long y tick labels move the panel and a

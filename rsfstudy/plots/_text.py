@@ -242,7 +242,8 @@ def format_number(value: float, digits: int = 3) -> str:
     Returns
     -------
     str
-        Number in mathtext. A power of ten is used for numbers that are far from 1.
+        Number in mathtext. Numbers that are much larger or much smaller than 1 are written with a
+        power of ten.
 
     Examples
     --------
@@ -290,8 +291,8 @@ def format_with_error(value: float, error: float, max_decimals: int | None = Non
 def format_slope(row: xr.Dataset, name: str, max_decimals: int | None = None) -> str:
     r"""Format a slope and its error.
 
-    The error is the sum of the standard error, which measures the misfit of the fitted line, and
-    the numerical error.
+    The error is the sum of the standard error and the numerical error. The standard error measures
+    the misfit of the fitted line.
 
     Parameters
     ----------

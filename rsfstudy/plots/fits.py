@@ -23,10 +23,10 @@ from rsfstudy.plots._style import add_grey_legend_entry, cycle_style
 from rsfstudy.study import Panel
 
 #: Maximum lag of the autocorrelation, minimum number of rows that remain after a long record is
-#: thinned, and maximum number of records that are shown in a panel.
+#: thinned, and maximum number of panels that show a record.
 _MAX_AUTOCORRELATION_LAGS, _MAX_DRAWN_RECORD_ROWS, _MAX_RECORD_PANELS = 40, 20_000, 4
-#: Margin on both sides of the fitted windows as a fraction of their total extent, and width of the
-#: moving average of residuals as a fraction of a window.
+#: Margin on both sides of the fitted windows as a fraction of the total extent of the windows, and
+#: width of the moving average of residuals as a fraction of a window.
 _MARGIN_FRACTION_BESIDE_WINDOWS, _RESIDUAL_AVERAGING_FRACTION_OF_WINDOW = 0.15, 0.02
 #: Half width of the confidence band of the fitted curve, in standard errors.
 _CONFIDENCE_BAND_HALF_WIDTH_IN_STDERRS = 2.0

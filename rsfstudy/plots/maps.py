@@ -45,7 +45,7 @@ _HATCH_PATTERNS_OF_STATUSES = ("////", "\\\\\\\\", "....", "xxxx", "||||", "----
 _MIN_DISTANCE_AROUND_CONTOUR_LABEL = 0.06
 #: Minimum extent of labelled contours, as a fraction of the panel size.
 _MIN_LENGTH_OF_LABELLED_CONTOUR = 0.2
-#: Number of points of each axis below which contours are not drawn.
+#: If an axis has fewer points than this number, contours are not drawn.
 _MIN_POINTS_FOR_CONTOURS = 6
 _STATUS_LABEL_BY_CODE = {int(status): status.label for status in Status}
 

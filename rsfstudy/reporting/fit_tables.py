@@ -39,9 +39,11 @@ _MAX_FITS_PER_TABLE = 3
 _PARAMETERS_IN_FIT_SUMMARY = ("a", "b", "b1", "b2", "Dc")
 #: Status of fits that have values and valid standard errors.
 _STATUS_LABELS_OF_FITS_WITH_VALUES = (Status.OK.label, Status.NOT_IDENTIFIED.label)
-#: Ratio of the standard error to the value above which neither number is printed.
+#: If the ratio of a standard error to the value of the parameter exceeds this limit, neither number
+#: is printed.
 _MAX_PRINTED_RELATIVE_ERROR = 1e4
-#: AIC difference above which the comparison of two friction laws is decisive.
+#: If the AIC values of two friction laws differ by more than this limit, the comparison of the laws
+#: is decisive.
 _DECISIVE_AIC_DIFFERENCE = 10.0
 #: Symbol that marks invalid standard errors.
 _MARK_OF_INVALID_STDERRS = "*"
@@ -103,8 +105,8 @@ def record_and_step_of_fit(fit: xr.Dataset) -> dict[str, Any]:
     Returns
     -------
     dict of str to object
-        The keys are ``record`` and ``step``. A key is missing if the dataset has no coordinate with
-        the name of the key, because all fits have the same record or step.
+        The keys are ``record`` and ``step``. If all fits belong to the same record, the key
+        ``record`` is missing. If all fits belong to the same step, the key ``step`` is missing.
     """
     found = {n: fit[n].item() for n in ("record", "step") if n in fit.coords}
     return {n: value if n == "record" else int(value) for n, value in found.items()}
@@ -122,7 +124,7 @@ def parameter_headings(fit: xr.Dataset) -> dict[str, str]:
     -------
     dict of str to str
         Heading of each variable in the notation of laboratories, such as ``Dc`` and ``mu_0``. The
-        headings have the order of the table.
+        headings have the same order as the columns of the table.
     """
     names, found = [*map(str, fit["parameter"].values), "a_minus_b"], {}
     for short in dict.fromkeys(("a", "b", "b1", "b2", "a_minus_b", *PARAMETERS)):
@@ -244,9 +246,9 @@ def summarise_fits(dataset: xr.Dataset) -> Iterator[TextTable | str]:
     Yields
     ------
     TextTable or str
-        Parameter tables, with up to three fits of one step next to each other, followed by remarks
-        and a comparison of the laws. If there are several steps or records, a final table has one
-        row per fit.
+        Parameter tables with up to three fits of the same step side by side. The tables are
+        followed by remarks and a comparison of the laws. If there are several steps or records, a
+        final table has one row per fit.
     """
     places: dict[str, list[xr.Dataset]] = {}
     for one in split_into_single_fits(dataset):

@@ -37,7 +37,7 @@ from rsfstudy.vocabulary import find_quantity
 #: Maximum number of cells in a table that shows a selection of cells, maximum number of cells in a
 #: table that shows all cells, and maximum number of failed cells in a table.
 MAX_CELLS_SHOWN, _MAX_CELLS_SHOWN_WITHOUT_THINNING, _MAX_FAILURES = 24, 36, 20
-#: Number of fields per point of a numbered axis above which a table shows fewer cells.
+#: If each point of a numbered axis has more fields than this number, a table shows fewer cells.
 _MAX_FIELDS_PER_POINT_WITHOUT_THINNING = 4
 #: Maximum number of significant digits of a float.
 _MAX_DIGITS = 15
@@ -48,7 +48,8 @@ _COLUMNS_OF_SLOPE_TABLE = {
     "points": ("points", ".0f"),
     "error": ("numerical error", ".2g"),
 }
-#: Name of a variable and function that formats a value, by the column heading.
+#: Mapping from a column heading to the name of a variable and to the function that formats the
+#: values of the variable.
 VariableAndFormatterByHeading = dict[str, tuple[str, Callable[[Any], str]]]
 
 
@@ -182,7 +183,7 @@ def format_axis_name(axis_coordinate: xr.DataArray) -> str:
 
 
 def format_status_counts(dataset: xr.Dataset) -> str:
-    """Format the number of cells per status and of right-hand-side evaluations.
+    """Format the number of cells with each status, and the computational work.
 
     Parameters
     ----------
@@ -221,7 +222,7 @@ def describe_scene_and_rig_fields(
     rig_values : mapping of str to float
         Quantities of the rig in SI units.
     varied_names : collection of str, optional
-        Names of the fields that vary along an axis, which are omitted.
+        Names of the fields that vary along an axis. These fields are omitted.
 
     Returns
     -------
@@ -282,7 +283,7 @@ def describe_study_origin(dataset: xr.Dataset) -> dict[str, str]:
 def build_rows_along_dimensions(
     dataset: xr.Dataset, dimensions: Iterable[Hashable], columns: VariableAndFormatterByHeading
 ) -> list[dict[str, str]]:
-    """Build one table row for each point of the lattice of some dimensions.
+    """Build one table row for each combination of points of several dimensions.
 
     Parameters
     ----------
@@ -291,7 +292,8 @@ def build_rows_along_dimensions(
     dimensions : iterable of hashable
         Dimensions along which the points become rows.
     columns : dict of str to (str, callable)
-        Name of the variable in each column and function that formats a value, by column heading.
+        Mapping from a column heading to the name of the variable in the column and to the function
+        that formats its values.
 
     Returns
     -------
@@ -320,7 +322,7 @@ def build_primary_output_table(dataset: xr.Dataset) -> TextTable:
     Returns
     -------
     TextTable
-        Table, which is empty if the study has no primary output.
+        Table of the primary output. The table is empty if the study has no primary output.
     """
     name = find_primary_output(dataset)
     if name is None:
@@ -572,8 +574,8 @@ def claims_table(verdicts: pd.DataFrame) -> TextTable | str:
     Returns
     -------
     TextTable or str
-        Table of the claims. If no claim applies, the function returns a sentence, which is empty if
-        there are no claims.
+        Table of the claims. If no claim applies, the function returns a sentence. The sentence is
+        empty if there are no claims.
     """
     rows = verdicts.to_dict("records")
     if not any(row["verdict"] != NOT_APPLICABLE_VERDICT for row in rows):
