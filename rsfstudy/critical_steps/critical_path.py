@@ -1,15 +1,15 @@
-"""Critical paths, integrated backwards from the instability norm.
+"""Critical paths, which are motions that just reach the instability norm.
 
 The main class is ``CriticalPath``. At the end of a critical path, ln V equals the instability norm
-and the time derivative of ln V is zero, which leaves one scalar equation for the stress. From this
-tangency point, the path is integrated backwards in time. Backwards in time, neighbouring paths
-converge, so a few short integrations with a moderate tolerance yield many digits. An integration
-forwards in time would amplify every error. Gu et al. [1]_ derive the critical path under the slip
-law.
+and the time derivative of ln V is zero, which leaves one scalar equation for the stress. The path
+is integrated backwards in time from its end, which is called the tangency point. Neighbouring paths
+converge backwards in time. A few short integrations with a moderate tolerance are therefore
+accurate to many digits. An integration forwards in time would amplify every error. Gu et al. [1]_
+derive the critical path under the slip law.
 
-The path has only two unknowns, spring stress and one state. Two unknowns are sufficient if the
-effect of inertia is small at the instability norm, because inertia has no effect when ln V is
-stationary.
+The unknowns of a critical path are the spring stress and one state. These two unknowns are
+sufficient if the effect of inertia is small at the instability norm. Inertia has no effect at an
+instant at which ln V is stationary.
 
 Stresses are deviations from steady sliding at V_* and are divided by sigma_*, slip is divided by
 D_c, and slip rate is divided by V_*.
@@ -54,14 +54,14 @@ from rsfstudy.slider import (
 )
 from rsfstudy.status import Status
 
-#: Number of right-hand-side evaluations, at a tolerance of 1e-5, after which the search for the
-#: start of a critical path is abandoned.
+#: Maximum number of right-hand-side evaluations in the search for the start of a critical path. The
+#: maximum is valid for a tolerance of 1e-5.
 _MAX_EVALUATIONS_OF_PATH_START_SEARCH = 1_500
 #: Value of ln(V/V_*) below which the integration of a critical path is abandoned. The slip rate is
 #: about 1e-100 V_*.
 _MIN_LOG_SLIP_RATE = -230.0
-#: Distance in ln V above the instability norm at which a path is considered to touch the norm from
-#: above.
+#: Minimum excess of ln V over the instability norm. A path with a larger excess is considered to
+#: touch the norm from above.
 _LOG_RATE_OFFSET_ABOVE_INSTABILITY_NORM = 1e-6
 
 
@@ -152,7 +152,7 @@ class CriticalPath(NamedTuple):
         Returns
         -------
         CriticalPath
-            Path with the same norm and the same friction.
+            Critical path with the same instability norm and the same friction.
         """
         p = list(self.parameters)
         p[LOAD_VELOCITY] = load_velocity
@@ -192,7 +192,7 @@ class CriticalPath(NamedTuple):
         work_meter : WorkMeter
             Counter of right-hand-side evaluations.
         crossing_quantity_and_level : tuple of str and float
-            Quantity and level that define the start.
+            Quantity and level whose crossing defines the start of the path.
         is_start_of_step : callable
             Function that returns True if a point at the crossing is the start of the requested
             step.
@@ -200,8 +200,8 @@ class CriticalPath(NamedTuple):
         Returns
         -------
         MotionPoint or None
-            Start of the path, or None if the path touches the norm from above or does not reach a
-            start.
+            Start of the path. The result is None if the path touches the instability norm from
+            above, or if no start is found.
         """
         above = rise(
             "log_slip_rate",
@@ -231,9 +231,9 @@ class CriticalPath(NamedTuple):
     ) -> Iterator[Event]:
         """Yield the events of the path, starting at the tangency point.
 
-        The integration ends early if the path cannot continue, or if its evaluation budget is
-        exceeded. This budget depends on the tolerance in the same way as the number of evaluations
-        of an order-eight integrator.
+        The integration ends early if the path cannot continue, or if the path exceeds its budget of
+        right-hand-side evaluations. The budget of right-hand-side evaluations depends on the
+        tolerance in the same way as the cost of an integrator of order eight.
         """
         start = self.tangency_point_at_instability_norm
         if start is None:
@@ -258,9 +258,9 @@ class CriticalPath(NamedTuple):
     ) -> float | None:
         """Compute the misfit of the state at the start of the path.
 
-        The misfit is the value of Psi/a where the path passes the initial slip rate of the motion.
-        The misfit is zero for the critical step, because a step from steady sliding at V_* leaves
-        Psi = 0.
+        The misfit is the value of Psi/a at the point of the path with the initial slip rate of the
+        motion. The misfit is zero for the critical step, because Psi is zero immediately after a
+        step from steady sliding at V_*.
 
         Parameters
         ----------
@@ -294,8 +294,8 @@ class CriticalPath(NamedTuple):
     ) -> float | None:
         """Compute the height of the next ln V peak above the instability norm.
 
-        The motion starts at the tangency point and is integrated forwards for one orbit. The misfit
-        is zero if the orbit is a limit cycle that touches the norm.
+        The motion starts at the tangency point and is integrated forwards for one orbit. The
+        returned misfit is zero if the orbit is a limit cycle that touches the instability norm.
 
         Parameters
         ----------
@@ -330,7 +330,8 @@ class CriticalPath(NamedTuple):
         Returns
         -------
         bool
-            True if ln V rises above the norm after the motion has left the tangency point.
+            True if ln V rises above the instability norm after the motion has passed the tangency
+            point.
         """
         beyond = rise(
             "log_slip_rate",
@@ -368,9 +369,10 @@ class CriticalPath(NamedTuple):
 def _build_tangency_point_solver(friction_functions: FrictionFunctions) -> Function:
     r"""Build the function that solves for the tangency point.
 
-    The function ``(x, weakest, p) -> (g, Psi)`` returns the frictional stress and the state at
-    which ln(V/V_*) = x is stationary. The results are NaN if ln V is never stationary at this slip
-    rate. The argument ``weakest`` is a lower bound of the frictional stress.
+    The function ``(x, weakest, p) -> (g, Psi)`` returns the frictional stress g and the state Psi
+    at which the time derivative of ln V is zero. The argument ``x`` is ln(V/V_*). The results are
+    NaN if ln V is never stationary at this slip rate. The argument ``weakest`` is a lower bound of
+    the frictional stress.
 
     Notes
     -----

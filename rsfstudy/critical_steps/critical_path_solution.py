@@ -18,8 +18,8 @@ from rsfstudy.critical_steps.shooting_steps import LOCAL_TOLERANCE_OF_FIRST_ROOT
 from rsfstudy.critical_steps.slow_manifold_accuracy import slow_manifold_relative_error
 from rsfstudy.motion import MIN_LOCAL_TOLERANCE, Accuracy, WorkMeter, estimate_error
 
-#: Minimum error estimate, as a fraction of the requested relative accuracy, because two
-#: integrations of a path may have the same error by chance.
+#: Minimum error estimate of a critical step, divided by the requested relative accuracy. The
+#: minimum is necessary because two integrations of a path may have the same error by chance.
 _MIN_ESTIMATED_ERROR_OVER_RTOL = 0.004
 
 #: Maximum number of integrations of a path with successively smaller local tolerances.
@@ -54,7 +54,7 @@ def find_boundary_by_critical_path(
     """Find the critical step size from the critical path.
 
     The boundary is rejected if smaller steps may be unstable. Smaller steps may be unstable if
-    steady sliding is unstable, or if the next peak of the motion exceeds the norm.
+    steady sliding is unstable, or if the next peak of ln V exceeds the instability norm.
 
     Parameters
     ----------
@@ -95,8 +95,8 @@ def find_boundary_by_limit_cycle(
 ) -> CriticalStepSizeEstimate | None:
     """Find the step size at which a limit cycle touches the instability norm.
 
-    A limit cycle can touch the instability norm if larger steps make steady sliding less stable,
-    and if steady sliding is unstable after the largest step.
+    The search requires that larger steps make steady sliding less stable, and that steady sliding
+    is unstable after the largest step.
 
     Parameters
     ----------
@@ -137,7 +137,7 @@ def _find_boundary_with_error(
     The path is integrated with decreasing tolerances until the difference between two runs is
     within the requested accuracy. More than one tolerance is necessary, because a path has so few
     integration steps that a single underestimated local error may dominate the result. The result
-    is None if the search finds no size between the smallest and the largest step.
+    is None if the search finds no boundary between the smallest and the largest step size.
     """
     boundary = None
     of_path = slow_manifold_relative_error(step_family.scene) if step_family.scene.has_mass else 0.0

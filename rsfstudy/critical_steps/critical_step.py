@@ -3,12 +3,12 @@
 The step may be a change of load point velocity, load point displacement or normal stress. A step is
 critical if the peak slip rate after the step just reaches the instability norm.
 
-If the effect of inertia is small up to the instability norm, the end of the critical path is known,
-because ln V equals the norm and its time derivative is zero. The critical path is integrated
-backwards in time to the step at which it starts (see ``critical_path``). If inertia is important
-below the norm, the peak slip rate is computed by integration forwards in time (see
-``motion_after_step``). A critical step is accepted only if the motions after a slightly smaller and
-a slightly larger step confirm the result.
+If the effect of inertia is small up to the instability norm, the end of the critical path is known.
+At the end of the critical path, ln V equals the instability norm, and the time derivative of ln V
+is zero. The critical path is integrated backwards in time to the step at which it starts (see
+``critical_path``). If inertia is important below the instability norm, the peak slip rate is
+computed by integration forwards in time (see ``motion_after_step``). A critical step is accepted
+only if the motions after a slightly smaller and a slightly larger step confirm the result.
 """
 
 from __future__ import annotations
@@ -53,10 +53,11 @@ STEP_FAMILY_BY_QUANTITY: Mapping[str, type[StepFamily]] = {
     "normal_stress_step": NormalStressStepFamily,
 }
 STEP_DIRECTIONS = ("up", "down")
-#: Aliases of the keys of ``STEP_FAMILY_BY_QUANTITY``, which are names of scene fields.
+#: Aliases of scene fields. The names of the scene fields are the keys of
+#: ``STEP_FAMILY_BY_QUANTITY``.
 QUANTITY_ALIASES: Mapping[str, str] = {"velocity_step": "load_velocity_ratio"}
 
-#: Largest relative accuracy of a boundary at which a limit cycle touches the norm.
+#: Largest relative tolerance for the step size at which a limit cycle touches the instability norm.
 _MAX_RTOL_OF_LIMIT_CYCLE_BOUNDARY = 1e-8
 
 #: Maximum width of a bracket that confirms a critical step, relative to the step size.
@@ -66,7 +67,8 @@ _MAX_CONFIRMING_BRACKET_OVER_STEP_SIZE = 0.02
 #: the motion can approach a limit cycle.
 _MIN_EXCESS_IF_FIRST_PEAK_REACHES_NORM = 0.1
 
-#: Slip rate norm at which the effect of inertia is negligible.
+#: Instability norm (limit of the dimensionless slip rate) at which the effect of inertia is
+#: negligible.
 _INSTABILITY_NORM_WITH_NEGLIGIBLE_INERTIA = 1e-3
 
 
@@ -114,7 +116,7 @@ class CriticalStep(Measure):
     -----
     The instability norm is a limit of the dimensionless slip rate :math:`V T/(2 \pi D_c)`, with the
     period :math:`T` of the scene. Under the slip law at constant normal stress and critical
-    stiffness, and with an infinite norm, the critical step [1]_ is
+    stiffness, and with an infinite instability norm, the critical step [1]_ is
 
     .. math:: \frac{V_0}{V_*} = 1 + \frac{a}{b - a},
 
@@ -162,17 +164,17 @@ class CriticalStep(Measure):
 
     @property
     def outputs(self) -> Sequence[Output]:
-        """Critical step, the two confirming steps, and additional results."""
+        """Critical step, two steps that confirm the critical step, and other results."""
         return _build_outputs_for_step_quantity(self.of)
 
     @property
     def solved_fields(self) -> tuple[str, ...]:
-        """Scene field of the step, whose value the measure ignores."""
+        """Scene field that contains the step. The measure ignores its value."""
         return (self.of,)
 
     @property
     def work_by_digits(self) -> Mapping[float, float]:
-        """Relative number of right-hand-side evaluations for each number of digits.
+        """Relative cost of the computation for each requested number of digits.
 
         The numbers of evaluations were measured for velocity steps in the study ``accuracy_cost``.
         """
@@ -201,9 +203,9 @@ class CriticalStep(Measure):
     def compute(self, scene: Scene, accuracy: Accuracy, meter: WorkMeter) -> Outcome:
         """Compute the critical step, and confirm it with two motions.
 
-        If the effect of inertia is small below the norm, the critical step follows from the
-        critical path. If there is no critical path, or if inertia is important, the critical step
-        follows from forward motions.
+        If the effect of inertia is small below the instability norm, the critical step follows from
+        the critical path. If there is no critical path, or if inertia is important, the critical
+        step is computed from motions that are integrated forwards in time.
 
         Parameters
         ----------
@@ -278,12 +280,13 @@ class CriticalStep(Measure):
     ) -> Outcome:
         """Confirm a critical step with motions after a smaller and a larger step.
 
-        The distance between the boundary and the two step sizes is the error of the boundary. If
-        the motions do not confirm a boundary that follows from forward motions or from a limit
-        cycle, the distance is increased tenfold, up to 2 %. The error of the boundary is the
-        distance at which the motions confirm it. A boundary that was computed from a critical path
-        is rejected at the first failure, because a smaller step may be critical if oscillations
-        below the norm grow.
+        The two step sizes differ from the critical step size by the error of the critical step
+        size. If the motions after the two steps do not confirm the critical step, the relative
+        difference between the two step sizes and the critical step size is increased tenfold, up to
+        2 %. The error of the critical step size is the difference at which the motions confirm the
+        critical step. A critical step that was computed from a critical path is rejected at the
+        first failure, without further differences. A smaller step may then be critical, because
+        oscillations below the instability norm may grow.
         """
         first = (
             boundary.relative_error
@@ -353,7 +356,8 @@ class CriticalStep(Measure):
     ) -> Outcome:
         """Find the critical step from motions after steps of increasing size.
 
-        The search continues until a motion reaches the norm, and the bracket is then refined.
+        The step size increases until the motion after the step reaches the instability norm. The
+        interval that contains the critical step size is then refined.
         """
         smallest, largest = math.log(step_family.min_size), math.log(step_family.max_size)
         spacing = (largest - smallest) / max(1, math.ceil((largest - smallest) / math.log(2.0)))
@@ -393,10 +397,10 @@ class CriticalStep(Measure):
         accuracy: Accuracy,
         work_meter: WorkMeter,
     ) -> Outcome:
-        """Find the boundary between a stable and an unstable logarithm of step size.
+        """Find the critical step size between a stable and an unstable step size.
 
-        The excess of the motions over the norm changes sign at the boundary. If a motion inside the
-        bracket cannot continue, the boundary is the centre of the remaining bracket.
+        The excess of ln V over the instability norm changes sign at the critical step size. If a
+        motion cannot continue, the result is the centre of the remaining interval of ln(step size).
         """
         stable, unstable = log_size_bracket
         rtol = max(
@@ -442,8 +446,9 @@ class CriticalStep(Measure):
     ) -> Outcome:
         """Return the outcome if no step up to the largest size is critical.
 
-        The status is ``norm_unreachable`` if inertia keeps the slip rate below the norm, ``ok`` if
-        the largest step itself reaches the norm, and ``stable_for_all_steps`` otherwise.
+        The status is ``norm_unreachable`` if inertia keeps the slip rate below the instability
+        norm, ``ok`` if the largest step itself raises the slip rate to the norm, and
+        ``stable_for_all_steps`` otherwise.
         """
         if (
             step_family.scene.has_mass
@@ -492,7 +497,7 @@ def _compute_excess_over_norm_after_step(
 
 
 def _critical_size_without_inertia(step_family: StepFamily, work_meter: WorkMeter) -> float | None:
-    """Compute the critical step for a norm at which inertia is negligible.
+    """Compute the critical step for an instability norm with negligible inertia.
 
     The estimate requires few evaluations. The result is None if there is no critical path.
     """
@@ -508,7 +513,7 @@ def _critical_size_without_inertia(step_family: StepFamily, work_meter: WorkMete
 def _bracket_critical_log_size(
     step_family: StepFamily, size_guess: float, accuracy: Accuracy, work_meter: WorkMeter
 ) -> tuple[float, float] | None:
-    """Find a stable and an unstable logarithm of step size around a guess.
+    """Find a stable and an unstable step size around a guess.
 
     If the guess is unstable, the search tests sizes down to 0.73 times the guess. If the guess is
     stable, the search tests sizes up to 1.37 times the guess. The result is None if the search

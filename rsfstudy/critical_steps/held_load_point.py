@@ -1,12 +1,13 @@
 """Peak slip rate of a motion with a held load point.
 
 The main function is ``compute_peak_excess_over_instability_norm``. Spring stress can only decrease
-while the load point is held. With one state variable, the first peak of ln V is also the last peak,
-because the rate at which friction weakens with slip decreases after the peak.
+while the load point is held. With one state variable, ln V has only one peak, because friction
+weakens less and less with slip after the first peak.
 
-With several state variables, friction may weaken repeatedly. States with b < 0, and pore pressure
-that dilatancy has lowered, weaken friction when the slip rate decreases. The motion is therefore
-integrated until no state can weaken friction enough for another peak above the instability norm.
+With several state variables, friction may weaken repeatedly. State variables with b < 0 weaken
+friction when the slip rate decreases. Pore pressure also weakens friction when the slip rate
+decreases, if dilatancy has lowered the pore pressure before. The motion is therefore integrated
+until no state can weaken friction enough for another peak above the instability norm.
 """
 
 from __future__ import annotations
@@ -37,15 +38,16 @@ from rsfstudy.slider import (
 )
 from rsfstudy.status import Status
 
-#: Minimum spacing in ln V of the levels at which the motion is tested for further peaks, and
-#: spacing as a fraction of the distance from the instability norm.
+#: Spacing of the levels of ln V at which the motion is tested for further peaks. The first number
+#: is the minimum spacing. The second number is the ratio of the spacing to the difference between
+#: ln V and the instability norm.
 _MIN_LEVEL_SPACING, _RELATIVE_LEVEL_SPACING = 1.0, 0.12
 #: Decreases of ln V at which the weakening of friction by the states is tested.
 _TESTED_LOG_RATE_DECREASES = (0.0, 1.0, 3.0, 10.0, 30.0, 100.0, 300.0)
 #: Increases of ln V that are tested as upper bounds of the effect of pore pressure.
 _TESTED_LOG_RATE_INCREASES = (1e-4, 1e-3, 1e-2, 0.1, 1.0)
-#: Maximum weakening of friction by the states, as a fraction of the decrease of spring stress, at
-#: which no further peak is possible.
+#: Maximum ratio of the weakening of friction by the states to the decrease of spring stress. No
+#: further peak of ln V is possible below this ratio.
 _MAX_WEAKENING_OVER_SPRING_UNLOADING = 0.5
 
 
@@ -54,9 +56,9 @@ def compute_peak_excess_over_instability_norm(
 ) -> float:
     """Compute the height of the highest ln V peak above the instability norm.
 
-    If the effect of inertia is small, the motion is integrated only up to the instability norm, and
-    the returned excess is the squared rate of change of ln V at the norm. This rate vanishes at the
-    boundary between stable and unstable steps.
+    If the effect of inertia is small, the motion is integrated only up to the instability norm. The
+    returned excess is then the squared rate of change of ln V at the norm. The rate of change of ln
+    V at the norm is zero at the boundary between stable and unstable steps.
 
     Parameters
     ----------
@@ -70,13 +72,13 @@ def compute_peak_excess_over_instability_norm(
     Returns
     -------
     float
-        Excess over the instability norm, which is negative if the slip rate does not reach the
-        norm.
+        Excess of ln V over the instability norm. The excess is negative if the slip rate does not
+        reach the norm.
 
     Raises
     ------
     MotionStopped
-        If the motion cannot continue. The exception is not raised if slip stops.
+        If the motion cannot continue. ``MotionStopped`` is not raised if slip stops.
     """
     norm, heavy, highest = (
         scene.log_instability_rate,
@@ -136,13 +138,12 @@ def _no_later_peak_reaches_norm(scene: Scene, event: Event) -> bool:
 def _stays_below_norm(scene: Scene, point: MotionPoint) -> bool:
     """Return True if ln V provably stays below the instability norm.
 
-    The slip rate must be decreasing at the point. A state that strengthens friction approaches its
-    steady state at the present slip rate. If b > 0, the steady state rises as ln V decreases, so
-    the state continues to strengthen friction.
+    The slip rate must be decreasing at the tested point of the motion. A state that strengthens
+    friction approaches its steady state at the present slip rate. If b > 0, the steady state rises
+    as ln V decreases, so the state continues to strengthen friction.
 
-    Pore pressure raises ln V by at most the resulting loss of strength divided by a. The proof also
-    requires that, at the raised ln V, the states weaken friction more slowly than spring stress
-    decreases.
+    Pore pressure raises ln V by at most the loss of strength due to pore pressure, divided by a. At
+    the increased ln V, the states must weaken friction more slowly than spring stress decreases.
     """
     _value, slope, shift, shift_slope = build_friction_relation(scene, point.psis)(
         point.frictional_stress

@@ -9,8 +9,8 @@ from rsfstudy.measure_base import Outcome, check_loading_changes_stress_only_in_
 from rsfstudy.slider import Scene, SliderParameters
 from rsfstudy.status import Status
 
-#: Minimum ratio of the instability norm to the load point velocity. A slower norm may be reached
-#: without an instability.
+#: Minimum ratio of the instability norm to the load point velocity. The slip rate may reach a lower
+#: norm without an instability.
 _MIN_NORM_OVER_LOAD_VELOCITY = 1e3
 #: Beginning of the warning that the instability norm is a slow slip rate.
 SLOW_INSTABILITY_NORM_WARNING_PREFIX = "the instability norm "

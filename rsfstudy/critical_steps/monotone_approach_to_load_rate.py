@@ -1,13 +1,15 @@
 """Monotonic rise of slip rate to a fast load point velocity.
 
-If seismic waves radiate most of the stress, V follows the spring over a slip of eta V_0/(K D_c),
-which is many times D_c, while the state stays close to its steady state. An explicit integrator
-would need steps of about D_c during the whole rise of the slip rate. The functions of this module
-test if the rest of the rise is monotonic, so that the integration can end early.
+If seismic waves radiate most of the stress, the slip rate V rises over a slip of eta V_0/(K D_c),
+which is many times D_c. During the rise of the slip rate, the state stays close to its steady
+state. An explicit integrator would need steps of about D_c during the whole rise of the slip rate.
+The functions of this module test if the slip rate rises monotonically to the load point velocity.
+If the rise is monotonic, the integration ends early.
 
-The test uses two curves in the plane of ln V and state, which meet only in steady sliding. The
-first curve is the steady state. The second curve is a lag behind the steady state that motions can
-cross only towards smaller lags. A motion between the curves remains there, and its slip rate rises.
+The test uses two curves in the plane of ln V and state. The two curves meet only at the point of
+steady sliding. The first curve is the steady state as a function of ln V. On the second curve, the
+state lags behind its steady state, and motions can cross the second curve only towards smaller
+lags. A motion between the two curves remains between the curves, and its slip rate rises.
 """
 
 from __future__ import annotations
@@ -57,9 +59,9 @@ _TESTED_LOG_DISTANCES_BELOW_LOAD_RATE = (
     _MAX_TEST_SPACING,
     _DIFFERENCE_STEP,
 ) = 2.0, 0.25, 1e-4, 0.25, 1e-5
-#: Largest change of ln V over a slip of D_c, relative to the distance from the load point velocity,
-#: at which the test for a monotonic rise is worthwhile. Such a slow motion would take hundreds of
-#: integration steps.
+#: Largest ratio of the change of ln V over a slip of D_c to the difference ln V_0 - ln V. The test
+#: for a monotonic rise is worthwhile only below this ratio, because the integration of such a slow
+#: motion would take hundreds of steps.
 _MAX_GROWTH_OVER_DISTANCE_TO_LOAD_RATE = 0.02
 
 
@@ -74,9 +76,10 @@ def build_events_testing_monotone_rise(scene: Scene) -> list[EventSpecification]
     Returns
     -------
     list of EventSpecification
-        Rises of ln V through levels below ln V_0. The function ``rises_monotonically_to_load_rate``
-        is the test. The list is empty if the rise is not slow, or if the scene has several states
-        or inertia, for which the test is not valid.
+        Events at which ln V rises through levels below ln V_0. The function
+        ``rises_monotonically_to_load_rate`` tests the motion at these events. The list of events is
+        empty if the slip rate does not rise slowly. The list is also empty if the scene has several
+        states or inertia, because the test is not valid for such scenes.
     """
     load = scene.log_load_velocity
     if scene.state_count > 1 or scene.has_mass:
@@ -104,8 +107,8 @@ def rises_monotonically_to_load_rate(scene: Scene, point: MotionPoint) -> bool:
     Returns
     -------
     bool
-        True if the motion is between the two curves of the module description, and if motions at
-        all tested points cross the curves inwards.
+        True if the motion is between the two curves that the module docstring describes, and if
+        motions at all tested points cross the curves inwards.
     """
     change, load = _build_log_rate_and_state_lag_derivatives(scene), scene.log_load_velocity
     distance = load - point.log_slip_rate
@@ -137,8 +140,8 @@ def _build_log_rate_and_state_lag_derivatives(
     """Build a function that computes the changes of ln V and of the state lag.
 
     The arguments of the function are ln(V/V_*) and the lag of the state behind the steady state.
-    The function returns the changes per D_c of slip, or NaN if no stress corresponds to the
-    friction at this slip rate and lag.
+    The function returns the changes of ln V and of the lag per D_c of slip. The results are NaN if
+    no stress corresponds to the friction at this slip rate and lag.
     """
     relation, evolution = (
         build_friction_relation(scene),

@@ -42,14 +42,16 @@ from rsfstudy.slider import (
 )
 from rsfstudy.status import Status
 
-#: Smallest significant difference from neutral stability, both for the relative distance below the
-#: critical stiffness and for the decay rate per D_c of slip.
+#: Smallest significant difference from neutral stability. The limit applies to the relative
+#: difference between the stiffness and the critical stiffness, and to the decay rate per D_c of
+#: slip.
 _NEUTRAL_STABILITY_MARGIN = 1e-9
 #: Largest amplitude of ln V for which linear theory predicts the growth of oscillations.
 _MAX_LINEAR_LOG_RATE_AMPLITUDE = 0.05
-#: Ratio of the sizes of successive orbits between which the computation leaps when growth is slow,
-#: and smallest permitted ratio. A leap may skip limit cycles whose sizes differ by less than this
-#: ratio. Leaps are shortened if they would end above the instability norm.
+#: Ratio of the size of the next orbit to the size of the present orbit if oscillations grow slowly,
+#: and smallest permitted ratio. The orbits between the two sizes are not computed, so limit cycles
+#: between the two sizes may be missed. The ratio is reduced if the next orbit would exceed the
+#: instability norm.
 _LEAP_FACTOR, _MIN_LEAP_FACTOR = 1.3, 1.002
 
 #: Number of successive equal peaks after which a motion with several states is considered periodic.
@@ -58,8 +60,8 @@ _REQUIRED_EQUAL_PEAKS_IN_A_ROW = 4
 #: Assumed height of the ln V peak above the instability norm, if the motion is integrated only up
 #: to the norm.
 _ASSUMED_LOG_RATE_OVERSHOOT_OF_NORM = 1.0
-#: Distance from steady sliding below which a motion has settled, as a fraction of the largest
-#: distance.
+#: A motion has settled if its distance from steady sliding is less than this fraction of the
+#: largest distance from steady sliding during the motion.
 _SETTLING_TOLERANCE_OVER_MAX_DISTANCE = 1e-3
 
 _SLIP_RATE_PEAK_EVENT = maximum("log_slip_rate")
@@ -89,12 +91,11 @@ class _OrbitOutcome:
     Parameters
     ----------
     log_slip_rate_peaks : tuple of float
-        Values of ln V at its peaks.
+        Values of ln V at the peaks of ln V.
     reached_norm : bool
         True if the motion has reached the instability norm.
     point_where_growth_was_too_slow : MotionPoint, optional
-        Point at the peak of ln V at which the integration ended, because the orbit grows too
-        slowly.
+        Peak of ln V at which the integration ended because the orbit grows too slowly.
     initial_log_slip_rate : float, default: -inf
         Value of ln V at the start of the motion, if the slip rate initially decreases.
     """
@@ -132,8 +133,8 @@ def compute_excess_over_instability_norm(
 
     The excess is negative if the slip rate never reaches the instability norm. With inertia, the
     excess is the height of the highest peak of ln V above the norm. Without inertia, the excess is
-    the increase of ln V from one peak to the next. If possible, the excess is continuous at the
-    boundary between stable and unstable steps.
+    the increase of ln V from one peak to the next. If possible, the excess is a continuous function
+    of the step size at the boundary between stable and unstable steps.
 
     Parameters
     ----------
@@ -158,14 +159,15 @@ def compute_excess_over_instability_norm(
     Notes
     -----
     Without inertia, the motion is planar and autonomous, so trajectories in the phase plane cannot
-    cross. If a peak is not higher than the previous peak, no later peak is higher. If peaks grow,
-    they grow until they reach the norm or a limit cycle.
+    cross. If a peak is not higher than the previous peak, no later peak is higher. If peaks of the
+    slip rate grow, they grow until the motion reaches the instability norm or a limit cycle.
 
-    If growth is slow, the motion leaps to a somewhat larger orbit instead of following a large
-    number of orbits. If all larger orbits grow up to the norm, the inner orbit also grows up to the
-    norm. The same rules apply with inertia, because inertia acts only during ruptures. With several
-    states, a motion ends only at the norm, in steady sliding or in a cycle that repeats. The module
-    ``held_load_point`` handles held load points.
+    If oscillations grow slowly, the computation continues with a somewhat larger orbit, and does
+    not compute the large number of orbits between the two. If all larger orbits grow up to the
+    instability norm, the inner orbit also grows up to the norm. The same rules apply with inertia,
+    because inertia acts only during ruptures. With several states, the integration ends only if the
+    slip rate reaches the instability norm, if the motion settles to steady sliding, or if a cycle
+    repeats. The module ``held_load_point`` handles held load points.
     """
     if scene.log_load_velocity == -math.inf:
         return compute_peak_excess_over_instability_norm(scene, accuracy, work_meter)
@@ -189,8 +191,7 @@ def compute_excess_over_instability_norm(
 def has_frictional_damping_only(scene: Scene) -> bool:
     """Return True if friction is the only source of damping.
 
-    The function also requires a constant effective normal stress, except for sudden changes by the
-    loading.
+    The effective normal stress must also be constant, except for sudden changes by the loading.
 
     Parameters
     ----------
@@ -264,8 +265,8 @@ def is_neutrally_stable(scene: Scene, tolerance: float) -> bool:
     -------
     bool
         True if growth and decay are indistinguishable. The result is False if the load point is
-        held, or if the stiffness is exactly critical and all orbits are closed, because stability
-        is known without integration in both cases.
+        held. The result is also False if the stiffness is exactly critical and all orbits are
+        closed. In both cases, the stability of steady sliding is known without integration.
     """
     off = abs(stiffness_ratio_after_step(scene) - 1.0)
     known = scene.log_load_velocity == -math.inf or (off == 0.0 and may_have_closed_orbits(scene))
@@ -305,7 +306,8 @@ def stability_margin(scene: Scene) -> float:
     float
         Margin :math:`k/k_{cr}(V_0) - 1`. The margin is infinite if steady sliding is stable at
         every stiffness or if the load point is held. If steady sliding with several states is
-        stable below the critical stiffness, the margin is the absolute value.
+        stable below the critical stiffness, the margin is the absolute value of
+        :math:`k/k_{cr}(V_0) - 1`.
 
     References
     ----------
@@ -324,10 +326,10 @@ def _max_log_slip_rate_of_closed_orbit(
 ) -> float:
     """Compute the largest value of ln V on a closed orbit.
 
-    The largest ln V is the peak closest to the start, before or after the start. If the motion
-    starts with a decreasing slip rate, the motion is integrated backwards in time to the previous
-    peak. The rest of the orbit may reach slip rates of 1e-40 V_*, at which an integration would
-    lose all digits.
+    The largest ln V on the orbit is the peak that is closest to the start of the motion, either
+    before or after the start. If the motion starts with a decreasing slip rate, the motion is
+    integrated backwards in time to the previous peak. The rest of the orbit may reach slip rates of
+    1e-40 V_*, at which an integration would lose all digits.
     """
     begin = initial_point(scene)
     equations, start = (
@@ -375,8 +377,8 @@ def _slow_orbit_grows_to_norm(
     """Return True if a slowly growing orbit grows up to the instability norm.
 
     The function tests successively larger orbits, until an orbit shrinks or reaches the instability
-    norm. The distance to the next orbit is reduced if the first peak of the next orbit is above the
-    norm.
+    norm. The difference in size between successive orbits is reduced if the first peak of ln V on
+    the next orbit is above the instability norm.
     """
     if not with_inertia and _orbit_touching_norm_shrinks(scene, accuracy, work_meter):
         return False
@@ -475,8 +477,8 @@ class _CycleRepetitionDetector:
 
     A motion repeats if its unknowns are the same at several successive peaks, within numerical
     errors. A motion whose unknowns are constant within the tolerance is also considered periodic.
-    If steady sliding is unstable and the oscillation is small, the motion continues, because the
-    growth may be too small to measure.
+    If steady sliding is unstable and the oscillation is small, the integration continues, because
+    the growth of the oscillation may be too small to measure.
     """
 
     def __init__(

@@ -21,25 +21,27 @@ from rsfstudy.critical_steps.motion_after_step import is_linearly_stable
 from rsfstudy.motion import WorkMeter
 from rsfstudy.slider import Scene, quasi_static_log_slip_rate
 
-#: Minimum step size of the search, and its maximum as a fraction of the largest step size.
+#: Smallest step size of the search. The second number is the largest ratio of the smallest to the
+#: largest step size.
 MIN_STEP_SIZE, _MIN_SIZE_FRACTION = 1e-3, 0.1
-#: Amount of ln V by which the largest step is increased if inertia delays the rise of slip rate.
+#: Increase of the largest step, in units of ln V, if inertia delays the rise of slip rate.
 LOG_RATE_EXTENSION_OF_MAX_STEP_FOR_INERTIA = 5.0
-#: Largest change of step size by inertia that is neglected, as a fraction of the requested
-#: accuracy.
+#: The effect of inertia on the critical step size is neglected if the effect is less than this
+#: fraction of the requested accuracy.
 MAX_NEGLECTED_INERTIA_EFFECT_OVER_RTOL = 0.01
 #: Number of step sizes at which stability is tested, if stability may change repeatedly with size.
 _COUNT_OF_STEP_SIZES_TESTED_FOR_STABILITY = 24
 #: Local tolerance of the integrations for the approximate root of the misfit.
 LOCAL_TOLERANCE_OF_FIRST_ROOT = 1e-5
 #: Smallest and largest difference of ln(step size) over which the slope of the misfit is computed.
-#: If a correction of the approximate root exceeds the largest distance, the refinement ends.
+#: If a correction of the approximate root exceeds the largest difference of ln(step size), the
+#: refinement of the root ends.
 _MIN_SLOPE_DISTANCE, _MAX_SLOPE_DISTANCE = 1e-3, 0.05
 _MAX_SECANT_ITERATIONS = 8
-#: Largest stride and upper end of the search for a sign change of the misfit, in logit(size/largest
-#: size).
+#: Largest increment and upper limit of logit(step size/largest step size) in the search for a sign
+#: change of the misfit.
 _MAX_STRIDE, _MAX_POSITION = 0.7, 4.0
-#: Number of successive strides without a critical path after which the search is abandoned.
+#: Number of successive step sizes without a critical path after which the search is abandoned.
 _MAX_SEARCH_STRIDES_WITHOUT_CRITICAL_PATH = 3
 
 
@@ -187,7 +189,7 @@ class StepFamily:
     def find_sizes_by_limit_cycle(
         self, local_tolerances: Iterable[float], work_meter: WorkMeter
     ) -> Iterator[float]:
-        """Yield sizes of the step whose limit cycle touches the instability norm.
+        """Yield step sizes at which a limit cycle touches the instability norm.
 
         Parameters
         ----------
@@ -206,7 +208,7 @@ class StepFamily:
     def inertia_shifts_critical_size(self, step_size: float, rtol: float) -> bool:
         """Return True if inertia changes the critical size significantly.
 
-        With inertia, the slip rate after the step rises to the critical path only after a delay.
+        With inertia, the motion after the step reaches the critical path only after a delay.
 
         Parameters
         ----------
@@ -218,14 +220,16 @@ class StepFamily:
         Returns
         -------
         bool
-            True if the start of the critical path is not the critical step within the accuracy.
+            True if the difference between the start of the critical path and the critical step
+            exceeds the requested accuracy.
         """
         return False
 
     def size_error_if_neutrally_stable(self, step_size: float, rtol: float) -> float:
-        """Return the size error if steady sliding is almost neutrally stable.
+        """Return the error of the step size close to neutral stability.
 
-        Close to neutral stability, forward motions cannot distinguish growth from decay.
+        Close to neutral stability, motions that are integrated forwards in time do not reveal if
+        oscillations grow or decay.
 
         Parameters
         ----------
@@ -306,14 +310,14 @@ class ShootingStepFamily(StepFamily):
     Attributes
     ----------
     sign_of_triggering_steps : int
-        Direction of the steps whose misfit is positive if the step is too small to trigger an
-        instability.
+        Direction of the steps (1 or -1) for which a positive misfit means that the step is too
+        small to trigger an instability.
     """
 
     sign_of_triggering_steps: ClassVar[int]
 
     def compute_field_value_error(self, step_size: float, relative_error: float) -> float:
-        """Return the error of the step value, whose logarithm is the size.
+        """Return the error of the step value, which is the exponential of the size.
 
         See ``StepFamily.compute_field_value_error``.
         """
@@ -324,10 +328,10 @@ class ShootingStepFamily(StepFamily):
     ) -> Iterator[float]:
         """Yield sizes of the step at which the critical path starts.
 
-        The critical path of the critical step begins with the state before the step. An approximate
-        root and its slope are computed first, with a loose tolerance. For each smaller tolerance,
-        one to three paths are integrated. With several states, there are no critical paths. See
-        ``StepFamily.find_sizes_by_critical_path``.
+        At the critical step, the critical path begins with the state before the step. An
+        approximate root of the misfit, and the slope of the misfit at the root, are computed first
+        with a loose tolerance. For each smaller tolerance, one to three paths are integrated. With
+        several states, there are no critical paths. See ``StepFamily.find_sizes_by_critical_path``.
         """
         path_at = self.build_critical_path_factory(work_meter.engine)
         loose = (
@@ -362,11 +366,11 @@ class ShootingStepFamily(StepFamily):
     def find_sizes_by_limit_cycle(
         self, local_tolerances: Iterable[float], work_meter: WorkMeter
     ) -> Iterator[float]:
-        """Yield the size of the step whose limit cycle touches the instability norm.
+        """Yield step sizes at which a limit cycle touches the instability norm.
 
-        The method searches for the smallest step after which an orbit that touches the norm does
-        not shrink. The computation of each misfit requires the integration of one orbit. See
-        ``StepFamily.find_sizes_by_limit_cycle``.
+        The method searches for the smallest step after which an orbit that touches the instability
+        norm does not shrink. The computation of each misfit requires the integration of one orbit.
+        See ``StepFamily.find_sizes_by_limit_cycle``.
         """
         found, path_at = dict[float, float](), self.build_critical_path_factory(work_meter.engine)
 
@@ -392,7 +396,7 @@ class ShootingStepFamily(StepFamily):
     def _find_misfit_root_at_loose_tolerance(
         self, build_critical_path: Callable[[float], CriticalPath], work_meter: WorkMeter
     ) -> tuple[float, float] | None:
-        """Return the root of the misfit in ln(step size), and the slope at the root.
+        """Return the root ln(step size) of the misfit, and the slope of the misfit.
 
         The misfit is computed with a loose tolerance. The result is None if there is no root.
         """
@@ -419,10 +423,10 @@ class ShootingStepFamily(StepFamily):
     ) -> tuple[float, float] | None:
         """Return two values of ln(step size) between which the misfit changes sign.
 
-        The search proceeds outwards from a guess, and first in the direction that the sign of the
+        The search starts at a guess, and first proceeds in the direction that the sign of the
         misfit indicates. The misfit is NaN, and has no sign, if there is no critical path. The
-        independent variable of the search is logit(size/largest size), which resolves both ends of
-        the range. The result is None if the search finds no sign change.
+        independent variable of the search is logit(step size/largest step size), which resolves
+        both ends of the range of step sizes. The result is None if the search finds no sign change.
         """
 
         def log_size(position: float) -> float:
@@ -480,11 +484,11 @@ class ShootingStepFamily(StepFamily):
 def _find_misfit_root(
     misfit_function: Callable[[float], float], known_misfits: Mapping[float, float], *bracket: float
 ) -> tuple[float, float] | None:
-    """Find the root of a misfit in ln(step size), and the slope at the root.
+    """Find the root ln(step size) of a misfit, and the slope of the misfit.
 
-    If there is no critical path, the misfit has a sign but no magnitude. The root and the slope are
-    computed from misfits with a magnitude. The result is None if there are too few misfits with a
-    magnitude.
+    If there is no critical path, only the sign of the misfit is known. The root and the slope are
+    computed from misfits whose magnitude is known. The result is None if the magnitude of too few
+    misfits is known.
     """
     try:
         brentq(misfit_function, *bracket, xtol=1e-4)
@@ -519,11 +523,11 @@ def _refine_misfit_root(
     local_tolerances: Iterable[float],
     misfit_function: Callable[[float, float], float | None],
 ) -> Iterator[float]:
-    """Yield the root of a misfit, as a step size, for decreasing local tolerances.
+    """Yield the step size at the root of a misfit for decreasing local tolerances.
 
     The refinement uses the secant method, starting from an approximate root and its slope with
-    respect to the log size. The iteration for each tolerance ends when the residual is below thirty
-    local tolerances. The iterator ends early if the secant method does not converge.
+    respect to the log size. For each local tolerance, the iteration ends when the residual is less
+    than thirty times the tolerance. The iterator ends early if the secant method does not converge.
     """
     if not math.isfinite(misfit_slope) or misfit_slope == 0.0:
         return

@@ -39,8 +39,8 @@ from rsfstudy.status import Status
 
 #: Smallest load point velocity of the search, in units of V_*.
 MIN_LOAD_VELOCITY = 1e-20
-#: Minimum value of b/a - 1 in the formula of the first guess. The minimum is necessary because some
-#: laws weaken friction although b < a.
+#: Minimum value of b/a - 1 in the formula for the first guess of the critical step size. The
+#: minimum of b/a - 1 is necessary because some laws weaken friction although b < a.
 _MIN_B_OVER_A_MINUS_ONE_IN_SIZE_GUESS = 1e-6
 #: Largest spring stress after a step, in units of sigma_*.
 _MAX_SPRING_STRESS = 1e6
@@ -49,8 +49,8 @@ _LOG_OF_MAX_FLOAT = math.log(sys.float_info.max)
 _MAX_LOG_NORMAL_STRESS_RATIO = math.log(1e3)
 #: Relative accuracy to which the largest step size is computed.
 _RTOL_OF_MAX_STEP_SIZE = 1e-6
-#: Minimum effective friction in the formula of the first guess, as a fraction of mu_*. The effect
-#: of normal stress on the state may cancel friction completely.
+#: Minimum effective friction in the formula for the first guess of the critical step size, as a
+#: fraction of mu_*. The effect of normal stress on the state may cancel friction completely.
 _MIN_EFFECTIVE_FRICTION_OVER_MU_STAR = 0.1
 
 
@@ -78,7 +78,7 @@ class LoadVelocityStepFamily(ShootingStepFamily):
     def build_critical_path_factory(self, engine: str) -> Callable[[float], CriticalPath]:
         """Return a function that computes the critical path after a step.
 
-        Only the load point velocity of the path depends on the size. See
+        The step size changes only the load point velocity of the critical path. See
         ``ShootingStepFamily.build_critical_path_factory``.
         """
         path = CriticalPath.from_scene(self.scene, engine)
@@ -115,8 +115,9 @@ class LoadVelocityStepFamily(ShootingStepFamily):
     def _compute_max_size(self) -> float:
         """Return the largest size of the search.
 
-        The largest upward step leads to a load point velocity at the instability norm. The largest
-        downward step leads to the smallest load point velocity with steady sliding.
+        After the largest upward step, the load point velocity equals the instability norm. After
+        the largest downward step, the load point has the smallest velocity at which sliding can be
+        steady.
         """
         if self.sign > 0:
             return self.scene.log_instability_rate
@@ -172,9 +173,9 @@ class DisplacementStepFamily(StepFamily):
         """Return True if inertia changes the critical size significantly.
 
         With inertia, the slider follows the critical path with a delay, which changes the critical
-        size in two ways. The load point moves during the delay, and the state evolves less because
-        the slip rate is lower. The effect on the state is b/2 times the delay in slip. See
-        ``StepFamily.inertia_shifts_critical_size``.
+        step size in two ways. The load point moves during the delay, and the state evolves less
+        because the slip rate is lower. The effect on the state is b/2 times the slip by which the
+        slider is delayed. See ``StepFamily.inertia_shifts_critical_size``.
         """
         scene = self.scene
         if not scene.has_mass:
@@ -218,9 +219,10 @@ class DisplacementStepFamily(StepFamily):
     ) -> Iterator[float]:
         """Yield the size of the step at which the critical path starts.
 
-        A displacement step changes only spring stress and leaves Psi = 0. The critical step is
-        therefore the point of the path at which Psi = 0, and each tolerance needs only one
-        integration. See ``StepFamily.find_sizes_by_critical_path``.
+        A displacement step changes only the spring stress, and the state Psi remains zero. The
+        critical step therefore follows from the point of the critical path at which Psi is zero,
+        and each tolerance needs only one integration. See
+        ``StepFamily.find_sizes_by_critical_path``.
         """
         path, sign = CriticalPath.from_scene(self.scene, work_meter.engine), self.sign
         for tolerance in local_tolerances:
@@ -236,7 +238,8 @@ class DisplacementStepFamily(StepFamily):
 
         The largest upward step raises the slip rate to the instability norm immediately. With
         inertia, the range of step sizes is extended, because the slip rate rises with a delay while
-        stress relaxes. The largest downward step removes the shear stress or the normal stress.
+        stress relaxes. After the largest downward step, the shear stress or the normal stress is
+        zero.
         """
         scene = self.scene
         if max(0.0, scene.log_load_velocity) >= scene.log_instability_rate:
@@ -301,8 +304,8 @@ class NormalStressStepFamily(ShootingStepFamily):
     def inertia_shifts_critical_size(self, step_size: float, rtol: float) -> bool:
         """Return True if inertia changes the critical size significantly.
 
-        With inertia, the slip rate rises with a delay after the step. The effect on the size
-        depends on the slip rate immediately after the step. See
+        With inertia, the slip rate rises with a delay after the step. The effect of inertia on the
+        critical step size depends on the slip rate immediately after the step. See
         ``StepFamily.inertia_shifts_critical_size``.
         """
         scene = self.scene
@@ -316,7 +319,7 @@ class NormalStressStepFamily(ShootingStepFamily):
         )
 
     def size_error_if_neutrally_stable(self, step_size: float, rtol: float) -> float:
-        """Return the size error if steady sliding is nearly neutral.
+        """Return the error of the step size close to neutral stability.
 
         The critical stiffness is proportional to normal stress, and the size is the logarithm of
         normal stress. See ``StepFamily.size_error_if_neutrally_stable``.
@@ -341,8 +344,8 @@ class NormalStressStepFamily(ShootingStepFamily):
         """Return a guess of the critical size.
 
         For a decrease of normal stress, the guess is the change of Coulomb stress that reaches the
-        threshold of the slip law. For an increase, the guess is the step after which steady sliding
-        becomes unstable.
+        threshold of the slip law. For an increase of normal stress, the guess is the step after
+        which steady sliding becomes unstable.
         """
         scene, law = self.scene, self.scene.parts.law
         if self.sign > 0 and 1.0 < scene.stiffness_ratio < math.inf:
@@ -376,8 +379,8 @@ class NormalStressStepFamily(ShootingStepFamily):
         The largest step raises the slip rate to the instability norm immediately. With inertia, the
         range of step sizes is extended, because the slip rate rises with a delay while stress
         relaxes. An increase of normal stress raises the slip rate only if its effect on the state
-        exceeds its effect on friction. If the load point moves, the largest step is limited by the
-        existence of steady sliding after the step.
+        exceeds its effect on friction. If the load point moves, the search is limited to steps
+        after which sliding can be steady.
         """
         scene = self.scene
         if max(0.0, scene.log_load_velocity) >= scene.log_instability_rate:
@@ -408,9 +411,9 @@ class NormalStressStepFamily(ShootingStepFamily):
     def _max_log_stress_ratio(self) -> float:
         """Return the largest step size after which the normal stress is positive.
 
-        If normal stress depends on shear stress, sigma_3 must remain positive after a decrease. If
-        sigma_3 were negative, friction would decrease with slip faster than spring stress, at any
-        slip rate.
+        If normal stress depends on shear stress, sigma_3 must remain positive after a decrease of
+        normal stress. If sigma_3 were negative, friction would decrease with slip faster than
+        spring stress, at any slip rate.
         """
         follows, _alpha = self.scene.parts.normal_stress.coupling or (0.0, 0.0)
         if self.sign > 0 or not follows:

@@ -35,8 +35,8 @@ class Triggered(Measure):
     Notes
     -----
     The slip rate :math:`V` reaches the norm if :math:`V T/(2 \pi D_c)` equals ``instability_norm``,
-    with the period :math:`T` of the scene. A norm of 5e-4 reproduces the results in section 4 of
-    [1]_.
+    with the period :math:`T` of the scene. An instability norm of 5e-4 reproduces the results in
+    section 4 of [1]_.
 
     References
     ----------

@@ -1,16 +1,17 @@
 """Limit cycle of stick-slip: recurrence interval, stress drops and slip rates.
 
-A cycle extends from one maximum of spring stress, at which V rises through V_0, to the next
-maximum. The return map computes spring stress and states at a maximum from their values at the
-previous maximum. The limit cycle is the fixed point of the return map.
+A cycle extends from one maximum of spring stress to the next maximum. At a maximum of spring
+stress, the slip rate V rises through the load point velocity V_0. The return map computes the
+spring stress and the states at a maximum of spring stress from the values at the previous maximum.
+The limit cycle is the fixed point of the return map.
 
 The motion is first integrated with a low accuracy until it approaches the limit cycle. The orbit is
 then refined until all unknowns repeat, first with the requested accuracy and then with smaller
 tolerances. The first cycle after the step is never accepted as the limit cycle.
 
 If the law or the fluid has several states, the motion may repeat only after 2, 4 or more cycles, or
-never. In this case, the results describe the cycle with the highest slip rate, and the recorded
-orbit covers the whole period.
+never. If the motion repeats after several cycles or never, the results describe the cycle with the
+highest slip rate, and the recorded orbit covers the whole period.
 """
 
 from __future__ import annotations
@@ -55,8 +56,8 @@ from rsfstudy.quantities import Output
 from rsfstudy.slider import Scene, linear_growth_rates
 from rsfstudy.status import Status
 
-#: Minimum error estimate, as a fraction of the requested relative accuracy, because two runs may
-#: have the same error by chance.
+#: Minimum error estimate of a result, divided by the requested relative accuracy. The minimum is
+#: necessary because two runs may have the same error by chance.
 _MIN_ESTIMATED_ERROR_OVER_RTOL = 0.06
 #: Displacement of the load point that starts a motion if the scene has no step, in units of D_c.
 INITIAL_PERTURBATION_DISPLACEMENT = 0.1
@@ -80,8 +81,9 @@ INDEX_OF_PEAK_SLIP_RATE_OUTPUT = 4
 EVENTS_PER_PERIOD_OUTPUT = Output(
     "period_events", "", "1", "number of events after which a motion repeats itself"
 )
-#: Final behaviour of a slider: steady sliding that is approached without or with oscillations, or
-#: cycles with a peak slip rate below or above the limit of ``LimitCycle``.
+#: Final behaviour of a slider. In the first two modes, the motion settles to steady sliding,
+#: without or with oscillations. In the last two modes, the motion repeats in cycles, with a peak
+#: slip rate below or above a limit.
 SLIP_MODES = ("steady", "damped_oscillation", "slow_slip", "stick_slip")
 _STEADY_CODE, _DAMPED_OSCILLATION_CODE, _SLOW_SLIP_CODE, _STICK_SLIP_CODE = map(
     float, range(len(SLIP_MODES))
@@ -126,14 +128,15 @@ class LimitCycle(RecordingMeasure):
     the event with the highest slip rate. If the motion never repeats, the status is
     ``not_periodic``, and the message reports the range of the events.
 
-    ``slip_mode`` is ``stick_slip`` if the peak slip rate reaches a limit, and ``slow_slip``
-    otherwise. If a motion settles with decaying oscillations, ``slip_mode`` is
-    ``damped_oscillation``. If a motion settles without oscillations, ``slip_mode`` is ``steady``.
+    ``slip_mode`` is ``stick_slip`` if the peak slip rate of the cycle reaches a limit, and
+    ``slow_slip`` if the peak slip rate is lower. If a motion settles with decaying oscillations,
+    ``slip_mode`` is ``damped_oscillation``. If a motion settles without oscillations, ``slip_mode``
+    is ``steady``.
 
     The status is ``no_limit_cycle`` only if small perturbations of steady sliding decay. If the
     largest growth rate of small perturbations is zero within its error, the status is
-    ``unverified``. The status is also ``unverified`` if an error estimate exceeds the requested
-    error more than a hundredfold.
+    ``unverified``. The status is also ``unverified`` if an error estimate is more than a hundred
+    times the requested error.
 
     Parameters
     ----------
@@ -150,13 +153,15 @@ class LimitCycle(RecordingMeasure):
 
     Notes
     -----
-    With radiation damping, the limit of the peak slip rate is :math:`a \sigma_*/\eta`. At this slip
-    rate, a change of slip rate changes the radiated stress as much as the direct effect. Without
-    radiation damping, the limit is the instability norm. A motion settles with oscillations if the
-    slowest-decaying eigenvalues of steady sliding are a complex pair.
+    With radiation damping, the limit of the peak slip rate is :math:`a \sigma_*/\eta`. At the slip
+    rate :math:`a \sigma_*/\eta`, a small change of slip rate changes the radiated stress and the
+    direct effect of friction by the same amount. Without radiation damping, the limit is the
+    instability norm. A motion settles with oscillations if the slowest-decaying eigenvalues of
+    steady sliding are a complex pair.
 
     The error estimates are based on two computations of the cycle with different tolerances. The
-    estimates also include the correction of each result for the closure error.
+    error estimates also include the correction of each result for the closure error, which is the
+    difference between the two ends of the orbit.
 
     Examples
     --------
@@ -351,7 +356,7 @@ def outcome_of_settling_motion(scene: Scene) -> Outcome:
 
 
 def _classify_slip_mode(scene: Scene, peak_log_slip_rate: float) -> float:
-    """Return the code of slow slip or stick-slip for a peak of ln V."""
+    """Return the slip mode code of a cycle with a given peak of ln V."""
     damping = scene.parts.dynamics.radiated_stress_slope(0.0)
     limit = math.log(scene.a / damping) if damping else scene.log_instability_rate
     return _STICK_SLIP_CODE if peak_log_slip_rate >= limit else _SLOW_SLIP_CODE
@@ -426,8 +431,8 @@ def status_from_output_errors(
 def _primary_output_error_scales(orbit: PeriodicOrbit) -> list[float]:
     """Return the scales of the errors of the main results.
 
-    The scale of a logarithm of slip rate is at least half of the range of the logarithms, because
-    the logarithm is zero at V_*.
+    The logarithm of V/V_* may be zero, so its scale is at least half of the range of the
+    logarithms.
     """
     *others, slowest, fastest = orbit.corrected_primary_outputs.tolist()
     half = 0.5 * (fastest - slowest)
@@ -481,7 +486,7 @@ def _additional_cycle_outputs(scene: Scene, cycle: Cycle) -> dict[str, float]:
 
 
 def _healing_exponent(scene: Scene, cycle: Cycle) -> float:
-    """Return d ln(theta)/d ln(V) between the arrest and the slowest point.
+    """Return d ln(theta)/d ln(V) between slip arrest and the lowest slip rate.
 
     The result is NaN if the law has no state variable Theta = b ln(theta/theta_*).
     """

@@ -1,12 +1,13 @@
 r"""Convergence of a motion to its limit cycle.
 
 If a scene has one state, use ``LimitCycleSearch``. The spring stress at a rise of V through V_0
-determines the subsequent motion, so two successive cycles are sufficient to compute the derivative
-of the return map. If the cycles converge slowly, the search leaps to a fixed point that is
-extrapolated from the derivative.
+determines the subsequent motion. Two successive cycles are therefore sufficient to compute the
+derivative of the return map. If the cycles converge slowly, the search continues from an
+extrapolated fixed point of the return map.
 
-If a scene has several states, use ``follow_to_periodic_orbit``. The function follows the motion
-cycle by cycle, and compares the cycles to find the number of cycles after which the motion repeats.
+If a scene has several states, use ``follow_to_periodic_orbit``. The function
+``follow_to_periodic_orbit`` integrates the motion cycle by cycle, and compares the cycles to find
+the number of cycles after which the motion repeats.
 
 Notes
 -----
@@ -56,20 +57,23 @@ from rsfstudy.motion import Accuracy, MotionStopped, WorkMeter
 from rsfstudy.slider import Scene, critical_stiffness
 from rsfstudy.status import Status
 
-#: Limits of the contraction ratio, the ratio of successive distances to the limit cycle. The motion
-#: leaps if the ratio is above the first limit, and does not converge if the ratio is above the
-#: second limit.
+#: Limits of the contraction ratio, the ratio of successive distances to the limit cycle. If the
+#: contraction ratio is above the first limit, the search continues from the extrapolated fixed
+#: point. If the contraction ratio is above the second limit, the cycles do not converge.
 _MIN_CONTRACTION_TO_LEAP, _MAX_CONTRACTION = 0.03, 0.98
-#: Maximum length of a leap to the extrapolated fixed point, as a fraction of the range of ln V.
+#: Maximum change of the range of ln V by a leap to the extrapolated fixed point, as a fraction of
+#: the range of ln V.
 _MAX_FIXED_POINT_LEAP_OVER_LOG_RATE_RANGE = 0.1
 #: Maximum number of cycles after which a periodic motion repeats.
 MAX_PERIOD_IN_CYCLES = 16
-#: Largest relative accuracy with which orbits are closed, because finite differences lose digits.
+#: Largest relative tolerance for the difference between the two ends of an orbit. The limit is
+#: necessary because finite differences lose digits.
 _MAX_ORBIT_CLOSURE_RTOL = 1e-7
 #: Number of cycles after which a motion is first tested for periodicity.
 _MIN_CYCLES_BEFORE_RECURRENCE_TEST = 8
-#: Absolute value of a Floquet multiplier above which an orbit is certainly repelling, and maximum
-#: difference between two cycles that are considered equal, relative to a times the range of ln V.
+#: Two limits. An orbit certainly repels motions if the absolute value of a Floquet multiplier
+#: exceeds the first limit. Two cycles are considered equal if their difference, divided by the
+#: product of a and the range of ln V, is below the second limit.
 _REPELLING_MULTIPLIER, _MAX_RECURRENCE_MISFIT = 1.01, 0.02
 #: Relative difference from the critical stiffness below which oscillations grow or decay so slowly
 #: that the search cannot converge.
@@ -101,8 +105,8 @@ class LimitCycleSearch:
         self._noise = accuracy.local_tolerance * scene.a
         self._work = 0
         self.cycles: list[Cycle] = []
-        #: Columns b and c of P', the derivatives of the image with respect to spring stress and
-        #: state, and True if the derivatives are known.
+        #: Columns b and c of P', which are the derivatives of the image with respect to spring
+        #: stress and state. The flag is True if the derivatives are known.
         self._derivatives, self._has_derivatives = (
             2 * ([0.0] * (2 + PRIMARY_OUTPUT_COUNT_PER_CYCLE),),
             False,
@@ -113,7 +117,8 @@ class LimitCycleSearch:
         self._image_change = self._image
         #: Vector from the section s to the fixed point, and the resulting change of the image P(s).
         self._correction, self._image_correction = self._section, self._image
-        #: Change of spring stress over the cycle before the last leap to a fixed point.
+        #: Change of spring stress over the cycle before the last leap to an extrapolated fixed
+        #: point.
         self._distance_at_leap = np.inf
 
     def follow_until_converged(self, max_cycles: int) -> bool:
@@ -175,7 +180,7 @@ class LimitCycleSearch:
 
     @property
     def orbit(self) -> PeriodicOrbit:
-        """Periodic orbit that consists of the last cycle, corrected to the limit cycle."""
+        """Last cycle as a periodic orbit, with a correction to the limit cycle."""
         last, slopes = self.cycles[-1:], np.array(self._derivatives).T
         return PeriodicOrbit(
             tuple(last), (slopes,), np.array(self._correction), self._accuracy, self._work
@@ -224,15 +229,15 @@ class LimitCycleSearch:
         self._image_correction = self._predict_return_map_image_change(self._correction)
 
     def _predict_return_map_image_change(self, section_change: Sequence[float]) -> list[float]:
-        """Compute the image change caused by a change of the section."""
+        """Compute the change of the image P(s) for a change of the section s."""
         by_stress, by_state = section_change
         return [x * by_stress + y * by_state for x, y in zip(*self._derivatives, strict=True)]
 
     def _has_converged(self) -> bool:
         """Return True if all further cycles would be equal to the last cycle.
 
-        The cycles have converged if the derivatives predict a sufficiently small change, or if the
-        last two cycles agree.
+        The cycles have converged if the derivatives of the return map predict a sufficiently small
+        change of the next cycle, or if the last two cycles agree.
         """
         allowed = [0.3 * self._accuracy.rtol * abs(number) for number in self._image[2:]]
         if (
@@ -268,12 +273,12 @@ class LimitCycleSearch:
         return before * last <= 0.0 and abs(last) <= near
 
     def _should_leap_to_fixed_point(self) -> bool:
-        """Return True if the motion should leap to the fixed point.
+        """Return True if the search should leap to the extrapolated fixed point.
 
         A leap to the extrapolated fixed point is useless if the next cycle would come equally close
-        to the fixed point. A long leap is avoided, because the motion may settle to steady sliding
-        after a long leap. A leap that does not halve the distance is not repeated, because repeated
-        leaps may form a loop.
+        to the fixed point. A long leap towards the fixed point is avoided, because the motion may
+        settle to steady sliding after a long leap. If a leap does not halve the change of spring
+        stress per cycle, no further leap follows, because repeated leaps may form a loop.
         """
         cycle = self.cycles[-1]
         left = abs(cycle.end_point.spring_stress - cycle.start_point.spring_stress)
@@ -300,7 +305,7 @@ class StickSlipSequence:
     Parameters
     ----------
     cycles : list of Cycle
-        Cycles of the motion. A cycle is an event in the results of ``LimitCycle``.
+        Cycles of the motion. The results of ``LimitCycle`` refer to a cycle as an event.
     orbit : PeriodicOrbit or None
         Periodic orbit that the motion approaches, or None if no orbit was found.
     may_still_converge : bool
@@ -415,16 +420,16 @@ def find_recurrence_period(
     cycles : sequence of Cycle
         Successive cycles.
     compared_state_indices : sequence of int, optional
-        Indices of the states to compare. By default, all states are compared except states in the
-        attribute ``excluded_from_distance`` of a part.
+        Indices of the states to compare. By default, all states are compared except the states that
+        a part lists in its attribute ``excluded_from_distance``.
 
     Returns
     -------
     period : int
-        Smallest number of cycles n for which the difference is at most twice the smallest
-        difference.
+        Smallest number of cycles n for which the difference between states n cycles apart is at
+        most twice the smallest difference for any n.
     off : float
-        Difference after ``period`` cycles, or infinity if there are too few cycles.
+        Difference between states ``period`` cycles apart, or infinity if there are too few cycles.
 
     Notes
     -----

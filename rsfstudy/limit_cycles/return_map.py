@@ -6,8 +6,8 @@ The main methods are ``ReturnMap.find_periodic_orbit``, which searches for an or
 A cycle extends from one rise of V through V_0 to the next rise. At a rise, the slip rate is known,
 so the motion is determined by spring stress and the states. With inertia, the spring stress also
 includes the stress that accelerates the slider. The motion therefore defines a return map of spring
-stress and states from one section (rise of V through V_0) to the next, and an orbit of n cycles is
-a fixed point of the n-th power of the return map.
+stress and states from one section (rise of V through V_0) to the next. An orbit of n cycles is a
+fixed point of the n-th power of the return map.
 
 The eigenvalues of the derivative of the return map are the Floquet multipliers, the factors by
 which small perturbations grow during one orbit. The orbit repels if the absolute value of a
@@ -60,15 +60,16 @@ from rsfstudy.motion import (
 from rsfstudy.slider import MotionPoint, Numbers, Scene, equations_without_mass
 from rsfstudy.status import Status
 
-#: Step of the finite differences of the return map, relative to a times the range of ln V. The
-#: derivatives of the return map vary on a scale of a hundredth of a times this range.
+#: Step of the finite differences of the return map, divided by the product of a and the range of ln
+#: V. The derivatives of the return map vary on a scale of a hundredth of this product.
 DIFFERENCE_STEP_OVER_LOG_RATE_RANGE = 1e-4
 _FINITE_DIFFERENCE_WEIGHTS = ((1, 2.0 / 3.0), (2, -1.0 / 12.0))
-#: Maximum distance of an orbit from the starting point of the search, relative to a times the range
-#: of ln V, and maximum number of Newton steps.
+#: Two limits of the search for an orbit. The first limit is the maximum distance of the orbit from
+#: the starting point of the search, divided by the product of a and the range of ln V. The second
+#: limit is the maximum number of Newton steps.
 _MAX_ORBIT_DISTANCE, _MAX_ITERATIONS = 0.1, 12
-#: Largest closure error of an orbit, relative to the requested accuracy. The results are corrected
-#: for the closure error to first order.
+#: Largest closure error (difference between the two ends) of an orbit, divided by the requested
+#: accuracy. The results are corrected for the closure error to first order.
 ORBIT_CLOSURE_TOLERANCE_OVER_RTOL = 0.3
 
 
@@ -81,9 +82,9 @@ class PeriodicOrbit:
     cycles : tuple of Cycle
         Successive cycles.
     cycle_derivatives : tuple of ndarray
-        Derivatives of each cycle, of shape (1 + states + results, 1 + states). The rows are the
-        section at the end of the cycle and the main results. The columns are the section at the
-        beginning of the cycle.
+        Derivatives of each cycle, of shape (1 + states + results, 1 + states). Rows correspond to
+        the spring stress and the states at the end of the cycle, and to the main results. Columns
+        correspond to the spring stress and the states at the beginning of the cycle.
     start_section_correction : ndarray, shape (1 + states,)
         Vector from the section at which the computed cycles begin to the corresponding section of
         the closed orbit.
@@ -232,7 +233,7 @@ class ReturnMap:
         stored.
     counted : sequence of int, optional
         Indices of the states used for the distance between two sections. By default, all states are
-        used except states in the attribute ``excluded_from_distance`` of a part.
+        used except the states that a part lists in its attribute ``excluded_from_distance``.
     """
 
     def __init__(
@@ -356,7 +357,7 @@ class ReturnMap:
         cycle_count : int
             Number of cycles.
         state_scale : float
-            Magnitude of the states, which determines the step of the differences.
+            Magnitude of the states, from which the step of the finite differences is computed.
 
         Returns
         -------
@@ -383,7 +384,7 @@ class ReturnMap:
     ) -> tuple[Numbers, Numbers]:
         """Compute the direction of the motion at a section, and its effect on the image.
 
-        The effect is the change of the image due to a displacement of the section along the motion.
+        The effect on the image is its change due to a displacement of the section along the motion.
         If the effect of inertia is small, a displacement along the motion changes only the duration
         of the cycle.
 
@@ -397,7 +398,8 @@ class ReturnMap:
         way : tuple of float
             Rates of change of the section components along the motion.
         passed : tuple of float
-            Corresponding change of the image (next section and main results).
+            Change of the image (next section and main results) due to a displacement of the section
+            along the motion.
         """
         scene, states = self.scene, len(point.psis)
         spring_stress = point.frictional_stress + scene.dynamics.radiated_stress(
@@ -414,8 +416,8 @@ class ReturnMap:
     ) -> np.ndarray | None:
         """Compute the derivatives of one cycle by differences of order four.
 
-        The derivative along the motion follows from the rates of the motion. The result is None if
-        a motion does not complete the cycle.
+        The derivative along the motion is computed from the time derivatives of the unknowns,
+        without finite differences. The result is None if a motion does not complete the cycle.
         """
         point = self.section_coordinates_to_point(start_section)
         way, passed = self.compute_motion_direction_and_image_change(point)

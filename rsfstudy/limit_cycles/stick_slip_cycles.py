@@ -1,7 +1,8 @@
 """Stick-slip cycles of a motion, assembled from its events.
 
-A cycle extends from one maximum of spring stress, at which V rises through V_0, to the next
-maximum. The main function is ``iterate_cycles``.
+A cycle extends from one maximum of spring stress to the next maximum. At a maximum of spring
+stress, the slip rate V rises through the load point velocity V_0. The main function is
+``iterate_cycles``.
 """
 
 from __future__ import annotations
@@ -42,10 +43,12 @@ _START, _RISE, _FALL = EventKind.START, EventKind.RISE, EventKind.FALL
 _SEGMENT, _SETTLED = EventKind.SEGMENT, EventKind.SETTLED
 _get_log_slip_rate, _get_spring_stress = attrgetter("log_slip_rate"), attrgetter("spring_stress")
 
-#: Range of ln V below which a cycle is treated as steady sliding, and number of successive cycles
-#: with decreasing ranges after which a motion may be approaching steady sliding.
+#: Two limits. A cycle is treated as steady sliding if its range of ln V is below the first limit. A
+#: motion may be approaching steady sliding if the range of ln V has decreased over more successive
+#: cycles than the second limit.
 MIN_LOG_SLIP_RATE_RANGE, _MIN_SHRINKING_CYCLES = 1e-3, 30
-#: Fraction of the largest distance from steady sliding below which a motion has settled.
+#: A motion has settled if its distance from steady sliding is less than this fraction of the
+#: largest distance from steady sliding during the motion.
 _SETTLING_TOLERANCE_OVER_MAX_DISTANCE = 1e-6
 
 
@@ -72,7 +75,8 @@ class Cycle(NamedTuple):
         Largest value of ln(V/V_*) during the cycle.
     slip_arrest_point : MotionPoint
         First point after the rupture at which V is below V_0 and friction balances the spring. If
-        there is no such point, the point with the lowest slip rate.
+        friction never balances the spring after the rupture, ``slip_arrest_point`` is the point
+        with the lowest slip rate.
     slowest_point : MotionPoint
         Point with the lowest slip rate.
     start_point : MotionPoint
@@ -255,9 +259,9 @@ def _cycle_event_specifications(log_load_velocity: float) -> tuple[EventSpecific
 def _are_log_rate_ranges_approaching_zero(log_slip_rate_ranges: list[float]) -> bool:
     """Return True if the decreasing ranges of ln V approach zero.
 
-    The last three ranges, with differences d_1 and d_2, are extrapolated as a geometric series. The
-    extrapolated decrease is d_2**2/(d_1 - d_2). Near the onset of stick-slip, the ranges decrease
-    slowly towards a positive limit instead.
+    The ranges of ln V in the last three cycles, with differences d_1 and d_2, are extrapolated as a
+    geometric series. The extrapolated further decrease of the range is d_2**2/(d_1 - d_2). Near the
+    onset of stick-slip, the ranges of ln V decrease slowly towards a positive limit instead.
     """
     if len(log_slip_rate_ranges) <= _MIN_SHRINKING_CYCLES or not all(
         y < x for x, y in pairwise(log_slip_rate_ranges[-_MIN_SHRINKING_CYCLES:])

@@ -36,18 +36,21 @@ _REMEDY_FOR_RIG_QUANTITY_ELASTICITIES = (
     "b at constant a is b_over_a; of a time in s, D_c is 1 + stiffness - reference_rate, normal "
     "stress is -stiffness, and V_* is reference_rate - 1."
 )
-#: Largest step of ln p. The finite-difference formula spans four steps.
+#: Largest finite-difference step of ln p for a parameter p. The finite-difference formula spans
+#: four steps.
 _MAX_LOG_PARAMETER_STEP = 0.05
-#: Evaluation points of the finite-difference formula in units of the step, and weights of the
-#: fourth difference.
+#: Evaluation points of the finite-difference formula, in units of the step of ln p. The second
+#: tuple contains the weights of the fourth difference.
 _STENCIL, _FOURTH_DIFFERENCE_WEIGHTS = (-2.0, -1.0, 1.0, 2.0), (1.0, -4.0, 6.0, -4.0, 1.0)
-#: Truncation error as a fraction of the difference between the fourth-order and the second-order
-#: formula. In random scenes, the largest fraction is 0.14, for the largest steps.
+#: Estimated truncation error of an elasticity, divided by the difference between the results of the
+#: fourth-order and the second-order formula. In random scenes, the largest ratio of the true
+#: truncation error to this difference is 0.14, and occurs with the largest steps.
 _TRUNCATION_ERROR_OVER_FORMULA_DIFFERENCE = 0.25
-#: Constants of the step selection. The first item contains the fractions of the step that are tried
-#: in turn if the result does not exist on one side, or if the relative error of the derivative
-#: exceeds the second item. The third item limits the number of right-hand-side evaluations with a
-#: shorter step, relative to the number at the unchanged scene.
+#: Constants of the step selection. The first item contains fractions of the largest step of ln p.
+#: The fractions are tried in turn if the result of the measure does not exist for a smaller or for
+#: a larger parameter value, or if the relative error of the derivative exceeds the second item. The
+#: third item limits the number of right-hand-side evaluations with a shorter step, divided by the
+#: number of evaluations for the unchanged scene.
 _STEP_FRACTIONS, _MAX_RELATIVE_ERROR, _MAX_EVALUATION_RATIO = (
     (1.0, 0.125, 0.125**2, 0.125**3),
     0.1,
@@ -78,18 +81,19 @@ class Elasticities(Measure):
     have the shape (parameters,).
 
     The elasticities are finite differences, so the measure is evaluated four times per parameter
-    and once for the scene itself. If the result does not exist on one side, for example near a
-    stability boundary, up to three shorter steps are tried. If the scene is exactly at a boundary,
-    such as the critical stiffness, the derivative is a one-sided difference.
+    and once for the scene itself. If the result does not exist for a smaller or for a larger
+    parameter value, for example near a stability boundary, up to three smaller changes of the
+    parameter are tried. If the scene is exactly at a stability boundary, such as the critical
+    stiffness, the derivative is a one-sided difference.
 
     Parameters
     ----------
     measure : Measure
         A measure whose main result is a single number.
     parameters : tuple of str, optional
-        Scene parameters, along the dimension ``parameter``. By default, all parameters that the
-        measure does not solve for. If the scene does not have a parameter, or if the parameter is
-        zero, the elasticity is NaN.
+        Scene parameters, along the dimension ``parameter``. By default, the tuple contains all
+        parameters that the measure does not solve for. If the scene does not have a parameter, or
+        if the parameter is zero, the elasticity is NaN.
 
     Raises
     ------
@@ -107,12 +111,12 @@ class Elasticities(Measure):
 
     .. math:: E \approx \frac{4 D(h) - D(2h)}{3}.
 
-    The step :math:`h = (e/2)^{1/3}`, but at most 0.05, depends on the relative error estimate
-    :math:`e` of :math:`y`. The error estimate of an elasticity is the sum of three terms. The first
-    term, about :math:`1.5\,e/h`, is the effect of the errors of :math:`y`. The second term is a
-    quarter of the difference between the fourth-order and the second-order formula. The third term
-    is a bound that follows from the fourth difference of :math:`\ln |y|`. Each shorter step is an
-    eighth of the previous step.
+    The step :math:`h` is the smaller of 0.05 and :math:`(e/2)^{1/3}`, with the relative error
+    estimate :math:`e` of :math:`y`. The error estimate of an elasticity is the sum of three terms.
+    The first term, about :math:`1.5\,e/h`, is the effect of the errors of :math:`y`. The second
+    term is a quarter of the difference between the fourth-order and the second-order formula. The
+    third term is a bound that follows from the fourth difference of :math:`\ln |y|`. Each shorter
+    step is an eighth of the previous step.
 
     Examples
     --------
@@ -194,7 +198,7 @@ class Elasticities(Measure):
 
     @property
     def work_by_digits(self) -> Mapping[float, float]:
-        """Relative number of evaluations of the inner measure for each number of digits."""
+        """Relative cost of the inner measure for each requested number of digits."""
         return self.measure.work_by_digits
 
     def describe(self) -> dict[str, Any]:
@@ -268,8 +272,8 @@ class Elasticities(Measure):
     ) -> tuple[float, float]:
         """Compute the derivative with respect to one parameter, and its error.
 
-        If the result does not exist on one side, or if the error is large, the derivative is
-        computed again with shorter steps.
+        If the result does not exist for a smaller or for a larger parameter value, or if the error
+        of the derivative is large, the derivative is computed again with shorter steps.
 
         Parameters
         ----------
@@ -289,7 +293,8 @@ class Elasticities(Measure):
         Returns
         -------
         slope, error : float
-            The derivative and its error. Both are NaN if the result does not exist on either side.
+            The derivative and its error. Both numbers are NaN if the result exists neither for a
+            smaller nor for a larger parameter value.
         """
         found: list[tuple[bool, float, float]] = []
         for part, accuracy in zip(_STEP_FRACTIONS, accuracies_of_step_fractions, strict=True):
@@ -401,7 +406,7 @@ def _central_difference(
     -------
     slope, error, of_levels : float
         The derivative, its error, and the contribution of the errors of y to this error. All three
-        are NaN if the values on both sides are missing.
+        numbers are NaN if the values are missing both for smaller and for larger parameter values.
     """
     far_below, below, above, far_above = neighbouring_values
     if far_below and below and above and far_above:

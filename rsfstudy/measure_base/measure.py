@@ -68,7 +68,7 @@ class Outcome:
     rhs_evaluations: int = 0
 
 
-#: Variable names of every lattice, which are not available as names of results.
+#: Names of the variables that every lattice contains. Results must not have these names.
 RESERVED_NAMES = frozenset(
     {
         "status",
@@ -219,7 +219,7 @@ class Measure(ConstructorKeywordCheckMixin):
 
     @property
     def work_by_digits(self) -> Mapping[float, float]:
-        """Relative number of right-hand-side evaluations for each number of digits.
+        """Relative cost of the computation for each requested number of digits.
 
         The number of digits is ``-log10(rtol)``, and the work is relative to the work at the
         default accuracy. The default values were measured for limit cycles, the most demanding
@@ -289,10 +289,10 @@ class Measure(ConstructorKeywordCheckMixin):
     def error_scales(self, scene: Scene, values: Mapping[str, Any]) -> Mapping[str, float]:
         """Return the scale of the numerical error of each result.
 
-        The requested accuracy is relative to this scale. If the error estimate of a result exceeds
-        the requested error more than a hundredfold, the status of the cell becomes ``unverified``.
-        Results without a scale are not checked. An override should omit statistical results, and
-        results whose resolution is an option of the measure.
+        The requested accuracy is relative to the scale of each result. If the error estimate of a
+        result is more than a hundred times the requested error, the status of the cell becomes
+        ``unverified``. Results without a scale are not checked. An override should omit statistical
+        results, and results whose resolution is an option of the measure.
 
         Parameters
         ----------
@@ -467,8 +467,8 @@ class Measure(ConstructorKeywordCheckMixin):
     def _find_missing_output(self, output_values: Mapping[str, OutputValue]) -> str | None:
         """Return the name of the first required result that is not finite.
 
-        The primary output is required, and so is each result with an error estimate, including the
-        error. Optional results are required only if they are present.
+        The primary output is required. Each result with an error estimate is also required,
+        together with the error estimate. Optional results are required only if they are present.
         """
         known = [
             n
@@ -584,7 +584,7 @@ def relative_work_at_rtol(rtol: float, work_by_digits: Mapping[float, float]) ->
     Returns
     -------
     float
-        Ratio of the two costs.
+        Cost at ``rtol`` divided by the cost at the default accuracy.
     """
     known = sorted(work_by_digits)
     digits = min(-math.log10(rtol), known[-1] + 2.0)

@@ -13,8 +13,8 @@ from rsfstudy.slider import (
     displacement_per_path_length,
 )
 
-#: Lower bound of the squared direction cosine of the path, which vanishes if ln V changes suddenly
-#: in a rupture.
+#: Lower bound of the squared direction cosine of the path. The direction cosine vanishes if ln V
+#: changes suddenly during a rupture.
 MIN_SQUARED_DIRECTION_COSINE_OF_PATH = 1e-12
 
 
@@ -33,8 +33,9 @@ def distance_from_steady_sliding(scene: Scene, point: MotionPoint, load_velocity
     Returns
     -------
     float
-        Larger of two distances: the difference of ln V, and the distance of the state from its
-        steady-state value in units of b.
+        Larger of two numbers. The first number is the difference between ln V and its value in
+        steady sliding. The second number is the difference between the state and its value in
+        steady sliding, in units of b.
     """
     size = scene.a * scene.parts.law.state_change_over_a
     return max(
@@ -81,7 +82,7 @@ def growth_rate_along_path(scene: Scene, event: Event, load_velocity: float) -> 
 
 
 def choose_friction_quantity_for_events(scene: Scene) -> tuple[str, float]:
-    """Return the quantity whose events represent events of the friction coefficient.
+    """Return the quantity that replaces the friction coefficient in events.
 
     If normal stress is constant and the law is not regularised, events of the friction coefficient
     coincide with events of the spring stress.

@@ -25,8 +25,8 @@ from rsfstudy.motion import (
 )
 from rsfstudy.slider import Scene, largest_linear_growth_rate
 
-#: Minimum error estimate, as a fraction of the requested relative accuracy, because two runs may
-#: have the same error by chance.
+#: Minimum error estimate of a result, divided by the requested relative accuracy. The minimum is
+#: necessary because two runs may have the same error by chance.
 ERROR_FLOOR_OVER_RTOL = 0.01
 #: Minimum error estimate of the friction coefficient at a single instant, as a fraction of a times
 #: the requested relative accuracy. Without this minimum, 22 of 7,071 results of random holds have
@@ -44,8 +44,9 @@ class RecordedMotion(NamedTuple):
         Events at the beginning of the first recorded loading segment and of all later segments.
     friction_before_segments : list of float
         Friction coefficient immediately before the beginning of each segment. With inertia, the
-        motion approaches the slow manifold after a beginning within the inertial time, and the
-        value immediately after the beginning is the value on the slow manifold.
+        motion approaches the slow manifold within the inertial time after the beginning of a
+        segment. The friction coefficient immediately after the beginning of a segment is the value
+        on the slow manifold.
     peak_event : Event or None
         Requested extremum, or None if the motion has no extremum.
     last_event : Event
@@ -53,7 +54,7 @@ class RecordedMotion(NamedTuple):
     recorded_rows : ndarray, shape (n, columns)
         Recorded samples. The columns are documented in ``rsfstudy.motion.recording``.
     neglected_inertia_error : ndarray, shape (n,)
-        Error of ln V up to each row that is caused by neglected inertia. See
+        Error of ln V that neglected inertia has caused up to each row. See
         ``rsfstudy.motion.neglected_inertia_error``.
     """
 
@@ -205,8 +206,8 @@ def estimate_error_at_instant(
     r"""Estimate the error of a result that is read at a single instant.
 
     If the machine is stiff, stability limits the time steps, so the errors of two runs may agree by
-    chance at a single instant. The estimate therefore includes a fraction of the result, and a
-    fraction of the friction from which the result is read.
+    chance at a single instant. The error estimate therefore includes a fraction of the result, and
+    a fraction of the friction coefficient from which the result is read.
 
     Parameters
     ----------

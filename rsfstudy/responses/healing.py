@@ -46,14 +46,15 @@ from rsfstudy.responses._recorded_motion import (
 from rsfstudy.slider import Scene
 from rsfstudy.status import Status
 
-#: Largest distance from steady sliding, in ln V or in the state divided by b, at which the motion
-#: before a hold is treated as steady.
+#: The motion before a hold is treated as steady if neither ln V, nor the state divided by b,
+#: differs from its value in steady sliding by more than this number.
 _MAX_STEADY_STATE_DISTANCE_BEFORE_HOLD = 1e-3
-#: Largest height of a peak, relative to the local tolerance, that is attributed to numerical errors
-#: near steady sliding. In 7,000 random motions with rtol from 1e-2 to 1e-6, the largest such height
-#: is 1.9.
+#: Peaks of friction near steady sliding are attributed to numerical errors if the ratio of their
+#: height to the local tolerance is below this number. In 7,000 random motions with rtol from 1e-2
+#: to 1e-6, the largest ratio of the height of such a peak to the local tolerance is 1.9.
 _FRICTION_NOISE_OVER_LOCAL_TOLERANCE = 3.0
-#: Fraction of the largest distance from steady sliding below which no further peak is expected.
+#: No further peak of friction is expected if the distance from steady sliding is less than this
+#: fraction of the largest distance from steady sliding during the motion.
 _SETTLING_TOLERANCE_OVER_MAX_DISTANCE = 1e-6
 
 _PEAK_DISPLACEMENT_MEANING = "load point displacement from reloading to the peak of friction"
@@ -89,7 +90,8 @@ class Healing(RecordingMeasure):
     Parameters
     ----------
     record : float, default: 10.0
-        Load point displacement after the peak that is recorded, in units of D_c.
+        Load point displacement over which the motion is recorded after the peak of friction, in
+        units of D_c.
     phases : int, default: 300
         Number of points of the record along ``phase``.
 

@@ -1,7 +1,7 @@
 """Linear stability of steady sliding.
 
 The critical stiffness is computed in three ways: from the friction relation, from the growth rates
-of the assembled equations, and in closed form.
+of small perturbations, and in closed form.
 """
 
 from __future__ import annotations
@@ -35,12 +35,13 @@ from rsfstudy.status import Status
 #: Step of the central differences, in units of the scale of an unknown. Rounding and truncation
 #: errors are of the same size at this step.
 _RELATIVE_DIFFERENCE_STEP = 1e-4
-#: Slip rate norm above which growth rates are computed from the full equations. Below this norm,
-#: inertia is smaller than the rounding errors of the full equations, and the slow manifold, which
-#: is of second order in the mass, is accurate enough.
+#: Dimensionless slip rate above which growth rates are computed from the inertial equations of
+#: motion. At lower slip rates, the effect of inertia is smaller than the rounding errors of the
+#: inertial equations of motion. At lower slip rates, the slow manifold, which is of second order in
+#: the mass, is accurate enough.
 _MIN_SLIP_RATE_NORM_FOR_FULL_EQUATIONS = 1e-3
-#: Relative increase of the critical stiffness by inertia above which steady sliding is treated as
-#: unstable at any stiffness.
+#: Steady sliding is treated as unstable at any stiffness if the relative increase of the critical
+#: stiffness by inertia exceeds this number.
 _MAX_CRITICAL_STIFFNESS_RISE_BY_INERTIA = 1e6
 
 _OUTPUTS = (
@@ -64,8 +65,8 @@ class LinearStability(Measure):
 
     The critical stiffness is computed in three ways, which verify each other. The first result
     follows from the friction relation. The second result is the stiffness at which small
-    perturbations of the assembled equations neither grow nor decay. The third result is the
-    quasi-static closed form, corrected for inertia and radiation damping.
+    perturbations neither grow nor decay according to the equations of motion. The third result is
+    the quasi-static closed form, corrected for inertia and radiation damping.
 
     Stresses are in units of sigma_*, and stiffnesses are in units of sigma_*/D_c. The relative
     critical stiffness is the critical stiffness divided by the critical stiffness at V_*.
@@ -112,13 +113,14 @@ class LinearStability(Measure):
 
     @property
     def solved_fields(self) -> tuple[str, ...]:
-        """Stiffness of the scene, which the measure ignores."""
+        """Stiffness of the scene. The measure ignores this value."""
         return ("stiffness_ratio",)
 
     def compute(self, scene: Scene, accuracy: Accuracy, meter: WorkMeter) -> Outcome:
         """Compute the critical stiffness from friction and from growth rates.
 
-        The error estimate is the difference between the critical stiffnesses from both methods.
+        The error estimate is the difference between the critical stiffness from friction and the
+        critical stiffness from growth rates.
 
         Parameters
         ----------

@@ -79,10 +79,10 @@ class RigidResponse(Measure):
     ``load_velocity_ratio`` of the scene. The direct effect changes the stress by ``a sigma
     ln(V/V_*)`` at the step. The stress then evolves with slip towards steady sliding at V.
 
-    ``evolution_distance`` is the slip at which 1/e of the stress change from the direct effect to
-    steady sliding remains. Under the slip law, the distance is D_c. The outputs ``shear_stress``,
-    ``normal_stress_ratio`` and ``state_variable`` have the shape (points,), along ``slip``. Slip is
-    in units of D_c, and stresses are in units of sigma_*.
+    ``evolution_distance`` is the slip at which 1/e of the evolution of stress towards steady
+    sliding remains. Under the slip law, ``evolution_distance`` is D_c. The outputs
+    ``shear_stress``, ``normal_stress_ratio`` and ``state_variable`` have the shape (points,), along
+    ``slip``. Slip is in units of D_c, and stresses are in units of sigma_*.
 
     Parameters
     ----------
@@ -151,8 +151,8 @@ class RigidResponse(Measure):
     def error_scales(self, scene: Scene, values: Mapping[str, Any]) -> Mapping[str, float]:
         """Return the scale of the numerical error of the evolution distance.
 
-        The scale is the distance, plus the change of the distance if friction changes by the direct
-        effect parameter ``a``.
+        The scale is the sum of the evolution distance and of the change of the evolution distance
+        that results from a change of friction by ``a``, the parameter of the direct effect.
 
         Parameters
         ----------
@@ -300,9 +300,9 @@ def _misfit_to_closed_form(
 def _compute_step_asymmetries(scene: Scene, log_slip_rate: float) -> dict[str, float]:
     """Compute the asymmetries between a step and the inverse step.
 
-    An asymmetry is the ratio of the magnitudes of the two stress changes minus 1. The dictionary
-    contains the asymmetries of the direct effect and of the evolution to steady sliding. If sliding
-    cannot be steady after one of the two steps, the dictionary is empty.
+    An asymmetry is the ratio of the magnitudes of the stress changes after the two steps, minus 1.
+    The dictionary contains the asymmetries of the direct effect and of the evolution to steady
+    sliding. If sliding cannot be steady after one of the two steps, the dictionary is empty.
     """
     steady, inverse_steady = (steady_sliding(scene, x) for x in (log_slip_rate, -log_slip_rate))
     if steady is None or inverse_steady is None:

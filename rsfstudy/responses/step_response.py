@@ -39,7 +39,8 @@ from rsfstudy.status import Status
 
 LN10 = math.log(10.0)
 
-#: Fraction of the largest distance from steady sliding below which an oscillation has ended.
+#: An oscillation has ended if the distance from steady sliding is less than this fraction of the
+#: largest distance from steady sliding during the motion.
 _SETTLING_TOLERANCE_OVER_MAX_DISTANCE = 1e-3
 
 _OUTPUTS = (
@@ -61,14 +62,16 @@ class StepResponse(RecordingMeasure):
 
     The motion is integrated until it has the requested number of peaks, or until it settles. A
     motion has settled if the distance of ln V and of the states from steady sliding is less than a
-    thousandth of the largest distance. The results include the peaks of log10(V/V_*), with NaN for
-    missing peaks. ``peak_log10_slip_rate`` has the shape (peaks,).
+    thousandth of the largest distance from steady sliding during the motion. The results include
+    the peaks of log10(V/V_*), with NaN for missing peaks. ``peak_log10_slip_rate`` has the shape
+    (peaks,).
 
     ``peak_ratio`` is the height of the second peak divided by the height of the first peak. The
-    height of a peak is the difference of ln V from the logarithm of the load point velocity. The
-    ratio is 1 if oscillations repeat, as small oscillations do at the critical stiffness, and 0 if
-    there is no second peak. The quantities along the path have the shape (phases,), and are in
-    units of D_c, D_c/V_* and sigma_*.
+    height of a peak is ln V at the peak minus the logarithm of the load point velocity.
+    ``peak_ratio`` is 1 if the amplitude of the oscillations is constant, for example in small
+    oscillations at the critical stiffness. ``peak_ratio`` is 0 if there is no second peak. The
+    quantities along the path have the shape (phases,), and are in units of D_c, D_c/V_* and
+    sigma_*.
 
     Parameters
     ----------
@@ -234,7 +237,7 @@ def _slip_rate_peaks_at_start(scene: Scene, event: Event) -> bool:
 def _error_of_neglected_initial_rise(scene: Scene, accuracy: Accuracy) -> float:
     """Return the error of log10(V/V_*) caused by an initial rise of slip rate.
 
-    The error is zero unless inertia delays the rise.
+    The error is zero unless inertia delays the initial rise of slip rate.
     """
     slip = accuracy.max_remaining_slip if _does_inertia_delay_initial_slip_rate_rise(scene) else 0.0
     return (1.0 + scene.stiffness / scene.a) * slip / LN10

@@ -48,10 +48,12 @@ from rsfstudy.responses._recorded_motion import (
 from rsfstudy.slider import Scene, steady_friction_minus_reference
 from rsfstudy.status import Status
 
-#: Fraction of the record, at its end, over which friction must be constant, and largest variation
-#: of constant friction as a fraction of the direct effect.
+#: Length of the last part of the record, in which friction must be constant, as a fraction of the
+#: length of the record. The second number is the largest permitted variation of friction in this
+#: part, as a fraction of the direct effect.
 _SETTLING_WINDOW_FRACTION, _SETTLING_TOLERANCE = 0.1, 0.01
-#: Largest distance from steady sliding before the step, as a fraction of ln r.
+#: Largest permitted distance from steady sliding before the step, divided by the logarithm of the
+#: velocity ratio of the step.
 _MAX_STEADY_DISTANCE_OVER_LOG_RATIO = 1e-3
 
 #: Results of the measure, with symbols, scales and meanings.
@@ -110,17 +112,17 @@ class VelocityStep(RecordingMeasure):
 
     The definitions are the same as in laboratory studies. The parameter ``a`` follows from the
     extremum of friction after the step, and ``a - b`` follows from friction at the end of the
-    record. The slip distance is the displacement from the extremum until 1/e of the evolution of
-    friction remains. The slip distance is reported as load point displacement and as slip, which
-    excludes the elongation of the spring. The results are not corrected for the stiffness of the
-    machine, and therefore show the effect of a soft machine.
+    record. The slip distance is the displacement from the extremum of friction to the point at
+    which 1/e of the evolution of friction remains. The slip distance is reported as load point
+    displacement and as slip, which excludes the elongation of the spring. The results are not
+    corrected for the stiffness of the machine, and therefore show the effect of a soft machine.
 
     ``settled`` is 1 if friction varies by less than a hundredth of the direct effect over the last
     tenth of the record, and if small perturbations of steady sliding do not grow. Otherwise
-    ``settled`` is 0. If the stability of steady sliding is undecided within its error, ``settled``
-    is NaN.
+    ``settled`` is 0. If the largest growth rate of small perturbations is zero within its error,
+    ``settled`` is NaN.
 
-    If there is no extremum, or if ``b`` is smaller than its error, the status is
+    If friction has no extremum after the step, or if ``b`` is smaller than its error, the status is
     ``not_applicable``, and the outcome contains only the available results. Distances are in units
     of D_c. The record begins at the step and has the shape (phases,).
 
@@ -129,8 +131,8 @@ class VelocityStep(RecordingMeasure):
     step_number : int, default: 1
         Number of the loading segment that begins with the step, counted from 1.
     record : float, default: 20.0
-        Longest load point displacement after the step that is recorded, in units of D_c. The record
-        also ends at the next step.
+        Largest load point displacement over which the motion is recorded after the step, in units
+        of D_c. The record also ends at the next step.
     phases : int, default: 400
         Number of points of the record along ``phase``.
 
@@ -245,7 +247,7 @@ class VelocityStep(RecordingMeasure):
 
         The motion is computed twice, with the requested accuracy and with smaller tolerances. The
         difference between the two runs determines the error estimates. Each run also integrates the
-        motion from the extremum until 1/e of the evolution remains.
+        motion from the extremum of friction until 1/e of the evolution of friction remains.
 
         Parameters
         ----------
@@ -325,7 +327,7 @@ class VelocityStep(RecordingMeasure):
     ) -> dict[str, float]:
         """Return the results that are read from a record.
 
-        Results that depend on the extremum are NaN if there is no extremum.
+        Results that depend on the extremum of friction are NaN if friction has no extremum.
         """
         before, after = (
             recorded_motion.friction_before_segments[0],
@@ -356,11 +358,12 @@ class VelocityStep(RecordingMeasure):
         accuracy: Accuracy,
         work_meter: WorkMeter,
     ) -> Event | None:
-        """Return the event at which 1/e of the evolution remains.
+        """Return the event at which 1/e of the evolution of friction remains.
 
-        The time and slip of the event are relative to the extremum. A separate integration starts
-        at the extremum, because the recorded integration step with the extremum may contain a
-        crossing of the level on either side.
+        The time and slip of the event are measured from the extremum of friction. A separate
+        integration starts at the extremum of friction, because the recorded integration step that
+        contains the extremum may cross the friction level of the event both before and after the
+        extremum.
         """
         peak = recorded_motion.peak_event
         if peak is None or not peak.time < recorded_motion.last_event.time:
@@ -411,7 +414,8 @@ def _max_departure_from_closed_form(
 ) -> float:
     """Compute the largest difference from the friction of a rigid slider.
 
-    Only friction after the extremum is compared. The result is NaN if there is no closed form.
+    Only friction after its extremum is compared with the friction of a rigid slider. The result is
+    NaN if there is no closed form.
     """
     relaxation = scene.parts.law.relaxation
     if (
