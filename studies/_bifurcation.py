@@ -35,14 +35,15 @@ from rsfstudy.measure_base import check_loading_changes_stress_only_in_steps
 from rsfstudy.measures import Measure, Outcome, Output, Quantity, Status
 from rsfstudy.motion import WorkMeter, estimate_error
 
-#: Lower bound of error estimates, relative to the requested accuracy. Without this bound, the
-#: estimate is too small if two runs agree by chance.
+#: Lower bound of error estimates, relative to the requested accuracy. Without this bound, the error
+#: estimate would be too small if two runs agree by chance.
 _COINCIDENCE_FLOOR = 0.02
 #: Number of events that are used to align a perturbation with the direction of fastest growth. In
 #: all other directions, a perturbation grows more slowly by a factor of at least ten per event.
 _ALIGNMENT_EVENTS = 16
-#: Maximum number of starting points in the search for the period-one cycle, and the maximum
-#: distance of the cycle from a starting point relative to ``a`` times the range of ln V.
+#: Maximum number of starting points in the search for the period-one cycle. The second value is the
+#: maximum distance between the cycle and a starting point, in units of ``a`` times the range of ln
+#: V.
 _MAX_CYCLE_GUESSES, _MAX_GUESS_DISTANCE = 3, 0.3
 
 _OUTPUTS = (
@@ -115,13 +116,14 @@ class Bifurcation(Measure):
     and states from one maximum of spring stress to the next. The period doubles if a multiplier
     passes through -1.
 
-    A period is reported only if the motion approaches an attracting cycle that closes to the
-    requested accuracy. Otherwise the status is ``not_periodic``, and the Lyapunov exponent is the
-    mean growth of perturbations over the recorded events, with a standard error. If the motion
-    approaches a cycle, the Lyapunov exponent is the logarithm of the absolute value of the largest
-    multiplier divided by the period, without a standard error. The peaks of a chaotic motion have
-    no error estimate, because a more accurate integration does not reproduce the peaks. The error
-    of the number of events per period is zero, because this number is an integer.
+    A period is reported only if the motion approaches an attracting cycle, and if this cycle closes
+    to the requested accuracy. If no period is reported, the status is ``not_periodic``. In this
+    case, the Lyapunov exponent is the mean growth of small perturbations over the recorded events,
+    and has a standard error. If the motion approaches a cycle, the Lyapunov exponent is the
+    logarithm of the absolute value of the largest multiplier divided by the period, without a
+    standard error. The peaks of a chaotic motion have no error estimate, because a more accurate
+    integration does not reproduce the peaks. The error of the number of events per period is zero,
+    because this number is an integer.
 
     Parameters
     ----------
@@ -343,11 +345,11 @@ def _find_one_event_cycle(by: ReturnMap, seen: Sequence[Cycle]) -> PeriodicOrbit
 
 
 def _closest_returns(seen: Sequence[Cycle]) -> list[Cycle]:
-    """Return the cycles that almost repeat, in order of distance.
+    """Return the cycles that almost repeat, the closest repetition first.
 
-    Only the second half of the cycles is searched. A cycle almost repeats if the states at its end
-    are close to the states at its beginning. The distance is the largest change of a state over one
-    cycle, relative to the range of ln V.
+    Cycles in the first half of the motion are ignored. A cycle almost repeats if the states at its
+    end are close to the states at its beginning. The cycles are sorted by the largest change of a
+    state over the cycle, relative to the range of ln V.
     """
 
     def off(cycle: Cycle) -> float:

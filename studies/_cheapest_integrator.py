@@ -10,7 +10,7 @@ import xarray as xr
 from rsfstudy.measures import Quantity
 from rsfstudy.reductions import Reduction
 
-#: Unit and description of each result, by the suffix of its name.
+#: Unit and description of each result. The keys are the suffixes of the result names.
 _RESULT_DESCRIPTIONS = {
     "integrator": ("", "integrator with the least right-hand sides"),
     "work": ("1", "its right-hand sides"),
@@ -26,8 +26,8 @@ _RESULT_DESCRIPTIONS = {
 class CheapestIntegrator(Reduction):
     """Integrator that reaches a number of correct digits with the least work.
 
-    The work is the number of right-hand-side evaluations, which is interpolated logarithmically
-    between neighbouring runs of the same integrator. Failed runs are ignored.
+    The work is the number of right-hand-side evaluations. This number is interpolated
+    logarithmically between neighbouring runs of the same integrator. Failed runs are ignored.
 
     Parameters
     ----------
@@ -137,7 +137,7 @@ def _values_at_digits(achieved: np.ndarray, values: np.ndarray, wanted: np.ndarr
 
 
 def _first_value_with_digits(kept: np.ndarray, values: np.ndarray, digits: float) -> float:
-    """Interpolate the values to one number of digits.
+    """Interpolate the values of the runs to a given number of correct digits.
 
     Parameters
     ----------

@@ -31,19 +31,20 @@ from rsfstudy.motion import (
 from rsfstudy.slider import MotionPoint
 from rsfstudy.slider.loading.oscillation import NormalStressOscillation
 
-#: Displacement step in D_c that starts the stick-slip motion without waves, and maximum number of
-#: events until the motion repeats.
+#: Size in D_c of the displacement step that starts the stick-slip motion without waves. The second
+#: value is the maximum number of events before the motion repeats.
 START_DISPLACEMENT_STEP, MAX_EVENTS = 0.1, 300
-#: Lower bound of error estimates, relative to the requested accuracy, because two runs may agree by
-#: chance.
+#: Lower bound of error estimates, relative to the requested accuracy. Without this bound, the error
+#: estimate would be too small if two runs agree by chance.
 _COINCIDENCE_FLOOR = 0.06
-#: Value of ln(V/V_*) at which the linear equations stop. The remaining time to the event at this
-#: slip rate is approximately exp(-9) D_c/V_*, which is negligible.
+#: Value of ln(V/V_*) at which the integration of the linear equations for the perturbations stops.
+#: The remaining time to the event at this slip rate is approximately exp(-9) D_c/V_*, which is
+#: negligible.
 NEGLIGIBLE_TIME_LOG_RATE = 9.0
-#: Number of times at which Coulomb stress is evaluated.
+#: Number of points in time at which Coulomb stress is evaluated.
 COULOMB_STRESS_SAMPLES = 2001
 INTERVAL = "recurrence_interval"
-#: Evolution laws for which the linear equations are implemented.
+#: Evolution laws for which the linear equations for the perturbations are implemented.
 LINEARISED_LAWS = ("slip", "slowness")
 
 _OUTPUTS = (
@@ -80,10 +81,9 @@ _OUTPUTS = (
 class ClockAdvance(Measure):
     """Clock advance of the next stick-slip event by a train of waves.
 
-    The clock advance is the time by which the event occurs earlier than without the waves. An event
-    occurs when the slip rate reaches the instability norm. The parameter ``cycle_phase`` determines
-    the time at which the train begins, and the value of ``oscillation_begin`` in the scene is
-    ignored.
+    The clock advance is the time by which the waves advance the next event. An event occurs when
+    the slip rate reaches the instability norm. The parameter ``cycle_phase`` determines the time at
+    which the train begins, and the value of ``oscillation_begin`` in the scene is ignored.
 
     Parameters
     ----------
@@ -149,7 +149,8 @@ class ClockAdvance(Measure):
     def error_scales(self, scene: Scene, values: Mapping[str, Any]) -> Mapping[str, float]:
         """Return the scales of the numerical errors.
 
-        Both results are differences of two times, so each scale is twice the recurrence interval.
+        Each result is the difference between two times. The scale of its error is therefore twice
+        the recurrence interval.
 
         Parameters
         ----------
@@ -161,7 +162,7 @@ class ClockAdvance(Measure):
         Returns
         -------
         mapping
-            Scales by result.
+            Scale of the error of each result.
         """
         return dict.fromkeys(("clock_advance", INTERVAL), 2.0 * values[INTERVAL])
 
@@ -213,7 +214,8 @@ class _NextEvent(NamedTuple):
     cycle_start : Point
         State of the slider at the beginning of the train.
     train_start : float
-        Friction coefficient at the onset of an event without waves, when V rises through V_0.
+        Friction coefficient at the onset of an event in the motion without waves. The onset is the
+        time at which V rises through V_0.
     """
 
     recurrence_interval: float
@@ -333,8 +335,9 @@ def _linear_clock_advance(scene: Scene, found: _NextEvent, meter: WorkMeter) -> 
     Returns
     -------
     float
-        Clock advance in D_c/V_*. The value is NaN if the scene has other equations, for example
-        radiation damping, another evolution law, or a dependence of the state on normal stress.
+        Clock advance in D_c/V_*. The value is NaN if the linear equations do not apply to the
+        scene, for example because of radiation damping, another evolution law, or a dependence of
+        the state on normal stress.
     """
     damps = scene.parts.dynamics.radiated_stress_slope(0.0)
     if scene.law not in LINEARISED_LAWS or scene.normal_stress != "imposed" or scene.alpha or damps:
@@ -356,7 +359,7 @@ def _linear_clock_advance(scene: Scene, found: _NextEvent, meter: WorkMeter) -> 
         y : ndarray
             Spring stress, state, and their perturbations.
         pressed : float
-            Change of normal stress relative to the amplitude.
+            Change of normal stress divided by the amplitude of the waves.
 
         Returns
         -------
@@ -406,9 +409,10 @@ def _linear_clock_advance(scene: Scene, found: _NextEvent, meter: WorkMeter) -> 
 def _coulomb_clock_advance(scene: Scene, found: _NextEvent) -> float:
     r"""Compute the clock advance for a threshold of Coulomb stress.
 
-    The load point stresses the spring at the rate :math:`K V_0`. The event occurs when friction
-    first reaches the value :math:`\mu` at the onset of an event without waves, at :math:`t_1`. The
-    clock advance :math:`t_1 - t` follows from
+    The load point stresses the spring at the rate :math:`K V_0`. In the motion without waves, the
+    onset of the event is at the time :math:`t_1`, and the friction coefficient at the onset is
+    :math:`\mu`. With waves, the event is assumed to occur when the friction coefficient first
+    reaches :math:`\mu`. The clock advance :math:`t_1 - t` follows from
 
     .. math:: K V_0\,(t - t_1) = \mu\,\Delta\sigma(t)/\sigma_*.
 

@@ -115,7 +115,7 @@ class Triggers(Measure):
 
     @property
     def work_by_digits(self) -> Mapping[float, float]:
-        """Relative number of right-hand-side evaluations by number of digits."""
+        """Relative number of right-hand-side evaluations for each requested accuracy."""
         return _NORMAL_STRESS_FALL.work_by_digits
 
     def compute(self, scene: Scene, accuracy: Accuracy, meter: WorkMeter) -> Outcome:
@@ -161,7 +161,7 @@ class Triggers(Measure):
 
 
 def _reason_without_effective_friction(scene: Scene) -> str:
-    """Return the part of the scene for which no effective friction is defined.
+    """Return the scene component that makes the effective friction undefined.
 
     Parameters
     ----------
@@ -171,7 +171,8 @@ def _reason_without_effective_friction(scene: Scene) -> str:
     Returns
     -------
     str
-        Description of the part. The string is empty if the effective friction is defined.
+        Description of the scene component. The string is empty if the effective friction is
+        defined.
     """
     law, stress, fluid = scene.parts.law, scene.parts.normal_stress, scene.parts.fluid
     if stress.coupling is None or stress.normal_stress is None:
@@ -264,7 +265,7 @@ def _trigger_stresses(
 
 
 def _scale_with_error(factor: float, name: str, values: Mapping[str, float]) -> tuple[float, float]:
-    """Return a result multiplied by a factor, and the error of the product."""
+    """Return the product of a result and a factor, and the error of the product."""
     value, error = values.get(name, math.nan), values.get(f"{name}_error", math.nan)
     return factor * value, abs(factor) * error
 

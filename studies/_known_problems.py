@@ -13,7 +13,7 @@ from rsfstudy import Scene
 from rsfstudy.errors import InvalidValue
 from rsfstudy.measures import Measure, Outcome, Output, Status
 
-#: Outputs of measures that solve a problem.
+#: Outputs of the measures that solve problems with known answers.
 ERROR_OUTPUTS = (
     Output("measured_error", "", "1", "error against an independent reference", error=True),
     Output("error_estimate", "", "1", "the run's own estimate of its error"),
@@ -37,7 +37,7 @@ class Problem:
     status : Status, optional
         Expected status of the outcome.
     scale : float, default: 0.0
-        Value to which errors are relative. The default is the absolute value of the answer.
+        Value by which errors are divided. The default is the absolute value of the answer.
     uncertainty : float, default: 0.0
         Error of the known value, relative to the scale.
     source : str
@@ -58,7 +58,7 @@ class Problem:
         object.__setattr__(self, "quantity", self.quantity or self.measure.primary_output)
 
     def relative_error(self, outcome: Outcome) -> float:
-        """Return the error of an outcome relative to the scale.
+        """Return the error of an outcome, divided by the scale of the problem.
 
         Parameters
         ----------
@@ -74,7 +74,7 @@ class Problem:
         return abs(self._output_value(outcome) - self.answer) / self._error_scale
 
     def relative_error_estimate(self, outcome: Outcome) -> float:
-        """Return the error estimate of an outcome relative to the scale.
+        """Return the error estimate of an outcome, divided by the scale of the problem.
 
         Parameters
         ----------
@@ -94,7 +94,7 @@ class Problem:
 
     @property
     def _error_scale(self) -> float:
-        """Scale of the errors."""
+        """Value by which errors are divided."""
         assert self.answer is not None
         return self.scale or abs(self.answer)
 
@@ -219,7 +219,7 @@ class ProblemMeasure(Measure):
         Returns
         -------
         Problem
-            Known problem that has the scene.
+            Known problem with this scene.
 
         Raises
         ------

@@ -47,7 +47,7 @@ LABELLED_LAWS = (
     NAGATA,
 )
 
-#: Steady state w of the composite law at V_*, from w exp(w) = exp(-V_*/V_c).
+#: Steady state w of the composite law at V_*. The value solves w exp(w) = exp(-V_*/V_c).
 COMPOSITE_STEADY_STATE = 0.56353169695
 
 REFERENCES = [
@@ -60,7 +60,7 @@ REFERENCES = [
 
 # ---- styles of figures --------------------------------------------------------------------------
 
-#: Indices of the colour and of the line style of laws outside the family. The family uses other
+#: Indices of the colours and line styles of the laws outside the family. The family uses other
 #: colours, and the line styles can be distinguished in greyscale.
 _STYLES_OUTSIDE_FAMILY = {
     PERRIN_RICE_ZHENG: (1, 1),

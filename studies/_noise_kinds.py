@@ -45,7 +45,7 @@ class ExactResponse(NamedTuple):
     noise_size: float
 
     def displacement(self, time: np.ndarray) -> np.ndarray:
-        """Return the load point displacement relative to the step.
+        """Return the load point displacement relative to its value at the step.
 
         Parameters
         ----------
@@ -80,13 +80,13 @@ class NoiseKind:
     spikes : float, default: 0.0
         Fraction of rows that are outliers.
     quantum : float, default: 0.0
-        Quantum to which friction is rounded, relative to the standard deviation of the noise.
+        Rounding step of friction, in units of the standard deviation of the noise.
     mean_of : int, default: 1
         Number of rows in a running mean of friction.
     displacement_noise : float, default: 0.0
         Standard deviation of the noise of the recorded load point displacement, in um.
     displacement_quantum : float, default: 0.0
-        Quantum to which the recorded load point displacement is rounded, in um.
+        Rounding step of the recorded load point displacement, in um.
     pink : bool, default: False
         If True, the power spectrum of the noise is proportional to 1/f.
     trend : float, default: 0.0
@@ -121,7 +121,7 @@ class NoiseKind:
     def finds_steps(self) -> bool:
         """True if the fit detects the steps in the recorded displacement.
 
-        Otherwise the exact steps are passed to the fit.
+        If the fit does not detect the steps, the exact steps are passed to the fit.
         """
         return self.displacement_noise > 0.0 or self.displacement_quantum > 0.0
 
@@ -169,8 +169,8 @@ class NoiseKind:
     def _times(self, truth: ExactResponse, rng: np.random.Generator, margin: int) -> np.ndarray:
         """Return the sample times.
 
-        The record is longer by ``margin`` rows at both ends, because the running mean shortens the
-        record.
+        The times contain ``margin`` additional rows at each end, because the running mean shortens
+        the record.
         """
         slow, fast = (1.0 / rate for rate in self.rate)
         first = np.arange(-margin * slow + 0.5 * slow, truth.step, slow)

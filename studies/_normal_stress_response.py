@@ -28,11 +28,12 @@ from rsfstudy.slider.stability import spring_response_to_normal_stress
 #: Remaining transient at the beginning of the record, relative to the requested accuracy. The
 #: remaining transient is computed from the slowest decay rate of small perturbations.
 _REMAINING_TRANSIENT = 0.1
-#: Largest response period in forcing periods, number of forcing periods that are compared to find
-#: the response period, and number of samples per forcing period for this comparison.
+#: Largest response period in forcing periods. The second value is the number of forcing periods
+#: that are compared to find the response period. The third value is the number of samples per
+#: forcing period in this comparison.
 _MAX_RESPONSE_PERIODS, _COMPARED_PERIODS, _INSTANTS_PER_PERIOD = 4, 8, 4
-#: Maximum number of comparisons before the response is reported as not periodic, and maximum factor
-#: by which the number of samples is increased to resolve the response.
+#: Maximum number of comparisons before the response is reported as not periodic. The second value
+#: is the maximum factor by which the number of samples is increased to resolve the response.
 _MAX_REPETITION_CHECKS, _MAX_SAMPLE_REFINEMENT = 6, 8
 #: Largest difference between two records of a settled response, relative to the range of spring
 #: stress.
@@ -157,11 +158,12 @@ class _ResponseRecord(NamedTuple):
     def aliasing(self) -> float:
         """Estimated change of the norm of all overtones due to aliasing.
 
-        Let :math:`D` be the norm of the resolved overtones and :math:`B` the norm of their upper
-        quarter. The unresolved overtones are assumed to have the norm :math:`B` as well. The
-        unresolved overtones are missing in the sum of squares, which changes the norm by up to
-        :math:`B^2/(2D)`. Aliasing also folds the unresolved overtones onto the upper quarter, which
-        changes the norm by up to :math:`3B^2/(2D)`. The sum of both changes is :math:`2B^2/D`.
+        Let :math:`D` be the norm of the resolved overtones, and :math:`B` the norm of the upper
+        quarter of these overtones. The unresolved overtones are assumed to have the norm :math:`B`
+        as well. The unresolved overtones are missing in the sum of squares, which changes the norm
+        by up to :math:`B^2/(2D)`. Aliasing also folds the unresolved overtones onto the upper
+        quarter, which changes the norm by up to :math:`3B^2/(2D)`. The sum of both changes is
+        :math:`2B^2/D`.
         """
         overtones = np.abs(self.overtones)
         resolved = float(np.linalg.norm(overtones))
@@ -182,7 +184,8 @@ class _ResponseRecord(NamedTuple):
     def equals_in_median(self, other: _ResponseRecord) -> bool:
         """Return True if two records of spring stress agree in the median.
 
-        The median is used because a jump of spring stress may be shifted by one sample.
+        The comparison uses the median difference, because a sudden change of spring stress may be
+        shifted by one sample.
 
         Parameters
         ----------
@@ -202,10 +205,11 @@ class _ResponseRecord(NamedTuple):
         """Relative error of the response due to the finite number of samples.
 
         The estimate compares the responses from all samples, from every second sample and from
-        every fourth sample. If spring stress jumps, the error halves when the number of samples is
-        doubled. If spring stress is smooth, the error decreases much faster. If the number of
-        samples per forcing period is less than 16 or not a multiple of four, the estimate is the
-        difference between all samples and every second sample.
+        every fourth sample. If spring stress changes suddenly, the error of the response halves
+        when the number of samples is doubled. If spring stress is smooth, the error of the response
+        decreases much faster. If the number of samples per forcing period is less than 16 or not a
+        multiple of four, the estimate is the difference between the responses from all samples and
+        from every second sample.
         """
         change = abs(self._subsampled(2) / self.response - 1.0)
         several, rest = divmod(len(self.spring_stress) // self.periods, 4)
@@ -265,7 +269,7 @@ class NormalStressResponse(RecordingMeasure):
         """Return the scales of the numerical errors.
 
         The scale of the gain is the gain plus the ratio of the direct effect ``a`` to the amplitude
-        of normal stress. The result ``distortion`` is not included, because its accuracy depends on
+        of normal stress. The result ``distortion`` has no scale, because its accuracy depends on
         the option ``samples``.
 
         Parameters
@@ -278,7 +282,7 @@ class NormalStressResponse(RecordingMeasure):
         Returns
         -------
         mapping
-            Scales by result.
+            Scale of the error of each result.
         """
         stressed = scene.a / scene.oscillation_amplitude
         size = values["gain"] + stressed
@@ -291,7 +295,7 @@ class NormalStressResponse(RecordingMeasure):
     def compute(self, scene: Scene, accuracy: Accuracy, meter: WorkMeter) -> Outcome:
         """Compute the response, and estimate its errors from a second motion.
 
-        The second motion has smaller tolerances.
+        The second motion is integrated with smaller tolerances.
 
         Parameters
         ----------
@@ -363,8 +367,8 @@ class NormalStressResponse(RecordingMeasure):
     ) -> tuple[MotionPoint, int]:
         """Find the number of forcing periods after which the response repeats.
 
-        The motion is first integrated over a number of forcing periods, the argument ``waits``. The
-        comparison is repeated several times, because strong oscillations may settle more slowly
+        The motion is first integrated over ``waits`` forcing periods. The search for the period is
+        repeated several times, because the transients of strong oscillations may decay more slowly
         than small perturbations.
 
         Parameters
@@ -383,7 +387,7 @@ class NormalStressResponse(RecordingMeasure):
         point : Point
             State of the slider at the end of the motion.
         count : int
-            Number of forcing periods. The number is zero if the response does not repeat.
+            Response period in forcing periods. The number is zero if the response does not repeat.
         """
         period = scene.oscillation_period
         *_earlier, begin = integrate_events(scene, accuracy, meter, until=waits * period)
@@ -456,9 +460,10 @@ class NormalStressResponse(RecordingMeasure):
     ) -> tuple[_ResponseRecord, _ResponseRecord]:
         """Record the response at two times.
 
-        The second record begins when the transient has decayed by another factor of e. The time
-        between the records is not a multiple of two or three response periods. The records
-        therefore differ if the response repeats after a longer time.
+        The second record begins when the transient has decayed by another factor of e. The number
+        of response periods from the beginning of the first record to the beginning of the second
+        record is not divisible by two or three. The two records therefore differ if the response
+        repeats only after two or three times the assumed period.
 
         Parameters
         ----------
@@ -501,7 +506,7 @@ class NormalStressResponse(RecordingMeasure):
     ) -> _ResponseRecord:
         """Record the motion at regular intervals over one response period.
 
-        Each sample is the end of a separate integration. The samples are therefore exact, and not
+        Each sample is the end point of a separate integration. The samples are therefore not
         interpolated between integration steps.
 
         Parameters
@@ -571,8 +576,8 @@ def _estimate_errors(
     """Estimate the errors of the results.
 
     The errors are estimated from a second run with smaller tolerances. The errors include the
-    change of the response between the two records, the effect of the trend, and the finite number
-    of samples.
+    change of the response between the two records, the effect of the linear trend of spring stress,
+    and the effect of the finite number of samples.
 
     Parameters
     ----------

@@ -34,16 +34,17 @@ from rsfstudy.motion import (
 )
 from rsfstudy.responses import compute_settled_friction_flag, estimate_errors_at_instants
 
-#: Final fraction of the record over which friction must be constant, and the tolerance of this
-#: condition relative to the remaining transient at ``fit_from``.
+#: Fraction of the record over which friction must be constant. This part is the end of the record.
+#: The second value is the tolerance of this condition, relative to the transient that remains at
+#: the slip ``fit_from``.
 _FINAL_SHARE, _FINAL_FRICTION_RTOL = 0.1, 0.01
-#: Largest value of |ln(V/V_*)| at ``fit_from``. If the slip rate is closer to V_*, the spring
+#: Largest allowed value of |ln(V/V_*)| at the slip ``fit_from``. If the value is smaller, spring
 #: stress has followed the change of strength.
 _SPRING_RESPONSE_LOG_RATE = math.log(2.0)
-#: Number of iterations that find the time at which slip reaches a prescribed value, and the
-#: smallest ln(V/V_*) that is used in the iterations.
+#: Maximum number of iterations that find the time at which slip reaches a prescribed value. The
+#: second value is the smallest ln(V/V_*) in these iterations.
 _MAX_EXTENSIONS, _MIN_LOG_SLIP_RATE = 3, -600.0
-#: Largest direct change of friction relative to mu_* that is attributed to rounding.
+#: Largest immediate change of friction, relative to mu_*, that is attributed to rounding errors.
 _NEGLIGIBLE_DIRECT_CHANGE = 10.0 * RELATIVE_ROUNDING_ERROR
 
 _OUTPUTS = (
@@ -133,7 +134,8 @@ class NormalStressTransient(RecordingMeasure):
     The load point moves at :math:`V_*` throughout, and normal stress changes by a factor :math:`r`.
     An exponential function is fitted to the remaining transient at two slips. The slip distance
     follows from the decay of this function. The size of the transient is extrapolated to the time
-    of the step. The apparent :math:`\alpha` is the size divided by :math:`-\ln r`.
+    of the step. The apparent :math:`\alpha` is the extrapolated size of the transient divided by
+    :math:`-\ln r`.
 
     The transient of a rigid slider after a slip :math:`\delta` is
 
@@ -149,14 +151,15 @@ class NormalStressTransient(RecordingMeasure):
     Parameters
     ----------
     fit_from : float, default: 0.5
-        First slip since the step at which the exponential is fitted, in D_c. At this slip, the
-        spring must have followed the change of strength, so that the slip rate differs from V_* by
-        less than a factor of two.
+        Smaller one of the two slips at which the exponential function is fitted, in D_c since the
+        step. At this slip, the spring must have followed the change of strength, so that the slip
+        rate differs from V_* by less than a factor of two.
     fit_to : float, default: 1.5
-        Second slip since the step at which the exponential is fitted, in D_c.
+        Larger one of the two slips at which the exponential function is fitted, in D_c since the
+        step.
     record : float, default: 30.0
-        Load point displacement of the record, in D_c. Friction at the end of the record is regarded
-        as steady.
+        Load point displacement over which friction is recorded, in D_c. Friction at the end of the
+        record is regarded as steady.
     phases : int, default: 300
         Number of samples of the record along ``phase``.
 
@@ -187,9 +190,9 @@ class NormalStressTransient(RecordingMeasure):
     def error_scales(self, scene: Scene, values: Mapping[str, Any]) -> Mapping[str, float]:
         """Return the scales of the numerical errors.
 
-        The scale of a result is its absolute value, multiplied by one plus the ratio of ``a`` to
-        the remaining transient at ``fit_to``. The relative error may therefore be larger if the
-        transient is small.
+        The scale of a result is the product of two factors: the absolute value of the result, and
+        one plus the ratio of ``a`` to the transient that remains at ``fit_to``. The relative error
+        may therefore be larger if the transient is small.
 
         Parameters
         ----------
@@ -201,7 +204,7 @@ class NormalStressTransient(RecordingMeasure):
         Returns
         -------
         mapping
-            Scales by result.
+            Scale of the error of each result.
         """
         ratio = 1.0 + scene.parts.loading.segments[0].normal_stress
         distance = values["apparent_slip_distance"]
@@ -213,7 +216,7 @@ class NormalStressTransient(RecordingMeasure):
     def compute(self, scene: Scene, accuracy: Accuracy, meter: WorkMeter) -> Outcome:
         """Compute the transient, and estimate its errors from a second motion.
 
-        The second motion has smaller tolerances.
+        The second motion is integrated with smaller tolerances.
 
         Parameters
         ----------
@@ -311,9 +314,9 @@ class NormalStressTransient(RecordingMeasure):
     ) -> dict[float, float]:
         """Return friction at the slips that the measure evaluates.
 
-        The recorded rows give an estimate of the time at which a slip is reached. The motion is
-        then followed to this time, and the time is corrected with the slip rate. Friction is not
-        interpolated between integration steps.
+        The recorded rows give an estimate of the time at which a given slip is reached. The motion
+        is integrated to this time, and the slip rate at the end is used to correct the time.
+        Friction is not interpolated between integration steps.
         """
         found, elapsed, slipped = dict[float, float](), 0.0, 0.0
         stepped, start = scene.segment_scene(0), None
@@ -374,7 +377,8 @@ class NormalStressTransient(RecordingMeasure):
         """Return the derivatives of the results with respect to friction.
 
         Friction is read at ``fit_from``, ``fit_to`` and a slip of D_c, and at the end of the
-        record. All readings may have the same error, so the derivatives contain a factor of two.
+        record. The results depend on differences between two values of friction. The derivatives
+        contain a factor of two, because each of the two values may have an error.
         """
         first, last = (
             abs(record.remaining_transient(self.fit_from)),

@@ -81,7 +81,7 @@ def steady_line(cell: xr.Dataset, log10_rates: np.ndarray) -> np.ndarray:
     Returns
     -------
     ndarray
-        Shear stress in sigma_*. The stress is NaN if there is no steady sliding at a slip rate.
+        Shear stress in sigma_*. The stress is NaN at slip rates without steady sliding.
     """
     scene = scene_from_coordinates(cell)
     excesses = [
@@ -112,7 +112,7 @@ def constant_state_line(cell: xr.Dataset, state: float, log10_rates: np.ndarray)
 
 
 def _stresses_from_friction(scene: Scene, excesses: np.ndarray) -> np.ndarray:
-    """Compute the shear stress at friction coefficients relative to mu_*."""
+    """Compute shear stresses from differences of the friction coefficient from mu_*."""
     stresses = (frictional_stress_for_friction(scene, excess) for excess in excesses.tolist())
     return np.array([math.nan if g is None else scene.mu_star + g for g in stresses])
 
@@ -135,7 +135,7 @@ def plot_steady_line(dataset: xr.Dataset, axes: Axes) -> None:
 
 
 def hatch_reversed_stress(_dataset: xr.Dataset, axes: Axes) -> None:
-    """Hatch the area of negative stress if it is visible.
+    """Hatch the area of negative shear stress if this area is visible.
 
     The friction laws apply to forward slip only, so results with negative shear stress are not
     valid.

@@ -164,7 +164,7 @@ def random_scene(like: Scene, question: str, sample: int) -> Scene:
     Parameters
     ----------
     like : Scene
-        Scene with the law, normal stress condition and dynamics of the result.
+        Scene that determines the law, the normal stress condition and the dynamics.
     question : str
         Name of the question.
     sample : int

@@ -4,9 +4,9 @@ The values of limit cycles and of critical steps were computed with
 ``tests/benchmarks/extended_precision.py``. The program ``extended_precision.py`` integrates the
 unknowns of the paper instead of the unknowns of rsfstudy. The program uses extrapolated midpoint
 steps in extended precision (64-bit mantissa), and removes the error of the slow manifold by
-Richardson extrapolation. Two computations with different thresholds for the change of regime, at
-slip rate norms of 0.02 and 0.01, agree to the uncertainty that is listed with each value. All other
-values are closed forms that were evaluated with 30 digits.
+Richardson extrapolation. Each value was computed twice, with a change between the equations without
+and with inertia at slip rate norms of 0.02 and 0.01. The two results agree to the uncertainty that
+is listed with each value. All other values are closed forms that were evaluated with 30 digits.
 """
 
 from typing import NamedTuple
@@ -28,7 +28,7 @@ class KnownValue(NamedTuple):
     uncertainty : float, default: 0.0
         Error of the value, relative to ``scale``.
     scale : float, default: 0.0
-        Value to which errors are relative. If the scale is zero, errors are relative to the known
+        Value by which errors are divided. If the scale is zero, errors are divided by the known
         value.
     """
 
@@ -39,8 +39,8 @@ class KnownValue(NamedTuple):
 
 
 #: Critical V_0/V_* for the slip law, constant normal stress, b/a = 2, k = 1.25 k_cr and an
-#: instability norm of 5e-4, without inertia. The value results from a bisection of motions to
-#: 1e-18.
+#: instability norm of 5e-4, without inertia. The value was found by bisection between stable and
+#: unstable motions, to a precision of 1e-18.
 CRITICAL_VELOCITY = KnownValue(
     2.633547063232728405, EXTENDED_PRECISION_SOURCE, 1e-17, 2.633547063232728405 - 1.0
 )
@@ -97,7 +97,8 @@ HARD_CYCLES = {
 }
 
 #: Recurrence intervals for variable normal stress and inertia, with random parameters (see the
-#: study ``hard_cases``). The error of the change of regime decreases with the square of the
-#: threshold in these cases, and was removed by extrapolation.
+#: study ``hard_cases``). In these cases, the change between the equations without and with inertia
+#: causes an error. This error decreases with the square of the slip rate norm at the change, and
+#: was removed by extrapolation.
 DOWN_TO_137 = KnownValue(0.79876073128172, uncertainty=3e-12)
 DOWN_TO_1745 = KnownValue(49.2071554225251, uncertainty=3e-11)

@@ -36,10 +36,12 @@ from rsfstudy.motion import WorkMeter
 
 from ._noise_kinds import NOISE_KINDS, ExactResponse
 
-#: Correlation of an autoregressive process of order one, and coefficients of moving averages.
+#: Correlation of the autoregressive noise between successive rows. The second value contains the
+#: coefficients of the moving averages.
 _AR1_CORRELATION, _MOVING_AVERAGES = 0.9, {"white": (1.0,), "ma3": (1.0, 0.8, 0.5, 0.2)}
 _PROCESSES = ("ar1", *_MOVING_AVERAGES, *NOISE_KINDS)
-#: Probability that a Gaussian variable lies within one and two standard deviations of the mean.
+#: Probability that a Gaussian variable lies within one standard deviation of the mean. The second
+#: value is the probability for two standard deviations.
 SHARE_WITHIN_ONE_STDERR, SHARE_WITHIN_TWO_STDERRS = 0.6827, 0.9545
 #: Scene, work budget and protocols of the studies that fit synthetic records. The protocols contain
 #: a velocity step from 1 to 10 um/s and a step back.
@@ -50,7 +52,7 @@ _NUMBER_PATTERN = r"\s*(\d+\.?\d*(?:e[-+]?\d+)?)\s*"
 #: Pattern of a protocol segment: velocity and displacement. If the letter s follows the second
 #: number, this number is the duration in s.
 _SEGMENT_PATTERN = re.compile(rf"{_NUMBER_PATTERN}:{_NUMBER_PATTERN}(s?)\s*")
-#: Ratio of the initial slip distance of a fit to the exact value.
+#: Ratio of the initial value of the slip distance in a fit to the exact slip distance.
 _INITIAL_SLIP_DISTANCE_FACTOR = 1.5
 
 _PARAMETER_OUTPUTS = (
@@ -237,7 +239,7 @@ class SyntheticFit(Measure):
         return Outcome(Status.OK, self._compare_with_exact(search, found, true, promised, reasons))
 
     def _fit_noisy_record(self, scene: Scene, accuracy: Accuracy, meter: WorkMeter) -> Outcome:
-        """Draw a laboratory record, and fit the record in the same way as ``fit``."""
+        """Draw a laboratory record, and fit it in the same way as the function ``fit``."""
         from rsfstudy.measures import Fit  # The import is slow.
 
         kind, true = NOISE_KINDS[self.process], self._exact_parameters(scene)
@@ -372,7 +374,7 @@ class SyntheticFit(Measure):
         return JointModel(tuple(parts))
 
     def _expected_stderrs(self, truth: JointModel, true: ParameterValues) -> np.ndarray:
-        """Compute standard errors from the Fisher information of the known noise."""
+        """Compute standard errors from the Fisher information, with the known noise."""
         correlations = _correlations(self.process, self.rows)
         jacobian = truth.jacobian(true, self._free_parameters)
         information = np.zeros((len(self._free_parameters),) * 2)
@@ -410,7 +412,7 @@ def _parse_segments(text: str, rows: int) -> list[_ProtocolSegment]:
 def _build_rows(pieces: Sequence[_ProtocolSegment]) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Return the times, displacements and loading history of a window.
 
-    Displacements are relative to the first step.
+    Displacements are measured from the first velocity step of the window.
     """
     begins = np.cumsum([0.0, *(piece.duration for piece in pieces)])
     moved = np.cumsum([0.0, *(piece.duration * piece.velocity for piece in pieces)])

@@ -47,7 +47,7 @@ CYCLE_FIELDS: Fields = {
 }
 cycle_measure = LimitCycle(phases=2)
 
-#: Fields of the scene and problem, by label. Each scene has one problem.
+#: Scene fields and problem of each label. Each scene has one problem.
 PROBLEMS = {
     "rigid response": register_problem(
         {**QUASI_STATIC_FIELDS, "load_velocity_ratio": 200.0},
@@ -82,7 +82,7 @@ _MAX_REPEATED_TIME = 0.05
 #: the same problem at this accuracy.
 _YARDSTICK_ACCURACY = Accuracy(1e-3)
 
-#: Regimes between ruptures, which cover most of the time of a motion.
+#: Regimes of a motion between ruptures. A motion is in one of these regimes most of the time.
 _SLOW_REGIMES = ("quasi_static", "quasi_dynamic", "slow_manifold", "rigid")
 
 
@@ -130,9 +130,9 @@ _OUTPUTS = (
 class WorkPrecision(ProblemMeasure):
     """Error, work and processor time of an integrator for a known problem.
 
-    The processor time is also reported relative to the default integrator with 3 requested digits.
-    The default integrator solves the same problem immediately before and after each run, so that
-    other processes on the machine affect both times equally.
+    The processor time is also reported relative to the processor time of the default integrator
+    with 3 requested digits. The default integrator solves the same problem immediately before and
+    after each run, so that other processes on the machine affect both times equally.
 
     Parameters
     ----------
@@ -189,7 +189,7 @@ class WorkPrecision(ProblemMeasure):
 
     @property
     def work_by_digits(self) -> Mapping[float, float]:
-        """Relative number of right-hand-side evaluations by number of digits.
+        """Relative number of right-hand-side evaluations for each requested accuracy.
 
         The work does not depend on the accuracy of the study, because each run has its own
         accuracy.

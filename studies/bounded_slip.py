@@ -4,8 +4,8 @@ Under the slowness law and with k >= k_cr, the slip rate remains bounded after e
 even without inertia. At constant normal stress and k = k_cr, the oscillations continue without
 decay. Peak slip rates can still be very high. After large steps, inertia limits the slip rate, and
 the motion with inertia departs from the quasi-static motion. At variable normal stress and k =
-k_cr, the two motions merge again after the largest steps. In all other cases, a difference in
-stress remains.
+k_cr, the motion with inertia and the quasi-static motion merge again after the largest steps. In
+all other cases, a difference in stress between the two motions remains.
 """
 
 import math
@@ -31,8 +31,8 @@ RANJITH_RICE = "Ranjith and Rice (1999), J. Mech. Phys. Solids 47, 1207-1218"
 
 #: Number of slip rates at which two paths are compared. The slip rates are evenly spaced in ln V.
 _COMPARED_SLIP_RATES = 4000
-#: Fraction of a branch that is excluded at each end, because a path turns there and the stress at a
-#: given slip rate is not meaningful.
+#: Fraction of a branch that is excluded at each end of the branch. The path turns at these ends,
+#: and the stress at a given slip rate is not meaningful there.
 _EXCLUDED_END_SHARE = 0.02
 
 
@@ -56,8 +56,8 @@ class PathSeparation(Reduction):
     along : str, default: "inertia"
         Dimension that distinguishes the two paths. The dimension must have a length of 2.
     tolerance : float, default: 0.001
-        Largest difference of stress between paths that are considered equal, relative to the range
-        of stress along the second path.
+        Largest stress difference for which two paths are considered equal. The stress difference is
+        relative to the range of stress along the second path.
     """
 
     along: str = "inertia"
@@ -116,7 +116,7 @@ class PathSeparation(Reduction):
         )
 
     def _compare(self, rates: np.ndarray, stresses: np.ndarray) -> tuple[float, float, float]:
-        """Return the slip rates of separation and merging, and the stress difference."""
+        """Return the slip rates at which paths separate and merge, and the stress offset."""
         if not (np.isfinite(rates).all() and np.isfinite(stresses).all()):
             return np.nan, np.nan, np.nan
         one, other = (_branches(rate, stress) for rate, stress in zip(rates, stresses, strict=True))

@@ -1,13 +1,13 @@
 """Coverage of error estimates for random scenes.
 
 Scenes with random parameters from wide ranges are solved with both laws, constant and variable
-normal stress, and all kinds of dynamics. Each scene is solved at the requested accuracy and with a
-tolerance that is smaller by a factor of 100. The measured error is the difference between the two
-runs minus the error estimate of the more accurate run. The figure shows the ratio of the measured
-error to the error estimate of the first run. Use --set sample=0:49:50 for more scenes, --set
-requested_digits=4,7,9 for other accuracies, and --set question for quantities that are measured in
-laboratory tests: rigid response, velocity step, healing, and (with --set normal_stress=imposed)
-normal stress transient and normal stress response.
+normal stress, and all kinds of dynamics. Each scene is solved twice: at the requested accuracy, and
+with a tolerance that is smaller by a factor of 100. The measured error is the difference between
+the two runs minus the error estimate of the more accurate run. The figure shows the ratio of the
+measured error to the error estimate of the first run. Use --set sample=0:49:50 for more scenes,
+--set requested_digits=4,7,9 for other accuracies, and --set question for quantities that are
+measured in laboratory tests: rigid response, velocity step, healing, and (with --set
+normal_stress=imposed) normal stress transient and normal stress response.
 """
 
 import math
@@ -33,7 +33,7 @@ _ESTIMATED_OUTPUTS = tuple(
     )
 )
 _TIGHTER_RTOL_FACTOR = 0.01
-#: Work budget of the more accurate run relative to the first run.
+#: Ratio of the work budget of the more accurate run to the work budget of the first run.
 _MAX_TIGHTER_WORK = 6
 
 
@@ -58,8 +58,8 @@ class Coverage(Measure):
 
     The random scene has the law, normal stress condition and dynamics of a scene of the study. All
     other parameters are drawn from wide ranges, with a fixed seed for each sample. The reference
-    results are computed with a tolerance that is smaller by a factor of 100, and their uncertainty
-    is the error estimate of the reference run.
+    results are computed with a tolerance that is smaller by a factor of 100, and the uncertainty of
+    the reference results is the error estimate of the reference run.
 
     Parameters
     ----------
@@ -210,7 +210,7 @@ class CoverageStatistics(Reduction):
         Variable that contains the ratios of errors to error estimates, with NaN for missing
         results.
     by : tuple of str, optional
-        Dimensions that are kept.
+        Dimensions over which the statistics are not combined.
     """
 
     by: tuple[str, ...] = ()
@@ -229,7 +229,7 @@ class CoverageStatistics(Reduction):
         return [Quantity(f"{self.name}_{k}", "", "1", f"{t}{among}") for k, t in texts.items()]
 
     def __call__(self, dataset: xr.Dataset) -> xr.Dataset:
-        """Compute the statistics over all dimensions that are not kept.
+        """Compute the statistics over all dimensions except the dimensions in ``by``.
 
         Parameters
         ----------

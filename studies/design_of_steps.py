@@ -4,8 +4,8 @@ The Fisher information predicts the standard errors of an experiment before it i
 designs are steps up, steps back, holds and pairs of steps, on a stiff and on a compliant machine. A
 step up followed by a step back determines the exponent of the law seven times more accurately than
 two steps up. With a single step, a compliant machine determines the exponent five times more
-accurately than a stiff machine. Four times as many rows have the same effect as half the noise, and
-both halve the standard errors. Fits of synthetic records agree with the predicted standard errors.
+accurately than a stiff machine. The standard errors are halved if the record has four times as many
+rows, or if the noise is halved. Fits of synthetic records agree with the predicted standard errors.
 """
 
 import xarray as xr

@@ -4,9 +4,9 @@ If pores dilate with slip rate, pore pressure falls, and frictional strength ris
 into the pores. With fast drainage, the critical stiffness is (b - a) sigma_*/D_c, as without a
 fluid. Without drainage, the critical stiffness is (b - a - E) sigma_*/D_c, with E = mu_* eps/(beta
 sigma_*). If E exceeds b - a, the undrained fault is stable at every stiffness. Between these
-limits, the result depends on the drainage within the time in which the fault slips by D_c. Even at
-the strongest dilatancy, oscillations that are slow enough to drain remain unstable on a soft
-spring.
+limits, the critical stiffness depends on how much fluid flows into the pores while the fault slips
+by D_c. Even at the strongest dilatancy, slow oscillations are unstable on a soft spring, because
+fluid has enough time to flow into the pores.
 """
 
 import numpy as np
@@ -84,7 +84,8 @@ def drainage_limit_claim(
 def growth_threshold_claim(dilatancy: float, drainage: float) -> Claim:
     """Return the claim that perturbations grow below k_cr (D3).
 
-    The threshold of growth is computed from the eigenvalues of the assembled equations.
+    The stiffness below which perturbations grow is computed from the eigenvalues of the linearised
+    equations of motion.
 
     Parameters
     ----------
@@ -127,7 +128,7 @@ def drained_critical_stiffness(dataset: xr.Dataset) -> float:
 
 
 def plot_limits(dataset: xr.Dataset, axes: Axes) -> None:
-    """Draw the drained limit, and the undrained limits at the left.
+    """Draw the drained limit of k_cr, and the undrained limits at the left.
 
     Parameters
     ----------

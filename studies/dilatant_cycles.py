@@ -54,14 +54,14 @@ def peak_slip_rate_claim(
     )
 
 
-#: Half-width of the linear range of the time axis, in D_c/V_*. Outside this range, the axis is
-#: logarithmic on both sides of the fastest slip, because the slip rate increases as the inverse of
-#: the time that remains before a rupture.
+#: Half-width of the linear range of the time axis, in D_c/V_*. Outside this range, the time axis is
+#: logarithmic before and after the fastest slip. A logarithmic axis is used because the slip rate
+#: before a rupture is inversely proportional to the remaining time.
 LINEAR_TIME_RANGE = 1e-6
 
 
 def plot_undrained_stiffness(dataset: xr.Dataset, axes: Axes) -> None:
-    """Draw a line at the dilatancy at which the undrained spring is critical.
+    """Draw a line at the dilatancy at which k is the undrained critical stiffness.
 
     Parameters
     ----------

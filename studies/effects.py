@@ -5,9 +5,9 @@ k_cr. Without inertia and radiation damping, the slip rate is unbounded, except 
 law at variable normal stress, where it reaches 10^13 to 10^19 V_*. A cycle with radiation damping
 needs half as many right-hand-side evaluations as a cycle with inertia. However, a cycle with
 radiation damping has no overshoot, so the static stress drop is smaller by 25 to 50 %. An effect
-that is not part of the scene adds no unknowns and no computing time. Times of a right-hand-side
-evaluation are relative to a quasi-static scene at constant normal stress. The two scenes are timed
-in alternation.
+that is not part of the scene adds no unknowns and no computing time. The time of a right-hand-side
+evaluation is relative to the time for a quasi-static scene at constant normal stress. Each scene
+and this quasi-static scene are timed in alternation.
 """
 
 import math
@@ -27,8 +27,8 @@ from rsfstudy.slider import Equations, equations_between_ruptures, equations_in_
 from rsfstudy.study import DrawFunction
 from rsfstudy.study.figure_declarations import Axes
 
-#: Radiation damping that equals the impedance of the spring and the mass at constant normal stress,
-#: K T V_*/(2 pi D_c).
+#: Radiation damping K T V_*/(2 pi D_c). This value equals the impedance of the spring and the mass
+#: at constant normal stress.
 IMPEDANCE = 0.8 * 0.0145 * 5.0 * 1.17e-8 / (2.0 * math.pi)
 
 COUPLINGS: dict[str, dict[str, str | float]] = {
@@ -52,7 +52,7 @@ _EVALUATIONS_PER_TIMING, _TIMING_REPEATS = 100, 25
 _SLOW_UNKNOWNS, _RUPTURE_UNKNOWNS = (0.01, 0.0), (0.01, 10.0, 0.01)
 
 _CYCLE_MEASURE = LimitCycle(phases=2)
-#: Outputs of the limit cycle that are kept.
+#: Outputs of the limit cycle that the study reports.
 _CYCLE_OUTPUTS = tuple(
     replace(about, error=about.name == LimitCycle.primary_output)
     for about in LimitCycle.outputs

@@ -34,16 +34,17 @@ from ._synthetic_fit import (
 
 RECORDS = 24
 CLASSIC_PROCESSES, LAWS = ("white", "ar1", "ma3"), ("slip", "slowness")
-#: Kinds of noise that cannot be modelled, with the smallest fraction of records that must be
-#: flagged.
+#: Kinds of noise that the fit cannot model. Each value is the minimum fraction of records for which
+#: the fit must report invalid standard errors.
 FLAGGED_KINDS = {"coarsely_rounded": 0.95, "unstated_average": 0.8}
-#: Kinds of noise whose coverage is reported without a claim, because 1/f noise is not modelled.
+#: Kinds of noise with a 1/f spectrum. The study makes no claim on the coverage for these kinds,
+#: because the fit does not model 1/f noise.
 KINDS_WITHOUT_CLAIM = ("pink",)
 MODELLED_KINDS = [
     kind for kind in NOISE_KINDS if kind not in (*FLAGGED_KINDS, *KINDS_WITHOUT_CLAIM)
 ]
 PROCESSES = (*CLASSIC_PROCESSES, *NOISE_KINDS)
-#: Nominal coverage of the intervals that are tested, by variable.
+#: Nominal coverage of the tested intervals. The keys are the names of the variables.
 NOMINAL_COVERAGE = {"inside_one": SHARE_WITHIN_ONE_STDERR, "inside_two": SHARE_WITHIN_TWO_STDERRS}
 #: Largest deviation of a measured coverage from its nominal value, in binomial standard deviations.
 MAX_BINOMIAL_DEVIATION = 3.5
@@ -51,13 +52,13 @@ MAX_BINOMIAL_DEVIATION = 3.5
 
 @dataclass(frozen=True)
 class ShareInside(Reduction):
-    """Fraction of records with the exact value inside an interval.
+    """Fraction of records for which an interval contains the exact value.
 
     Parameters
     ----------
     name : str
-        Name of the fraction. ``<name>_least`` is the smallest fraction among all parameters minus
-        the nominal coverage, in binomial standard deviations.
+        Name of the fraction. ``<name>_least`` is the difference between the smallest fraction of
+        all parameters and the nominal coverage, in binomial standard deviations.
     of : str
         Variable that is 1 inside the interval and 0 outside.
     covers : float, optional
@@ -219,12 +220,12 @@ def flagged_claim(process: str, law: str, least: float) -> Claim:
     law : str
         State evolution law.
     least : float
-        Minimum fraction of records that are flagged.
+        Minimum fraction of records for which the fit reports invalid standard errors.
 
     Returns
     -------
     Claim
-        Claim on the fraction of flagged records.
+        Claim on the fraction of records for which the fit reports invalid standard errors.
     """
     return Claim.above(
         id="F6",
@@ -250,7 +251,7 @@ def seldom_flagged_claim(process: str, law: str) -> Claim:
     Returns
     -------
     Claim
-        Claim on the fraction of flagged records.
+        Claim on the fraction of records for which the fit reports invalid standard errors.
     """
     return Claim.below(
         id="F7",

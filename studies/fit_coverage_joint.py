@@ -4,9 +4,10 @@ Synthetic records of a slider with two states are fitted with the law that was u
 The records contain a single velocity step up, or a step up and a step back that are fitted jointly
 with separate values of initial friction and trend. The noise is white or has a correlation of 0.9.
 Correlated noise reduces the effective sample size of a step to 26. In this case, a single step
-determines the longer slip distance only to within a third. The likelihood of parameters that are
-correlated with this slip distance is not parabolic, and the confidence intervals are computed from
-the likelihood. Markers have the same meaning as in the study fit_coverage.
+determines the longer slip distance only to within a third. The errors of some other parameters are
+correlated with the error of this slip distance, and the likelihood of these parameters is not
+parabolic. The confidence intervals are computed from the likelihood. Markers have the same meaning
+as in the study fit_coverage.
 """
 
 from dataclasses import replace

@@ -36,8 +36,8 @@ SLIP_DISTANCE, ROWS, MOTION_RTOL = 10.0, 300, 1e-9
 #: duration.
 STEADY_TIME_BEFORE_RECORD = 5.0
 #: Loading histories by name. Each row contains the time in s, the load point velocity in um/s,
-#: normal stress relative to its initial value, and the rate of this ratio in 1/s. The last number
-#: is the end of the record in s.
+#: normal stress relative to its initial value, and the rate of change of this ratio in 1/s. The
+#: last number is the end of the record in s.
 LOADINGS = {
     "step up": (((0.0, 1.0, 1.0, 0.0), (40.0, 10.0, 1.0, 0.0)), 55.0),
     "step down": (((0.0, 10.0, 1.0, 0.0), (4.0, 1.0, 1.0, 0.0)), 154.0),
@@ -51,13 +51,14 @@ LOADINGS = {
         135.0,
     ),
 }
-#: Ratios and differences between the initial and the exact parameters.
+#: Ratios of initial parameters to exact parameters. The second dictionary contains differences
+#: between initial and exact parameters.
 INITIAL_FACTORS = {"a": 1.2, "b": 0.8, "slip_distance": 1.5, "stiffness": 1.3}
 INITIAL_OFFSETS = {"alpha": 0.1, "law_exponent": 0.2}
-#: Largest deviation of a parameter by source of the record. For records of the model, the deviation
-#: is due to rounding and to the termination of the fit. For records of other code, the deviation is
-#: due to the numerical errors of both motions, which are amplified because the parameters are
-#: correlated.
+#: Largest deviation of a parameter for each method that computes the record. If the record was
+#: computed with the model of the fit, the deviation is due to rounding and to the termination of
+#: the fit. If the record was computed with other code, the deviation is due to the numerical errors
+#: of both motions. Correlations between the parameters amplify these errors.
 MAX_DEVIATIONS = {"the model": 1e-8, "other code": 1e-6}
 
 
@@ -122,7 +123,7 @@ class RecoveryError(Measure):
     def error_scales(self, scene: Scene, values: Mapping[str, Any]) -> Mapping[str, float]:
         """Return the scale of the largest deviation, which is 1.
 
-        Deviations are already relative to the scales of the parameters.
+        The deviations of the parameters are already divided by the scales of the parameters.
 
         Parameters
         ----------
@@ -134,7 +135,7 @@ class RecoveryError(Measure):
         Returns
         -------
         mapping
-            Scales by result.
+            Scale of the error of each result.
         """
         return {"largest_deviation": 1.0}
 
@@ -265,9 +266,10 @@ def _friction_by_scipy(model: WindowModel, true: ParameterValues) -> np.ndarray:
 def _parameter_scale(name: str, true: ParameterValues) -> float:
     """Return the scale of the deviations of a parameter.
 
-    The scale of a parameter that is fitted as a logarithm is its exact value. The scale of ``a``
-    and ``b`` is the larger absolute value of the two. The scale of a trend is the trend that
-    changes friction by 1 over the window. All other parameters have a scale of 1.
+    Deviations of a parameter are divided by the scale. If the logarithm of a parameter is fitted,
+    the scale is the exact value of the parameter. The scale of the deviations of ``a`` and ``b`` is
+    the larger of the absolute values of ``a`` and ``b``. The scale of the deviations of a trend is
+    the trend that changes friction by 1 over the window. The scale is 1 for all other parameters.
     """
     if name in LOGARITHMIC_PARAMETERS:
         return true[name]

@@ -3,8 +3,8 @@
 The cases include slip rates from 10^-1745 to 10^87 V_*, stiffness that differs from the critical
 stiffness in the eighth digit, parameters at the ends of their ranges, masses from zero to very
 large values, and loading that friction cannot balance. If the result is a number, it must agree
-with an independent computation or a closed form to within its error estimate. Otherwise the
-computation must end with a status that describes the reason.
+with an independent computation or a closed form to within its error estimate. If a case has no
+result, the computation must end with a status that describes the reason.
 """
 
 import math
@@ -422,7 +422,7 @@ def write_text(axes: Axes, row: int, text: str, color: str = "0.35") -> None:
 
 
 def plot_errors(dataset: xr.Dataset, axes: Axes) -> None:
-    """Draw measured errors (filled) and error estimates (open).
+    """Draw measured errors as filled markers, and error estimates as open markers.
 
     Cases without an error are labelled with the name of the status or with the word "exact".
 

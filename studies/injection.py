@@ -5,10 +5,10 @@ fault is drained, or dilatant with pores that drain into the surroundings. Befor
 spring is slightly softer than critical. The critical stiffness decreases with effective normal
 stress. Small perturbations therefore stop growing when k exceeds the critical stiffness at the
 current pressure in the fault, and start to grow again when k falls below the critical stiffness.
-For both laws, the pressure that follows from this rule is accurate to the pressure change in one or
-two D_c/V_*. While pressure rises, slip is faster, and the ratio of drainage to slip rate is
-smaller. On a dilatant fault, instability therefore ends at a lower pressure than the pressure at
-which it begins.
+For both laws, this rule predicts the pore pressure at which perturbations stop or start to grow.
+The predicted pressure is accurate to the change of pressure within a time of one or two D_c/V_*.
+While pressure rises, slip is faster, and the ratio of drainage to slip rate is smaller. On a
+dilatant fault, instability therefore ends at a lower pressure than the pressure at which it begins.
 """
 
 import math
@@ -26,8 +26,9 @@ from rsfstudy.slider import SampledHistory
 from rsfstudy.slider.sampled_loading import TIME_COLUMN
 from rsfstudy.study.figure_declarations import Axes, horizontal_line
 
-#: Initial perturbation of spring stress relative to ``a``, sampling interval in D_c/V_*, and
-#: half-width of the window around an extremum as a fraction of the record.
+#: Initial perturbation of spring stress relative to ``a``. The second value is the sampling
+#: interval in D_c/V_*. The third value is the half-width of the window around an extremum, as a
+#: fraction of the length of the record.
 INITIAL_DEPARTURE, SAMPLING_INTERVAL, EXTREMUM_WINDOW = 1e-5, 0.25, 1.0 / 16.0
 
 LOG_SLIP_RATE_COLUMN = MOTION_VARIABLES.index("log10_slip_rate")
@@ -268,7 +269,7 @@ def _critical_pressure(scene: Scene) -> float:
     """Return the pore pressure at which the stiffness is critical at V_0."""
 
     def excess(pressure: float) -> float:
-        """Return the excess of the critical stiffness over the stiffness."""
+        """Return the critical stiffness minus the stiffness of the spring."""
         return critical_stiffness(scene, pressure, scene.load_velocity) - scene.stiffness
 
     return float(brentq(excess, -1.0, 0.99))

@@ -19,9 +19,9 @@ from rsfstudy.study.figure_declarations import Axes, horizontal_line
 
 from ._paper import PAPER, REFERENCE
 
-#: Critical steps of the study: two values from section 4 of the paper (slowness law, b/a = e, alpha
-#: = 0.56), and the slip law at constant normal stress with small b - a, for which the norm is most
-#: important.
+#: Cases of the study. Two cases are taken from section 4 of the paper (slowness law, b/a = e, alpha
+#: = 0.56). The other cases have the slip law, constant normal stress and a small b - a, for which
+#: the instability norm is most important.
 SOFT_BOUNDARY, STIFF_BOUNDARY = "slowness at k_cr", "slowness at 1.5 k_cr"
 SLOWNESS_FIELDS: dict[str, str | float] = {
     "law": "slowness",
@@ -45,7 +45,7 @@ BOUNDARIES: dict[str, dict[str, str | float]] = {
 
 
 def plot_norm(_dataset: xr.Dataset, axes: Axes) -> None:
-    """Draw a line at the norm of the other studies.
+    """Draw a line at the instability norm that the other studies use.
 
     Parameters
     ----------
@@ -59,7 +59,7 @@ def plot_norm(_dataset: xr.Dataset, axes: Axes) -> None:
 
 
 def plot_published_norms(dataset: xr.Dataset, axes: Axes) -> None:
-    """Draw the norms that the published values imply.
+    """Draw the instability norms that the published critical steps imply.
 
     Parameters
     ----------

@@ -3,7 +3,7 @@
 Velocity steps are computed with one law and fitted with both laws. The law with the lower AIC is
 chosen if the difference exceeds 4. The AIC accounts for the noise model. With the noise of a good
 testing machine, a single step is sufficient to identify the law. With ten times this noise, a
-single step leaves the choice open, and a step up followed by a step back identifies the law.
+single step does not identify the law, but a step up followed by a step back identifies the law.
 """
 
 from collections.abc import Mapping
@@ -33,8 +33,8 @@ DESIGNS = {
     "a pair, up and back": f"{STEP_UP_PROTOCOL}; {STEP_BACK_PROTOCOL}",
 }
 NOISE_SIZES = (5e-4, 5e-3)
-#: Difference of the AIC that is considered decisive. The likelihood of the other law is then lower
-#: by a factor of e^2.
+#: Difference of the AIC that is considered decisive. At this difference, the likelihood of the law
+#: with the higher AIC is lower by a factor of e^2.
 DECISIVE_AIC_DIFFERENCE = 4.0
 
 

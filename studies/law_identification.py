@@ -3,9 +3,9 @@
 The records contain tenfold velocity steps with white noise, which has a standard deviation of 5e-4.
 Each window has separate values of initial friction and trend. The exponent is 0 for the slip law
 and 1 for the slowness law. A single step up determines the exponent poorly, because a change of the
-slip distance has a similar effect. A second step up reduces the standard error only as much as a
-repetition of the first step. A step up followed by a step back determines the exponent ten times
-more accurately.
+slip distance has a similar effect on friction. A second step up reduces the standard error only as
+much as a repetition of the first step. A step up followed by a step back determines the exponent
+ten times more accurately.
 """
 
 import math
@@ -60,7 +60,7 @@ class ScatterRatio(Reduction):
     of : str
         Variable that contains the deviations of the estimate.
     over : tuple of str, default: ("seed",)
-        Dimensions of the records.
+        Dimensions along which the records differ.
     """
 
     over: tuple[str, ...] = ("seed",)

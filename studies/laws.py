@@ -4,13 +4,13 @@ The load point is displaced instantaneously and then held. If the evolution of a
 Theta/b + ln V, the critical step at constant normal stress has a closed form, h(u*) = -k/k_cr. The
 exponent eps connects the slip law (eps = 0) with the slowness law (eps = 1). For eps > 0, the
 critical step increases with stiffness and does not exist if eps k >= k_cr. On such stiff springs,
-an instability occurs only if the slip rate reaches the norm during the step. Laws with a faster
-evolution than the slip law far from steady sliding have smaller critical steps, in particular on
-stiff springs. Variable normal stress has little influence on the critical step under the slip law
-(Fig. 7 of the paper) and under similar laws. Variable normal stress has a larger influence under
-the slowness law and under a law with a cut-off velocity. The composite law has V_c = 100 V_*, and
-the cut-off velocity is 10^4 V_*. The instability norm of 1e6 is so high that closed forms for an
-infinite norm apply.
+an instability occurs only if the slip rate reaches the instability norm during the step. Some laws
+evolve faster than the slip law far from steady sliding. These laws have smaller critical steps than
+the slip law, in particular on stiff springs. Variable normal stress has little influence on the
+critical step under the slip law (Fig. 7 of the paper) and under similar laws. Variable normal
+stress has a larger influence under the slowness law and under a law with a cut-off velocity. The
+composite law has V_c = 100 V_*, and the cut-off velocity is 10^4 V_*. The instability norm of 1e6
+is so high that closed forms for an infinite norm apply.
 """
 
 import math
@@ -138,7 +138,7 @@ def variable_normal_stress_claim(law: str, published: float) -> Claim:
 
 
 def plot_closed_forms(dataset: xr.Dataset, axes: Axes) -> None:
-    """Draw open circles at the closed forms.
+    """Draw open circles at the critical steps from the closed form.
 
     Parameters
     ----------

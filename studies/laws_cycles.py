@@ -1,13 +1,13 @@
 """Influence of the evolution law on stick-slip cycles.
 
 Limit cycles with inertia are computed for all laws at four load point velocities. At constant
-normal stress, the dynamic stress drop decreases with ln V_0 by about (a-b) sigma_* for all laws.
-The static stress drop decreases by 2.1 times this amount under the slip law, and by 1.5 times this
-amount under the slowness law. The minimum slip rate depends most strongly on the law, and ranges
-from 10^-1.4 V_* (slip law) to 10^-19 V_* (Perrin-Rice-Zheng law). Variable normal stress lowers the
-minimum slip rate by ten decades under the slip law, but not under the slowness law. The composite
-law has V_c = 100 V_*. The cut-off velocity of 10^4 V_* limits the slip rate to 10^5.4 V_* and makes
-the stress drops small.
+normal stress, the dynamic stress drop decreases for all laws by about (b-a) sigma_* if ln V_0
+increases by 1. The static stress drop decreases by 2.1 (b-a) sigma_* under the slip law, and by 1.5
+(b-a) sigma_* under the slowness law. The minimum slip rate depends most strongly on the law, and
+ranges from 10^-1.4 V_* (slip law) to 10^-19 V_* (Perrin-Rice-Zheng law). Variable normal stress
+lowers the minimum slip rate by ten decades under the slip law, but not under the slowness law. The
+composite law has V_c = 100 V_*. The cut-off velocity of 10^4 V_* limits the slip rate to 10^5.4 V_*
+and makes the stress drops small.
 """
 
 from rsfstudy import Axis, Claim, Figure, Scene, Study

@@ -3,10 +3,10 @@
 A family of laws with the exponent eps connects the slip law (eps = 0) with the slowness law (eps =
 1). At constant normal stress and critical stiffness, the critical step is V_0/V_* = 1 + a/[(1 -
 eps)(b-a)], so zeta = 1/(1 - eps). Eq. 10 of the paper is the special case eps = 0. Under the
-slowness law, no step is critical for an arbitrarily large norm. Variable normal stress lowers zeta.
-Close to the slowness law, the critical step disappears at variable normal stress, because k_cr
-decreases with V_0. The instability norm of 1e6 is so high that the closed form for an infinite norm
-applies.
+slowness law, no velocity step triggers an instability if the instability norm is arbitrarily large.
+Variable normal stress lowers zeta. Close to the slowness law, the critical step disappears at
+variable normal stress, because k_cr decreases with V_0. The instability norm of 1e6 is so high that
+the closed form for an infinite norm applies.
 """
 
 import numpy as np

@@ -55,7 +55,7 @@ CONSTANT_STATE_LOG_RATES = (-8.0, -4.0, 0.0, 4.0, 8.0)
 def distinct_orbits(dataset: xr.Dataset) -> list[tuple[xr.Dataset, str]]:
     """Return the distinct limit cycles and their names.
 
-    If several cells contain the same motion, only the first of these cells is returned.
+    If several cells contain the same motion, the function returns only the first of these cells.
 
     Parameters
     ----------

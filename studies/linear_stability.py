@@ -34,7 +34,8 @@ MASS_CASES: dict[str, dict[str, bool | float]] = {
 def growth_threshold_claim(mass: str, phi: float, rate: float) -> Claim:
     """Return the claim that perturbations grow below k_cr (C1).
 
-    The threshold of growth is computed from the eigenvalues of the assembled equations.
+    The stiffness below which perturbations grow is computed from the eigenvalues of the linearised
+    equations of motion.
 
     Parameters
     ----------

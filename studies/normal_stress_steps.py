@@ -54,13 +54,14 @@ def initial_log_rate(step: float) -> float:
 def remaining_transient(law: str, step: float, ratio: float, slip: float) -> float:
     r"""Compute the remaining transient of friction, to first order in a/K.
 
-    Let :math:`r` be one plus the step, and :math:`\delta` the slip in :math:`D_c`. The transient of
-    a rigid slider is :math:`-\alpha \ln r \, e^{-\delta}` under the slip law. Under the slowness
-    law, the transient is :math:`b \ln(1 + y)` with :math:`y = (r^{-\alpha/b} - 1)\,e^{-\delta}`.
-    The finite stiffness :math:`K` has two effects. While the spring follows the change of strength,
-    ln V returns to zero over a slip of approximately :math:`a r/K`, and the state does not evolve
-    as at :math:`V_*`. Later, the slip rate differs from the velocity of the load point while
-    friction changes.
+    Let :math:`r` be one plus the step of normal stress, and :math:`\delta` the slip in :math:`D_c`.
+    The transient of a rigid slider is :math:`-\alpha \ln r \, e^{-\delta}` under the slip law.
+    Under the slowness law, the transient is :math:`b \ln(1 + y)` with
+    :math:`y = (r^{-\alpha/b} - 1)\,e^{-\delta}`. The finite stiffness :math:`K` has
+    two effects. While the spring follows the change of strength, ln V returns to zero over a slip
+    of approximately :math:`a r/K`, and the evolution of the state differs from the evolution at
+    :math:`V_*`. Later, the slip rate differs from the velocity of the load point while friction
+    changes.
 
     Parameters
     ----------

@@ -3,8 +3,9 @@
 The load point velocity of a slider in steady state at V_* changes to V_0. The critical step is the
 smallest V_0 for which the slip rate reaches the instability norm. The figure shows the critical
 step for constant normal stress, and for normal stress that varies with shear stress. The function
-V_0/V_* = 1 + zeta a/(b-a) is fitted for a/(b-a) from 0.25 to 1. At larger values, the finite norm
-lowers the critical step even at constant normal stress, below the line V_0/V_* = 1 + a/(b-a).
+V_0/V_* = 1 + zeta a/(b-a) is fitted for a/(b-a) from 0.25 to 1. At larger values of a/(b-a), the
+finite instability norm lowers the critical step below the line V_0/V_* = 1 + a/(b-a), even at
+constant normal stress.
 """
 
 import numpy as np
@@ -26,7 +27,7 @@ from ._paper import (
 )
 
 #: Values of a/(b-a). The values are closely spaced over the fitted range, which is the range of the
-#: paper, and extend to values at which the finite norm bends the curves.
+#: paper, and extend to values at which the finite instability norm bends the curves.
 a_over_b_minus_a = np.concatenate([np.arange(5, 20) / 20, np.arange(4, 17) / 4])
 
 
@@ -51,7 +52,7 @@ def fit_line(row: xr.Dataset) -> tuple[np.ndarray, np.ndarray]:
 
 
 def plot_fitted_range(_dataset: xr.Dataset, axes: Axes) -> None:
-    """Shade the range of the fit.
+    """Shade the range of a/(b-a) over which the line is fitted.
 
     Parameters
     ----------

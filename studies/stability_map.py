@@ -184,7 +184,7 @@ STIFF_SPRINGS = (1.5, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0, 8.0, 10.0)
 
 
 def spans_stiffness(softest: float, dataset: xr.Dataset) -> bool:
-    """Return True if the stiffness ratios lie on both sides of a limit.
+    """Return True if some stiffness ratios lie below a limit and others above it.
 
     Parameters
     ----------
@@ -300,8 +300,8 @@ figure = Figure(
 )
 
 
-#: Claims about each case: position of the boundary, and number of limit cycles above and of steady
-#: sliding below the boundary.
+#: Claims about the position of the boundary in each case. The second claim concerns the number of
+#: cells with a limit cycle above the boundary and of cells with steady sliding below the boundary.
 EDGE_CLAIM: dict[str, Any] = {
     "says": "limit cycles end where the eigenvalues say",
     "variable": "cycling_edge_farthest",

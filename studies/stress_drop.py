@@ -5,8 +5,8 @@ and at constant normal stress, the slopes over three decades are close to 2 (a-b
 and (a-b) sigma_* (dynamic). At variable normal stress, these values are divided by 1 - mu_*
 cot(phi). Under the slowness law, the slopes depend on stiffness. Separate fits at low and at high
 velocities show that the slope is not constant at variable normal stress. At phi = 50 degrees, k_cr
-decreases so much with V that stick-slip ends. The fits ignore cells without stick-slip and report
-the number of points.
+decreases so much with V that stick-slip does not occur at high velocities. The fits ignore cells
+without stick-slip and report the number of points.
 """
 
 import math
@@ -123,7 +123,8 @@ def slope_reductions(drop: str) -> list[Reduction]:
 
 
 ABSCISSA = "log_load_velocity_ratio"
-#: Largest misfit of a line that is considered a good fit, relative to the range of the stress drop.
+#: Maximum misfit of a line, relative to the range of the stress drop. A line with a smaller misfit
+#: is considered a good fit.
 MAX_MISFIT_SHARE = 0.05
 DROPS = ("static", "dynamic")
 
@@ -194,7 +195,7 @@ def curve_name(drop: str, row: xr.Dataset) -> str:
 
 
 def scaled_slope(row: xr.Dataset) -> xr.DataArray:
-    """Return the scaled slopes of the static drop against stiffness.
+    """Return the slopes of the static drop in (a-b) sigma_* for each stiffness.
 
     Parameters
     ----------

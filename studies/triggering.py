@@ -1,27 +1,28 @@
 """Triggering by steps of normal stress, displacement and velocity.
 
-A slider is in steady state at V_*. Then normal stress decreases instantaneously, or the load point
-is displaced, and the load point is held. Alternatively, the load point velocity increases. To first
-order in k/k_cr, a decrease of normal stress and a displacement step trigger an instability at the
-same change of Coulomb stress with mu' = mu_* - alpha (1 - a/b), for all laws. Under the slip law,
-this rule remains valid at larger stiffness: exactly for alpha = 0, and to within 3 % up to 2 k_cr,
-even for inclined driving. Under the slowness law, the rule fails close to the critical stiffness.
-The critical decrease of normal stress then needs up to 2.4 times the Coulomb stress change of a
-displacement step, because a decrease of normal stress also lowers the critical stiffness. On very
-stiff springs, an instability occurs only if the slip rate reaches the norm during the step, and the
-Coulomb stress change is not a good predictor either. The effect of normal stress on the state makes
-decreases of normal stress less effective. The direct effect of the critical velocity step, a
-ln(V_0/V_*), is 0.6 to 1.03 times the stress change of the critical displacement step. In most
-cases, the direct effect is smaller, because the load point continues to move. Below the critical
-stiffness, every velocity step triggers an instability. For inclined driving, the angle is 60
-degrees, and the decrease of normal stress is a decrease of sigma_3.
+A slider is in steady state at V_*. Then normal stress decreases instantaneously or the load point
+is displaced, and the load point is held afterwards. Alternatively, the load point velocity
+increases. To first order in k/k_cr, a decrease of normal stress and a displacement step trigger an
+instability at the same change of Coulomb stress with mu' = mu_* - alpha (1 - a/b), for all laws.
+Under the slip law, this rule of equal Coulomb stress remains valid at larger stiffness: exactly for
+alpha = 0, and to within 3 % up to 2 k_cr, even for inclined driving. Under the slowness law, the
+rule of equal Coulomb stress fails close to the critical stiffness. The critical decrease of normal
+stress then needs up to 2.4 times the Coulomb stress change of a displacement step, because a
+decrease of normal stress also lowers the critical stiffness. On very stiff springs, an instability
+occurs only if the slip rate reaches the instability norm during the step. The rule of equal Coulomb
+stress fails on these springs as well. The effect of normal stress on the state makes decreases of
+normal stress less effective. The direct effect of the critical velocity step, a ln(V_0/V_*), is 0.6
+to 1.03 times the stress change of the critical displacement step. In most cases, the direct effect
+is smaller, because the load point continues to move. Below the critical stiffness, every velocity
+step triggers an instability. For inclined driving, the angle is 60 degrees, and the decrease of
+normal stress is a decrease of sigma_3.
 
 The change of Coulomb stress is ``dtau - mu' dsigma``. A displacement d of the load point changes
-shear stress by K d, and normal stress by cot(phi) times this amount. A step of imposed normal
-stress, or of sigma_3, does not change shear stress. The rule of equal Coulomb stress holds to first
-order in k/k_cr for all laws whose evolution depends on Theta/b + ln V. A step of load point
-velocity does not change stress instantaneously. The study represents a velocity step by its direct
-effect a ln(V_0/V_*), which is the increase of friction before the state changes.
+shear stress by K d, and normal stress by K d cot(phi). A step of imposed normal stress, or of
+sigma_3, does not change shear stress. The rule of equal Coulomb stress holds to first order in
+k/k_cr for all laws whose evolution depends on Theta/b + ln V. A step of load point velocity does
+not change stress instantaneously. The study represents a velocity step by its direct effect a
+ln(V_0/V_*), which is the increase of friction before the state changes.
 """
 
 from dataclasses import replace

@@ -4,9 +4,10 @@ The load point velocity changes from V_* to r V_*, and friction is recorded over
 effect, the following evolution, and the displacement over which the evolution decays to 1/e give
 estimates of a, b and D_c. On soft machines, the estimates of a and b are too small. At 10 k_cr,
 tenfold steps give a value of a that is 14 to 40 % too small. The estimate of a - b is correct if
-friction has reached steady state. The error of D_c depends on the machine and, under the slowness
-law, on the direction of the step, and a correction for stiffness does not remove this dependence.
-Under the slip law, large steps up on soft machines end in instability.
+friction has reached steady state. The error of the estimate of D_c depends on the stiffness of the
+machine. Under the slowness law, this error also depends on the direction of the step. A correction
+for stiffness does not remove these dependences. Under the slip law, large steps up on soft machines
+end in instability.
 """
 
 import math

@@ -5,10 +5,10 @@ cycle. Small waves advance or delay the next event in proportion to their amplit
 linear perturbation theory. Under the slowness law, waves have no effect if they end several
 nucleation times a sigma/(k V_0) before the event. Slow waves and strong waves trigger the event
 when Coulomb stress reaches the threshold of an event without waves. For slow waves with a period of
-a hundred nucleation times, the clock advance of this threshold is accurate to a few percent. For
-strong waves, which raise Coulomb stress faster than the load point does, the clock advance is
-accurate to one nucleation time. In all other cases, the threshold is wrong by a factor of two to
-ten.
+a hundred nucleation times, the clock advance from this threshold of Coulomb stress is accurate to a
+few percent. For strong waves, which raise Coulomb stress faster than the load point does, this
+clock advance is accurate to one nucleation time. In all other cases, the clock advance from the
+threshold is wrong by a factor of two to ten.
 """
 
 from collections.abc import Callable
@@ -40,8 +40,8 @@ FAST_WAVES, WAVES, SLOW_WAVES = PERIODS = [
 ]
 SMALL, LARGE, LARGEST = AMPLITUDES = [1e-4, 1e-2, 5e-2]
 PHASES = [0.4, 0.5, 0.6, 0.65, 0.7, 0.75, 0.8, 0.85, 0.9, 0.95]
-#: Change of ln V per unit amplitude of a wave, which is the ratio of the second order to the first
-#: order of perturbation theory.
+#: Change of ln V per unit amplitude of a wave. This value is the ratio of the second-order term to
+#: the first-order term of perturbation theory.
 SECOND_ORDER_RATIO = base.mu_star / base.a
 
 
@@ -110,7 +110,7 @@ def linear_limit_claim(law: str, period: float, phase: float) -> Claim:
     Returns
     -------
     Claim
-        Claim on the ratio of the clock advance to linear theory.
+        Claim on the ratio of the clock advance to the prediction of linear theory.
     """
     within = 2.0 * SMALL * SECOND_ORDER_RATIO
     return Claim(
@@ -140,7 +140,7 @@ def coulomb_limit_claim(law: str, phase: float) -> Claim:
     Returns
     -------
     Claim
-        Claim on the ratio of the clock advance to the Coulomb threshold.
+        Claim on the ratio of the clock advance to the prediction of the Coulomb threshold.
     """
     return Claim(
         id="W2",
@@ -170,7 +170,7 @@ def strong_waves_claim(law: str) -> Claim:
     Returns
     -------
     Claim
-        Claim on the ratio of the clock advance to the Coulomb threshold.
+        Claim on the ratio of the clock advance to the prediction of the Coulomb threshold.
     """
     return Claim(
         id="W3",
@@ -222,7 +222,7 @@ def coulomb_error_claim(law: str) -> Claim:
     Returns
     -------
     Claim
-        Claim on the ratio of the clock advance to the Coulomb threshold.
+        Claim on the ratio of the clock advance to the prediction of the Coulomb threshold.
     """
     return Claim.above(
         id="W5",

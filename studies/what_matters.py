@@ -35,7 +35,7 @@ from rsfstudy.study.figure_declarations import Axes
 INPUT_MEANS = {"ln_a": 0.01, "ln_net": 0.02, "ln_stiffness": 0.006}
 RELATIVE_UNCERTAINTY = 0.1
 SOBOL_POINTS = 128
-#: Output whose Sobol index is computed, by the prefix of the index.
+#: Outputs whose Sobol indices are computed. The keys are the prefixes of the indices.
 INDEXED_OUTPUTS = {
     "displacement": "critical_displacement",
     "drop": "static_stress_drop",

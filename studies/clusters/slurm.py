@@ -19,8 +19,8 @@ import rsfstudy
 from rsfstudy.cli import assignment_parsing, options
 from rsfstudy.study import study_loader
 
-#: Options of one job. Each of the 16 worker processes has one thread, because a cell uses its
-#: thread fully.
+#: Options of one job. Each of the 16 worker processes has one thread, because the computation of a
+#: cell keeps one thread busy.
 JOB_OPTIONS = {
     "cores": 16,
     "processes": 16,

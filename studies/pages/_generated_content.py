@@ -31,8 +31,8 @@ from rsfstudy.study import study_index, study_loader
 from rsfstudy.study.verdict_table import format_published_value
 from rsfstudy.vocabulary import QUANTITY_BY_NAME, find_quantity
 
-#: Modules of the base classes for user-defined parts, measures and reductions, by the name of the
-#: class.
+#: Modules that define the base classes for user-defined parts, measures and reductions. The keys
+#: are the names of the classes.
 CLASSES = {
     "Law": "rsfstudy.parts",
     "LawBase": "rsfstudy.parts",

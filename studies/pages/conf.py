@@ -57,8 +57,8 @@ html_math_renderer = "mathml"
 html_show_sphinx = False
 #: Style of tables. Seven columns fit into a window with a width of 1200 pixels.
 TABLES = "table.docutils { font-size: .78rem } table.docutils :is(td, th) { padding: .2rem .35rem }"
-#: Pages below the directory ``studies`` in the order of the table of contents, by caption. Pages
-#: that are not listed here come last.
+#: Pages below the directory ``studies`` in the order of the table of contents. The keys are the
+#: captions of the groups of pages. Pages that are not listed here come last.
 CONTENTS = {
     "Use": ["pages/rig", "pages/studies", "pages/running", "pages/own_studies", "clusters/README"],
     "Notebooks": sorted(file.stem for file in HERE.parent.glob("*.ipynb")),
