@@ -94,6 +94,9 @@ def integrate_events(
         else ((scene.segment_scene(-1), SINGLE_ENDLESS_SEGMENT_TABLE),)
     )
     with_time = with_time or until < math.inf or len(chains) > 1 or len(chains[0][1]) > 1
+    settling_is_terminal = any(
+        spec.terminal for spec in event_specs if spec.kind is EventKind.SETTLED
+    )
     time, slip, before, told = 0.0, 0.0, None, scene.parts.loading.reported_segment_count
     if resume_from is not None:
         chains, start = _find_remaining_segment_chains(scene, resume_from)
@@ -103,12 +106,11 @@ def integrate_events(
             start = initial_point(acting)
         elif number:
             start = point_after_loading_jump(acting, start)
-        goes_on = number == len(chains) - 1 and not acting.parts.loading.unknowns
-        asked = (
-            event_specs
-            if goes_on and _steady_sliding_may_be_stable(scene, event_specs)
-            else _without_settling_events(event_specs)
-        )
+        can_settle = number == len(chains) - 1 and not acting.parts.loading.unknowns
+        # A terminal settling event would end the motion, even near unstable steady sliding.
+        if can_settle and settling_is_terminal:
+            can_settle = not _is_steady_sliding_unstable(scene)
+        asked = event_specs if can_settle else _without_settling_events(event_specs)
         table = _truncate_segments_at(table, until)
         end = float(table[-1, SEGMENT_END])
         motion = get_motion_driver(acting, work_meter.engine, with_time=with_time).iterate_events(
@@ -128,6 +130,8 @@ def integrate_events(
             if acting.parts.loading.has_load_point_unknown
             else None,
         )
+        if can_settle and not settling_is_terminal:
+            motion = _drop_settling_if_unstable(scene, motion)
         if before is None and end == math.inf:  # The motion consists of a single chain.
             yield from motion
             return
@@ -207,17 +211,22 @@ def _iterate_segment_start_events(
         yield event._replace(kind=spec.kind, specification=spec, point=point)
 
 
-def _steady_sliding_may_be_stable(scene: Scene, event_specs: Sequence[EventSpecification]) -> bool:
-    """Return False if steady sliding is unstable in the last loading segment.
+def _drop_settling_if_unstable(scene: Scene, motion: Iterator[Event]) -> Iterator[Event]:
+    """Yield the events of a motion, without settling events at unstable steady sliding.
 
-    The growth rate of small perturbations is computed only if a settling event is requested.
+    The stability is computed at the first settling event, because most motions have none.
     """
-    if scene.log_load_velocity == -math.inf or all(
-        spec.kind is not EventKind.SETTLED for spec in event_specs
-    ):
-        return True
+    for event in motion:
+        if event.kind is not EventKind.SETTLED or not _is_steady_sliding_unstable(scene):
+            yield event
+
+
+def _is_steady_sliding_unstable(scene: Scene) -> bool:
+    """Return True if perturbations of steady sliding grow in the last loading segment."""
+    if scene.log_load_velocity == -math.inf:
+        return False
     growth = largest_linear_growth_rate(scene.segment_scene(-1), scene.log_load_velocity)
-    return growth is None or not growth.is_positive
+    return growth is not None and growth.is_positive
 
 
 def _without_settling_events(event_specs: Sequence[EventSpecification]) -> list[EventSpecification]:
