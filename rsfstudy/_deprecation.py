@@ -581,7 +581,7 @@ def accept_former_keyword_names(function_or_class: DecoratedFunction) -> Decorat
     @functools.wraps(wrapped)
     def wrapper(*args: Any, **keywords: Any) -> Any:
         # The function dataclasses.replace passes the current values under the new names.
-        for former in table.keys() & keywords.keys():
+        for former in table.keys() & keywords.keys() if keywords else ():
             warn_renamed(former, table[former], f"{function_or_class.__name__}()")
             keywords[table[former]] = keywords.pop(former)
         return wrapped(*args, **keywords)

@@ -8,6 +8,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 from rsfstudy.critical_steps.critical_path import CriticalPath
 from rsfstudy.critical_steps.held_load_point import compute_peak_excess_over_instability_norm
@@ -65,6 +66,7 @@ _ASSUMED_LOG_RATE_OVERSHOOT_OF_NORM = 1.0
 _SETTLING_TOLERANCE_OVER_MAX_DISTANCE = 1e-3
 
 _SLIP_RATE_PEAK_EVENT = maximum("log_slip_rate")
+_SETTLING_EVENT = approach_to_steady_state(_SETTLING_TOLERANCE_OVER_MAX_DISTANCE)
 
 
 @dataclass(frozen=True)
@@ -77,7 +79,25 @@ class _SteadySlidingWithMargin(SteadySliding):
     of the peaks.
     """
 
-    stability_margin: float
+    scene: Scene
+
+    # Most motions reach the norm or a peak that decides the outcome before the margin is needed.
+    @cached_property
+    def stability_margin(self) -> float:
+        scene, law = self.scene, self.scene.parts.law
+        at_every_rate = may_have_closed_orbits(scene) and law.scale_free and not law.regularised
+        if at_every_rate and not scene.has_mass and not scene.parts.loading.unknowns:
+            margin = stiffness_ratio_after_step(scene) - 1.0
+        else:
+            critical = critical_stiffness(scene, self.log_slip_rate)
+            margin = scene.stiffness / critical - 1.0 if critical > 0.0 else math.inf
+        if (
+            margin < -_NEUTRAL_STABILITY_MARGIN
+            and scene.state_count > 1
+            and _is_stable_to_small_perturbations(scene)
+        ):
+            return -margin
+        return margin
 
     @property
     def is_stable(self) -> bool:
@@ -418,17 +438,11 @@ def _follow_one_orbit(
     The integration also ends if the orbit grows too slowly to decide the outcome.
     """
     norm = scene.log_instability_rate
-    specs = (
-        [_SLIP_RATE_PEAK_EVENT]
-        if with_inertia
-        else [_SLIP_RATE_PEAK_EVENT, rise("log_slip_rate", norm)]
-    )
-    levels = build_events_testing_monotone_rise(scene) if steady_state.is_stable else []
-    specs += (
-        [approach_to_steady_state(_SETTLING_TOLERANCE_OVER_MAX_DISTANCE), *levels]
-        if steady_state.is_stable
-        else []
-    )
+    levels = build_events_testing_monotone_rise(scene)
+    if levels and not steady_state.is_stable:
+        levels = []
+    reaches_norm = [] if with_inertia else [rise("log_slip_rate", norm)]
+    specs = [_SLIP_RATE_PEAK_EVENT, *reaches_norm, _SETTLING_EVENT, *levels]
     planar, repeating = (
         scene.state_count == 1,
         _CycleRepetitionDetector(scene, steady_state, accuracy),
@@ -454,7 +468,7 @@ def _follow_one_orbit(
             return _OrbitOutcome(
                 (*peaks, norm + _ASSUMED_LOG_RATE_OVERSHOOT_OF_NORM), reached_norm=True
             )
-        elif event.kind is EventKind.SETTLED:
+        elif event.kind is EventKind.SETTLED and steady_state.is_stable:
             return _OrbitOutcome(tuple(peaks), reached_norm=False, initial_log_slip_rate=at_start)
         elif event.kind is EventKind.MAXIMUM:
             peaks.append(top)
@@ -560,20 +574,7 @@ def _steady_sliding_with_margin(scene: Scene) -> _SteadySlidingWithMargin:
             Status.NO_STEADY_STATE,
             f"no steady state exists at V_0/V_* = {math.exp(load):.3g}: phi < atan(mu_ss)",
         )
-    law = scene.parts.law
-    at_every_rate = may_have_closed_orbits(scene) and law.scale_free and not law.regularised
-    if at_every_rate and not scene.has_mass and not scene.parts.loading.unknowns:
-        margin = stiffness_ratio_after_step(scene) - 1.0
-    else:
-        critical = critical_stiffness(scene, load)
-        margin = scene.stiffness / critical - 1.0 if critical > 0.0 else math.inf
-    if (
-        margin < -_NEUTRAL_STABILITY_MARGIN
-        and scene.state_count > 1
-        and _is_stable_to_small_perturbations(scene)
-    ):
-        margin = -margin
-    return _SteadySlidingWithMargin(**vars(sliding), stability_margin=margin)
+    return _SteadySlidingWithMargin(**vars(sliding), scene=scene)
 
 
 def _is_stable_to_small_perturbations(scene: Scene) -> bool:

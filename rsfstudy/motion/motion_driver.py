@@ -9,7 +9,7 @@ compiled loop (``compiled.numba_backend.NumbaBackend``).
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from functools import lru_cache, partial
 from types import SimpleNamespace
 from typing import Any
@@ -346,7 +346,8 @@ class MotionDriver:
         MotionStopped
             If the motion cannot continue or exceeds the budget.
         """
-        machine, states, systems, numbers = self._backend, self._states, self._equations, self._p
+        machine, states, numbers = self._backend, self._states, self._p
+        systems: Iterable[Equations] = self._equations
         before, turns = numbers, len(kinks_and_reported_count[0])
         if isinstance(start_point_or_unknowns, MotionPoint):
             start_point_or_unknowns = (
@@ -370,13 +371,13 @@ class MotionDriver:
             )
         if parameters is not None or turns:  # The loop changes the parameters at kinks.
             before = numbers = machine.as_loop_parameters(
-                systems[0].parameters if parameters is None else parameters
+                self._equations[0].parameters if parameters is None else parameters
             )
             if turns:
                 before = machine.as_loop_parameters(numbers)
-            systems = tuple(system._replace(parameters=numbers) for system in systems)
+            systems = (system._replace(parameters=numbers) for system in self._equations)
         tolerance = max(tolerance, MIN_LOCAL_TOLERANCE)
-        records, samples, rows = _prepare_recording_tables(recording, systems[0], states)
+        records, samples, rows = _prepare_recording_tables(recording, self._equations[0], states)
         state = machine.create_motion_state(
             self._initial_values,
             (

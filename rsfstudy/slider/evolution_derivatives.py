@@ -174,7 +174,7 @@ def _central_differences_at_zero(
         For each component, the largest ratio of a function value to the magnitude of the argument
         of the function. The rounding errors of the derivatives are proportional to this ratio.
     """
-    slopes = [0.0] * len(function(0.0))
+    slopes = [0.0] * len(function(step))
     sizes = [*slopes]
     for number, weight in _FINITE_DIFFERENCE_WEIGHTS:
         away = number * step
