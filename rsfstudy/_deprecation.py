@@ -230,7 +230,6 @@ NEW_NAME_BY_OWNER_AND_FORMER_NAME: Mapping[str, Mapping[str, str]] = {
         "begins_elsewhere": "starts_unsteady",
         "numbers_of_friction": "friction_parameter_values",
         "shown": "quantities_with_values",
-        "functions": "equation_functions",
         "numbers": "parameter_values",
     },
     "rsfstudy.slider.motion_point:MotionPoint": {

@@ -95,7 +95,7 @@ def compute_state_evolution_derivatives(
         Derivatives with an error estimate.
     """
     evolutions, p = (
-        scene.equation_functions.friction_functions.evolutions,
+        scene.friction_functions.evolutions,
         scene.friction_parameter_values,
     )
     shift = build_friction_relation(scene)(steady_state.frictional_stress)[2]

@@ -19,12 +19,12 @@ from rsfstudy.errors import InvalidValue
 from rsfstudy.slider import (
     dynamics,
     fluid,
+    friction,
     laws,
     loading,
     normal_stress,
     parameter_layout,
     part_registry,
-    scene_functions,
     stability,
 )
 from rsfstudy.slider.dynamics.quasi_static import QuasiStatic
@@ -350,9 +350,9 @@ class Scene(SceneBase):
         return parameter_layout.pack_friction_parameter_values(self)
 
     @cached_attribute
-    def equation_functions(self) -> scene_functions.SceneFunctions:
-        """Functions that define the equations of motion (see ``scene_functions``)."""
-        return scene_functions.build_scene_functions(self)
+    def friction_functions(self) -> friction.FrictionFunctions:
+        """Functions that define the friction of the scene."""
+        return friction.build_friction_functions(self)
 
     # ---- derived values -------------------------------------------------------------------------
 

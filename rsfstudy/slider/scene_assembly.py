@@ -327,7 +327,7 @@ _ATTRIBUTES_HIDDEN_FROM_DIR = frozenset(
     {
         "field_index",
         "cache",
-        "equation_functions",
+        "friction_functions",
         "parameter_values",
         "friction_parameter_values",
         "with_segment",

@@ -314,7 +314,7 @@ def _log_slip_rate_change_by_each_state(
     law, fluid = scene.parts.law.state_count, len(scene.parts.fluid.unknowns)
     if not fluid:
         return [1.0] * law, 0.0
-    by_pressure = scene.equation_functions.friction_functions.pressure_derivatives
+    by_pressure = scene.friction_functions.pressure_derivatives
     gained, shifted = by_pressure(
         steady_state.frictional_stress, steady_state.states, scene.friction_parameter_values
     )
@@ -501,7 +501,7 @@ def spring_response_to_normal_stress(
     steady = _require_steady_sliding(still, log_slip_rate)
     psis = (*steady.states, *(0.0 for _unknown in scene.pressure_source.unknowns))
     by_pressure, p = (
-        scene.equation_functions.friction_functions.pressure_derivatives,
+        scene.friction_functions.pressure_derivatives,
         scene.friction_parameter_values,
     )
     gained, shifted = by_pressure(steady.frictional_stress, psis, p)

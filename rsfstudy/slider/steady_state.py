@@ -107,9 +107,7 @@ def steady_friction_minus_reference(scene: SceneView, log_slip_rate: float) -> f
     ----------
     Ruina (1983), J. Geophys. Res. 88, 10359-10370.
     """
-    psi = scene.equation_functions.friction_functions.state_sum(
-        compute_steady_states(scene, log_slip_rate, 0.0)
-    )
+    psi = scene.friction_functions.state_sum(compute_steady_states(scene, log_slip_rate, 0.0))
     return float(scene.a * log_slip_rate + psi)
 
 

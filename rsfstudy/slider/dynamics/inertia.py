@@ -22,7 +22,7 @@ from rsfstudy.slider.parameter_layout import (
     A,
 )
 from rsfstudy.slider.parts import Function, Numbers, flag
-from rsfstudy.slider.scene_functions import velocity_ratios
+from rsfstudy.slider.path_length import velocity_ratios
 from rsfstudy.slider.scene_view import SceneView
 from rsfstudy.slider.state_functions import build_state_step_function
 
