@@ -215,7 +215,7 @@ NEW_NAME_BY_OWNER_AND_FORMER_NAME: Mapping[str, Mapping[str, str]] = {
         "IMPOSED": "IMPOSED_NORMAL_STRESS",
         "RECHARGE": "BOUNDARY_PRESSURE_RATE",
     },
-    "rsfstudy.slider.scene_assembly:SceneBase": {
+    "rsfstudy.slider.scene_base:SceneBase": {
         "under": "with_segment",
         "acting": "segment_scene",
         "chains": "continuous_segments",

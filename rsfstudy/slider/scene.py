@@ -32,7 +32,8 @@ from rsfstudy.slider.fluid._boundary_pressure import FluidWithBoundaryPressure
 from rsfstudy.slider.loading.step import StepLoading
 from rsfstudy.slider.needed_quantities import check_needed_quantities
 from rsfstudy.slider.parts import Numbers
-from rsfstudy.slider.scene_assembly import SceneBase, SceneParts
+from rsfstudy.slider.scene_assembly import SceneParts
+from rsfstudy.slider.scene_base import SceneBase
 from rsfstudy.slider.scene_caching import cached_attribute
 from rsfstudy.slider.slider_parameters import SliderParameters
 from rsfstudy.slider.state_functions import check_steady_states
@@ -53,7 +54,7 @@ class Scene(SceneBase):
     scene is immutable, and its values are checked when it is created. Quantities are dimensionless,
     with stress in :math:`\sigma_*`, slip in :math:`D_c`, time in :math:`D_c/V_*` and slip rate in
     :math:`V_*`. The method ``as_dict``, which returns the values of the fields, is inherited from
-    ``SceneBase`` in ``slider.scene_assembly``.
+    ``SceneBase`` in ``slider.scene_base``.
 
     Parameters
     ----------
