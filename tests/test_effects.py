@@ -13,12 +13,12 @@ from rsfstudy.named_studies import effects
 from rsfstudy import Scene
 from rsfstudy.motion.accuracy import Accuracy
 from rsfstudy.slider.equations import (
-    build_friction_relation,
     equations_at_imposed_slip_rate,
     equations_between_ruptures,
     equations_in_rupture,
     quasi_static_log_slip_rate,
 )
+from rsfstudy.slider.friction import build_friction_relation
 
 shear = st.floats(-0.5, 0.5)
 

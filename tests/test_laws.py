@@ -22,7 +22,7 @@ from rsfstudy.motion.work_meter import WorkMeter
 from rsfstudy.responses.rigid_response import RigidResponse
 from rsfstudy.responses.step_response import StepResponse
 from rsfstudy.slider import laws, steady_state
-from rsfstudy.slider.equations import build_state_evolution_function, compute_steady_states
+from rsfstudy.slider.friction import build_state_evolution_function, compute_steady_states
 from rsfstudy.slider.laws.composite import lambert_w
 from rsfstudy.slider.path_length import velocity_ratios
 from rsfstudy.status import Status

@@ -68,10 +68,6 @@ if TYPE_CHECKING:
         Equations,
         build_equations_against_displacement,
         build_equations_against_inertial_time,
-        build_friction_relation,
-        build_state_evolution_function,
-        compute_steady_states,
-        effective_normal_stress_at,
         equations_at_imposed_slip_rate,
         equations_between_ruptures,
         equations_in_rupture,
@@ -80,7 +76,13 @@ if TYPE_CHECKING:
     )
     from rsfstudy.slider.field_name_hints import hint_for_unknown_field
     from rsfstudy.slider.fluid import BUILT_IN_PARTS
-    from rsfstudy.slider.friction import FrictionFunctions
+    from rsfstudy.slider.friction import (
+        FrictionFunctions,
+        build_friction_relation,
+        build_state_evolution_function,
+        compute_steady_states,
+        effective_normal_stress_at,
+    )
     from rsfstudy.slider.loading import MIN_SEGMENT_DURATION
     from rsfstudy.slider.motion_point import MotionPoint
     from rsfstudy.slider.parameter_layout import LARGEST_LOG_SLIP_RATE
@@ -149,20 +151,22 @@ else:
             "slider.equations": (
                 "Equations",
                 "RUPTURE_REGIME",
-                "compute_steady_states",
                 "equations_between_ruptures",
                 "build_equations_against_displacement",
                 "build_equations_against_inertial_time",
                 "equations_in_rupture",
                 "equations_at_imposed_slip_rate",
                 "equations_without_mass",
-                "build_friction_relation",
                 "quasi_static_log_slip_rate",
-                "effective_normal_stress_at",
-                "build_state_evolution_function",
             ),
             "slider.fluid": ("BUILT_IN_PARTS",),
-            "slider.friction": ("FrictionFunctions",),
+            "slider.friction": (
+                "FrictionFunctions",
+                "build_friction_relation",
+                "build_state_evolution_function",
+                "compute_steady_states",
+                "effective_normal_stress_at",
+            ),
             "slider.field_name_hints": ("hint_for_unknown_field",),
             "slider.loading": ("MIN_SEGMENT_DURATION",),
             "slider.parameter_layout": ("LARGEST_LOG_SLIP_RATE",),

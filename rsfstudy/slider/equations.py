@@ -318,56 +318,6 @@ def equations_at_imposed_slip_rate(scene: SceneView, log_slip_rate: float) -> Eq
     )
 
 
-def build_friction_relation(
-    scene: SceneView, states: Numbers = ()
-) -> Callable[[float], tuple[float, float, float, float]]:
-    """Return the friction relation of a scene as a function of stress.
-
-    Parameters
-    ----------
-    scene : Scene
-        Scene with friction parameters.
-    states : tuple of float, optional
-        States of the scene, from which the pore pressure is read. By default, the function uses the
-        pore pressure of steady sliding.
-
-    Returns
-    -------
-    callable
-        Function ``g -> (strength, slope, shift, shift_slope)``.
-    """
-    strength, p = scene.friction_functions.strength, scene.friction_parameter_values
-    known = states or (0.0,) * scene.state_count
-    return lambda friction: strength(friction, known, p)
-
-
-def effective_normal_stress_at(
-    scene: SceneView, frictional_stress: float, states: Numbers = ()
-) -> float:
-    r"""Compute the effective normal stress from the frictional stress.
-
-    Parameters
-    ----------
-    scene : Scene
-        Scene with friction parameters.
-    frictional_stress : float
-        Deviation of the frictional stress from :math:`\tau_*`, in units of :math:`\sigma_*`.
-    states : tuple of float, optional
-        States of the scene, from which the pore pressure is read. By default, the function uses the
-        pore pressure of steady sliding.
-
-    Returns
-    -------
-    float
-        Effective normal stress in :math:`\sigma_*`.
-    """
-    at = states or (0.0,) * scene.state_count
-    stress = scene.friction_functions.effective_normal_stress(
-        frictional_stress, at, scene.friction_parameter_values
-    )
-    return 1.0 + float(stress[0])
-
-
 def quasi_static_log_slip_rate(scene: SceneView, spring_stress: float, state_sum: float) -> float:
     r"""Compute the slip rate from the spring stress and the state.
 
@@ -391,42 +341,3 @@ def quasi_static_log_slip_rate(scene: SceneView, spring_stress: float, state_sum
     balance = equations_without_mass(scene, with_time=False).force_balance_function
     assert balance is not None
     return float(balance(spring_stress, psis, scene.parameter_values)[0])
-
-
-def build_state_evolution_function(scene: SceneView) -> Callable[[float, Numbers, float], Numbers]:
-    """Return the state evolution of a scene as a function.
-
-    Parameters
-    ----------
-    scene : Scene
-        Scene with friction parameters.
-
-    Returns
-    -------
-    callable
-        Function ``(log_slip_rate, psis, shift)`` that returns the change of each state per slip
-        distance of :math:`D_c`.
-    """
-    evolutions, p = scene.friction_functions.evolutions, scene.friction_parameter_values
-    return lambda log_slip_rate, psis, shift: evolutions(log_slip_rate, psis, shift, 1.0, p)
-
-
-def compute_steady_states(scene: SceneView, log_slip_rate: float, state_shift: float) -> Numbers:
-    r"""Compute the states of steady sliding at a slip rate.
-
-    Parameters
-    ----------
-    scene : Scene
-        Scene with friction parameters.
-    log_slip_rate : float
-        Natural logarithm of the slip rate, :math:`\ln(V/V_*)`.
-    state_shift : float
-        Decrease of the state variable due to stress.
-
-    Returns
-    -------
-    tuple of float
-        States :math:`\Psi_i`.
-    """
-    p = scene.friction_parameter_values
-    return scene.friction_functions.steady_states(log_slip_rate, state_shift, p)

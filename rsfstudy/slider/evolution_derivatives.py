@@ -6,7 +6,7 @@ import math
 from collections.abc import Callable
 from typing import NamedTuple, cast
 
-from rsfstudy.slider.equations import build_friction_relation, compute_steady_states
+from rsfstudy.slider.friction import build_friction_relation, compute_steady_states
 from rsfstudy.slider.parts import Numbers
 from rsfstudy.slider.scene_view import SceneView
 from rsfstudy.slider.steady_state import SteadySliding

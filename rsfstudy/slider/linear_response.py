@@ -32,11 +32,11 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from rsfstudy.slider.equations import build_friction_relation
 from rsfstudy.slider.evolution_derivatives import (
     StateEvolutionDerivatives,
     compute_state_evolution_derivatives,
 )
+from rsfstudy.slider.friction import build_friction_relation
 from rsfstudy.slider.polynomials import (
     PolynomialCoefficients,
     compute_resolvent_polynomials,

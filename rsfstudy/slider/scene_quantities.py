@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from typing import TYPE_CHECKING
 
 from rsfstudy.error_boundary import wrap_methods_in_error_boundary
 from rsfstudy.errors import InvalidValue
@@ -22,7 +23,11 @@ class SceneQuantities(SceneBase):
     a scene.
     """
 
-    critical_stiffness: float
+    if TYPE_CHECKING:
+
+        @property
+        def critical_stiffness(self) -> float:
+            """Critical stiffness at V_*."""
 
     @cached_attribute
     def _segments(self) -> tuple[Segment, ...]:

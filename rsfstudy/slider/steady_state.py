@@ -17,7 +17,7 @@ from dataclasses import dataclass
 
 from scipy.optimize import brentq
 
-from rsfstudy.slider.equations import build_friction_relation, compute_steady_states
+from rsfstudy.slider.friction import build_friction_relation, compute_steady_states
 from rsfstudy.slider.parts import Numbers
 from rsfstudy.slider.scene_caching import cached_per_scene
 from rsfstudy.slider.scene_view import SceneView
