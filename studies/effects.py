@@ -121,7 +121,7 @@ class EffectCost(Measure):
             cycle = _CYCLE_MEASURE.compute(scene, integrator)
         except MotionStopped as halt:
             return Outcome(halt.status, costs, str(halt))
-        spent = integrator.evaluations_by_regime.get("inertial", 0)
+        spent = integrator.work_meter.evaluations_by_regime.get("inertial", 0)
         costs["share_in_rupture"] = (
             spent / integrator.evaluations if integrator.evaluations else math.nan
         )

@@ -207,7 +207,7 @@ def test_inertia_is_integrated_only_where_it_acts():
     """
     slow = Scene(load_velocity_ratio=1.2, stiffness_ratio=1.2, inertia=True)
     integrator = follow_until(slow, 1e-7, lambda event: event.clock > 100.0)
-    assert set(integrator.evaluations_by_regime) == {"slow_manifold"}
+    assert set(integrator.work_meter.evaluations_by_regime) == {"slow_manifold"}
     fast = slow.with_(stiffness_ratio=0.8)
     regimes = []
 

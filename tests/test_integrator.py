@@ -37,7 +37,7 @@ def test_copies_share_the_count_and_the_budget():
         assert copied.evaluations == integrator.evaluations > before
     assert [copied.rtol for copied in copies] == [1e-4, 1e-6, 1e-9]
     assert copies[0].local_tolerance == pytest.approx(0.1 * integrator.local_tolerance)
-    assert sum(integrator.evaluations_by_regime.values()) == integrator.evaluations
+    assert sum(integrator.work_meter.evaluations_by_regime.values()) == integrator.evaluations
     assert not integrator.is_budget_exceeded
 
 

@@ -220,7 +220,7 @@ def simulate(
     check_integrator(integrator)
     if is_alone and not scene.is_perturbed:
         warnings.warn(_UNPERTURBED_SCENE_MESSAGE, NoResultWarning, stacklevel=3)
-    spent, by_regime = integrator.evaluations, dict(integrator.evaluations_by_regime)
+    spent, by_regime = integrator.evaluations, dict(integrator.work_meter.evaluations_by_regime)
     recording = Recording(list(_BUILT_IN_REGIME_NAMES), at)
     status, message, limit, passed = (
         Status.OK,
@@ -261,7 +261,7 @@ def simulate(
             "rhs_evaluations_by_regime": json.dumps(
                 {
                     regime: n - by_regime.get(regime, 0)
-                    for regime, n in integrator.evaluations_by_regime.items()
+                    for regime, n in integrator.work_meter.evaluations_by_regime.items()
                 }
             ),
             **provenance_attributes("rsfstudy.simulate"),

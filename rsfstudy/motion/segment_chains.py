@@ -11,7 +11,35 @@ from rsfstudy.motion.events import Event, EventKind, EventSpecification
 from rsfstudy.motion.initial_points import point_after_loading_jump
 from rsfstudy.motion.motion_driver import find_events_at_jump
 from rsfstudy.parts import SEGMENT_END, SEGMENT_START
-from rsfstudy.slider import MotionPoint, Numbers, Scene, largest_linear_growth_rate
+from rsfstudy.slider import (
+    SINGLE_ENDLESS_SEGMENT_TABLE,
+    MotionPoint,
+    Numbers,
+    Scene,
+    largest_linear_growth_rate,
+)
+
+
+def list_segment_chains(
+    scene: Scene, *, only_last_segment: bool
+) -> Sequence[tuple[Scene, np.ndarray]]:
+    """Return the segment chains of a motion.
+
+    Parameters
+    ----------
+    scene : Scene
+        Scene of the motion.
+    only_last_segment : bool
+        If True, the motion starts in the last loading segment, which has no end.
+
+    Returns
+    -------
+    sequence of (Scene, ndarray)
+        Scene and segment table of each chain.
+    """
+    if only_last_segment:
+        return ((scene.segment_scene(-1), SINGLE_ENDLESS_SEGMENT_TABLE),)
+    return scene.continuous_segments
 
 
 def find_remaining_segment_chains(
@@ -108,22 +136,44 @@ def iterate_segment_start_events(
         yield event._replace(kind=spec.kind, specification=spec, point=point)
 
 
-def steady_sliding_may_be_stable(scene: Scene, event_specs: Sequence[EventSpecification]) -> bool:
-    """Return False if steady sliding is unstable in the last loading segment.
+def select_event_specs(
+    scene: Scene,
+    chain_scene: Scene,
+    event_specs: Sequence[EventSpecification],
+    *,
+    is_last_chain: bool,
+) -> Sequence[EventSpecification]:
+    """Select the requested events that can occur in a segment chain.
 
-    The growth rate of small perturbations is computed only if a settling event is requested.
+    The motion can settle only in the last chain. Settling events are omitted if the load point
+    oscillates, or if steady sliding is unstable.
 
     Parameters
     ----------
     scene : Scene
         Scene of the motion.
+    chain_scene : Scene
+        Scene of the first segment of the chain.
     event_specs : sequence of EventSpecification
         Requested events.
+    is_last_chain : bool
+        True if no other chain follows.
 
     Returns
     -------
-    bool
-        False if a settling event is requested and small perturbations grow.
+    sequence of EventSpecification
+        Events to detect.
+    """
+    may_settle = is_last_chain and not chain_scene.parts.loading.unknowns
+    if may_settle and _steady_sliding_may_be_stable(scene, event_specs):
+        return event_specs
+    return [spec for spec in event_specs if spec.kind is not EventKind.SETTLED]
+
+
+def _steady_sliding_may_be_stable(scene: Scene, event_specs: Sequence[EventSpecification]) -> bool:
+    """Return False if steady sliding is unstable in the last loading segment.
+
+    The growth rate of small perturbations is computed only if a settling event is requested.
     """
     if scene.log_load_velocity == -math.inf or all(
         spec.kind is not EventKind.SETTLED for spec in event_specs
@@ -131,19 +181,3 @@ def steady_sliding_may_be_stable(scene: Scene, event_specs: Sequence[EventSpecif
         return True
     growth = largest_linear_growth_rate(scene.segment_scene(-1), scene.log_load_velocity)
     return growth is None or not growth.is_positive
-
-
-def without_settling_events(event_specs: Sequence[EventSpecification]) -> list[EventSpecification]:
-    """Remove the settling events from a sequence of event specifications.
-
-    Parameters
-    ----------
-    event_specs : sequence of EventSpecification
-        Requested events.
-
-    Returns
-    -------
-    list of EventSpecification
-        Specifications of all other events.
-    """
-    return [spec for spec in event_specs if spec.kind is not EventKind.SETTLED]
