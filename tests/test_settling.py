@@ -11,12 +11,12 @@ from rsfstudy import Scene
 from rsfstudy.errors import InvalidValue
 from rsfstudy.limit_cycles.limit_cycle import LimitCycle
 from rsfstudy.measure_base.settling_checks import steady_sliding_is_linearly_stable
-from rsfstudy.motion import event_integration
+from rsfstudy.motion import segment_chains
 from rsfstudy.motion.accuracy import Accuracy
 from rsfstudy.motion.engines import COMPILED, PYTHON, SCIPY
-from rsfstudy.motion.event_integration import integrate_events
 from rsfstudy.motion.events import EventKind, approach_to_steady_state, rise
-from rsfstudy.motion.work_meter import MotionStopped, WorkMeter
+from rsfstudy.motion.integrator import Integrator
+from rsfstudy.motion.work_meter import MotionStopped
 from rsfstudy.quantities import Quantity
 from rsfstudy.responses._recorded_motion import compute_settled_friction_flag
 from rsfstudy.responses.step_response import StepResponse
@@ -109,8 +109,8 @@ def test_a_passive_unknown_does_not_end_a_damped_oscillation(engine):
 def events_until_third_rise(scene, *settling):
     """Return the events of a motion until ln V has exceeded ln V_0 three times."""
     asked = (*settling, rise("log_slip_rate", scene.log_load_velocity))
-    events, accuracy = [], Accuracy(1e-4)
-    for event in integrate_events(scene, accuracy, WorkMeter(accuracy.budget), asked):
+    events = []
+    for event in Integrator(Accuracy(1e-4)).follow(scene, asked):
         events.append(event)
         if sum(each.kind is EventKind.RISE for each in events) == 3:
             break
@@ -142,7 +142,7 @@ def test_stability_is_computed_at_the_first_settling_event(fluid, level, monkeyp
         scenes.append(scene)
         return largest_linear_growth_rate(scene, log_slip_rate)
 
-    monkeypatch.setattr(event_integration, "largest_linear_growth_rate", growth_rate)
+    monkeypatch.setattr(segment_chains, "largest_linear_growth_rate", growth_rate)
     scene = Scene(**CYCLES, fluid=fluid)
     events_until_third_rise(scene, approach_to_steady_state(level))
     assert bool(scenes) == (fluid is Dissipation)
