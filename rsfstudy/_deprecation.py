@@ -318,7 +318,7 @@ NEW_NAME_BY_OWNER_AND_FORMER_NAME: Mapping[str, Mapping[str, str]] = {
         "work": "evaluation_count",
         "evaluations": "evaluation_count",
     },
-    "rsfstudy.motion.motion_driver:PythonMotionState": {
+    "rsfstudy.motion.python_backend:PythonMotionState": {
         "lasts": "end_time",
         "taken": "step_length",
         "finer": "step_limit_factor",

@@ -33,12 +33,7 @@ from rsfstudy.parts import (
     SEGMENT_END,
     SEGMENT_LOG_VELOCITY,
 )
-from rsfstudy.slider import (
-    Equations,
-    MotionPoint,
-    Numbers,
-    Scene,
-)
+from rsfstudy.slider import Equations, MotionPoint, Numbers, Scene
 
 
 class Integrator:
@@ -354,10 +349,9 @@ class Integrator:
             asked = select_event_specs(scene, acting, event_specs, is_last_chain=is_last)
             table = truncate_segments_at(table, until)
             end = float(table[-1, SEGMENT_END])
-            driver = get_motion_driver(
+            motion = get_motion_driver(
                 acting, self.engine, self.accuracy.methods, with_time=with_time
-            )
-            motion = driver.iterate_events(
+            ).iterate_events(
                 start,
                 self.work_meter,
                 asked,

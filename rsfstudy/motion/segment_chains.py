@@ -7,9 +7,9 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
+from rsfstudy.motion.event_spec_table import find_events_at_jump
 from rsfstudy.motion.events import Event, EventKind, EventSpecification
 from rsfstudy.motion.initial_points import point_after_loading_jump
-from rsfstudy.motion.motion_driver import find_events_at_jump
 from rsfstudy.parts import SEGMENT_END, SEGMENT_START
 from rsfstudy.slider import (
     SINGLE_ENDLESS_SEGMENT_TABLE,
