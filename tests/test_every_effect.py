@@ -18,9 +18,8 @@ from hypothesis import strategies as st
 
 from rsfstudy import Scene
 from rsfstudy.motion.accuracy import Accuracy
-from rsfstudy.motion.event_integration import integrate_events
 from rsfstudy.motion.events import EventKind, maximum
-from rsfstudy.motion.work_meter import WorkMeter
+from rsfstudy.motion.integrator import Integrator
 from rsfstudy.responses.linear_stability import LinearStability
 from rsfstudy.slider import laws, stability, steady_state
 from rsfstudy.slider.equations import (
@@ -231,8 +230,8 @@ def test_small_oscillations_grow_as_linear_theory_says(fields, ratio):
     rates = stability.linear_growth_rates(scene, 0.0)
     turning = max((rate for rate in rates if rate.imag), key=lambda rate: rate.real)
     peaks = []
-    for event in integrate_events(
-        scene, Accuracy(1e-9), WorkMeter(10**6), [maximum("log_slip_rate")], with_time=True
+    for event in Integrator(Accuracy(1e-9, 10**6)).follow(
+        scene, [maximum("log_slip_rate")], with_time=True
     ):
         if event.kind is EventKind.MAXIMUM:
             peaks.append((event.time, event.point.log_slip_rate))
