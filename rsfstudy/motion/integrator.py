@@ -11,7 +11,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Sequence
 
-from rsfstudy.errors import InvalidValue
+from rsfstudy.error_boundary import wrap_methods_in_error_boundary
 from rsfstudy.motion.accuracy import Accuracy, estimate_error
 from rsfstudy.motion.events import Event, EventKind, EventSpecification
 from rsfstudy.motion.initial_points import initial_point, point_after_loading_jump
@@ -40,6 +40,7 @@ from rsfstudy.slider import (
 )
 
 
+@wrap_methods_in_error_boundary
 class Integrator:
     """Integrator of motions to a requested accuracy, with a count of the work.
 
@@ -67,9 +68,6 @@ class Integrator:
 
     def __init__(self, accuracy: Accuracy) -> None:
         """Create an integrator whose count starts at zero."""
-        given: object = accuracy
-        if not isinstance(given, Accuracy):
-            raise InvalidValue("accuracy", given, "must be an Accuracy, such as Accuracy(rtol=...)")
         self.accuracy, self.work_meter = accuracy, WorkMeter(accuracy.budget)
 
     @property
@@ -110,8 +108,8 @@ class Integrator:
         Integrator
             Copy with the same accuracy.
         """
-        copied = Integrator(self.accuracy)
-        copied.work_meter = work_meter
+        copied = object.__new__(Integrator)  # The checks of the constructor are not necessary.
+        copied.accuracy, copied.work_meter = self.accuracy, work_meter
         return copied
 
     def with_accuracy(self, accuracy: Accuracy) -> Integrator:
@@ -127,7 +125,9 @@ class Integrator:
         Integrator
             Copy that adds its evaluations to the same count.
         """
-        return Integrator(accuracy).counted_by(self.work_meter)
+        copied = object.__new__(Integrator)
+        copied.accuracy, copied.work_meter = accuracy, self.work_meter
+        return copied
 
     def with_rtol(self, rtol: float) -> Integrator:
         """Return a copy with another relative error tolerance that shares the count.
