@@ -173,7 +173,10 @@ def test_the_measure_finds_the_threshold_of_growth(
         # stiffness. Close to the limit beyond which no stiffness is stable, the threshold is
         # ill-conditioned.
         undamped = stability.critical_stiffness(Scene(**fields), log_slip_rate, quasi_static=True)
-        slack = 1e-6 * max(undamped, told["critical_stiffness"])
+        # With inertia, growth per inertial time is proportional to the square of the slip rate
+        # norm, and the Jacobian from differences has an error of a few 1e-12.
+        within = 1e-6 if log_norm is None else max(1e-6, 2e-11 * 100.0 ** -max(log_norm, -3.0))
+        slack = within * max(undamped, told["critical_stiffness"])
         slack *= 1.0 + max(0.0, told["rise_by_dynamics"])
         found = told["critical_stiffness_from_growth"]
         assert found == pytest.approx(told["critical_stiffness"], abs=slack)
