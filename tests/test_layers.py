@@ -23,6 +23,7 @@ FILES = sorted(ROOT.rglob("*.py"))
 FLOORS = (
     ("_deprecation",),
     ("errors", "status", "defaults", "formatting", "_lazy_exports", "_former_modules"),
+    ("object_digest",),
     ("argument_checks",),
     ("error_boundary",),
     ("netcdf_encoding", "path_checks", "quantities"),

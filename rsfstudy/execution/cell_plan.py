@@ -49,7 +49,7 @@ def compute_cell_key(scene: Scene, measure: Measure) -> bytes:
     bytes
         Key of 16 bytes.
     """
-    of_scene, of_measure = scene.as_dict(), measure.plain_fields
+    of_scene, of_measure = scene.stored_fields(), measure.plain_fields
     values = (*of_scene.values(), *of_measure.values())
     floats = [value for value in values if type(value) is float]
     others = tuple(None if type(value) is float else value for value in values)

@@ -116,7 +116,9 @@ class StudyRun:
     ) -> None:
         self.study, self.options, self.task, self.workers = study, options, task, workers
         self.plan = CellPlan(study)
-        self.provenance = provenance.collect_provenance(study, options.command_line)
+        self.provenance = provenance.collect_provenance(
+            study, options.command_line, self.plan.example_scenes
+        )
         self._check_reductions_and_claims()
 
     def _check_reductions_and_claims(self) -> None:

@@ -18,7 +18,6 @@ if TYPE_CHECKING:
         CellTimings,
         OutputPacker,
         StoredCellRow,
-        find_fingerprint_differences,
         read_timings,
     )
     from rsfstudy.storage.comparison import (
@@ -33,6 +32,7 @@ if TYPE_CHECKING:
         write_dataset,
     )
     from rsfstudy.storage.dataset_scenes import scene_of_dataset
+    from rsfstudy.storage.fingerprints import find_fingerprint_differences
     from rsfstudy.storage.lattice_datasets import assemble_dataset
     from rsfstudy.storage.rebuild_from_file import (
         find_primary_output,
@@ -71,9 +71,9 @@ else:
                 "CellTimings",
                 "CellJournal",
                 "OutputPacker",
-                "find_fingerprint_differences",
                 "read_timings",
             ),
+            "storage.fingerprints": ("find_fingerprint_differences",),
             "storage.lattice_datasets": ("assemble_dataset",),
             "storage.rebuild_from_file": (
                 "find_primary_output",

@@ -5,7 +5,8 @@ that an interrupted run can be resumed. Only one run can use a journal at a time
 
 The key of a cell is a digest of the exact values of the scene fields and the measure fields. All
 other settings that affect the results form the fingerprint of the journal. A run rejects a journal
-with a different fingerprint, unless the only difference is a smaller work budget in the journal.
+with a different fingerprint (see ``fingerprints``), unless the only difference is a smaller work
+budget in the journal.
 """
 
 from __future__ import annotations
@@ -26,6 +27,7 @@ import numpy as np
 from rsfstudy.errors import DataError, shorten_text
 from rsfstudy.measures import Measure, Outcome
 from rsfstudy.status import Status
+from rsfstudy.storage.fingerprints import find_fingerprint_differences, merge_fingerprints
 
 #: Row of the table ``cells``: key, name of the status, message, number of right-hand-side
 #: evaluations, wall time in s, packed outputs, and checksum.
@@ -219,7 +221,7 @@ class CellJournal:
         try:
             theirs = self._read_or_store_fingerprint(wanted)
             if theirs != wanted:
-                self._accept_journal_with_smaller_budget(theirs, ours)
+                self._accept_compatible_fingerprint(theirs, ours)
         except sqlite3.Error as error:
             self._db.close()
             raise self._build_unusable_journal_error(error) from error
@@ -253,23 +255,24 @@ class CellJournal:
                 self._db.execute("INSERT INTO fingerprint VALUES (?)", (run_fingerprint,))
         return run_fingerprint if row is None else row[0]
 
-    def _accept_journal_with_smaller_budget(
+    def _accept_compatible_fingerprint(
         self, stored_fingerprint: Any, run_fingerprint: Mapping[str, Any]
     ) -> None:
-        """Accept a journal with a smaller work budget, and reject other differences.
+        """Accept other modules of code or a smaller work budget, and reject other differences.
 
-        If the fingerprints differ only in the work budget and the new budget is larger, the method
-        stores the new fingerprint. The results in the journal remain valid because no result
-        depends on the budget. For any other difference, the method raises ``DataError``.
+        The results in the journal remain valid if the run uses more or fewer modules than the
+        journal, and if the new work budget is larger, because no result depends on the budget. The
+        method then stores the merged fingerprint. For any other difference, the method raises
+        ``DataError``.
         """
         try:
-            differ = find_fingerprint_differences(
-                dict(json.loads(stored_fingerprint)), run_fingerprint
-            )
-            if differ.keys() == {"budget"} and differ["budget"][0] < differ["budget"][1]:
+            stored = dict(json.loads(stored_fingerprint))
+            differ = find_fingerprint_differences(stored, run_fingerprint)
+            is_budget_raised = "budget" in differ and differ["budget"][0] < differ["budget"][1]
+            if not differ or (is_budget_raised and len(differ) == 1):
+                merged = json.dumps(merge_fingerprints(stored, run_fingerprint), sort_keys=True)
                 with self._db:
-                    wanted = json.dumps(run_fingerprint, sort_keys=True)
-                    self._db.execute("UPDATE fingerprint SET json = ?", (wanted,))
+                    self._db.execute("UPDATE fingerprint SET json = ?", (merged,))
                 return
             told = "; ".join(
                 f"{name}: {shorten_text(there, 70)} there, {shorten_text(now, 70)} now"
@@ -494,30 +497,3 @@ def _compute_checksum(
     # repr escapes quotes, so that different strings cannot produce the same text.
     text = f"{cell_key!r} {status!r} {message!r} {rhs_evaluations} {known!r} "
     return zlib.crc32(packed_outputs, zlib.crc32(text.encode()))
-
-
-def find_fingerprint_differences(
-    first: Mapping[str, Any], second: Mapping[str, Any]
-) -> dict[str, tuple[Any, Any]]:
-    """Find the entries that differ between two fingerprints.
-
-    Both fingerprints are converted to JSON and back before the comparison, because a fingerprint
-    that was read from a file contains lists instead of tuples.
-
-    Parameters
-    ----------
-    first, second : mapping of str to object
-        Fingerprints to compare.
-
-    Returns
-    -------
-    dict of str to tuple of (object, object)
-        Each entry that differs, with its values in the first and in the second fingerprint. The
-        value of a missing entry is None.
-    """
-    first, second = (json.loads(json.dumps(fingerprint)) for fingerprint in (first, second))
-    return {
-        name: (first.get(name), second.get(name))
-        for name in sorted({*first, *second})
-        if first.get(name) != second.get(name)
-    }

@@ -21,7 +21,7 @@ from rsfstudy.error_boundary import wrap_methods_in_error_boundary
 from rsfstudy.errors import InvalidValue
 from rsfstudy.formatting import format_list
 from rsfstudy.status import STATUS_LABELS, Status
-from rsfstudy.storage.cell_journal import find_fingerprint_differences
+from rsfstudy.storage.fingerprints import find_fingerprint_differences
 from rsfstudy.storage.rebuild_from_file import find_primary_output
 from rsfstudy.storage.schema import is_of_single_scene, read_provenance
 from rsfstudy.vocabulary import TIMING_VARIABLES

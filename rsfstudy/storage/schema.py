@@ -31,7 +31,7 @@ from rsfstudy.errors import DataError, InvalidValue, shorten_text
 from rsfstudy.motion import Accuracy
 from rsfstudy.slider import (
     BUILT_IN_PARTS,
-    FIELDS_OMITTED_IF_NONE,
+    OMITTED_DEFAULTS,
     SLOTS,
     Scene,
     UserLoading,
@@ -427,7 +427,8 @@ def build_scene_from_stored(
     ]
     kinds = scene_field_types(parts)
     values = {
-        **dict.fromkeys(FIELDS_OMITTED_IF_NONE),
+        # A field that the parts of the scene lack must be None. The defaults of slots are names.
+        **{n: v if isinstance(v, str) else None for n, v in OMITTED_DEFAULTS.items()},
         **_SCENE_DEFAULTS_FOR_OLDER_FILES,
         **stored_scene,
     }
