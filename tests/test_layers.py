@@ -59,7 +59,12 @@ HOMES = {
     "rich": {"cli", "api/progress"},
     "sqlite3": {"storage/cell_journal"},
     "zarr": set(),  # xarray writes and reads Zarr stores.
-    "msgspec": {"storage/schema", "storage/rebuild_from_file", "referee/problem_files"},
+    "msgspec": {
+        "storage/declarations",
+        "storage/plain_data",
+        "storage/rebuild_from_file",
+        "referee/problem_files",
+    },
 }
 
 

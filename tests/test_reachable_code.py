@@ -20,7 +20,7 @@ from rsfstudy.execution.cell_plan import compute_cell_key
 from rsfstudy.execution.module_graph import ModuleGraph
 from rsfstudy.measures import CriticalStep, Elasticities, LimitCycle, LinearStability
 from rsfstudy.slider import part_registry
-from rsfstudy.storage import fingerprints, schema
+from rsfstudy.storage import declarations, fingerprints
 
 PACKAGE = Path(rsfstudy.__file__).parent
 SOURCES = provenance.read_physics_sources(PACKAGE)
@@ -233,12 +233,12 @@ from rsfstudy import Scene
 for key, cell in tests.KEYS.items():
     assert tests.compute_cell_key(*cell).hex() == key
     assert not {{"warmth", "lean"}} & cell[0].stored_fields().keys()
-    assert tests.schema.build_scene_from_stored(cell[0].stored_fields()) == cell[0]
+    assert tests.declarations.build_scene_from_stored(cell[0].stored_fields()) == cell[0]
 warm = Scene(fluid="warm")
 assert (warm.warmth, warm.lean) == (2.0, 0.5) and Scene().warmth is None
 assert warm.as_dict()["warmth"] == 2.0 and "warmth" not in warm.stored_fields()
 for scene in (warm, Scene(fluid="warm", warmth=3.0), Scene(lean=0.7)):
-    assert tests.schema.build_scene_from_stored(scene.stored_fields()) == scene
+    assert tests.declarations.build_scene_from_stored(scene.stored_fields()) == scene
     keys.add(tests.compute_cell_key(scene, tests.LimitCycle()))
 print(len(keys))
 """
@@ -260,5 +260,5 @@ def test_a_later_slot_does_not_change_the_keys_of_other_scenes(monkeypatch):
     assert dilatant.stored_fields()["fluid"] == "dilatant"
     assert compute_cell_key(scene, LimitCycle()) != compute_cell_key(dilatant, LimitCycle())
     for each in (scene, dilatant):
-        assert schema.build_scene_from_stored(each.stored_fields()) == each
+        assert declarations.build_scene_from_stored(each.stored_fields()) == each
     assert dilatant.with_(fluid="drained") == scene

@@ -32,6 +32,7 @@ if TYPE_CHECKING:
         write_dataset,
     )
     from rsfstudy.storage.dataset_scenes import scene_of_dataset
+    from rsfstudy.storage.declarations import build_scene_from_stored
     from rsfstudy.storage.fingerprints import find_fingerprint_differences
     from rsfstudy.storage.lattice_datasets import assemble_dataset
     from rsfstudy.storage.rebuild_from_file import (
@@ -40,8 +41,6 @@ if TYPE_CHECKING:
         study_of_dataset,
     )
     from rsfstudy.storage.schema import (
-        build_axis_from_stored,
-        build_scene_from_stored,
         check_contains_study_results,
         is_of_single_scene,
         read_declaration,
@@ -73,6 +72,7 @@ else:
                 "OutputPacker",
                 "read_timings",
             ),
+            "storage.declarations": ("build_scene_from_stored",),
             "storage.fingerprints": ("find_fingerprint_differences",),
             "storage.lattice_datasets": ("assemble_dataset",),
             "storage.rebuild_from_file": (
@@ -81,8 +81,6 @@ else:
                 "study_of_dataset",
             ),
             "storage.schema": (
-                "build_axis_from_stored",
-                "build_scene_from_stored",
                 "check_contains_study_results",
                 "is_of_single_scene",
                 "read_declaration",
@@ -111,7 +109,6 @@ __all__ = [
     "CellJournal",
     "OutputPacker",
     "assemble_dataset",
-    "build_axis_from_stored",
     "build_scene_from_stored",
     "check_contains_study_results",
     "check_store_does_not_exist",

@@ -18,8 +18,10 @@ from rsfstudy.slider import (
     normalise_field_value,
     protocol,
 )
+from rsfstudy.storage.declarations import build_scene_from_stored
 from rsfstudy.storage.lattice_datasets import build_lattice_coordinates
-from rsfstudy.storage.schema import build_scene_from_stored, invalid_part_error, read_scene_fields
+from rsfstudy.storage.plain_data import invalid_part_error
+from rsfstudy.storage.schema import read_scene_fields
 from rsfstudy.study import Study
 
 
