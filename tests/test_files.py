@@ -24,7 +24,8 @@ from rsfstudy.execution.provenance import read_git_commit_and_state
 from rsfstudy.measures import Measure, Outcome
 from rsfstudy.status import Status
 from rsfstudy.storage import dataset_files, declarations, rebuild_from_file, schema
-from rsfstudy.storage.cell_journal import CellJournal, OutputPacker
+from rsfstudy.storage.cell_columns import OutputPacker
+from rsfstudy.storage.cell_journal import CellJournal
 from rsfstudy.study import study_index, study_loader
 
 

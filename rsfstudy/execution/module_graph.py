@@ -64,18 +64,18 @@ class ModuleGraph:
         dict of str to str
             Digest of each module, by name relative to the package, such as ``"slider.friction"``.
         """
-        reached: set[str] = set()
-        found = set(self._modules)
-        if roots is not None:
-            found = {module for root in roots for module in self._modules_loaded_by(root, ())}
-        while found:
-            reached |= found
-            found = {m for module in found for m in self._imports_of(module)} - reached
+        reached = self._modules if roots is None else self._find_reachable_modules(roots)
         return {module: self._modules[module].digest for module in sorted(reached)}
 
-    def _imports_of(self, module: str) -> Iterator[str]:
-        for source, names in self._modules[module].imports:
-            yield from self._modules_loaded_by(source, names)
+    def _find_reachable_modules(self, roots: Iterable[str]) -> set[str]:
+        reached: set[str] = set()
+        found = {module for root in roots for module in self._modules_loaded_by(root, ())}
+        while found:
+            reached |= found
+            imports = [statement for module in found for statement in self._modules[module].imports]
+            found = {m for statement in imports for m in self._modules_loaded_by(*statement)}
+            found -= reached
+        return reached
 
     def _modules_loaded_by(self, source: str, names: Iterable[str]) -> Iterator[str]:
         """Yield the modules that ``from source import names`` or ``import source`` loads."""

@@ -25,7 +25,7 @@ from rsfstudy.storage.declarations import (
     build_scene_from_stored,
     find_user_part_missing_from_file,
 )
-from rsfstudy.storage.lattice_datasets import build_lattice_coordinates
+from rsfstudy.storage.lattice_coordinates import build_dimension_coordinates
 from rsfstudy.storage.plain_data import invalid_part_error
 from rsfstudy.study import Study, load_study, study_names
 from rsfstudy.vocabulary import find_coverage_content_type
@@ -151,11 +151,11 @@ def depends_on_user_code(results: xr.Dataset) -> bool:
 
 def _check_axes(study: Study, results: xr.Dataset) -> None:
     """Check that the axes of the results match the declaration."""
-    ours, dims = xr.Dataset(coords=build_lattice_coordinates(study)), results["status"].dims
+    dims = results["status"].dims
     if dims != study.dimensions:
         raise invalid_part_error("status", f"lies along {dims}, not the axes of the declaration")
-    for name in study.dimensions:
-        if ours[name].values.tolist() != results[name].values.tolist():
+    for name, values in build_dimension_coordinates(study).items():
+        if values.tolist() != results[name].values.tolist():
             raise invalid_part_error(name, "is not that axis of the declaration")
 
 
