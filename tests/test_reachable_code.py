@@ -68,7 +68,7 @@ def test_limit_cycles_do_not_affect_critical_steps(tmp_path, monkeypatch):
     after = resume(study, tmp_path, monkeypatch)
     assert after.critical_velocity_ratio.values == before.critical_velocity_ratio.values
     edit(monkeypatch, *FRICTION)
-    told = r"differently: physics \(slider.friction\): \w{12} there, \w{12} now\. Mixing"
+    told = r"differently: physics \(slider.friction\): \w{16} there, \w{16} now\. Mixing"
     with pytest.raises(DataError, match=told):
         rsfstudy.run(study, output=tmp_path, **OPTIONS)
 
@@ -183,6 +183,14 @@ def test_older_fingerprints_have_one_digest(older):
     assert fingerprints.merge_fingerprints({"physics": older}, now) == now
 
 
+def test_a_difference_lists_the_first_modules_that_changed():
+    then, now = ({"physics": {f"m{n:02}": text for n in range(20)}} for text in ("ab", "cd"))
+    now["physics"]["m00"] = "ab"
+    ((name, (there, here)),) = fingerprints.find_fingerprint_differences(then, now).items()
+    assert (name, there == here) == ("physics (m01, m02, m03, ..., m19)", False)
+    assert fingerprints.find_fingerprint_differences(then, then) == {}
+
+
 # ---- keys of cells -------------------------------------------------------------------------------
 
 #: Keys of cells in existing journals.
@@ -237,6 +245,7 @@ for key, cell in tests.KEYS.items():
 warm = Scene(fluid="warm")
 assert (warm.warmth, warm.lean) == (2.0, 0.5) and Scene().warmth is None
 assert warm.as_dict()["warmth"] == 2.0 and "warmth" not in warm.stored_fields()
+assert Scene(fluid="warm", warmth=3.0).with_(fluid="drained") == Scene()
 for scene in (warm, Scene(fluid="warm", warmth=3.0), Scene(lean=0.7)):
     assert tests.declarations.build_scene_from_stored(scene.stored_fields()) == scene
     keys.add(tests.compute_cell_key(scene, tests.LimitCycle()))

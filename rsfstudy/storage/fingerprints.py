@@ -13,6 +13,8 @@ import json
 from collections.abc import Mapping
 from typing import Any
 
+from rsfstudy.formatting import format_list
+
 #: Name of the entry that contains the code digests of modules.
 _MODULES = "physics"
 
@@ -34,17 +36,20 @@ def find_fingerprint_differences(
     -------
     dict of str to tuple of (object, object)
         Each entry that differs, with its values in the first and in the second fingerprint. The
-        value of a missing entry is None. For each module with different code, the dictionary
-        contains an entry such as ``"physics (slider.friction)"``.
+        value of a missing entry is None. If the code of modules differs, the name of the entry
+        lists the modules, for example ``"physics (slider.friction)"``.
     """
     both: list[dict[str, Any]] = [json.loads(json.dumps(each)) for each in (first, second)]
     codes = [each.get(_MODULES) for each in both]
     for fingerprint, code, other in zip(both, codes, reversed(codes), strict=True):
         if isinstance(code, dict) and isinstance(other, dict):
             del fingerprint[_MODULES]
-            fingerprint |= {f"{_MODULES} ({name})": code[name] for name in code.keys() & other}
+            names = sorted(name for name in code.keys() & other if code[name] != other[name])
+            if names:
+                changed = {name: code[name] for name in names}
+                fingerprint[f"{_MODULES} ({format_list(names, ', ')})"] = _combine_digests(changed)
         elif isinstance(code, dict):  # An older fingerprint contains one digest of all modules.
-            fingerprint[_MODULES] = _combine_module_digests(code)
+            fingerprint[_MODULES] = _combine_digests(code)
     first, second = both
     return {
         name: (first.get(name), second.get(name))
@@ -72,7 +77,7 @@ def merge_fingerprints(stored: Mapping[str, Any], current: Mapping[str, Any]) ->
     return {**current, _MODULES: {**code, **current_code}}
 
 
-def _combine_module_digests(digests_by_module: Mapping[str, str]) -> str:
+def _combine_digests(digests_by_module: Mapping[str, str]) -> str:
     """Combine the code digests of several modules into one digest."""
     text = json.dumps(digests_by_module, sort_keys=True)
     return hashlib.sha256(text.encode()).hexdigest()[:16]
