@@ -12,11 +12,17 @@ from test_shown import rows as of_html
 import rsfstudy
 from rsfstudy import Scene
 from rsfstudy.api import study_runs
-from rsfstudy.cli import file_summaries, study_declarations, table_layout
+from rsfstudy.cli import study_declarations, table_layout
 from rsfstudy.cli.commands import rerun
 from rsfstudy.formatting import format_overrides
 from rsfstudy.measures import Outcome
-from rsfstudy.reporting import cell_tables, lattice_tables, reduction_tables, verdict_tables
+from rsfstudy.reporting import (
+    cell_tables,
+    lattice_tables,
+    machine_readable,
+    reduction_tables,
+    verdict_tables,
+)
 from rsfstudy.reporting.tables import TextTable
 from rsfstudy.status import Status
 from rsfstudy.study import study_index, study_loader
@@ -65,7 +71,7 @@ def test_results_of_every_study(name, printed, tmp_path_factory):
     shown = [
         lattice_tables.build_primary_output_table(dataset),
         *reduction_tables.build_reduction_tables(dataset),
-        file_summaries.build_contents_table(dataset),
+        machine_readable.build_contents_table(dataset),
     ]
     shown += [verdict_tables.claims_table(study_runs.check(dataset))]
     for table in (table for table in shown if table.rows):

@@ -81,22 +81,6 @@ def output_result(result: Result, print_result: Callable[[Result], None], as_jso
     return result.exit_status
 
 
-def drop_none(fields: Mapping[str, Any]) -> dict[str, Any]:
-    """Return the fields that are not None.
-
-    Parameters
-    ----------
-    fields : mapping of str to object
-        Fields of a scene. Fields that do not apply to the scene are None.
-
-    Returns
-    -------
-    dict of str to object
-        Fields that apply to the scene.
-    """
-    return {name: value for name, value in fields.items() if value is not None}
-
-
 def to_json_value(value: Any) -> Any:
     """Convert a value to a value that JSON can represent.
 

@@ -11,7 +11,7 @@ from typing import Any
 from rsfstudy import Study
 from rsfstudy.cli import cost_estimates
 from rsfstudy.cli.printing import print_line, print_pieces
-from rsfstudy.cli.results import EXIT_STATUS_OK, CommandResult, drop_none
+from rsfstudy.cli.results import EXIT_STATUS_OK, CommandResult
 from rsfstudy.execution import CellPlan
 from rsfstudy.reporting import describe_scene_and_rig_fields
 
@@ -71,7 +71,11 @@ class StudyDeclaration(CommandResult):
             "title": study.title,
             "summary": study.summary,
             "axes": [{"size": len(axis), **axis.describe()} for axis in study.axes],
-            "scene": drop_none({n: v for n, v in study.base.as_dict().items() if n not in varied}),
+            "scene": {
+                name: value
+                for name, value in study.base.as_dict().items()
+                if name not in varied and value is not None
+            },
             "rig": {n: v for n, v in self.rig_quantities.items() if n not in varied},
             "measure": self.measure_fields,
             "outputs": [

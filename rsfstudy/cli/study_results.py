@@ -19,13 +19,11 @@ from rsfstudy.cli.printing import print_line, print_pieces
 from rsfstudy.formatting import format_overrides, pluralize
 from rsfstudy.reporting import (
     TextTable,
-    build_reduction_tables,
     claims_table,
     count_pending_cells,
-    count_statuses,
     count_verdicts,
     failures_table,
-    missing_result_reasons,
+    summarise_study_as_fields,
 )
 from rsfstudy.storage import read_declaration
 from rsfstudy.study import NOT_APPLICABLE_VERDICT
@@ -84,21 +82,7 @@ class StudyResults:
         dict of str to object
             Status counts, reductions, missing reductions and failed cells.
         """
-        rows = [row for table in build_reduction_tables(self.dataset) for row in table.values]
-        return {
-            "study": self.name,
-            "title": self.dataset.attrs["title"],
-            "file": self.file,
-            "completeness": self.dataset.attrs["completeness"],
-            "overrides": self.overrides,
-            "statuses": count_statuses(self.dataset),
-            "rhs_evaluations": int(self.dataset["rhs_evaluations"].sum()),
-            "pending_cells": self.pending_count,
-            "failed_cells": self.failures.values,
-            "reductions": [row for row in rows if "name" in row],
-            "cheapest_integrators": [row for row in rows if "name" not in row],
-            "missing_reductions": missing_result_reasons(self.dataset),
-        }
+        return summarise_study_as_fields(self.dataset, self.file)
 
 
 def collect_verdicts(studies: Sequence[StudyResults]) -> pd.DataFrame:

@@ -13,7 +13,6 @@ from rsfstudy._lazy_exports import build_lazy_export_functions
 if TYPE_CHECKING:
     from rsfstudy.reporting.cell_tables import (
         build_frame_of_cells,
-        count_failures,
         count_pending_cells,
         count_statuses,
         failures_table,
@@ -28,18 +27,20 @@ if TYPE_CHECKING:
         split_into_single_fits,
     )
     from rsfstudy.reporting.lattice_tables import (
-        build_primary_output_table,
         summarise_study_as_text_lines,
+    )
+    from rsfstudy.reporting.machine_readable import (
+        build_contents_table,
+        classify_contents,
+        summarise_file_as_fields,
+        summarise_study_as_fields,
     )
     from rsfstudy.reporting.origin_tables import (
         describe_scene_and_rig_fields,
-        find_constant_fields,
         note_on_norms_near_load_velocity,
     )
     from rsfstudy.reporting.reduction_tables import (
-        build_reduction_tables,
         build_reduction_tables_and_sentences,
-        missing_result_reasons,
     )
     from rsfstudy.reporting.summaries import (
         SummaryTableOrSentence,
@@ -47,11 +48,9 @@ if TYPE_CHECKING:
         build_summary_tables_and_sentences,
         describe_dataset_origin,
         is_motion,
-        measure_motion,
     )
     from rsfstudy.reporting.tables import (
         TextTable,
-        build_single_scene_result_table,
         format_number_or_dash,
     )
     from rsfstudy.reporting.verdict_tables import (
@@ -65,7 +64,6 @@ else:
         {
             "reporting.cell_tables": (
                 "build_frame_of_cells",
-                "count_failures",
                 "count_pending_cells",
                 "count_statuses",
                 "failures_table",
@@ -79,31 +77,27 @@ else:
                 "list_fit_values",
                 "split_into_single_fits",
             ),
-            "reporting.lattice_tables": (
-                "build_primary_output_table",
-                "summarise_study_as_text_lines",
+            "reporting.lattice_tables": ("summarise_study_as_text_lines",),
+            "reporting.machine_readable": (
+                "build_contents_table",
+                "classify_contents",
+                "summarise_file_as_fields",
+                "summarise_study_as_fields",
             ),
             "reporting.origin_tables": (
                 "describe_scene_and_rig_fields",
-                "find_constant_fields",
                 "note_on_norms_near_load_velocity",
             ),
-            "reporting.reduction_tables": (
-                "build_reduction_tables_and_sentences",
-                "missing_result_reasons",
-                "build_reduction_tables",
-            ),
+            "reporting.reduction_tables": ("build_reduction_tables_and_sentences",),
             "reporting.summaries": (
                 "SummaryTableOrSentence",
                 "build_motion_tables_and_sentences",
                 "build_summary_tables_and_sentences",
                 "describe_dataset_origin",
                 "is_motion",
-                "measure_motion",
             ),
             "reporting.tables": (
                 "TextTable",
-                "build_single_scene_result_table",
                 "format_number_or_dash",
             ),
             "reporting.verdict_tables": (
@@ -115,18 +109,16 @@ else:
     )
 
 __all__ = [
-    "find_constant_fields",
-    "build_single_scene_result_table",
     "SummaryTableOrSentence",
     "TextTable",
     "all_fits_are_valid",
+    "build_contents_table",
     "build_frame_of_cells",
     "build_motion_tables_and_sentences",
-    "build_primary_output_table",
     "build_reduction_tables_and_sentences",
     "build_summary_tables_and_sentences",
     "claims_table",
-    "count_failures",
+    "classify_contents",
     "count_pending_cells",
     "count_statuses",
     "count_verdicts",
@@ -140,11 +132,10 @@ __all__ = [
     "is_fit",
     "is_motion",
     "list_fit_values",
-    "measure_motion",
-    "missing_result_reasons",
     "note_on_norms_near_load_velocity",
-    "build_reduction_tables",
     "split_into_single_fits",
+    "summarise_file_as_fields",
+    "summarise_study_as_fields",
     "summarise_study_as_text_lines",
     "summarise_verdicts",
 ]
