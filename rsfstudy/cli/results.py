@@ -6,7 +6,6 @@ The printed text and the JSON output are generated from the same result.
 
 from __future__ import annotations
 
-import json
 import math
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping
@@ -68,6 +67,8 @@ def output_result(result: Result, print_result: Callable[[Result], None], as_jso
     if not as_json:
         print_result(result)
         return result.exit_status
+    import json
+
     about = {
         "command": click.get_current_context().info_name,
         "format": JSON_FORMAT,

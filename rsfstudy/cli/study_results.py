@@ -166,21 +166,22 @@ def print_unexpected_verdicts(verdicts: pd.DataFrame) -> None:
         print_line(f"{row.id}: {row.verdict}, expected {row.expected}: {row.claim}", style="red")
 
 
-def print_failures(results: StudyResults) -> None:
+def print_failures(results: StudyResults, with_commands: bool = True) -> None:
     """Print the failed cells, and a command that reproduces each failed cell.
 
     Parameters
     ----------
     results : StudyResults
-        Results of the study. If ``file`` is empty, the commands are not printed.
+        Results of the study.
+    with_commands : bool, default: True
+        If False, the commands are not printed.
     """
     if results.pending_count:
         cells = pluralize(results.dataset["status"].size, "cell")
         text = f"{results.pending_count} of {cells} have not been computed yet"
         print_line(text, style="red")
-    failures = results.failures
-    print_pieces([failures])
-    if failures.rows and results.file:
+    print_pieces([results.failures])
+    if results.failures.rows and with_commands:
         print_line("to reproduce each cell in a single process:")
-        for row in failures.values:
+        for row in results.failures.values:
             print_line(f"  {row['command']}", soft_wrap=True)

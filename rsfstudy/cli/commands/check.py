@@ -135,7 +135,7 @@ def _print_check(result: Check) -> None:
         print_study_name(result.studies[0])
     print_verdicts(result.verdicts)
     for one in result.studies:
-        print_failures(one)
+        print_failures(one, with_commands=False)
     if result.unapplied_claims:
         text = "not checked, because they do not apply to these results"
         print_line(f"{text}: {', '.join(result.unapplied_claims)}", style="red")

@@ -20,7 +20,10 @@ _UNIT_OPTION_NAMES = ("stress", "length", "time")
 @click.option("--csv", is_flag=True, help="Write a CSV table without constant columns.")
 @click.option("--mat", is_flag=True, help="Write a MATLAB file with all variables.")
 @click.option(
-    "--units", nargs=3, metavar="STRESS LENGTH TIME", help="Units of a rig, for example MPa um s."
+    "--units",
+    nargs=3,
+    metavar="STRESS LENGTH TIME",
+    help="Convert results of a rig to these units, for example MPa um s.",
 )
 @click.option(
     "--output",
