@@ -31,7 +31,7 @@ def place(tmp_path_factory):
     for name, rest in (("plain", ("--duration", "8")), ("rig", ("--duration", "80 s", *RIG))):
         ran = call_main(*common, *rest, "--output", place / f"{name}.png")
         assert ran.returncode == 0, ran.stderr
-        assert "stiffness is 0.5 of the critical" in ran.stdout
+        assert "stiffness is 0.5 times the critical" in ran.stdout
         assert "Events faster than 100 V_*" in ran.stdout
     asked = rsfstudy.simulate(SCENE, times=[1.0, 2.0], engine="compiled")
     dataset_files.write_dataset(asked, place / "asked.nc")
