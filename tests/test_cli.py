@@ -1,5 +1,6 @@
 """Tests of the command line: printed output, files and exit statuses."""
 
+import json
 import re
 import subprocess
 import sys
@@ -223,6 +224,19 @@ def test_run_all_goes_on_whatever_becomes_of_a_study(catalogued, tmp_path, monke
     }
     assert ended["moving"][1] == "1 differs"
     assert (tmp_path / "fine.nc").exists()
+    again = call_main("run", "--all", "--serial", "--output", tmp_path, "--json")
+    found = {one["study"]: one for one in json.loads(again.stdout)["studies"]}
+    assert again.returncode == 1
+    assert {name: one["outcome"] for name, one in found.items()} == {
+        "failing": "failed",
+        "moving": "failed",
+        "undrawn": "failed",
+        "taken": "not_finished",
+        "fine": "ok",
+    }
+    assert found["moving"]["problems"] == ["C1 moved"]
+    assert "taken.cells.sqlite" in found["taken"]["message"]
+    assert found["taken"]["results"] is None
 
 
 @pytest.fixture
@@ -250,6 +264,9 @@ def test_run_all_names_the_studies_it_leaves_out(catalogued, tmp_path, monkeypat
     ended = {name: row[-1] for name, row in rows(ran.stdout).items()}
     assert ended == {"plain": "ok", "dear": short}
     assert not list(tmp_path.glob("dear*"))
+    again = call_main("run", "--all", "--serial", "--output", tmp_path, "--json")
+    plain, dear = json.loads(again.stdout)["studies"]
+    assert (plain["outcome"], dear["outcome"], dear["seconds"]) == ("ok", "skipped", None)
     checked = call_main("check", "--all", "--output", tmp_path)
     assert f"dear: {said}" in checked.stdout
     assert "not run yet" not in checked.stdout

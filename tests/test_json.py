@@ -24,7 +24,7 @@ from study_runs import call_main, run_with_failures
 
 import rsfstudy
 from rsfstudy import Scene
-from rsfstudy.cli import commands, results
+from rsfstudy.cli import commands, results, study_results
 from rsfstudy.cli.command_group import CommandGroup
 from rsfstudy.cli.command_line import cli
 from rsfstudy.referee.problem_files import shipped_problem_files
@@ -211,6 +211,20 @@ def test_check_of_a_changed_verdict_and_of_a_claim_that_does_not_apply(place, tm
     # A slope through fewer points than declared does not belong to the claim.
     checked, status = output_of("check", place / "other" / "slopes.nc")
     assert (status, checked["unapplied_claims"]) == (1, ["C1"])
+
+
+def test_check_of_all_studies(place, tmp_path):
+    found, status = output_of("check", "--all", "--output", tmp_path)
+    assert_documented(found)
+    assert status == 1
+    assert {*found["not_run"], *found["skipped"]} == set(rsfstudy.studies())
+    files = [str(place / folder / "slopes.nc") for folder in ("out", "other")]
+    several = [study_results.StudyResults(rsfstudy.open(file), file) for file in files]
+    verdicts = study_results.collect_verdicts(several)
+    claims = study_results.verdicts_to_json(verdicts)
+    assert [claim["study"] for claim in claims] == ["slopes", "slopes"]
+    assert [claim["verdict"] for claim in claims] == ["reproduced", "not applicable"]
+    assert set(claims[0]) == set(documented_keys("Verdict on a claim"))
 
 
 def test_run_prints_nothing_else_on_the_standard_output(place, tmp_path):
