@@ -17,7 +17,7 @@ import numpy as np
 from scipy.optimize import brentq
 
 from rsfstudy.critical_steps.critical_path import CriticalPath
-from rsfstudy.critical_steps.motion_after_step import is_linearly_stable
+from rsfstudy.critical_steps.stability_after_step import is_linearly_stable
 from rsfstudy.motion import Integrator
 from rsfstudy.slider import Scene, quasi_static_log_slip_rate
 

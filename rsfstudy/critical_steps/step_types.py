@@ -11,12 +11,7 @@ import numpy as np
 from scipy.optimize import brentq
 
 from rsfstudy.critical_steps.critical_path import CriticalPath
-from rsfstudy.critical_steps.motion_after_step import (
-    is_linearly_stable,
-    may_have_closed_orbits,
-    motion_reaches_norm,
-    stability_margin,
-)
+from rsfstudy.critical_steps.motion_after_step import motion_reaches_norm
 from rsfstudy.critical_steps.shooting_steps import (
     LOCAL_TOLERANCE_OF_FIRST_ROOT,
     LOG_RATE_EXTENSION_OF_MAX_STEP_FOR_INERTIA,
@@ -25,6 +20,11 @@ from rsfstudy.critical_steps.shooting_steps import (
     ShootingStepFamily,
     StepFamily,
     slip_lag_due_to_inertia,
+)
+from rsfstudy.critical_steps.stability_after_step import (
+    is_linearly_stable,
+    may_have_closed_orbits,
+    stability_margin,
 )
 from rsfstudy.motion import Integrator, MotionStopped, slow_manifold_point
 from rsfstudy.slider import (
