@@ -62,6 +62,8 @@ def place(tmp_path_factory) -> Path:
     scene = Scene(load_velocity_ratio=2.0, normal_stress="constant")
     motion = rsfstudy.simulate(scene, duration=0.1, rtol=1e-2, engine="compiled")
     motion.to_netcdf(place / "motion.nc")
+    held = rsfstudy.simulate(scene.with_(load_velocity_ratio=None, hold_time=10.0), duration=30.0)
+    rsfstudy.healing(held).to_netcdf(place / "holds.nc")
     return place
 
 
@@ -121,6 +123,8 @@ def calls(place: Path) -> dict[str, dict]:
         "rerun": {"file": place / "lattice.nc", **no_workers},
         "run": {"study": LATTICE, "output": None, **no_workers},
         "simulate": {"scene": scene, **quick},
+        "healing": {"record": xr.load_dataset(place / "motion.nc")},
+        "plot_healing": {"table": xr.load_dataset(place / "holds.nc")},
         "plot_motion": {"motion": xr.load_dataset(place / "motion.nc")},
         "to_si": {"dataset": dataset, "normal_stress": 5e6, "slip_distance": 1e-5},
     }

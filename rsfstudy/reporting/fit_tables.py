@@ -173,6 +173,8 @@ def fit_table(dataset: xr.Dataset) -> pd.DataFrame:
         row |= _normal_stresses_in_mpa(one)
         if "window_stiffness" in one and "stiffness" not in one["parameter"].values:
             row["k"] = one["window_stiffness"].item()
+            if stderr := _stderr_of_fixed_stiffness(one):
+                row["k_std"] = stderr
         row["window"] = f"{one['window_begins'].item():g} to {one['window_ends'].item():g}"
         row["R2"], row["criterion"] = one["r_squared"].item(), one["criterion"].item()
         row["p_value"], row["status"] = one["whiteness"].item(), status_label_of_fit(one)
@@ -248,7 +250,8 @@ def summarise_fits(dataset: xr.Dataset) -> Iterator[TextTable | str]:
     TextTable or str
         Parameter tables with up to three fits of the same step side by side. The tables are
         followed by remarks and a comparison of the laws. If there are several steps or records, a
-        final table has one row per fit.
+        final table has one row per fit, and a sentence replaces the tables of each step that was
+        not fitted.
     """
     places: dict[str, list[xr.Dataset]] = {}
     for one in split_into_single_fits(dataset):
@@ -256,7 +259,12 @@ def summarise_fits(dataset: xr.Dataset) -> Iterator[TextTable | str]:
         places.setdefault(where, []).append(one)
     measure: Any = read_declaration(dataset).measure
     together = ", ".join(f"step {step} of {record}" for record, step in measure.get("together", ()))
+    several, unfitted = len(places) > 1, []
     for where, fits in places.items():
+        if several and not any(np.isfinite(one["rows_fitted"].item()) for one in fits):
+            yield _describe_unfitted_step(where, fits)
+            unfitted.append(where)
+            continue
         if together:
             yield f"together: {together}; the window is that of the first"
         for first in range(0, len(fits), _MAX_FITS_PER_TABLE):
@@ -264,10 +272,18 @@ def summarise_fits(dataset: xr.Dataset) -> Iterator[TextTable | str]:
         for one in fits:
             yield from _iterate_fit_remarks(one)
         yield from _compare_laws_of_fits(fits)
-    if len(places) > 1:
-        yield TextTable(
-            [_summary_row_of_fit(one) for fits in places.values() for one in fits], "Of all:"
-        )
+    fitted = [one for where, fits in places.items() if where not in unfitted for one in fits]
+    if several and fitted:
+        yield TextTable([_summary_row_of_fit(one) for one in fitted], "Of all:")
+
+
+def _describe_unfitted_step(place: str, fits: Sequence[xr.Dataset]) -> str:
+    """Return a sentence with the reason why no law was fitted to a step."""
+    reasons = {
+        str(one["message"].item()) or status_label_of_fit(one).replace("_", " "): None
+        for one in fits
+    }
+    return f"{place} is not fitted: {'; '.join(reasons)}"
 
 
 def _compare_laws_of_fits(fits: Sequence[xr.Dataset]) -> Iterator[str]:
@@ -315,7 +331,9 @@ def _build_parameter_column(fit: xr.Dataset) -> dict[str, str]:
         for name, n in parameter_headings(fit).items()
     }
     if "window_stiffness" in fit and "stiffness" not in fit["parameter"].values:
-        found["k" + _bracketed_units("stiffness")] = f"{fit['window_stiffness'].item():.6g}"
+        value, stderr = fit["window_stiffness"].item(), _stderr_of_fixed_stiffness(fit)
+        text = _format_rounded_to_error(value, stderr) if stderr else f"{value:.6g}"
+        found["k" + _bracketed_units("stiffness")] = text
     stresses = [f"{stress:.6g}" for stress in _normal_stresses_in_mpa(fit).values()]
     if stresses:
         found["normal stress (MPa)"] = ", ".join(stresses)
@@ -330,6 +348,13 @@ def _build_parameter_column(fit: xr.Dataset) -> dict[str, str]:
             "worth": pluralize(round(fit["effective_samples"].item()), "independent row"),
         }
     return found | quality | {"status": status_label_of_fit(fit)}
+
+
+def _stderr_of_fixed_stiffness(fit: xr.Dataset) -> float:
+    """Return the standard error of a stiffness that is not fitted, or 0 if it is exact."""
+    if "window_stiffness_stderr" not in fit:
+        return 0.0
+    return float(np.nan_to_num(fit["window_stiffness_stderr"].item()))
 
 
 def _bracketed_units(parameter_name: str) -> str:
