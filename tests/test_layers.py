@@ -6,12 +6,14 @@ Packages import from lower layers only, and heavy libraries are imported by few 
 import ast
 import importlib.util
 import itertools
+import re
 import subprocess
 import sys
 from pathlib import Path
 
 import rsfstudy
 from rsfstudy import slider
+from rsfstudy.cli.commands import MODULE_BY_COMMAND
 from rsfstudy.execution import cell_computation
 from rsfstudy.study import study_index, study_loader
 
@@ -195,14 +197,31 @@ HEAVY = (
 
 def test_help_and_the_list_of_studies_load_next_to_nothing():
     """Help texts and the list of studies do not import heavy libraries."""
+    lines = [["--help"], ["list"], ["list", "--json"], *([n, "--help"] for n in MODULE_BY_COMMAND)]
     asked = (
         "import contextlib, sys; from rsfstudy.cli.command_line import main\n"
-        "for words in (['--help'], ['list'], ['run', '--help'], ['show', '--help']):\n"
+        f"for words in {lines}:\n"
         "    sys.argv = ['rsfstudy', *words]\n"
         "    with contextlib.suppress(SystemExit): main()\n"
         f"    print('loaded:', *set({HEAVY.split()}) & set(sys.modules))"
     )
     ran = subprocess.run([sys.executable, "-c", asked], capture_output=True, text=True, check=True)
     *answers, after = ran.stdout.split("loaded:\n")
-    assert (len(answers), after) == (4, "")
-    assert all(len(answer.splitlines()) > 9 for answer in answers)
+    assert (len(answers), after) == (len(lines), "")
+    assert all(len(answer.splitlines()) > 6 for answer in answers)
+
+
+def test_no_function_takes_an_accuracy_and_a_meter():
+    """An integrator contains both, so no function takes the two arguments."""
+    found = []
+    for file in FILES:
+        for node in ast.walk(ast.parse(file.read_text())):
+            if isinstance(node, ast.FunctionDef):
+                arguments = [*node.args.posonlyargs, *node.args.args, *node.args.kwonlyargs]
+                texts = {ast.unparse(argument) for argument in arguments}
+                accuracies = [t for t in texts if re.search(r"\baccuracy\b|\bAccuracy\b", t)]
+                meters = [t for t in texts if re.search(r"meter\b|\bWorkMeter\b", t)]
+                meters = [t for t in meters if "parameter" not in t.lower()]
+                if accuracies and meters:
+                    found.append(f"{file.name}:{node.name}")
+    assert found == []
