@@ -58,7 +58,7 @@ _REMEDY_FOR_WRONG_STATE_PARAMETERS = (
     "One state has b; two states have b1, b2, slip_distance and slip_distance_2."
 )
 #: Value of the argument ``stiffness`` for a stiffness that is measured in the records.
-_STIFFNESS_FROM_RECORD = "from record"
+STIFFNESS_FROM_RECORD = "from record"
 #: Initial guess of the slip distance, as a fraction of the load point displacement after a step.
 _SLIP_DISTANCE_GUESS_OVER_DISPLACEMENT = 0.05
 #: Maximum value of the argument ``windows``.
@@ -465,7 +465,7 @@ def _initial_stiffness(
     relative_stderr : float
         Relative standard error of a stiffness that is measured in the records, or 0.
     """
-    if stated_stiffness == _STIFFNESS_FROM_RECORD:
+    if stated_stiffness == STIFFNESS_FROM_RECORD:
         return _measure_stiffness(records)
     if stated_stiffness is None:
         if rig is not None and rig.stiffness is not None:
@@ -518,7 +518,7 @@ def _measure_stiffness(records: Sequence[Record]) -> tuple[float, float, float]:
         rule = "needs a portion of the record in which the fault is locked: the reloading after a "
         rule += "hold, an unloading and reloading, or the initial loading"
         remedy = "Pass the stiffness as a quantity, as in '1.6e-3 1/um', or fit it: --free (free=)."
-        raise InvalidValue("stiffness", _STIFFNESS_FROM_RECORD, rule, remedy=remedy)
+        raise InvalidValue("stiffness", STIFFNESS_FROM_RECORD, rule, remedy=remedy)
     value, stderr = compute_weighted_mean(*found.T)
     return (0.0, value, stderr / value) if stressed else (value, 0.0, stderr / value)
 

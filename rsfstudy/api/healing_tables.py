@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -26,21 +25,15 @@ _VELOCITY_ROUNDING = 1e-6
 
 
 @error_boundary
-def healing(
-    record: Record | xr.Dataset | str | Path,
-    *,
-    columns: Mapping[str, Any] | None = None,
-    normal_stress: Any = None,
-    stiffness: Any = None,
-) -> xr.Dataset:
+def healing(record: Record | xr.Dataset | str | Path, **reading: Any) -> xr.Dataset:
     """Measure frictional healing in a slide-hold-slide test.
 
     Parameters
     ----------
     record : Record, xarray.Dataset, str or Path
         Record of an experiment, or the path of its file, or a motion from ``rsfstudy.simulate``.
-    columns, normal_stress, stiffness : optional
-        Arguments of ``rsfstudy.read_record`` if ``record`` is a path.
+    **reading : object
+        Keyword arguments of ``rsfstudy.read_record`` if ``record`` is a path.
 
     Returns
     -------
@@ -72,7 +65,7 @@ def healing(
     array([0.04])
     """
     if isinstance(record, str | Path):
-        record = read_record(record, columns, normal_stress=normal_stress, stiffness=stiffness)
+        record = read_record(record, **reading)
     if isinstance(record, Record):
         table, name = record.holds(), record.name
     elif hasattr(record, "data_vars"):

@@ -80,8 +80,8 @@ class Hold(NamedTuple):
     @property
     def exact_quantities(self) -> tuple[float, float, float, float]:
         """Begin and duration of the hold in s, and velocities before and after in um/s."""
-        duration = self.reload.start - self.stop.end
-        return self.stop.end, duration, self.stop.velocity_before, self.reload.velocity_after
+        duration = self.reload.middle - self.stop.middle
+        return self.stop.middle, duration, self.stop.velocity_before, self.reload.velocity_after
 
 
 class Estimate(NamedTuple):
@@ -203,12 +203,12 @@ class HoldFit:
         displacement_variance: float,
     ) -> None:
         self.time, self.hold, self.displacement_variance = time, hold, displacement_variance
-        late = np.maximum(time - hold.reload.start, 0.0)
-        early = np.minimum(time - hold.stop.start, 0.0)
+        late = np.maximum(time - hold.reload.middle, 0.0)
+        early = np.minimum(time - hold.stop.middle, 0.0)
         #: Load point displacement relative to the displacement of the hold.
         self.moved = hold.stop.velocity_before * early + hold.reload.velocity_after * late
         self.level = friction - trend * self.moved
-        self.rows_after = np.flatnonzero((time > hold.reload.start) & (time < hold.window_end))
+        self.rows_after = np.flatnonzero((time > hold.reload.middle) & (time < hold.window_end))
 
     def measure(self) -> tuple[list[float], list[float], list[float]]:
         """Estimate the frictions of the hold.
@@ -273,7 +273,8 @@ class HoldFit:
 
     def _hold_coordinate(self, rows: np.ndarray) -> np.ndarray:
         """Return the logarithm of the hold time, mapped to 1 at the end of the hold."""
-        logs = np.log(np.append(self.time[rows], self.hold.reload.start) - self.hold.stop.end)
+        times = np.append(self.time[rows], self.hold.reload.middle)
+        logs = np.log(times - self.hold.stop.middle)
         return normalise(logs)[:-1]
 
     def _choose_rows_of_hold_end(self) -> np.ndarray:
@@ -290,7 +291,7 @@ class HoldFit:
         guard = 0.5 * gap + math.cbrt(self.displacement_variance * gap / speed**2)
         rows = rows[(time[rows] > begins + guard) & (time[rows] < ends - guard)]
         windows = (rows[-count:] for count in _HOLD_END_ROWS if count <= len(rows))
-        logs = np.log(np.maximum(time - begins, 1e-300))
+        logs = np.log(np.maximum(time - self.hold.stop.middle, 1e-300))
         degree = _HOLD_END_DEGREES[0]
         return choose_polynomial_window(windows, logs, self.level, degree, self._reference)[0]
 
@@ -352,12 +353,10 @@ class HoldFit:
             low = find_polynomial_maximum(fewer)
             misfit = float(polynomial.polyval(low if math.isfinite(low) else at, fewer)) - value
         half = 0.5 * float(self.time[rows[-1]] - self.time[rows[0]])
-        reload, when = self.hold.reload, float(self.time[rows[0]]) + (at + 1.0) * half
-        ramp = reload.velocity_after - reload.velocity_before
-        distance = reload.velocity_after * (when - reload.start)
-        distance -= 0.5 * ramp * (reload.end - reload.start)
+        speed, when = self.hold.reload.velocity_after, self.time[rows[0]] + (at + 1.0) * half
+        distance = speed * float(when - self.hold.reload.middle)
         padding = np.zeros(first)
-        by_slope = reload.velocity_after * half * of_slope / curvature
+        by_slope = speed * half * of_slope / curvature
         return (
             Estimate(
                 value - excess, np.append(padding, of_value), excess**2 + misfit**2, -distance

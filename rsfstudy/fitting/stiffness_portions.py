@@ -69,6 +69,9 @@ _BOUNDS_OF_LOG_RATE_RATIO, _BOUNDS_OF_LOG_A, _BOUNDS_OF_STATE_CHANGE = (
 )
 #: Number of times that the noise and the parameters are estimated in turn.
 _NOISE_ESTIMATION_PASSES = 3
+#: Number of rows after a step from which its displacement is computed. A step is immediate if the
+#: displacement during the step deviates by at most the second number of standard deviations.
+_ROWS_AFTER_STEP, _MAX_DEVIATION_OF_IMMEDIATE_STEP = 20, 5.0
 #: Largest relative standard error of a stiffness that is used.
 _MAX_RELATIVE_STDERR = 0.25
 
@@ -195,7 +198,7 @@ def find_portions(
     Portion
         Portions in order of time.
     """
-    guard = noise_variance(time, displacement)
+    noise_sd = math.sqrt(noise_variance(time, displacement))
     end_times = [*(step.start for step in steps[1:]), float(time[-1])]
     for number, (step, ends) in enumerate(zip(steps, end_times, strict=True)):
         if not number:
@@ -206,16 +209,40 @@ def find_portions(
             kind = RELOADING
         else:
             continue
-        change = step.velocity_after - step.velocity_before
-        if not step.velocity_after or not change:
+        if not step.velocity_after:
             continue
-        gap = float(np.median(np.diff(time[(time > step.end)][:20]))) if number else 0.0
-        late = step.end + math.cbrt(guard * gap / change**2)
-        rows = (time >= late) & (time < ends)
-        moved = step.velocity_after * (time[rows] - step.end)
+        begins = _find_end_of_step(time, displacement, step, noise_sd) if number else step.end
+        rows = (time >= begins) & (time < ends)
+        moved = step.velocity_after * (time[rows] - step.middle)
         portion = _cut_at_slip(Portion(kind, time[rows], moved, friction[rows]))
         if portion is not None:
             yield portion
+
+
+def _find_end_of_step(
+    time: np.ndarray, displacement: np.ndarray, step: LoadingStep, noise_sd: float
+) -> float:
+    """Return the time in s from which the load point velocity is constant after a step.
+
+    If a record has few rows before an immediate step, the detected step lasts longer than the
+    actual step.
+    """
+    later = np.flatnonzero(time > step.end)[:_ROWS_AFTER_STEP]
+    inside = (time > step.start) & (time < step.end)
+    if len(later) < 2:
+        return step.end
+    late = time - step.middle
+    line = step.velocity_before * np.minimum(late, 0.0) + step.velocity_after * np.maximum(
+        late, 0.0
+    )
+    level = float(np.mean((displacement - line)[later]))
+    off = np.abs((displacement - line)[inside] - level).max(initial=0.0)
+    is_immediate = off <= _MAX_DEVIATION_OF_IMMEDIATE_STEP * noise_sd
+    gap = float(np.median(np.diff(time[later])))
+    change = step.velocity_after - step.velocity_before
+    # The time of the step has an uncertainty.
+    guard = math.cbrt(noise_sd**2 * gap / change**2) if change else 0.0
+    return (step.middle if is_immediate else step.end) + guard
 
 
 def _cut_at_slip(portion: Portion) -> Portion | None:

@@ -131,7 +131,7 @@ def _build_parameter_column(fit: xr.Dataset) -> dict[str, str]:
     }
     if "window_stiffness" in fit and "stiffness" not in fit["parameter"].values:
         value, stderr = fit["window_stiffness"].item(), stderr_of_fixed_stiffness(fit)
-        text = _format_rounded_to_error(value, stderr) if stderr else f"{value:.6g}"
+        text = format_with_error(value, stderr) if stderr else f"{value:.6g}"
         found["k" + _bracketed_units("stiffness")] = text
     stresses = [f"{stress:.6g}" for stress in normal_stresses_in_mpa(fit).values()]
     if stresses:
@@ -188,17 +188,25 @@ def format_with_stderr(fit: xr.Dataset, parameter_name: str) -> str:
     str
         Formatted parameter. An asterisk marks a standard error that is not valid.
     """
-    text = _format_rounded_to_error(
-        fit[parameter_name].item(), fit[f"{parameter_name}_stderr"].item()
-    )
+    text = format_with_error(fit[parameter_name].item(), fit[f"{parameter_name}_stderr"].item())
     is_marked = " +- " in text and status_label_of_fit(fit) == Status.ERRORS_NOT_VALID.label
     return text + _MARK_OF_INVALID_STDERRS * is_marked
 
 
-def _format_rounded_to_error(value: float, error: float) -> str:
+def format_with_error(value: float, error: float) -> str:
     """Format a value with its standard error.
 
     The value and the error are rounded to two significant digits of the error.
+
+    Parameters
+    ----------
+    value, error : float
+        Value and standard error.
+
+    Returns
+    -------
+    str
+        Formatted value and error, or a dash if the value is not finite.
     """
     if not math.isfinite(value):
         return "-"
