@@ -38,8 +38,11 @@ def select_steady_rows(
     """
     share = _WINDOW_START_FRACTION if start_time > time[0] else 0.0
     start_time += share * (end_time - start_time)
+    rows = np.flatnonzero((time >= start_time) & (time < end_time))
+    if len(rows) < MIN_ROWS:
+        return rows[:0]
     begins = find_start_of_linear_friction(time, friction, start_time, end_time)
-    rows = np.flatnonzero((time >= begins) & (time < end_time))[-_MAX_ROWS:]
+    rows = rows[time[rows] >= begins][-_MAX_ROWS:]
     return rows if len(rows) >= MIN_ROWS else rows[:0]
 
 

@@ -164,7 +164,7 @@ def measure_holds(
     moves = [step for step in steps if step.changes_velocity]
     holds = find_holds(time, friction, moves)
     trend, trend_stderr = fit_trend(time, friction, moves)
-    guard = noise_variance(time, displacement) if holds else 0.0
+    guard = noise_variance(time, displacement) if holds and len(time) > 2 else 0.0
     results = [HoldFit(time, friction, hold, trend, guard).measure() for hold in holds]
     # The rows are holds, and the columns are the quantities that have errors.
     values, errors, slopes = (np.array([of[n] for of in results]).reshape(-1, 5) for n in range(3))

@@ -123,10 +123,12 @@ def measure_stiffness(
         first_velocity = float(np.polyfit(time - time[0], displacement, 1)[0])
     moves.insert(0, LoadingStep(float(time[0]), float(time[0]), 0.0, first_velocity))
     trend, trend_stderr = fit_trend(time, friction, moves)
-    rows = []
+    rows: list[tuple[str, float, float, float, float, float]] = []
+    if len(time) < _MIN_PORTION_ROWS:
+        return _build_table(rows, 0.0, has_stress=normal_stress is not None)
     for portion in find_portions(time, displacement, friction, moves):
         value, stderr = fit_stiffness(portion)
-        if stderr < _MAX_RELATIVE_STDERR * value:
+        if 0.0 < stderr < _MAX_RELATIVE_STDERR * value:
             begins, ends = portion.time[[0, -1]].tolist()
             inside = (time >= begins) & (time <= ends)
             stress = math.nan if normal_stress is None else float(normal_stress[inside].mean())
