@@ -61,9 +61,10 @@ _MIN_INITIAL_RISE = 0.05
 #: Mean and standard deviation of the prior distributions of ln a and g.
 _PRIOR_OF_LOG_A, _PRIOR_OF_STATE_CHANGE = (math.log(0.01), 0.7), (0.0, 1.5)
 #: Bounds of ln |v|, ln a and g. The slip rate ratio v belongs to the last row of a portion, or to
-#: the first row of an unloading portion.
+#: the first row of an unloading portion. At the end of a loading portion, v is less than 1, because
+#: friction still increases.
 _BOUNDS_OF_LOG_RATE_RATIO, _BOUNDS_OF_LOG_A, _BOUNDS_OF_STATE_CHANGE = (
-    (-12.0, 1.0),
+    (-12.0, -0.05),
     (math.log(5e-4), math.log(0.1)),
     (-1.0, 12.0),
 )
@@ -307,6 +308,7 @@ def fit_stiffness(portion: Portion) -> tuple[float, float]:
         [(-np.inf, np.inf), first[1] + np.array([-3.0, 3.0]), _BOUNDS_OF_LOG_RATE_RATIO,
          _BOUNDS_OF_LOG_A, _BOUNDS_OF_STATE_CHANGE]
     ).T  # fmt: skip
+    bounds[1, 2] += unloads  # Sliding precedes the unloading, so |v| is about 1.
     prior_means, prior_sds = np.array([_PRIOR_OF_LOG_A, _PRIOR_OF_STATE_CHANGE]).T
     noise, noise_sd = build_white_noise_model(time), math.sqrt(noise_variance(time, y))
 

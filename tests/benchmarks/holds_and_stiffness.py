@@ -86,10 +86,12 @@ def integrate(
     displacement, friction = np.empty((2, len(times)))
     peaks = []
     for lasts, load in loading:
-        solved = solve_ivp(
-            rates, (0.0, lasts), state, "Radau", dense_output=True, events=at_peak, args=(load,),
-            rtol=1e-8, atol=1e-10,
-        )  # fmt: skip
+        # Trial values of the implicit solver may overflow.
+        with np.errstate(over="ignore"):
+            solved = solve_ivp(
+                rates, (0.0, lasts), state, "Radau", dense_output=True, events=at_peak, args=(load,),
+                rtol=1e-8, atol=1e-10,
+            )  # fmt: skip
         here = times >= begins  # Later segments overwrite their own rows.
         friction[here] = solved.sol(np.minimum(times[here] - begins, lasts))[0]
         displacement[here] = moved + load * (times[here] - begins)
