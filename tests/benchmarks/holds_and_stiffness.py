@@ -89,9 +89,16 @@ def integrate(
         # Trial values of the implicit solver may overflow.
         with np.errstate(over="ignore"):
             solved = solve_ivp(
-                rates, (0.0, lasts), state, "Radau", dense_output=True, events=at_peak, args=(load,),
-                rtol=1e-8, atol=1e-10,
-            )  # fmt: skip
+                rates,
+                (0.0, lasts),
+                state,
+                "Radau",
+                dense_output=True,
+                events=at_peak,
+                args=(load,),
+                rtol=1e-8,
+                atol=1e-10,
+            )
         here = times >= begins  # Later segments overwrite their own rows.
         friction[here] = solved.sol(np.minimum(times[here] - begins, lasts))[0]
         displacement[here] = moved + load * (times[here] - begins)
