@@ -15,7 +15,7 @@ from rsfstudy._lazy_exports import build_lazy_export_functions
 if TYPE_CHECKING:
     from rsfstudy.fitting.drop_detection import MIN_SAMPLES, Detection
     from rsfstudy.fitting.drop_measurements import read_drops
-    from rsfstudy.fitting.filters import LOW_PASS_ORDERS, MEAN, TRAILING_MEAN, Filter
+    from rsfstudy.fitting.filters import FILTER_KINDS, LOW_PASS_ORDERS, MEAN, TRAILING_MEAN, Filter
     from rsfstudy.fitting.fit_measure import Fit
     from rsfstudy.fitting.fit_validity_checks import describe_whiteness
     from rsfstudy.fitting.fit_window import FitWindow
@@ -36,7 +36,13 @@ else:
         {
             "fitting.drop_detection": ("Detection", "MIN_SAMPLES"),
             "fitting.drop_measurements": ("read_drops",),
-            "fitting.filters": ("Filter", "LOW_PASS_ORDERS", "MEAN", "TRAILING_MEAN"),
+            "fitting.filters": (
+                "FILTER_KINDS",
+                "Filter",
+                "LOW_PASS_ORDERS",
+                "MEAN",
+                "TRAILING_MEAN",
+            ),
             "fitting.fit_measure": ("Fit",),
             "fitting.joint_model": ("fitted_fields", "split_window_number", "strip_window_number"),
             "fitting.record": ("RECORD_COLUMNS", "Record"),
@@ -58,6 +64,7 @@ __all__ = [
     "Detection",
     "EVENT_QUANTITIES",
     "EventNumbers",
+    "FILTER_KINDS",
     "Filter",
     "Fit",
     "FitWindow",

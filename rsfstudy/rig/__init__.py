@@ -19,6 +19,8 @@ if TYPE_CHECKING:
         convert_values_to_units,
         make_axis_with_units,
     )
+    from rsfstudy.rig.column_reading import ColumnsOfSource, ReadingOptions, read_columns
+    from rsfstudy.rig.columns import Column
     from rsfstudy.rig.dataset_scales import (
         DIMENSIONLESS_PREFIX,
         DISPLAY_BASE_UNITS,
@@ -43,13 +45,14 @@ if TYPE_CHECKING:
         convert_scene_and_axes_to_rig,
         replace_rig_quantity,
     )
-    from rsfstudy.rig.table_files import Column, read_table
+    from rsfstudy.rig.table_files import read_table
     from rsfstudy.rig.units import (
         compute_conversion_factor,
         convert_to_si,
         expand_range,
         parse_number,
     )
+    from rsfstudy.rig.usual_headings import UsableColumns
 else:
     __getattr__, __dir__ = build_lazy_export_functions(
         __name__,
@@ -78,13 +81,16 @@ else:
                 "slip_rate_from_log",
                 "find_scale_of_variable",
             ),
-            "rig.table_files": ("Column", "read_table"),
+            "rig.columns": ("Column",),
+            "rig.column_reading": ("ColumnsOfSource", "ReadingOptions", "read_columns"),
+            "rig.table_files": ("read_table",),
             "rig.axes_with_units": (
                 "axis_name_and_units",
                 "convert_axis_to_stated_units",
                 "convert_values_to_units",
                 "make_axis_with_units",
             ),
+            "rig.usual_headings": ("UsableColumns",),
             "rig.units": (
                 "convert_to_si",
                 "expand_range",
@@ -96,11 +102,14 @@ else:
 
 __all__ = [
     "Column",
+    "ColumnsOfSource",
     "DIMENSIONLESS_PREFIX",
     "DISPLAY_BASE_UNITS",
     "RATIO_FIELD_BY_DIMENSIONAL_NAME",
     "RIG_QUANTITIES",
+    "ReadingOptions",
     "Rig",
+    "UsableColumns",
     "LatticeScenesOnRig",
     "NAME_OF_SCALES_ATTRIBUTE",
     "axis_name_and_units",
@@ -117,6 +126,7 @@ __all__ = [
     "make_axis_with_units",
     "parse_number",
     "convert_scene_and_axes_to_rig",
+    "read_columns",
     "read_si_scales",
     "read_table",
     "slip_rate_from_log",

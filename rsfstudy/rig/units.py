@@ -43,8 +43,10 @@ _SI_FACTOR_AND_EXPONENTS_BY_UNIT: Mapping[str, tuple[str | int, tuple[int, int, 
     **dict.fromkeys(("um", "\u00b5m", "\u03bcm", "micron", "microns"), ("1e-6", _LENGTH_EXPONENTS)),
     "nm": ("1e-9", _LENGTH_EXPONENTS),
     "ms": ("1e-3", _TIME_EXPONENTS),
-    "s": (1, _TIME_EXPONENTS),
+    **dict.fromkeys(("s", "sec", "seconds"), (1, _TIME_EXPONENTS)),
     "min": (60, _TIME_EXPONENTS),
+    "Hz": (1, (0, 0, -1)),
+    "kHz": ("1e3", (0, 0, -1)),
     "h": (3600, _TIME_EXPONENTS),
     "day": (86400, _TIME_EXPONENTS),
     "year": (31557600, _TIME_EXPONENTS),
@@ -395,3 +397,23 @@ def _convert_pint_quantity(quantity_name: str, value: Any, quantity: Any, units:
     except Exception as error:
         raise _incompatible_units_error(quantity_name, value, units) from error
     return to_plain_value(quantity_name, magnitude)
+
+
+def find_size_of_units(units: str) -> SiFactorAndExponents | None:
+    """Return the conversion factor and the kind of units that need no pint.
+
+    Parameters
+    ----------
+    units : str
+        Product or quotient of units, such as "MPa" or "um/s".
+
+    Returns
+    -------
+    (Fraction, (int, int, int)) or None
+        Conversion factor to SI units, and the exponents of kilogram, metre and second. The value is
+        None if the string is not a product or quotient of known units.
+    """
+    powers = _parse_unit_powers(units) if 0 < len(units) <= _MAX_QUANTITY_TEXT_LENGTH else None
+    if not powers or not all(name in _KNOWN_UNITS for name, _power in powers):
+        return None
+    return _multiply_known_units(powers)
