@@ -28,6 +28,7 @@ from rsfstudy.fitting import (
     LoadingStep,
     Record,
     check_free_parameters,
+    displacement_is_slip,
     noise_variance,
     parameters_of_law,
 )
@@ -155,7 +156,8 @@ def fit(
     averaging : quantity, optional
         Time over which the data logger averaged friction around each row, such as "1 s", or a
         number in s. Use "trailing 1 s" if the average ends at the row. The same average is applied
-        to the model. By default, the fit assumes that friction was not averaged.
+        to the model. By default, the fit applies the filter with which `read_record` filtered the
+        record, or assumes that friction was not averaged.
     low_pass : str, optional
         Low-pass filter that was applied to friction, with its corner frequency: "first_order 2 Hz",
         "butterworth_2 2 Hz" or "butterworth_4 2 Hz". The same filter is applied to the model. By
@@ -277,6 +279,8 @@ def fit(
     if machine:
         _check_normal_stress_is_compressive(records, numbers)
         ratio = machine / FitWindow(records[0], numbers[0]).mean_normal_stress_before_step
+    if "stiffness" not in free:
+        _check_displacement_is_not_slip(records, numbers, ratio, machine)
     first = _initial_scene(laws, scene, ratio * guess)
     sought = _free_parameters(free, laws, first)
     there = tuple((one.name, n) for one in records for n in numbers if n <= len(one.loading_steps))
@@ -291,7 +295,7 @@ def fit(
         after=_to_micrometres("after", after),
         noise=noise,
         loading=loading,
-        filter=_describe_filter(averaging, low_pass),
+        filter=_find_common_filter(records, _describe_filter(averaging, low_pass)),
         posterior=posterior,
         machine_stiffness=machine,
     )
@@ -322,9 +326,11 @@ def fit(
         plot="fits",
         accuracy=Accuracy(rtol, budget, engine=chosen),
     )
-    return study_runs.run(
+    fits = study_runs.run(
         study, workers=workers, output=None, progress=False, keep_going=True, command=command
     )
+    processing = [f"{one.name}: {text}" for one in records for text in one.processing]
+    return fits.assign_attrs({"processing": "; ".join(processing)} if processing else {})
 
 
 def _select_step_numbers(records: Sequence[Record], steps: Sequence[int]) -> tuple[int, ...]:
@@ -376,9 +382,36 @@ def _check_displacement_was_not_reset(record: Record) -> None:
     if record.specified_steps is None and back:
         rule = f"falls back between two rows at {time[row + 1]:g} s in {record.name}, as a load "
         rule += "point does that is set to zero again"
-        remedy = f"Fit its parts, as in record.window({time[0]:g}, {time[row]:g}), or add the "
-        remedy += "offset to the later rows."
+        remedy = f"Fit its parts, as in record.window({time[0]:g}, {time[row]:g}) or by reading "
+        remedy += f"begin='{time[row + 1]:g} s' (--begin), or add the offset to the later rows."
         raise InvalidValue("displacement", f"{jumps[row]:.4g} um", rule, remedy=remedy)
+
+
+def _check_displacement_is_not_slip(
+    records: Sequence[Record], step_numbers: Sequence[int], ratio: float, machine: float
+) -> None:
+    """Raise ``InvalidValue`` if the displacement of a record is the slip of the fault.
+
+    The stiffness is ``ratio`` in 1/um or ``machine`` in Pa/um, as in ``_initial_stiffness``.
+    """
+    for record in records:
+        stress = record.columns["friction"]
+        shortening = (
+            stress * record.columns["normal_stress"] / machine if machine else stress / ratio
+        )
+        ends = [-math.inf, *(step.end for step in record.loading_steps)]
+        begins = [*(step.start for step in record.loading_steps[1:]), math.inf, math.inf]
+        for number in step_numbers:
+            if number > len(record.loading_steps):
+                continue
+            rows = (record.time >= ends[number - 1]) & (record.time <= begins[number - 1])
+            moved = record.columns["displacement"][rows]
+            if displacement_is_slip(record.time[rows], moved, shortening[rows]):
+                rule = f"is the slip of the fault at step {number}, because displacement plus "
+                rule += "friction over stiffness moves at constant velocities, as a load point does"
+                remedy = "Name the column slip: --columns 'slip=HEADING (um)' (columns=), and pass "
+                remedy += "the stiffness to read_record, too."
+                raise InvalidValue("displacement", record.name, rule, remedy=remedy)
 
 
 def _check_step_can_be_fitted(record: Record, step_number: int, step: LoadingStep) -> None:
@@ -589,6 +622,23 @@ def _describe_filter(averaging: Any, low_pass: str) -> str:
     else:
         return ""
     return f"{kind} {seconds!r}"
+
+
+def _find_common_filter(records: Sequence[Record], stated_filter: str) -> str:
+    """Return the filter that was applied to the friction of all records.
+
+    A filter that was applied while a record was read is part of the record.
+    """
+    filters = {record.filter for record in records if record.filter}
+    if not filters:
+        return stated_filter
+    if stated_filter:
+        remedy = "Leave averaging= and low_pass= out, or read the record without filter=."
+        raise InvalidValue("filter", stated_filter, "follows another filter", remedy=remedy)
+    if len({record.filter for record in records}) > 1:
+        remedy = "Read all records with the same filter=, or fit them separately."
+        raise InvalidValue("filter", sorted(filters), "differs between the records", remedy=remedy)
+    return filters.pop()
 
 
 def _to_micrometres(argument_name: str, value: Any) -> float:

@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from rsfstudy.fitting.fit_validity_checks import describe_whiteness
     from rsfstudy.fitting.fit_window import FitWindow
     from rsfstudy.fitting.joint_model import fitted_fields, split_window_number, strip_window_number
+    from rsfstudy.fitting.load_point_check import displacement_is_slip
     from rsfstudy.fitting.record import RECORD_COLUMNS, Record
     from rsfstudy.fitting.stress_drop_fits import EVENT_QUANTITIES, EventNumbers
     from rsfstudy.fitting.velocity_steps import LoadingStep, noise_variance
@@ -45,6 +46,7 @@ else:
             ),
             "fitting.fit_measure": ("Fit",),
             "fitting.joint_model": ("fitted_fields", "split_window_number", "strip_window_number"),
+            "fitting.load_point_check": ("displacement_is_slip",),
             "fitting.record": ("RECORD_COLUMNS", "Record"),
             "fitting.stress_drop_fits": ("EVENT_QUANTITIES", "EventNumbers"),
             "fitting.fit_validity_checks": ("describe_whiteness",),
@@ -79,6 +81,7 @@ __all__ = [
     "TRAILING_MEAN",
     "check_free_parameters",
     "describe_whiteness",
+    "displacement_is_slip",
     "fitted_fields",
     "noise_variance",
     "parameters_of_law",

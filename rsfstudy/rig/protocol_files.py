@@ -218,7 +218,9 @@ def _load_point_velocity(
 
 @accept_former_keyword_names
 @error_boundary
-def read_protocol(path: str | Path, rig: Rig | None = None, name: str = "protocol") -> Protocol:
+def read_protocol(
+    path: str | Path, rig: Rig | None = None, name: str = "protocol", *, decimal: str = "."
+) -> Protocol:
     r"""Read a loading protocol from a CSV file.
 
     Parameters
@@ -234,6 +236,8 @@ def read_protocol(path: str | Path, rig: Rig | None = None, name: str = "protoco
         units ``V_*``, ``D_c``, ``D_c/V_*`` and ``sigma_*``.
     name : str, default: "protocol"
         Name of the protocol in results.
+    decimal : {".", ","}, default: "."
+        Decimal separator of the file.
 
     Returns
     -------
@@ -258,7 +262,7 @@ def read_protocol(path: str | Path, rig: Rig | None = None, name: str = "protoco
     >>> test.duration
     12.0
     """
-    columns = read_table(path)
+    columns = read_table(path, decimal=decimal)
     for key in columns:
         if key not in SEGMENT_MAPPING_KEYS:
             raise InvalidValue("column", key, "is unknown", choices=SEGMENT_MAPPING_KEYS)

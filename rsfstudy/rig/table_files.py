@@ -26,7 +26,10 @@ ColumnChoosingFunction = Callable[[list[str], str], dict[str, ColumnSpec]]
 
 @error_boundary
 def read_table(
-    path: str | Path, columns: Mapping[str, Any] | ColumnChoosingFunction | None = None
+    path: str | Path,
+    columns: Mapping[str, Any] | ColumnChoosingFunction | None = None,
+    *,
+    decimal: str = ".",
 ) -> dict[str, Column]:
     r"""Read columns of a CSV file or of a text file.
 
@@ -43,6 +46,8 @@ def read_table(
         units, as in ``velocity (um/s), distance (um)``. You can also pass a function with two
         arguments, a list of headings and a description of the location of the headings. The
         function must return a mapping of column names to column selections.
+    decimal : {".", ","}, default: "."
+        Decimal separator of a text file.
 
     Returns
     -------
@@ -69,7 +74,7 @@ def read_table(
     >>> table["distance"].units
     'um'
     """
-    table = read_source(path)
+    table = read_source(path, decimal=decimal)
     headings = dict.fromkeys(table.headings)
     wanted: Any
     if isinstance(columns, Mapping):

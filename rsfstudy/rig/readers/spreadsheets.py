@@ -12,7 +12,7 @@ import numpy as np
 import pandas as pd
 
 from rsfstudy.errors import DataError, InvalidValue
-from rsfstudy.rig.columns import Column
+from rsfstudy.rig.columns import EXAMPLE_OF_TABLE_HEADER, Column
 from rsfstudy.rig.readers.missing_libraries import missing_library_error
 from rsfstudy.rig.readers.source import Source, Table
 from rsfstudy.rig.readers.text_layout import detect_layout
@@ -92,7 +92,7 @@ def read_workbook(source: Source) -> Table:
             raise InvalidValue("sheet", source.sheet, "is not in the workbook", choices=names)
         sheet = source.sheet or names[0]
         try:
-            cells = book.parse(sheet, header=None)
+            cells = pd.read_excel(book, sheet_name=sheet, header=None)
         except Exception as error:
             raise DataError(f"{source.origin}: cannot read sheet {sheet!r} ({error})") from error
     return _build_table_of_cells(cells, f"{source.origin}, sheet {sheet!r}", source.decimal)
@@ -122,7 +122,7 @@ def _build_table_of_cells(cells: pd.DataFrame, name: str, decimal: str) -> Table
     ]
     layout = detect_layout([f"sep={_MARK}", *lines], decimal)
     if not layout.headings:
-        remedy = "Its first row reads, for instance, Time (s), Displacement (um), Friction."
+        remedy = f"Its first row reads, for instance, {EXAMPLE_OF_TABLE_HEADER}."
         raise InvalidValue("table", name, "has no header", remedy=remedy)
     # The line with the separator comes before the cells.
     body = cells.iloc[layout.body_line - 2 :]

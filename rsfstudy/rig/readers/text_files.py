@@ -12,7 +12,7 @@ import numpy as np
 import pandas as pd
 
 from rsfstudy.errors import DataError, InvalidValue
-from rsfstudy.rig.columns import Column
+from rsfstudy.rig.columns import EXAMPLE_OF_TABLE_HEADER, Column
 from rsfstudy.rig.readers.source import Source, Table
 from rsfstudy.rig.readers.text_layout import (
     BLANKS,
@@ -120,7 +120,7 @@ def read_text(source: Source) -> Table:
     has_headings = layout.header_line > 0
     location = f"{name}, line {layout.header_line}" if has_headings else name
     if not layout.headings:
-        remedy = "Its first line reads, for instance, Time (s), Displacement (um), Friction."
+        remedy = f"Its first line reads, for instance, {EXAMPLE_OF_TABLE_HEADER}."
         raise InvalidValue("table", name, "has no header", remedy=remedy)
 
     def load(index: int, quantity_name: str) -> Column:

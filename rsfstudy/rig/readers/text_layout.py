@@ -227,15 +227,22 @@ def _split_header(line: str, delimiter: str, size: int) -> list[str]:
 def _split_in_several_ways(text: str, delimiter: str) -> Iterator[list[str]]:
     """Yield the fields of a header for several delimiters, beginning with the given one."""
     if delimiter == BLANKS:
-        yield _merge_brackets(text.split())
-        yield text.split()
+        yield from _split_at_blanks(text)
     for mark in (delimiter, "\t", ";", ","):
         if mark != BLANKS:
             yield split_fields(text, mark)
     yield re.split(r"\s{2,}", text)
     if delimiter != BLANKS:
-        yield _merge_brackets(text.split())
-        yield text.split()
+        yield from _split_at_blanks(text)
+
+
+def _split_at_blanks(text: str) -> Iterator[list[str]]:
+    """Yield the fields of a header whose headings and units are separated by blanks."""
+    words = text.split()
+    yield _merge_brackets(words)
+    yield re.split(r"(?<=[)\]])\s+", text)
+    if len({word.startswith(("(", "[")) for word in words}) == 1:
+        yield words
 
 
 def _merge_brackets(words: Sequence[str]) -> list[str]:

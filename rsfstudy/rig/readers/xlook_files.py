@@ -82,9 +82,13 @@ def read_xlook(source: Source) -> Table:
         columns.append((begin, count))
         begin += 4 * count
 
+    # The last sample of a column may be missing.
+    longest = max(count for _start, count in columns)
+    common = min(count for _start, count in columns if count >= longest - 1)
+
     def load(index: int, quantity_name: str) -> Column:
         start, count = columns[index]
-        values = np.frombuffer(data, ">f4", count, start).astype(float)
+        values = np.frombuffer(data, ">f4", min(count, common), start).astype(float)
         values = np.cumsum(values) if quantity_name == "time" else values
         return Column(values, "", index + 1)
 
