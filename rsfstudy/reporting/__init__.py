@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 from rsfstudy._lazy_exports import build_lazy_export_functions
 
 if TYPE_CHECKING:
+    from rsfstudy.reporting.event_tables import build_record_events_pieces, list_record_events
     from rsfstudy.reporting.fit_tables import (
         all_fits_are_valid,
         fit_table,
@@ -45,6 +46,7 @@ else:
     __getattr__, __dir__ = build_lazy_export_functions(
         __name__,
         {
+            "reporting.event_tables": ("build_record_events_pieces", "list_record_events"),
             "reporting.fit_tables": (
                 "all_fits_are_valid",
                 "fit_table",
@@ -82,6 +84,8 @@ __all__ = [
     "SummaryTableOrSentence",
     "TextTable",
     "all_fits_are_valid",
+    "build_record_events_pieces",
+    "list_record_events",
     "build_frame_of_cells",
     "claims_table",
     "count_pending_cells",
