@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from rsfstudy.errors import DataError, InvalidValue
+from rsfstudy.rig.readers.matlab_elements import read_numeric_arrays
 from rsfstudy.rig.readers.missing_libraries import missing_library_error
 from rsfstudy.rig.readers.source import Source, Table, build_table_of_arrays
 
@@ -57,10 +58,10 @@ def read_matlab(source: Source) -> Table:
     InvalidValue
         If the file contains no numeric arrays.
     """
-    data = io.BytesIO(source.read_bytes())
+    data = source.read_bytes()
     is_hdf5 = source.signature.startswith(_SIGNATURE_7_3)
     try:
-        variables = _read_version_7_3(data) if is_hdf5 else _read_version_5(data)
+        variables = _read_version_7_3(data) if is_hdf5 else read_numeric_arrays(data)
     except ImportError as error:
         raise missing_library_error(source, "a MATLAB file of v7.3", "hdf5", "h5py") from error
     except Exception as error:  # Damaged files cause errors of many types.
@@ -80,14 +81,7 @@ def read_matlab(source: Source) -> Table:
     return build_table_of_arrays(unique, [columns[name] for name in names], str(source.origin))
 
 
-def _read_version_5(data: io.BytesIO) -> dict[str, Any]:
-    from scipy.io import loadmat
-
-    found: dict[str, Any] = loadmat(data, simplify_cells=True)
-    return {name: value for name, value in found.items() if not name.startswith("__")}
-
-
-def _read_version_7_3(data: io.BytesIO) -> dict[str, Any]:
+def _read_version_7_3(data: bytes) -> dict[str, Any]:
     h5py = importlib.import_module("h5py")
 
     def convert(group: Any, depth: int) -> dict[str, Any]:
@@ -103,7 +97,7 @@ def _read_version_7_3(data: io.BytesIO) -> dict[str, Any]:
                 found[name] = np.asarray(item).T
         return found
 
-    with h5py.File(data, "r") as file:
+    with h5py.File(io.BytesIO(data), "r") as file:
         return convert(file, 0)
 
 

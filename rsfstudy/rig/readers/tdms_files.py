@@ -66,15 +66,14 @@ def read_tdms(source: Source) -> Table:
         nptdms = importlib.import_module("nptdms")
     except ImportError as error:
         raise missing_library_error(source, "a TDMS file", "tdms", "npTDMS") from error
-    log = logging.getLogger("nptdms")
-    level = log.level
-    log.setLevel(logging.ERROR)  # The errors below contain the reasons of the warnings.
+    level = logging.root.manager.disable
+    logging.disable(logging.WARNING)  # npTDMS prints the bytes of damaged files.
     try:
         file = nptdms.TdmsFile.read(io.BytesIO(source.read_bytes()))
     except Exception as error:  # Damaged files cause errors of many types.
         raise DataError(f"{source.origin}: cannot be read as a TDMS file ({error})") from error
     finally:
-        log.setLevel(level)
+        logging.disable(level)
     groups = {group.name: group.channels() for group in file.groups()}
     names = [name for name, channels in groups.items() if channels]
     if not names or (source.sheet and source.sheet not in names):
