@@ -6,7 +6,6 @@ The main function is ``fit``. The function checks the arguments, builds a study 
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from numbers import Real
@@ -16,6 +15,12 @@ import numpy as np
 import xarray as xr
 
 from rsfstudy.api import study_runs
+from rsfstudy.api.record_checks import (
+    check_displacement_is_not_slip,
+    check_displacement_was_not_reset,
+    check_normal_stress_changes_for_alpha,
+    check_step_can_be_fitted,
+)
 from rsfstudy.axes import Axis
 from rsfstudy.defaults import FIT_EVALUATION_BUDGET as BUDGET
 from rsfstudy.error_boundary import error_boundary
@@ -25,11 +30,8 @@ from rsfstudy.fitting import (
     MEAN,
     TRAILING_MEAN,
     FitWindow,
-    LoadingStep,
     Record,
     check_free_parameters,
-    displacement_is_slip,
-    noise_variance,
     parameters_of_law,
 )
 from rsfstudy.measures import Fit
@@ -61,15 +63,6 @@ _REMEDY_FOR_WRONG_STATE_PARAMETERS = (
 _SLIP_DISTANCE_GUESS_OVER_DISPLACEMENT = 0.05
 #: Maximum value of the argument ``windows``.
 _MAX_FIT_WINDOW_COUNT = 1000
-#: A decrease of the load point displacement between two rows is a reset to zero if the decrease
-#: exceeds three limits: a multiple of the noise of displacement, a multiple of the changes between
-#: the neighbouring rows, and a fraction of the range of displacement. The noise is estimated only
-#: if the record has more than 20 rows.
-(
-    _MIN_DISPLACEMENT_RESET_OVER_NOISE,
-    _MIN_DISPLACEMENT_RESET_OVER_EXTENT,
-    _MIN_ROWS_FOR_NOISE_ESTIMATE,
-) = 10.0, 0.01, 20
 #: Length of the shortest window of a fit, as a fraction of the load point displacement after a
 #: step.
 _MIN_WINDOW_LENGTH_OVER_FULL_LENGTH = 0.5
@@ -273,14 +266,14 @@ def fit(
     if "alpha" in scene:
         scene = {"normal_stress": "imposed", **scene}
     if "alpha" in free:
-        _check_normal_stress_changes_for_alpha(records, loading, numbers)
+        check_normal_stress_changes_for_alpha(records, loading, numbers)
         scene = {"normal_stress": "imposed", **scene}
     ratio, machine = _initial_stiffness(rig, stiffness, free, records)
     if machine:
         _check_normal_stress_is_compressive(records, numbers)
         ratio = machine / FitWindow(records[0], numbers[0]).mean_normal_stress_before_step
     if "stiffness" not in free:
-        _check_displacement_is_not_slip(records, numbers, ratio, machine)
+        check_displacement_is_not_slip(records, numbers, ratio, machine)
     first = _initial_scene(laws, scene, ratio * guess)
     sought = _free_parameters(free, laws, first)
     there = tuple((one.name, n) for one in records for n in numbers if n <= len(one.loading_steps))
@@ -345,7 +338,7 @@ def _select_step_numbers(records: Sequence[Record], steps: Sequence[int]) -> tup
         move forward.
     """
     for record in records:
-        _check_displacement_was_not_reset(record)
+        check_displacement_was_not_reset(record)
     count = max(len(one.loading_steps) for one in records)
     if not count:
         remedy = "State them: record.with_steps([(begins, ends, before, after)])."
@@ -358,103 +351,8 @@ def _select_step_numbers(records: Sequence[Record], steps: Sequence[int]) -> tup
             raise InvalidValue("steps", number, rule)
         for record in records:
             for step in record.loading_steps[number - 1 : number]:
-                _check_step_can_be_fitted(record, number, step)
+                check_step_can_be_fitted(record, number, step)
     return numbers
-
-
-def _check_displacement_was_not_reset(record: Record) -> None:
-    """Raise ``InvalidValue`` if the load point displacement was reset to zero.
-
-    A reset appears as a large decrease of displacement between two successive rows.
-    """
-    time, moved = record.time, record.columns["displacement"]
-    jumps = np.diff(moved)
-    row = int(np.argmin(jumps))
-    noise = (
-        math.sqrt(noise_variance(time, moved)) if len(time) > _MIN_ROWS_FOR_NOISE_ESTIMATE else 0.0
-    )
-    beside = np.abs(np.delete(jumps[max(row - 5, 0) : row + 6], min(row, 5))).max(initial=0.0)
-    back = -float(jumps[row]) > max(
-        _MIN_DISPLACEMENT_RESET_OVER_NOISE * beside,
-        _MIN_DISPLACEMENT_RESET_OVER_NOISE * noise,
-        _MIN_DISPLACEMENT_RESET_OVER_EXTENT * np.ptp(moved),
-    )
-    if record.specified_steps is None and back:
-        rule = f"falls back between two rows at {time[row + 1]:g} s in {record.name}, as a load "
-        rule += "point does that is set to zero again"
-        remedy = f"Fit its parts, as in record.window({time[0]:g}, {time[row]:g}) or by reading "
-        remedy += f"begin='{time[row + 1]:g} s' (--begin), or add the offset to the later rows."
-        raise InvalidValue("displacement", f"{jumps[row]:.4g} um", rule, remedy=remedy)
-
-
-def _check_displacement_is_not_slip(
-    records: Sequence[Record], step_numbers: Sequence[int], ratio: float, machine: float
-) -> None:
-    """Raise ``InvalidValue`` if the displacement of a record is the slip of the fault.
-
-    The stiffness is ``ratio`` in 1/um or ``machine`` in Pa/um, as in ``_initial_stiffness``.
-    """
-    for record in records:
-        stress = record.columns["friction"]
-        shortening = (
-            stress * record.columns["normal_stress"] / machine if machine else stress / ratio
-        )
-        ends = [-math.inf, *(step.end for step in record.loading_steps)]
-        begins = [*(step.start for step in record.loading_steps[1:]), math.inf, math.inf]
-        for number in step_numbers:
-            if number > len(record.loading_steps):
-                continue
-            rows = (record.time >= ends[number - 1]) & (record.time <= begins[number - 1])
-            moved = record.columns["displacement"][rows]
-            if displacement_is_slip(record.time[rows], moved, shortening[rows]):
-                rule = f"is the slip of the fault at step {number}, because displacement plus "
-                rule += "friction over stiffness moves at constant velocities, as a load point does"
-                remedy = "Name the column slip: --columns 'slip=HEADING (um)' (columns=), and pass "
-                remedy += "the stiffness to read_record, too."
-                raise InvalidValue("displacement", record.name, rule, remedy=remedy)
-
-
-def _check_step_can_be_fitted(record: Record, step_number: int, step: LoadingStep) -> None:
-    """Raise ``InvalidValue`` if a step cannot be fitted.
-
-    A step cannot be fitted if it is outside the record, or if the load point does not move forward.
-    """
-    time, moved = record.time, record.columns["displacement"]
-    if not time[0] < step.start <= step.end < time[-1]:
-        rule = f"is stated outside of {record.name}, {time[0]:g} to {time[-1]:g} s"
-        remedy = "State steps in s, by the clock of the record: record.with_steps([...])."
-        raise InvalidValue(f"step {step_number}", tuple(step), rule, remedy=remedy)
-    if min(step.velocity_before, step.velocity_after) < 0.0 or not moved[-1] > np.interp(
-        step.end, time, moved
-    ):
-        told = (
-            f"{step.velocity_before:.4g} um/s before step {step_number}, "
-            f"{step.velocity_after:.4g} um/s after it"
-        )
-        rule = "must grow: a load point moves forward"
-        remedy = "Reverse its sign, or say which column is which: --columns (columns=)."
-        raise InvalidValue("displacement", told, rule, remedy=remedy)
-
-
-def _check_normal_stress_changes_for_alpha(
-    records: Sequence[Record], loading_kind: str, step_numbers: Sequence[int]
-) -> None:
-    """Raise ``InvalidValue`` if ``alpha`` cannot be fitted.
-
-    The parameter ``alpha`` cannot be fitted at constant normal stress.
-    """
-    for record in records:
-        stress = record.columns.get("normal_stress", np.zeros(1))
-        steps = [
-            record.loading_steps[n - 1] for n in step_numbers if n <= len(record.loading_steps)
-        ]
-        by_steps = loading_kind == "steps" and any(step.stress_ratio != 1.0 for step in steps)
-        if not by_steps and not (loading_kind == "recorded" and np.ptp(stress) > 0.0):
-            rule = "needs a normal stress that changes: "
-            rule += f"that of {record.name} has no step among those that are fitted"
-            remedy = "Leave alpha out, name a step of normal stress (steps=), or follow the "
-            remedy += "recorded normal stress with --loading recorded (loading=)."
-            raise InvalidValue("free", "alpha", rule, remedy=remedy)
 
 
 def _guess_slip_distance(

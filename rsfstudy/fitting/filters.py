@@ -14,6 +14,7 @@ import numpy as np
 from scipy.signal import butter, sosfilt, sosfilt_zi
 
 from rsfstudy.errors import InvalidValue
+from rsfstudy.fitting.averaged_noise_correlation import apply_running_mean
 
 #: Names of a running mean centred at each row, and of a running mean that ends at each row.
 MEAN, TRAILING_MEAN = "mean", "trailing_mean"
@@ -197,7 +198,11 @@ class Filter:
             points.
         """
         if self.kind not in LOW_PASS_ORDERS:
-            return self._average_rows(time, values)
+            centre = 0.0 if self.kind == MEAN else -0.5 * self.size
+            # The deviations from the mean have smaller rounding errors.
+            level = values.mean()
+            deviations = (values - level)[:, None]
+            return np.asarray(level + apply_running_mean(time, deviations, self.size, centre)[:, 0])
         interval = float(np.median(np.diff(time)))
         about = f"{self.kind} {self.size:g} Hz"
         if not self.size * interval < 0.5:
@@ -213,22 +218,6 @@ class Filter:
         # The values are assumed to be constant before the first row.
         begin = sosfilt_zi(sections) * samples[0]
         return np.asarray(np.interp(time, at, sosfilt(sections, samples, zi=begin)[0]))
-
-    def _average_rows(self, time: np.ndarray, values: np.ndarray) -> np.ndarray:
-        """Return running means of values that are linear between the rows."""
-        before, after = self._averaging_times()
-        level = float(values.mean())
-        pieces = 0.5 * np.diff(time) * (values[1:] + values[:-1] - 2.0 * level)
-        integral = np.append(0.0, np.cumsum(pieces))
-
-        def integrate_until(at: np.ndarray) -> np.ndarray:
-            row = np.clip(np.searchsorted(time, at, side="right") - 1, 0, len(time) - 2)
-            lasts = at - time[row]
-            slope = (values[row + 1] - values[row]) / (time[row + 1] - time[row])
-            return np.asarray(integral[row] + lasts * (values[row] - level + 0.5 * lasts * slope))
-
-        areas = integrate_until(time + after) - integrate_until(time - before)
-        return np.asarray(level + areas / self.size)
 
     def _averaging_times(self) -> tuple[float, float]:
         """Return the averaging times in s before and after a row."""

@@ -33,6 +33,7 @@ if TYPE_CHECKING:
         read_si_scales,
         slip_rate_from_log,
     )
+    from rsfstudy.rig.ranges import expand_range
     from rsfstudy.rig.rig import Rig
     from rsfstudy.rig.rig_quantities import (
         RATIO_FIELD_BY_DIMENSIONAL_NAME,
@@ -49,7 +50,6 @@ if TYPE_CHECKING:
     from rsfstudy.rig.units import (
         compute_conversion_factor,
         convert_to_si,
-        expand_range,
         parse_number,
     )
     from rsfstudy.rig.usual_headings import UsableColumns
@@ -63,6 +63,7 @@ else:
                 "in_display_units",
                 "is_stiffness_over_normal_stress",
             ),
+            "rig.ranges": ("expand_range",),
             "rig.rig": ("Rig",),
             "rig.rig_scenes": (
                 "LatticeScenesOnRig",
@@ -93,7 +94,6 @@ else:
             "rig.usual_headings": ("UsableColumns",),
             "rig.units": (
                 "convert_to_si",
-                "expand_range",
                 "parse_number",
                 "compute_conversion_factor",
             ),
