@@ -157,7 +157,10 @@ REDUCED_AXES = {
     "dilatant_cycles": {"drainage": [1.0], "dilatancy": [0.0, 0.004, 0.008]},
     "dilatant_steps": {"drainage": [0.1, 1.0, 10.0]},
     "displacement_boundary": {"b_over_a": 1.0 + 1.0 / np.array([0.25, 0.5, 0.75, 1.0, 2.0])},
-    "fit_coverage": {"process": ["white", "ar1", "ma3", "encoder", "coarsely_rounded"]},
+    "fit_coverage": {
+        "process": ["white", "ar1", "encoder", "coarsely_rounded"],
+        "seed": list(range(12)),
+    },
     "fit_coverage_joint": {"process": ["white"]},
     "injection": {"record": ["1000", "2000"]},
     "instability_norm": {
