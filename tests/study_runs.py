@@ -34,8 +34,7 @@ from rsfstudy.errors import DataError, IncompleteWarning
 from rsfstudy.execution import cell_computation, cell_plan
 from rsfstudy.motion.accuracy import Accuracy
 from rsfstudy.motion.engines import COMPILED
-from rsfstudy.motion.event_integration import integrate_events
-from rsfstudy.motion.work_meter import WorkMeter
+from rsfstudy.motion.integrator import Integrator
 from rsfstudy.slider.motion_point import MotionPoint
 from rsfstudy.study import study_loader
 from rsfstudy.study.claims import Claim
@@ -70,7 +69,7 @@ class Power(Measure):
     variables = {"total": ()}
     typical_work = 1
 
-    def compute(self, scene, accuracy, meter):
+    def compute(self, scene, integrator):
         if self.power == 4:
             raise ZeroDivisionError
         return Outcome(Status.OK, {"total": scene.b_over_a**self.power + self.offset})
@@ -314,7 +313,7 @@ def run_command(words: Sequence[str]) -> tuple[int, str]:
 
 def start_point(scene: Scene) -> MotionPoint:
     """Return the initial point of the motion of a scene."""
-    return next(integrate_events(scene, Accuracy(), WorkMeter(1_000_000))).point
+    return next(Integrator(Accuracy(budget=1_000_000)).follow(scene)).point
 
 
 def count_journal_cells(journal: Path) -> int:

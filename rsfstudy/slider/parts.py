@@ -6,7 +6,7 @@ usually in its own module. The class declares the fields of the part with ``numb
 
 The functions of a part are plain functions of floats. The functions receive the parameters of a
 scene as a flat tuple ``p``. The parameters of a part start at the index of its slot, for example
-``p[LAW]`` (see ``parameter_layout``). The modules ``friction`` and ``scene_functions`` combine the
+``p[LAW]`` (see ``parameter_layout``). The modules ``friction`` and ``equations`` combine the
 functions of all parts.
 
 To add an effect, derive a class from the base class of a slot:
