@@ -10,6 +10,7 @@ import numpy as np
 import pandas as pd
 import pytest
 import record_events
+import xarray as xr
 from study_runs import call_main
 
 import rsfstudy
@@ -75,3 +76,26 @@ def test_fit_reads_with_the_same_options(tmp_path: Path, monkeypatch: pytest.Mon
     assert record["processing"][1:] == ["one of every 2 rows"]
     assert record["processing"][0].endswith(" of 600")
     assert len(record["steps"]) == 1
+
+
+def test_a_loading_is_read_from_a_file_with_other_columns(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The load point of a record with usual headings is a loading."""
+    monkeypatch.chdir(tmp_path)
+    lines = [
+        "# run 7",
+        "Time (s),LP displacement (um),Friction",
+        "0,0,0.6",
+        "10,10,0.6",
+        "20,30,0.6",
+    ]
+    Path("run.csv").write_text("\n".join(lines))
+    rig = ["--slip-distance", "10 um", "--reference-velocity", "1 um/s", "--normal-stress", "5 MPa"]
+    scene = ["--set", "stiffness_ratio=3", "--duration", "20 s", "--rtol", 1e-3]
+    ran = call_main("simulate", "--protocol", "run.csv", *rig, *scene)
+    assert ran.returncode == 0, ran.stderr
+    columns = {"time": [0.0, 1.0, 2.0], "displacement": [0.0, 1.0, 3.0]}
+    loading = xr.load_dataset("motion.nc").rsf.scene.parts.loading
+    known = rsfstudy.history(columns, name="run").sample_table
+    np.testing.assert_allclose(loading.sample_table, known, atol=1e-12)

@@ -52,7 +52,7 @@ if TYPE_CHECKING:
         convert_to_si,
         parse_number,
     )
-    from rsfstudy.rig.usual_headings import UsableColumns
+    from rsfstudy.rig.usual_headings import UsableColumns, has_time_column
 else:
     __getattr__, __dir__ = build_lazy_export_functions(
         __name__,
@@ -91,7 +91,7 @@ else:
                 "convert_values_to_units",
                 "make_axis_with_units",
             ),
-            "rig.usual_headings": ("UsableColumns",),
+            "rig.usual_headings": ("UsableColumns", "has_time_column"),
             "rig.units": (
                 "convert_to_si",
                 "parse_number",
@@ -120,6 +120,7 @@ __all__ = [
     "convert_values_to_units",
     "convert_to_dimensional_name",
     "expand_range",
+    "has_time_column",
     "has_units_unexpected_by_its_figures",
     "in_display_units",
     "is_stiffness_over_normal_stress",

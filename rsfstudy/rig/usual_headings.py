@@ -13,6 +13,7 @@ import numpy as np
 
 from rsfstudy.errors import InvalidValue
 from rsfstudy.rig.columns import HEADING_PATTERN, Column, ColumnSpec, parse_column_spec
+from rsfstudy.rig.readers import read_source
 from rsfstudy.rig.readers.source import Table
 from rsfstudy.rig.units import compute_conversion_factor
 
@@ -169,6 +170,22 @@ def _read_column_with_units(
         remedy += f"(columns={{'{name}': '{whole}', ...}})."
         raise InvalidValue("heading", selection, "states no units", remedy=remedy)
     return table.read_column(name, spec)
+
+
+def has_time_column(source: Any) -> bool:
+    """Return True if a table has a column with a usual heading for time.
+
+    Parameters
+    ----------
+    source : str, Path or object
+        File or object that contains the table, as for ``read_record``.
+
+    Returns
+    -------
+    bool
+        True if the table is a record. Protocols have durations or distances in place of times.
+    """
+    return bool(_find_usual_heading("time", read_source(source)))
 
 
 def _find_usual_heading(column_name: str, table: Table) -> dict[str, str]:
