@@ -159,6 +159,23 @@ def test_show_a_study():
     assert found["cost"]["seconds"] > 0.0
 
 
+def test_quantities_of_a_rig_that_vary_are_not_listed(tmp_path):
+    words = ["slide_hold_slide", "--set", "hold_time=10", "--normal-stress", "5 MPa"]
+    words += ["--slip-distance", "10 um", "--reference-velocity", "1 um/s"]
+    assert output_of("show", *words)[0]["rig"] == {
+        "normal_stress": 5e6,
+        "slip_distance": pytest.approx(1e-5),
+        "reference_velocity": pytest.approx(1e-6),
+    }
+    study = rsfstudy.studies()["rig_recurrence"]
+    varied = {field for axis in study.axes for field in axis.fields}
+    found = output_of("show", "rig_recurrence")[0]
+    assert varied == {"law", "sigma_star", "load_velocity"}
+    assert "normal_stress" not in found["rig"]  # sigma_star is the axis of the normal stress
+    assert "slip_distance" in found["rig"]
+    assert not varied & set(found["scene"])
+
+
 def test_show_results_and_their_reductions(place):
     file = place / "out" / "slopes.nc"
     found, status = output_of("show", file)

@@ -14,6 +14,7 @@ from rsfstudy.cli.printing import print_line, print_pieces
 from rsfstudy.cli.results import EXIT_STATUS_OK, CommandResult
 from rsfstudy.execution import CellPlan
 from rsfstudy.reporting import describe_scene_and_rig_fields
+from rsfstudy.rig import in_display_units
 
 #: Maximum number of printed values of an axis.
 _MAX_PRINTED_AXIS_POINTS = 40
@@ -76,7 +77,9 @@ class StudyDeclaration(CommandResult):
                 for name, value in study.base.as_dict().items()
                 if name not in varied and value is not None
             },
-            "rig": {n: v for n, v in self.rig_quantities.items() if n not in varied},
+            "rig": {
+                n: self.rig_quantities[n] for n in in_display_units(self.rig_quantities, varied)
+            },
             "measure": self.measure_fields,
             "outputs": [
                 {"name": name, "has_error": f"{name}_error" in variables}

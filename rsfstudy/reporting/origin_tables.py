@@ -81,7 +81,8 @@ def find_constant_fields(dataset: xr.Dataset) -> tuple[dict[str, Any], dict[str,
         if along.dims
     }
     scene = {n: v for n, v in declared.base.items() if n not in varied}
-    return scene, {n: v for n, v in (declared.laboratory or {}).items() if n not in varied}
+    rig = declared.laboratory or {}
+    return scene, {name: rig[name] for name in in_display_units(rig, varied)}
 
 
 def describe_study_origin(dataset: xr.Dataset) -> dict[str, str]:
