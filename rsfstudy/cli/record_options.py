@@ -7,7 +7,13 @@ from typing import Any
 
 import click
 
-from rsfstudy.cli.options import CommandOptions, DecoratedFunction, combine_option_decorators
+from rsfstudy.cli.options import (
+    CommandOptions,
+    DecoratedFunction,
+    columns_option,
+    combine_option_decorators,
+    normal_stress_option,
+)
 from rsfstudy.errors import InvalidValue
 
 #: Options that are passed unchanged to the functions that read records.
@@ -47,18 +53,8 @@ def make_quantity_option(
 
 
 reading_options = combine_option_decorators(
-    click.option(
-        "--columns",
-        metavar="NAME=HEADING,...",
-        help="Columns of the record, for example 'time=t (s),displacement=lp (um),friction=mu'. "
-        "Other quantities are slip, shear_stress and normal_stress. Columns can be selected by "
-        "their numbers, for example 'time=1 (s)'. Raw values can be scaled, for example 'lp (um) * "
-        "0.1 + 5'.  [default: recognised headings]",
-    ),
-    click.option(
-        "--normal-stress",
-        help="Normal stress, for example '20 MPa', if the record has no such column.",
-    ),
+    columns_option,
+    normal_stress_option,
     click.option(
         "--decimal",
         type=click.Choice([".", ","]),

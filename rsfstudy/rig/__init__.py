@@ -34,6 +34,7 @@ if TYPE_CHECKING:
         slip_rate_from_log,
     )
     from rsfstudy.rig.ranges import expand_range
+    from rsfstudy.rig.record_files import read_record
     from rsfstudy.rig.rig import Rig
     from rsfstudy.rig.rig_quantities import (
         RATIO_FIELD_BY_DIMENSIONAL_NAME,
@@ -64,6 +65,7 @@ else:
                 "is_stiffness_over_normal_stress",
             ),
             "rig.ranges": ("expand_range",),
+            "rig.record_files": ("read_record",),
             "rig.rig": ("Rig",),
             "rig.rig_scenes": (
                 "LatticeScenesOnRig",
@@ -128,6 +130,7 @@ __all__ = [
     "parse_number",
     "convert_scene_and_axes_to_rig",
     "read_columns",
+    "read_record",
     "read_si_scales",
     "read_table",
     "slip_rate_from_log",

@@ -30,6 +30,7 @@ MODULE_BY_COMMAND = {
     "simulate": "simulate",
     "fit": "fit",
     "events": "events",
+    "healing": "healing",
     "problems": "problems",
     "verify": "verify",
 }
