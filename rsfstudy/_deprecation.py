@@ -64,7 +64,7 @@ NEW_NAME_BY_OWNER_AND_FORMER_NAME: Mapping[str, Mapping[str, str]] = {
     "rsfstudy.rig.table_files": {
         "Selected": "ColumnSpec",
     },
-    "rsfstudy.rig.table_files:Column": {
+    "rsfstudy.rig.columns:Column": {
         "number": "column_number",
         "lines": "line_numbers",
         "place": "location",
