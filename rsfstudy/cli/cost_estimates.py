@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -87,6 +88,29 @@ def estimate_study_cost(cell_plan: CellPlan, output_directory: Path) -> CostEsti
     known = [times[key] for key in keys if key in times]
     missing = (cells - len(known)) * float(np.mean(list(times.values())))
     return CostEstimate(work, math.fsum(known) + missing, cells, len(known), len(times), journal)
+
+
+def collect_cost_fields(cell_plan: CellPlan, output_directory: Path) -> dict[str, Any]:
+    """Return the accuracy of a study and its expected cost as plain data.
+
+    Parameters
+    ----------
+    cell_plan : CellPlan
+        Cells of the study.
+    output_directory : Path
+        Directory of results with measured times.
+
+    Returns
+    -------
+    dict
+        Relative tolerance, expected work, computing time and number of measured cells.
+    """
+    cost = estimate_study_cost(cell_plan, output_directory)
+    fields = ("rhs_evaluations", "seconds", "measured_cells")
+    return {
+        "rtol": cell_plan.study.accuracy.rtol,
+        "cost": {name: getattr(cost, name) for name in fields},
+    }
 
 
 def describe_study_cost(cell_plan: CellPlan, output_directory: Path) -> str:

@@ -53,6 +53,11 @@ class CommandOptions(SimpleNamespace):
         return {name: getattr(self, name) for name in option_names}
 
     @property
+    def changes_accuracy(self) -> bool:
+        """True if the user specified a relative tolerance."""
+        return self.rtol is not None
+
+    @property
     def rig_option_texts(self) -> dict[str, str]:
         """Rig options that the user specified, by name."""
         return {

@@ -64,7 +64,6 @@ class StudyDeclaration(CommandResult):
     def json_fields(self) -> dict[str, Any]:
         """Return the fields of the JSON output."""
         study, varied = self.study, self.varied_fields
-        cost = cost_estimates.estimate_study_cost(self.plan, self.output_directory)
         variables = study.measure.variables
         return {
             "kind": "study",
@@ -90,12 +89,7 @@ class StudyDeclaration(CommandResult):
             "claims": list(dict.fromkeys(claim.id for claim in study.claims)),
             "cells": study.size,
             "distinct_cells": len(self.plan.unique_cell_numbers),
-            "rtol": study.accuracy.rtol,
-            "cost": {
-                "rhs_evaluations": cost.rhs_evaluations,
-                "seconds": cost.seconds,
-                "measured_cells": cost.measured_cells,
-            },
+            **cost_estimates.collect_cost_fields(self.plan, self.output_directory),
         }
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from typing import Any
 
@@ -72,6 +73,6 @@ def _find_index_on_axis(axis_values: np.ndarray, wanted_value: Any) -> int | Non
         except (TypeError, ValueError):
             return None
         nearest = int(np.argmin(np.abs(axis_values - number)))
-        return nearest if np.isclose(axis_values[nearest], number, rtol=1e-5, atol=0.0) else None
+        return nearest if math.isclose(axis_values[nearest], number, rel_tol=1e-5) else None
     places = np.flatnonzero(axis_values.astype(object).astype(str) == str(wanted_value))
     return int(places[0]) if places.size else None

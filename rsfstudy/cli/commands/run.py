@@ -174,7 +174,7 @@ def _print_expected_cost(study: Study, given: options.CommandOptions) -> None:
     from rsfstudy.motion import DEFAULT_RTOL
 
     plan = CellPlan(study)
-    if given.rtol is not None and not given.as_json:
+    if given.changes_accuracy and not given.as_json:
         ratio = study.measure.expected_work(study.accuracy) / study.measure.typical_work
         words = f"{study.name}: {ratio:.2g} times the work of rtol {DEFAULT_RTOL:g}"
         print_line(f"{words}, {cost_estimates.describe_study_cost(plan, given.output)}")

@@ -37,7 +37,7 @@ def show(given: options.CommandOptions) -> int:
         study = study_options.build_study_from_options(given.name, given)
         declared = StudyDeclaration(study, given.output)
         return output_result(declared, print_study_declaration, given.as_json)
-    if given.settings or given.rtol is not None or given.rig_option_texts:
+    if given.settings or given.changes_accuracy or given.rig_option_texts:
         rule = "--set, --rtol and rig options cannot be used with a results file"
         raise click.UsageError(rule)
     dataset = study_options.read_results_file(Path(given.name), given.study)
