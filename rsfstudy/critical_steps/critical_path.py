@@ -43,14 +43,7 @@ from rsfstudy.motion import (
     rise,
 )
 from rsfstudy.parts import LOAD_VELOCITY, LOG_LOAD_VELOCITY, STIFFNESS, A, B
-from rsfstudy.slider import (
-    FrictionFunctions,
-    Function,
-    MotionPoint,
-    Numbers,
-    Scene,
-    equations_between_ruptures,
-)
+from rsfstudy.slider import FrictionFunctions, Function, MotionPoint, Numbers, Scene
 from rsfstudy.status import Status
 
 #: Maximum number of right-hand-side evaluations in the search for the start of a critical path. The
@@ -118,7 +111,7 @@ class CriticalPath(NamedTuple):
         CriticalPath
             Path with the load point velocity of the scene.
         """
-        slow, x = equations_between_ruptures(scene, with_time=False), scene.log_instability_rate
+        slow, x = scene.equations_between_ruptures(with_time=False), scene.log_instability_rate
         weakest = scene.parts.normal_stress.min_frictional_stress(scene)
         begin = (scene.spring_stress_step, *(0.0,) * scene.state_count)
         tangency, planar = (

@@ -27,16 +27,7 @@ from rsfstudy.motion import (
     rise,
     slow_manifold_point,
 )
-from rsfstudy.slider import (
-    RUPTURE_REGIME,
-    MotionPoint,
-    Scene,
-    SteadySliding,
-    critical_stiffness,
-    equations_without_mass,
-    linear_growth_rates,
-    steady_sliding,
-)
+from rsfstudy.slider import RUPTURE_REGIME, MotionPoint, Scene, SteadySliding
 from rsfstudy.status import Status
 
 #: Smallest significant difference from neutral stability. The limit applies to the relative
@@ -323,7 +314,7 @@ def _max_log_slip_rate_of_closed_orbit(scene: Scene, integrator: Integrator) -> 
     """
     begin = initial_point(scene)
     equations, start = (
-        equations_without_mass(scene, with_time=False),
+        scene.equations_without_mass(with_time=False),
         (begin.spring_stress, begin.psi),
     )
     rising, norm = (
@@ -540,7 +531,7 @@ def _steady_sliding_with_margin(scene: Scene) -> _SteadySlidingWithMargin:
         If sliding cannot be steady at the load point velocity.
     """
     load = scene.log_load_velocity
-    sliding = steady_sliding(scene, load)
+    sliding = scene.steady_sliding(load)
     if sliding is None:
         raise MotionStopped(
             Status.NO_STEADY_STATE,
@@ -551,7 +542,7 @@ def _steady_sliding_with_margin(scene: Scene) -> _SteadySlidingWithMargin:
     if at_every_rate and not scene.has_mass and not scene.parts.loading.unknowns:
         margin = stiffness_ratio_after_step(scene) - 1.0
     else:
-        critical = critical_stiffness(scene, load)
+        critical = scene.critical_stiffness_at(load)
         margin = scene.stiffness / critical - 1.0 if critical > 0.0 else math.inf
     if (
         margin < -_NEUTRAL_STABILITY_MARGIN
@@ -568,5 +559,5 @@ def _is_stable_to_small_perturbations(scene: Scene) -> bool:
     With several states, perturbations may decay below the critical stiffness.
     """
     return bool(
-        linear_growth_rates(scene, scene.log_load_velocity)[0].real < -_NEUTRAL_STABILITY_MARGIN
+        scene.linear_growth_rates(scene.log_load_velocity)[0].real < -_NEUTRAL_STABILITY_MARGIN
     )

@@ -51,7 +51,7 @@ from rsfstudy.motion import (
 )
 from rsfstudy.parts import Segment
 from rsfstudy.quantities import Output
-from rsfstudy.slider import Scene, linear_growth_rates
+from rsfstudy.slider import Scene
 from rsfstudy.status import Status
 
 #: Minimum error estimate of a result, divided by the requested relative accuracy. The minimum is
@@ -334,7 +334,7 @@ def outcome_of_settling_motion(scene: Scene) -> Outcome:
         Outcome with the status ``no_limit_cycle`` and the slip mode.
     """
     try:
-        last = linear_growth_rates(scene, scene.log_load_velocity)[0]
+        last = scene.linear_growth_rates(scene.log_load_velocity)[0]
     except ValueError:
         # The growth rates have no closed form.
         return STEADY_SLIDING_OUTCOME

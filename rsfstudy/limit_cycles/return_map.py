@@ -56,7 +56,7 @@ from rsfstudy.motion import (
     compute_restart_point,
     point_with_slip_rate,
 )
-from rsfstudy.slider import MotionPoint, Numbers, Scene, equations_without_mass
+from rsfstudy.slider import MotionPoint, Numbers, Scene
 from rsfstudy.status import Status
 
 #: Step of the finite differences of the return map, divided by the product of a and the range of ln
@@ -400,7 +400,7 @@ class ReturnMap:
         spring_stress = point.frictional_stress + scene.dynamics.radiated_stress(
             scene.log_load_velocity
         )
-        rates = equations_without_mass(scene, with_time=True).evaluate_rates(
+        rates = scene.equations_without_mass(with_time=True).evaluate_rates(
             (spring_stress, *point.psis, 0.0)
         )
         rest = (0.0,) * (PRIMARY_OUTPUT_COUNT_PER_CYCLE - 1)

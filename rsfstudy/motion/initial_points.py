@@ -13,15 +13,7 @@ from scipy.optimize import newton
 from rsfstudy.motion import regime_switching
 from rsfstudy.motion.work_meter import MotionStopped
 from rsfstudy.parts import Segment
-from rsfstudy.slider import (
-    MotionPoint,
-    Numbers,
-    Scene,
-    compute_steady_states,
-    effective_normal_stress_at,
-    equations_between_ruptures,
-    frictional_stress_after_jump,
-)
+from rsfstudy.slider import MotionPoint, Numbers, Scene
 from rsfstudy.status import Status
 
 _NAN_FOR_UNEVALUATED_POINT_FIELDS = (math.nan,) * len(MotionPoint._fields[5:-1])
@@ -51,7 +43,7 @@ def initial_point(scene: Scene) -> MotionPoint:
         If normal stress vanishes or shear stress changes sign in the loading step.
     """
     check_forward_slip_is_possible_at_start(scene)
-    psis, log_slip_rate = compute_steady_states(scene, 0.0, 0.0), 0.0
+    psis, log_slip_rate = scene.compute_steady_states(0.0, 0.0), 0.0
     if scene.starts_unsteady:
         psis, log_slip_rate = _find_specified_initial_states(scene, psis)
     psis = _reset_loading_unknowns(scene, psis)
@@ -74,7 +66,7 @@ def point_before_start(scene: Scene) -> MotionPoint:
         Point on the slow manifold.
     """
     before = scene.with_segment(Segment(1.0))
-    psis = compute_steady_states(before, 0.0, 0.0)
+    psis = before.compute_steady_states(0.0, 0.0)
     if scene.starts_unsteady:
         psis = _find_specified_initial_states(scene, psis)[0]
     return slow_manifold_point(before, scene.parts.slider.initial_stress, psis)
@@ -135,7 +127,7 @@ def compute_restart_point(scene: Scene, spring_stress: float, states: Numbers) -
     MotionStopped
         If the spring stress is incompatible with forward slip.
     """
-    balance = equations_between_ruptures(scene, with_time=False).force_balance_function
+    balance = scene.equations_between_ruptures(with_time=False).force_balance_function
     assert balance is not None
     x, friction, _shift = balance(spring_stress, states, scene.parameter_values)
     point = point_without_derived_values(scene, spring_stress, states, x, friction)
@@ -224,7 +216,7 @@ def point_with_slip_rate(scene: Scene, point: MotionPoint, log_slip_rate: float)
         If normal stress vanishes.
     """
     excess = scene.a * log_slip_rate + point.psi
-    friction = frictional_stress_after_jump(scene, excess, point.psis)
+    friction = scene.frictional_stress_after_jump(excess, point.psis)
     if friction is None:
         raise MotionStopped(Status.NORMAL_STRESS_LOST, "the step takes normal stress away")
     return point._replace(log_slip_rate=log_slip_rate, frictional_stress=friction)
@@ -247,7 +239,7 @@ def slow_manifold_point(scene: Scene, spring_stress: float, states: Numbers) -> 
     MotionPoint
         Point with all fields.
     """
-    return equations_between_ruptures(scene, with_time=False).evaluate_point(
+    return scene.equations_between_ruptures(with_time=False).evaluate_point(
         (spring_stress, *states)
     )
 
@@ -276,7 +268,7 @@ def check_forward_slip_is_possible_at_start(
     lost = spring_stress <= scene.parts.normal_stress.min_frictional_stress(scene)
     if lost or (
         start_point
-        and effective_normal_stress_at(scene, spring_stress, start_point.psis)
+        and scene.effective_normal_stress_at(spring_stress, start_point.psis)
         <= regime_switching.MIN_NORMAL_STRESS
     ):
         raise MotionStopped(Status.NORMAL_STRESS_LOST, "the step takes normal stress away")

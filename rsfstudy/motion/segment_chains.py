@@ -11,13 +11,7 @@ from rsfstudy.motion.events import Event, EventKind, EventSpecification
 from rsfstudy.motion.initial_points import point_after_loading_jump
 from rsfstudy.motion.motion_driver import find_events_at_jump
 from rsfstudy.parts import SEGMENT_END, SEGMENT_START
-from rsfstudy.slider import (
-    SINGLE_ENDLESS_SEGMENT_TABLE,
-    MotionPoint,
-    Numbers,
-    Scene,
-    largest_linear_growth_rate,
-)
+from rsfstudy.slider import SINGLE_ENDLESS_SEGMENT_TABLE, MotionPoint, Numbers, Scene
 
 
 def list_segment_chains(
@@ -179,5 +173,5 @@ def _steady_sliding_may_be_stable(scene: Scene, event_specs: Sequence[EventSpeci
         spec.kind is not EventKind.SETTLED for spec in event_specs
     ):
         return True
-    growth = largest_linear_growth_rate(scene.segment_scene(-1), scene.log_load_velocity)
+    growth = scene.segment_scene(-1).largest_linear_growth_rate(scene.log_load_velocity)
     return growth is None or not growth.is_positive

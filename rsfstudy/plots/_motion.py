@@ -33,7 +33,7 @@ from rsfstudy.plots._style import (
 )
 from rsfstudy.plots._text import to_mathtext, wrap_text
 from rsfstudy.rig import DISPLAY_BASE_UNITS, Rig
-from rsfstudy.slider import Scene, steady_friction_minus_reference
+from rsfstudy.slider import Scene
 from rsfstudy.storage import read_scene_fields
 
 #: Height of a panel in mm.
@@ -238,7 +238,7 @@ def _compute_steady_friction(
     except InvalidValue:
         return None
     rates = log10_rates * NATURAL_LOG_OF_10
-    excess = [steady_friction_minus_reference(scene, x) for x in rates.tolist()]
+    excess = [scene.steady_friction_minus_reference(x) for x in rates.tolist()]
     return np.asarray(scene.mu_star + np.array(excess))
 
 

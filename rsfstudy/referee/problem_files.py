@@ -35,12 +35,7 @@ from rsfstudy.motion import (
 from rsfstudy.parts import Segment
 from rsfstudy.path_checks import check_path
 from rsfstudy.rig import Rig, convert_to_si
-from rsfstudy.slider import (
-    Scene,
-    build_friction_relation,
-    compute_steady_states,
-    scene_field_defaults,
-)
+from rsfstudy.slider import Scene, scene_field_defaults
 
 #: Folder of the shipped problems and their answers.
 SHIPPED_PROBLEM_FOLDER = Path(__file__).with_name("problems")
@@ -348,7 +343,7 @@ class BenchmarkProblem:
         if scene.parts.law.regularised:
             above = (scene.mu_star + friction) / scene.a
             friction = scene.a * math.asinh(0.5 * math.exp(above)) - scene.mu_star
-        taken = compute_steady_states(before, 0.0, build_friction_relation(before)(friction)[2])
+        taken = before.compute_steady_states(0.0, before.friction_relation()(friction)[2])
         psis = (
             *map(add, states, taken),
             *taken[len(states) :],

@@ -21,7 +21,6 @@ from rsfstudy.motion import (
     maximum,
 )
 from rsfstudy.referee.problem_files import BenchmarkProblem
-from rsfstudy.slider import critical_stiffness, linear_growth_rates
 from rsfstudy.status import Status
 
 AnswerColumnByQuantity = dict[str, np.ndarray]
@@ -167,8 +166,8 @@ def _run_measure_of_problem(
 def _compute_stability_numbers(problem: BenchmarkProblem, accuracy: Accuracy) -> tuple[float, ...]:
     """Compute the critical stiffness, the growth rate and the frequency."""
     scene, rig = problem.scene, problem.rig
-    growth = linear_growth_rates(scene, scene.log_load_velocity)[0] * scene.load_velocity
-    stiffness = critical_stiffness(scene, scene.log_load_velocity)
+    growth = scene.linear_growth_rates(scene.log_load_velocity)[0] * scene.load_velocity
+    stiffness = scene.critical_stiffness_at(scene.log_load_velocity)
     scale, rate = rig.normal_stress / rig.slip_distance, rig.dimensionless("1 s")
     return stiffness * scale, growth.real * rate, abs(growth.imag) * rate
 

@@ -20,7 +20,7 @@ from rsfstudy.motion import (
     point_before_start,
     recorded_friction_coefficient,
 )
-from rsfstudy.slider import Scene, largest_linear_growth_rate
+from rsfstudy.slider import Scene
 
 #: Minimum error estimate of a result, divided by the requested relative accuracy. The minimum is
 #: necessary because two runs may have the same error by chance.
@@ -300,7 +300,7 @@ def compute_settled_friction_flag(scene: Scene, *, is_flat: bool) -> float:
     """
     if not is_flat:
         return 0.0
-    growth = largest_linear_growth_rate(scene, scene.log_load_velocity)
+    growth = scene.largest_linear_growth_rate(scene.log_load_velocity)
     if growth is not None and growth.is_zero_within_error:
         return math.nan
     return 0.0 if growth is not None and growth.is_positive else 1.0

@@ -43,7 +43,7 @@ from rsfstudy.responses._recorded_motion import (
     path_relative_to_start,
     record_motion_of_segment,
 )
-from rsfstudy.slider import Scene, steady_friction_minus_reference
+from rsfstudy.slider import Scene
 from rsfstudy.status import Status
 
 #: Length of the last part of the record, in which friction must be constant, as a fraction of the
@@ -418,8 +418,8 @@ def _max_departure_from_closed_form(
         math.log(evaluated_step.velocity_before),
         math.log(evaluated_step.velocity_after),
     )
-    steady = steady_friction_minus_reference(scene, after) - steady_friction_minus_reference(
-        scene, before
+    steady = scene.steady_friction_minus_reference(after) - scene.steady_friction_minus_reference(
+        before
     )
     steady += scene.dynamics.radiated_stress(after) - scene.dynamics.radiated_stress(before)
     slip = recorded_motion.recorded_rows[:, MOTION_VARIABLES.index("slip")]
