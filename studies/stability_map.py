@@ -26,7 +26,6 @@ from rsfstudy.errors import InvalidValue
 from rsfstudy.limit_cycles import SLIP_MODES
 from rsfstudy.measures import LimitCycle, Quantity, Status
 from rsfstudy.reductions import Boundary, Reduction
-from rsfstudy.slider import critical_stiffness
 from rsfstudy.study import failed_cell_mask
 from rsfstudy.study.figure_declarations import Axes
 from rsfstudy.study.reductions.base import dimension_of_coordinate, refused_result_mask
@@ -169,7 +168,7 @@ def _linear_boundary(places: xr.DataArray, dataset: xr.Dataset) -> xr.DataArray 
         except InvalidValue:
             return None
         values[place] = (
-            critical_stiffness(scene, scene.log_load_velocity) / scene.critical_stiffness
+            scene.critical_stiffness_at(scene.log_load_velocity) / scene.critical_stiffness
         )
     return places.copy(data=values)
 

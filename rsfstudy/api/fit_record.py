@@ -32,7 +32,7 @@ from rsfstudy.fitting import (
     parameters_of_law,
 )
 from rsfstudy.measures import Fit
-from rsfstudy.motion import COMPILED, DEFAULT_RTOL, SCIPY, Accuracy, is_engine_installed
+from rsfstudy.motion import Accuracy, Engine
 from rsfstudy.reductions import Range
 from rsfstudy.rig import Rig, convert_to_si, is_stiffness_over_normal_stress
 from rsfstudy.slider import Scene
@@ -98,7 +98,7 @@ def fit(
     stiffness: Any = None,
     slip_distance: Any = None,
     engine: str | type | None = None,
-    rtol: float = DEFAULT_RTOL,
+    rtol: float = Accuracy.DEFAULT_RTOL,
     budget: int = BUDGET,
     workers: int = 0,
     command: str = "rsfstudy.fit",
@@ -311,7 +311,7 @@ def fit(
         reductions = [Range(f"{n}_windows", n, over="part") for n in measure.parameters]
     chosen: Any = engine
     if engine is None:
-        chosen = COMPILED if is_engine_installed(COMPILED) else SCIPY
+        chosen = Engine.COMPILED if Engine.is_installed(Engine.COMPILED) else Engine.SCIPY
     study = Study(
         name="fit",
         title="Friction parameters of a record",

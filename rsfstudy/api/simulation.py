@@ -19,23 +19,14 @@ from rsfstudy.error_boundary import error_boundary
 from rsfstudy.errors import IncompleteWarning, InvalidValue, NoResultWarning, shorten_text
 from rsfstudy.execution import provenance_attributes
 from rsfstudy.motion import (
-    DEFAULT_EVALUATION_BUDGET,
-    DEFAULT_RTOL,
-    FIRST_STATE_COLUMN,
-    MOTION_VARIABLES,
-    REGIME_COLUMN,
-    SAMPLE_COLUMN,
-    SCIPY,
     Accuracy,
+    Engine,
     Event,
     EventKind,
     Integrator,
     MotionStopped,
     Recording,
     accept_accuracy_and_meter,
-    check_engine_is_usable,
-    recorded_friction_coefficient,
-    recorded_load_point_displacement,
     rise,
     suggest_raising_budget,
 )
@@ -84,9 +75,9 @@ def simulate(
     duration: float | None = None,
     times: Sequence[float] | np.ndarray | None = None,
     start: xr.Dataset | None = None,
-    rtol: float = DEFAULT_RTOL,
-    budget: int = DEFAULT_EVALUATION_BUDGET,
-    engine: Any = SCIPY,
+    rtol: float = Accuracy.DEFAULT_RTOL,
+    budget: int = Accuracy.DEFAULT_BUDGET,
+    engine: Any = Engine.SCIPY,
     integrator: Integrator | None = None,
 ) -> xr.Dataset:
     """Integrate the motion of a scene.
@@ -305,7 +296,7 @@ def check_integrator(integrator: Any) -> None:
     if not isinstance(integrator, Integrator):
         remedy = "Pass integrator=integrator, as Measure.compute receives it."
         raise InvalidValue("integrator", integrator, "must be an Integrator", remedy=remedy)
-    check_engine_is_usable(integrator.engine)
+    Engine.check_is_usable(integrator.engine)
 
 
 def _recording_to_dataset(
@@ -315,20 +306,22 @@ def _recording_to_dataset(
     fluid = scene.parts.fluid.unknowns
     columns = {
         find_quantity(name): recorded_rows[:, column]
-        for column, name in enumerate(MOTION_VARIABLES)
+        for column, name in enumerate(Recording.MOTION_VARIABLES)
     }
-    first = FIRST_STATE_COLUMN + scene.state_count - len(fluid)
+    first = Recording.FIRST_STATE_COLUMN + scene.state_count - len(fluid)
     columns |= {about: recorded_rows[:, first + i] for i, about in enumerate(fluid)}
     if scene.parts.law.state_count > 1:
         of_law = range(scene.parts.law.state_count)
         columns |= {
-            _build_state_variable_quantity(i + 1): recorded_rows[:, FIRST_STATE_COLUMN + i]
+            _build_state_variable_quantity(i + 1): recorded_rows[
+                :, Recording.FIRST_STATE_COLUMN + i
+            ]
             for i in of_law
         }
-    columns[find_quantity("load_point_displacement")] = recorded_load_point_displacement(
+    columns[find_quantity("load_point_displacement")] = Recording.load_point_displacement(
         scene, recorded_rows
     )
-    columns[find_quantity("friction_coefficient")] = recorded_friction_coefficient(recorded_rows)
+    columns[find_quantity("friction_coefficient")] = Recording.friction_coefficient(recorded_rows)
     dataset = xr.Dataset(
         {
             q.name: ("time", values, motion_variable_attributes(q, scene))
@@ -340,7 +333,7 @@ def _recording_to_dataset(
         "flag_values": np.arange(len(regime_names), dtype=np.int8),
         "flag_meanings": " ".join(regime_names),
     }
-    dataset["regime"] = "time", recorded_rows[:, REGIME_COLUMN].astype(np.int8), flags
+    dataset["regime"] = "time", recorded_rows[:, Recording.REGIME_COLUMN].astype(np.int8), flags
     about_rate = find_quantity("reference_rate").attributes
     dataset["reference_rate"] = (), scene.reference_rate, about_rate
     return dataset.set_coords(["slip", "reference_rate"])
@@ -479,9 +472,12 @@ def make_row_times_strictly_increasing(table: np.ndarray) -> np.ndarray:
     numpy.ndarray
         Recorded motion with strictly increasing times.
     """
-    same = (np.diff(np.delete(table, [REGIME_COLUMN, SAMPLE_COLUMN], axis=1), axis=0) == 0.0).all(
-        axis=1
-    )
+    same = (
+        np.diff(
+            np.delete(table, [Recording.REGIME_COLUMN, Recording.SAMPLE_COLUMN], axis=1), axis=0
+        )
+        == 0.0
+    ).all(axis=1)
     table = table[~np.append(same, np.zeros(min(len(table), 1), dtype=bool))]
     times, earliest = table[:, 0].tolist(), -math.inf
     for place, time in enumerate(times):

@@ -24,7 +24,7 @@ from rsfstudy.error_boundary import error_boundary, find_stacklevel_of_user_code
 from rsfstudy.errors import IncompleteWarning, InvalidValue, RsfStudyWarning, shorten_text
 from rsfstudy.execution import OutputOptions, WorkerPool, prepare_study_run, run_fingerprint
 from rsfstudy.measures import Outcome
-from rsfstudy.motion import COMPILED, check_engine_is_usable
+from rsfstudy.motion import Engine
 from rsfstudy.netcdf_encoding import copy_with_cf_encoding
 from rsfstudy.quantities import html_table
 from rsfstudy.reporting import format_notes_on_incomplete_results, note_on_norms_near_load_velocity
@@ -283,12 +283,12 @@ def prepare_run_with_progress(
     InvalidValue
         If the study or an option is invalid.
     """
-    check_engine_is_usable(study.accuracy.engine)
+    Engine.check_is_usable(study.accuracy.engine)
     ready = prepare_study_run(study, output_options, worker_pool)
 
     def run() -> xr.Dataset:
         """Compile the equations if necessary, and run the study."""
-        if study.accuracy.engine == COMPILED:
+        if study.accuracy.engine == Engine.COMPILED:
             compile_scenes_with_notice(
                 ready.plan.example_scenes, study.measure.needs_time, show_progress_bar
             )

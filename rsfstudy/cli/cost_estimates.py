@@ -14,7 +14,7 @@ import numpy as np
 
 from rsfstudy.errors import InvalidValue
 from rsfstudy.execution import CellPlan, estimate_evaluations_and_time
-from rsfstudy.motion import COMPILED, SCIPY, check_engine_is_usable
+from rsfstudy.motion import Engine
 from rsfstudy.storage import CellTimings, read_timings
 
 #: Typical speed-up of the compiled engine relative to SciPy, by measure. The page of benchmarks
@@ -134,11 +134,11 @@ def compiled_engine_hint(cell_plan: CellPlan, output_directory: Path) -> str:
     measure, engine = cell_plan.study.measure.describe()["name"], cell_plan.study.accuracy.engine
     kept = output_directory / f"{cell_plan.study.name}.cells.sqlite"
     saves = (
-        engine == SCIPY
+        engine == Engine.SCIPY
         and measure != _NAME_OF_MEASURE_REQUIRING_SCIPY_ENGINE
         and estimate_evaluations_and_time(cell_plan)[1] > _MIN_SECONDS_FOR_FASTER_ENGINE_HINT
     )
-    if not saves or kept.exists() or describe_missing_engine_packages(COMPILED):
+    if not saves or kept.exists() or describe_missing_engine_packages(Engine.COMPILED):
         return ""
     if measure in _COMPILED_SPEEDUP_BY_MEASURE:
         return (
@@ -203,9 +203,9 @@ def describe_missing_engine_packages(engine_name: str) -> str:
         If the engine is unknown.
     """
     try:
-        check_engine_is_usable(engine_name)
+        Engine.check_is_usable(engine_name)
     except InvalidValue:
-        if engine_name != COMPILED:
+        if engine_name != Engine.COMPILED:
             raise
         return "needs Numba (pip install 'rsfstudy[fast]')"
     return ""

@@ -19,7 +19,7 @@ import click
 from rsfstudy.defaults import CELL_TIME_LIMIT, FIGURE_FORMATS, OUTPUT_DIRECTORY
 from rsfstudy.error_boundary import check_regular_file
 from rsfstudy.errors import InvalidValue
-from rsfstudy.motion import ENGINES
+from rsfstudy.motion import Engine
 from rsfstudy.path_checks import check_path
 
 DecoratedFunction = TypeVar("DecoratedFunction", bound=Callable[..., Any])
@@ -196,7 +196,7 @@ rtol_option = click.option(
 )
 engine_option = click.option(
     "--engine",
-    type=click.Choice(ENGINES),
+    type=click.Choice(Engine.NAMES),
     help="Integration engine. The engine compiled requires Numba and is much faster.  "
     "[default: engine of the study, scipy]",
 )

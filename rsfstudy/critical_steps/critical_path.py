@@ -29,7 +29,7 @@ from functools import cache
 from typing import Any, NamedTuple
 
 from rsfstudy.motion import (
-    COMPILED,
+    Engine,
     Event,
     EventKind,
     EventSpecification,
@@ -38,7 +38,6 @@ from rsfstudy.motion import (
     MotionStopped,
     build_root_finder,
     fall,
-    import_compiled_engine,
     maximum,
     rise,
 )
@@ -433,7 +432,7 @@ def prepare_scalar_function_for_engine(
         The compiled function, or ``function`` itself if the engine is not the compiled engine.
     """
     return (
-        import_compiled_engine().compile_scalar_function(function, *arguments)
-        if engine == COMPILED
+        Engine.import_compiled().compile_scalar_function(function, *arguments)
+        if engine == Engine.COMPILED
         else function
     )

@@ -21,11 +21,9 @@ from rsfstudy.motion import (
     Integrator,
     MotionStopped,
     approach_to_steady_state,
-    initial_point,
     maximum,
     minimum,
     rise,
-    slow_manifold_point,
 )
 from rsfstudy.slider import RUPTURE_REGIME, MotionPoint, Scene, SteadySliding
 from rsfstudy.status import Status
@@ -312,7 +310,7 @@ def _max_log_slip_rate_of_closed_orbit(scene: Scene, integrator: Integrator) -> 
     integrated backwards in time to the previous peak. The rest of the orbit may reach slip rates of
     1e-40 V_*, at which an integration would lose all digits.
     """
-    begin = initial_point(scene)
+    begin = Integrator.initial_point(scene)
     equations, start = (
         scene.equations_without_mass(with_time=False),
         (begin.spring_stress, begin.psi),
@@ -370,7 +368,7 @@ def _slow_orbit_grows_to_norm(
                 strict=True,
             )
         )
-        beyond = slow_manifold_point(scene, spring_stress, tuple(psis))
+        beyond = scene.slow_manifold_point(spring_stress, tuple(psis))
         orbit = _follow_one_orbit(
             scene, steady_state, beyond, integrator, with_inertia=with_inertia
         )

@@ -26,7 +26,7 @@ from rsfstudy.critical_steps.shooting_steps import (
     StepFamily,
     slip_lag_due_to_inertia,
 )
-from rsfstudy.motion import Integrator, MotionStopped, slow_manifold_point
+from rsfstudy.motion import Integrator, MotionStopped
 from rsfstudy.slider import Scene, effective_friction
 from rsfstudy.status import Status
 
@@ -432,7 +432,7 @@ class NormalStressStepFamily(ShootingStepFamily):
         """Return ln(V/V_*) immediately after the step, without inertia."""
         scene = self.scene_with_step(step_size).without_mass()
         steady_states = scene.compute_steady_states(0.0, 0.0)
-        return slow_manifold_point(scene, scene.spring_stress_step, steady_states).log_slip_rate
+        return scene.slow_manifold_point(scene.spring_stress_step, steady_states).log_slip_rate
 
 
 def _reaches_norm_at_loose_tolerance(scene: Scene, integrator: Integrator) -> bool:

@@ -18,7 +18,7 @@ import numpy as np
 
 from rsfstudy.errors import InvalidValue
 from rsfstudy.measures import Measure
-from rsfstudy.motion import COMPILED, PYTHON, SCIPY
+from rsfstudy.motion import Engine
 from rsfstudy.slider import Scene
 from rsfstudy.study import CellChanges, Study
 
@@ -28,7 +28,7 @@ _GOLDEN_SECTION_RATIO = (math.sqrt(5.0) - 1.0) / 2.0
 #: cells of its batch are lost.
 _TARGET_SECONDS_PER_BATCH, MAX_BATCH_SIZE = 0.3, 5000
 #: Typical time per right-hand-side evaluation in s, by engine, including all overheads.
-_SECONDS_PER_RHS_EVALUATION = {SCIPY: 1.2e-5, PYTHON: 8e-6, COMPILED: 5e-7}
+_SECONDS_PER_RHS_EVALUATION = {Engine.SCIPY: 1.2e-5, Engine.PYTHON: 8e-6, Engine.COMPILED: 5e-7}
 
 
 def compute_cell_key(scene: Scene, measure: Measure) -> bytes:
@@ -267,5 +267,5 @@ def estimate_evaluations_and_time(plan: CellPlan) -> tuple[int, float]:
     accuracy = plan.study.accuracy
     work = len(plan.unique_cell_numbers) * plan.study.measure.expected_work(accuracy)
     return round(work), work * _SECONDS_PER_RHS_EVALUATION.get(
-        accuracy.engine, _SECONDS_PER_RHS_EVALUATION[SCIPY]
+        accuracy.engine, _SECONDS_PER_RHS_EVALUATION[Engine.SCIPY]
     )

@@ -16,12 +16,7 @@ import numpy as np
 
 from rsfstudy.errors import InvalidValue
 from rsfstudy.fitting.filters import Filter
-from rsfstudy.motion import (
-    Integrator,
-    MotionStopped,
-    Recording,
-    recorded_friction_coefficient,
-)
+from rsfstudy.motion import Integrator, MotionStopped, Recording
 from rsfstudy.quantities import Quantity
 from rsfstudy.slider import Scene, build_sampled_history_from_table, replace_field_values
 from rsfstudy.status import Status
@@ -341,7 +336,7 @@ class WindowModel:
             return nothing
         finally:
             self.integrator.work_meter.budget = budget
-        found = recorded_friction_coefficient(recording.as_table(scene))
+        found = Recording.friction_coefficient(recording.as_table(scene))
         if len(found) != len(times):
             return nothing
         return self.filter.apply(self.time, found) if self.filter else found

@@ -43,10 +43,10 @@ from rsfstudy.measure_base import (
     create_outputs_along_phase,
 )
 from rsfstudy.motion import (
-    MAX_ERROR_OVER_RTOL,
-    MOTION_VARIABLES,
+    Accuracy,
     Integrator,
     MotionStopped,
+    Recording,
     resample_motion_along_path,
 )
 from rsfstudy.parts import Segment
@@ -112,7 +112,7 @@ _OUTPUTS = (
         "what the slider does in the end, by its peak slip rate",
         flags=SLIP_MODES,
     ),
-    *create_outputs_along_phase(*MOTION_VARIABLES),
+    *create_outputs_along_phase(*Recording.MOTION_VARIABLES),
 )
 
 
@@ -411,7 +411,7 @@ def status_from_output_errors(
         Largest relative error, or an empty string.
     """
     worst = float((output_errors / _primary_output_error_scales(orbit))[outputs].max())
-    if worst <= integrator.result_tolerance(MAX_ERROR_OVER_RTOL):
+    if worst <= integrator.result_tolerance(Accuracy.MAX_ERROR_OVER_RTOL):
         return Status.OK, ""
     asked = integrator.result_tolerance()
     why = f"the cycle is known to {worst:.1e} only, where {asked:g} was asked for"

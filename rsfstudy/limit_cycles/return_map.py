@@ -48,14 +48,7 @@ from rsfstudy.limit_cycles.stick_slip_cycles import (
     Cycle,
     iterate_cycles,
 )
-from rsfstudy.motion import (
-    Accuracy,
-    Integrator,
-    MotionStopped,
-    Recording,
-    compute_restart_point,
-    point_with_slip_rate,
-)
+from rsfstudy.motion import Accuracy, Integrator, MotionStopped, Recording
 from rsfstudy.slider import MotionPoint, Numbers, Scene
 from rsfstudy.status import Status
 
@@ -271,9 +264,9 @@ class ReturnMap:
             If forward slip is impossible at this spring stress.
         """
         spring_stress, *psis = section.tolist()
-        point = compute_restart_point(self.scene, spring_stress, tuple(psis))
+        point = Integrator.restart_point(self.scene, spring_stress, tuple(psis))
         return (
-            point_with_slip_rate(self.scene, point, self.scene.log_load_velocity)
+            Integrator.point_with_slip_rate(self.scene, point, self.scene.log_load_velocity)
             if self._inertia_matters_at(point)
             else point
         )

@@ -26,7 +26,6 @@ from rsfstudy.measure_base import _declaration_checks
 from rsfstudy.measure_base._declaration_checks import OutputValue as OutputValue
 from rsfstudy.measure_base._declaration_checks import PlainValue
 from rsfstudy.motion import (
-    MAX_ERROR_OVER_RTOL,
     Accuracy,
     Integrator,
     MotionStopped,
@@ -493,7 +492,7 @@ class Measure(ConstructorKeywordCheckMixin):
         values, doubts = outcome.values, []
         for name, scale in self.error_scales(scene, values).items():
             error, asked = values.get(f"{name}_error", 0.0), integrator.result_tolerance() * scale
-            if error > MAX_ERROR_OVER_RTOL * asked:
+            if error > Accuracy.MAX_ERROR_OVER_RTOL * asked:
                 text = f"{name} = {values[name]:.6g} is known to {error:.2g}, and {asked:.2g}"
                 doubts.append(f"{text} was asked for")
         if not doubts:

@@ -69,7 +69,7 @@ def point_before_start(scene: Scene) -> MotionPoint:
     psis = before.compute_steady_states(0.0, 0.0)
     if scene.starts_unsteady:
         psis = _find_specified_initial_states(scene, psis)[0]
-    return slow_manifold_point(before, scene.parts.slider.initial_stress, psis)
+    return before.slow_manifold_point(scene.parts.slider.initial_stress, psis)
 
 
 def point_without_derived_values(
@@ -154,7 +154,7 @@ def _find_specified_initial_states(scene: Scene, steady_states: Numbers) -> tupl
     others = steady_states[1 : before.state_count]
 
     def begun(psi: float) -> MotionPoint:
-        return slow_manifold_point(before, scene.initial_stress, (psi, *others))
+        return before.slow_manifold_point(scene.initial_stress, (psi, *others))
 
     def missing(psi: float) -> float:
         return scene.initial_state - begun(psi).state
@@ -220,28 +220,6 @@ def point_with_slip_rate(scene: Scene, point: MotionPoint, log_slip_rate: float)
     if friction is None:
         raise MotionStopped(Status.NORMAL_STRESS_LOST, "the step takes normal stress away")
     return point._replace(log_slip_rate=log_slip_rate, frictional_stress=friction)
-
-
-def slow_manifold_point(scene: Scene, spring_stress: float, states: Numbers) -> MotionPoint:
-    """Return the point on the slow manifold for a spring stress and states.
-
-    Parameters
-    ----------
-    scene : Scene
-        Scene of the motion.
-    spring_stress : float
-        Spring stress :math:`f`, in sigma_*.
-    states : tuple of float
-        States of the friction law, followed by the unknowns of the loading and the fluid.
-
-    Returns
-    -------
-    MotionPoint
-        Point with all fields.
-    """
-    return scene.equations_between_ruptures(with_time=False).evaluate_point(
-        (spring_stress, *states)
-    )
 
 
 def check_forward_slip_is_possible_at_start(

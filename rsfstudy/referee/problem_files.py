@@ -25,13 +25,7 @@ from scipy.special import lambertw
 
 from rsfstudy.error_boundary import check_regular_file, format_exception
 from rsfstudy.errors import DataError, InvalidValue, shorten_text
-from rsfstudy.motion import (
-    Event,
-    EventKind,
-    MotionStopped,
-    point_with_slip_rate,
-    slow_manifold_point,
-)
+from rsfstudy.motion import Event, EventKind, Integrator, MotionStopped
 from rsfstudy.parts import Segment
 from rsfstudy.path_checks import check_path
 from rsfstudy.rig import Rig, convert_to_si
@@ -350,8 +344,8 @@ class BenchmarkProblem:
             *scene.parts.loading.initial_unknowns(scene),
         )
         radiated = before.dynamics.radiated_stress(x)
-        point = slow_manifold_point(acting, friction + radiated + acting.spring_stress_step, psis)
-        point = point_with_slip_rate(acting, point, x) if scene.has_mass else point
+        point = acting.slow_manifold_point(friction + radiated + acting.spring_stress_step, psis)
+        point = Integrator.point_with_slip_rate(acting, point, x) if scene.has_mass else point
         return Event(EventKind.START, None, 0.0, 0.0, point, "", 0, 0.0)
 
     def _initial_state_variables(self) -> tuple[float, ...]:

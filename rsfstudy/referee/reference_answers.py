@@ -10,16 +10,7 @@ import numpy as np
 
 from rsfstudy.errors import RsfStudyError
 from rsfstudy.measures import CriticalStep, LimitCycle, Measure
-from rsfstudy.motion import (
-    FIRST_STATE_COLUMN,
-    MOTION_VARIABLES,
-    Accuracy,
-    EventKind,
-    Integrator,
-    MotionStopped,
-    Recording,
-    maximum,
-)
+from rsfstudy.motion import Accuracy, EventKind, Integrator, MotionStopped, Recording, maximum
 from rsfstudy.referee.problem_files import BenchmarkProblem
 from rsfstudy.status import Status
 
@@ -98,9 +89,9 @@ def _compute_series_answer(problem: BenchmarkProblem, accuracy: Accuracy) -> Ans
     for _ in moving:
         pass
     seen = recording.as_table(scene)
-    told = dict(zip(MOTION_VARIABLES, seen.T, strict=False))
+    told = dict(zip(Recording.MOTION_VARIABLES, seen.T, strict=False))
     sigma, b = rig.normal_stress, np.array(problem.b)
-    states = seen[:, FIRST_STATE_COLUMN : FIRST_STATE_COLUMN + len(b)]
+    states = seen[:, Recording.FIRST_STATE_COLUMN : Recording.FIRST_STATE_COLUMN + len(b)]
     taken = states.sum(axis=1) - told["state_variable"]
     states = states - np.outer(taken, np.abs(b) / np.abs(b).sum())
     thetas = (np.array(problem.theta_star) * np.exp(states / b)).T

@@ -12,15 +12,7 @@ import numpy as np
 from rsfstudy.error_boundary import wrap_methods_in_error_boundary
 from rsfstudy.errors import InvalidValue
 from rsfstudy.measure_base import Measure, Outcome
-from rsfstudy.motion import (
-    RECORDED_VARIABLES,
-    EventKind,
-    Integrator,
-    MotionStopped,
-    Recording,
-    fall,
-    rise,
-)
+from rsfstudy.motion import EventKind, Integrator, MotionStopped, Recording, fall, rise
 from rsfstudy.quantities import Output
 from rsfstudy.responses._recorded_motion import estimate_error_at_instant
 from rsfstudy.slider import Scene
@@ -255,7 +247,7 @@ class RigidResponse(Measure):
             if complete and not math.isnan(distance):
                 break
         names = ("slip", "frictional_stress", "state_variable", "normal_stress_ratio")
-        columns = [RECORDED_VARIABLES.index(name) for name in names]
+        columns = [Recording.VARIABLES.index(name) for name in names]
         slips, *values = recording.as_table(scene)[:, columns].T
         values[0] = values[0] - scene.mu_star
         rows = np.stack(values, axis=1)

@@ -66,22 +66,11 @@ if TYPE_CHECKING:
     from rsfstudy.slider.equations import (
         RUPTURE_REGIME,
         Equations,
-        build_equations_against_displacement,
-        build_equations_against_inertial_time,
-        equations_at_imposed_slip_rate,
-        equations_between_ruptures,
-        equations_in_rupture,
-        equations_without_mass,
-        quasi_static_log_slip_rate,
     )
     from rsfstudy.slider.field_name_hints import hint_for_unknown_field
     from rsfstudy.slider.fluid import BUILT_IN_PARTS
     from rsfstudy.slider.friction import (
         FrictionFunctions,
-        build_friction_relation,
-        build_state_evolution_function,
-        compute_steady_states,
-        effective_normal_stress_at,
     )
     from rsfstudy.slider.loading import MIN_SEGMENT_DURATION
     from rsfstudy.slider.motion_point import MotionPoint
@@ -121,19 +110,8 @@ if TYPE_CHECKING:
     from rsfstudy.slider.scene_caching import cached_attribute, cached_per_scene
     from rsfstudy.slider.scene_view import SceneView
     from rsfstudy.slider.slider_parameters import ALTERNATIVE_STIFFNESS_FIELDS, SliderParameters
-    from rsfstudy.slider.stability import (
-        all_critical_stiffnesses,
-        critical_stiffness,
-        largest_linear_growth_rate,
-        linear_growth_rates,
-    )
     from rsfstudy.slider.steady_state import (
         SteadySliding,
-        frictional_stress_after_jump,
-        frictional_stress_for_friction,
-        min_steady_log_slip_rate,
-        steady_friction_minus_reference,
-        steady_sliding,
     )
     from rsfstudy.slider.user_loadings import SEGMENT_MAPPING_KEYS, Protocol, UserLoading, protocol
 else:
@@ -151,22 +129,9 @@ else:
             "slider.equations": (
                 "Equations",
                 "RUPTURE_REGIME",
-                "equations_between_ruptures",
-                "build_equations_against_displacement",
-                "build_equations_against_inertial_time",
-                "equations_in_rupture",
-                "equations_at_imposed_slip_rate",
-                "equations_without_mass",
-                "quasi_static_log_slip_rate",
             ),
             "slider.fluid": ("BUILT_IN_PARTS",),
-            "slider.friction": (
-                "FrictionFunctions",
-                "build_friction_relation",
-                "build_state_evolution_function",
-                "compute_steady_states",
-                "effective_normal_stress_at",
-            ),
+            "slider.friction": ("FrictionFunctions",),
             "slider.field_name_hints": ("hint_for_unknown_field",),
             "slider.loading": ("MIN_SEGMENT_DURATION",),
             "slider.parameter_layout": ("LARGEST_LOG_SLIP_RATE",),
@@ -205,20 +170,7 @@ else:
             "slider.scene": ("SINGLE_ENDLESS_SEGMENT_TABLE", "Scene"),
             "slider.scene_view": ("SceneView",),
             "slider.slider_parameters": ("ALTERNATIVE_STIFFNESS_FIELDS", "SliderParameters"),
-            "slider.stability": (
-                "critical_stiffness",
-                "all_critical_stiffnesses",
-                "linear_growth_rates",
-                "largest_linear_growth_rate",
-            ),
-            "slider.steady_state": (
-                "SteadySliding",
-                "min_steady_log_slip_rate",
-                "steady_friction_minus_reference",
-                "steady_sliding",
-                "frictional_stress_after_jump",
-                "frictional_stress_for_friction",
-            ),
+            "slider.steady_state": ("SteadySliding",),
         },
     )
 
@@ -258,29 +210,14 @@ __all__ = [
     "build_sampled_history",
     "cached_attribute",
     "cached_per_scene",
-    "compute_steady_states",
-    "critical_stiffness",
     "critical_stiffness_closed_form",
-    "all_critical_stiffnesses",
     "effective_friction",
-    "equations_between_ruptures",
-    "build_equations_against_displacement",
-    "build_equations_against_inertial_time",
-    "equations_in_rupture",
-    "equations_at_imposed_slip_rate",
-    "equations_without_mass",
     "scene_field_defaults",
     "field_names",
     "scene_field_types",
     "find_inapplicable_fields",
-    "build_friction_relation",
-    "linear_growth_rates",
     "build_sampled_history_from_table",
-    "largest_linear_growth_rate",
-    "quasi_static_log_slip_rate",
-    "min_steady_log_slip_rate",
     "replace_names_by_user_parts",
-    "effective_normal_stress_at",
     "normalise_field_value",
     "displacement_per_path_length",
     "protocol",
@@ -288,11 +225,6 @@ __all__ = [
     "register_user_parts",
     "replace_field_values",
     "scene_field_quantities",
-    "build_state_evolution_function",
-    "steady_friction_minus_reference",
-    "steady_sliding",
-    "frictional_stress_after_jump",
-    "frictional_stress_for_friction",
     "hint_for_unknown_field",
     "add_scene_fields_to_signature",
 ]

@@ -21,6 +21,7 @@ class SceneFunctions:
     equations_at_imposed_slip_rate = equations.equations_at_imposed_slip_rate
     equations_against_displacement = equations.build_equations_against_displacement
     equations_against_inertial_time = equations.build_equations_against_inertial_time
+    slow_manifold_point = equations.slow_manifold_point
     quasi_static_log_slip_rate = equations.quasi_static_log_slip_rate
 
     friction_relation = friction.build_friction_relation

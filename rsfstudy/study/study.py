@@ -23,7 +23,7 @@ from rsfstudy.error_boundary import error_boundary, wrap_methods_in_error_bounda
 from rsfstudy.errors import InvalidValue
 from rsfstudy.formatting import is_sequence_of_axis_values
 from rsfstudy.measures import Measure
-from rsfstudy.motion import Accuracy, find_user_stepper
+from rsfstudy.motion import Accuracy, Engine
 from rsfstudy.quantities import Quantity
 from rsfstudy.rig import (
     RATIO_FIELD_BY_DIMENSIONAL_NAME,
@@ -237,7 +237,7 @@ class Study:
         return (
             *self.measure.code_classes,
             *self.user_parts.values(),
-            *find_user_stepper(self.accuracy.engine),
+            *Engine.find_user_stepper(self.accuracy.engine),
         )
 
     @cached_property

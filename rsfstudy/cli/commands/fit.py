@@ -17,7 +17,7 @@ from rsfstudy.cli.printing import print_line, print_pieces
 from rsfstudy.cli.results import EXIT_STATUS_FAILED, EXIT_STATUS_OK, CommandResult, output_result
 from rsfstudy.defaults import FIT_EVALUATION_BUDGET
 from rsfstudy.errors import InvalidValue
-from rsfstudy.motion import ENGINES
+from rsfstudy.motion import Engine
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -214,7 +214,7 @@ def _make_quantity_option(
 )
 @click.option(
     "--engine",
-    type=click.Choice(ENGINES),
+    type=click.Choice(Engine.NAMES),
     help="Integration engine.  [default: compiled if Numba is installed, otherwise scipy]",
 )
 @options.make_image_option(

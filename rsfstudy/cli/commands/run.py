@@ -171,12 +171,12 @@ def _print_expected_cost(study: Study, given: options.CommandOptions) -> None:
     """Print the expected cost of a run with another accuracy, and a hint at a faster engine."""
     from rsfstudy.cli import cost_estimates
     from rsfstudy.execution import CellPlan
-    from rsfstudy.motion import DEFAULT_RTOL
+    from rsfstudy.motion import Accuracy
 
     plan = CellPlan(study)
     if given.rtol is not None and not given.as_json:
         ratio = study.measure.expected_work(study.accuracy) / study.measure.typical_work
-        words = f"{study.name}: {ratio:.2g} times the work of rtol {DEFAULT_RTOL:g}"
+        words = f"{study.name}: {ratio:.2g} times the work of rtol {Accuracy.DEFAULT_RTOL:g}"
         print_line(f"{words}, {cost_estimates.describe_study_cost(plan, given.output)}")
     if not (given.every or given.quiet) and (
         text := cost_estimates.compiled_engine_hint(plan, given.output)

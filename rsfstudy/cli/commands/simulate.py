@@ -13,7 +13,7 @@ from rsfstudy.cli.command_group import Command
 from rsfstudy.cli.printing import print_line, print_pieces
 from rsfstudy.cli.results import EXIT_STATUS_FAILED, EXIT_STATUS_OK
 from rsfstudy.errors import InvalidValue
-from rsfstudy.motion import DEFAULT_EVALUATION_BUDGET, DEFAULT_RTOL, ENGINES, SCIPY
+from rsfstudy.motion import Accuracy, Engine
 from rsfstudy.status import Status
 
 if TYPE_CHECKING:
@@ -45,11 +45,13 @@ _EXIT_STATUS_UNPHYSICAL_MOTION = 3
 )
 @options.abscissa_option
 @options.rig_options
-@click.option("--rtol", type=float, default=DEFAULT_RTOL, help="Relative tolerance.")
+@click.option("--rtol", type=float, default=Accuracy.DEFAULT_RTOL, help="Relative tolerance.")
 @options.make_count_option(
-    "--budget", DEFAULT_EVALUATION_BUDGET, "Maximum number of right-hand-side evaluations."
+    "--budget", Accuracy.DEFAULT_BUDGET, "Maximum number of right-hand-side evaluations."
 )
-@click.option("--engine", type=click.Choice(ENGINES), default=SCIPY, help="Integration engine.")
+@click.option(
+    "--engine", type=click.Choice(Engine.NAMES), default=Engine.SCIPY, help="Integration engine."
+)
 @options.make_image_option(
     "--output",
     Path("motion.png"),
