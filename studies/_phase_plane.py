@@ -11,7 +11,7 @@ import numpy as np
 import xarray as xr
 
 from rsfstudy import Scene
-from rsfstudy.slider import find_inapplicable_fields, scene_field_types
+from rsfstudy.slider import SceneFields, scene_field_types
 from rsfstudy.study import find_named_user_parts
 from rsfstudy.study.figure_declarations import Axes
 
@@ -58,7 +58,7 @@ def scene_from_coordinates(cell: xr.Dataset) -> Scene:
     values = {n: v for n, v in here.items() if n in kinds and v == v and v != ""}
     flags = [name for name in values if kinds[name] in (bool, bool | None)]
     values |= {name: bool(values[name]) for name in flags}
-    for name in find_inapplicable_fields(Scene().as_dict() | values, parts.values()):
+    for name in SceneFields.find_inapplicable(Scene().as_dict() | values, parts.values()):
         values.pop(name, None)
     return Scene(**values)
 

@@ -28,7 +28,7 @@ from rsfstudy.motion import Engine
 from rsfstudy.netcdf_encoding import copy_with_cf_encoding
 from rsfstudy.quantities import html_table
 from rsfstudy.reporting import format_notes_on_incomplete_results, note_on_norms_near_load_velocity
-from rsfstudy.slider import Scene, add_scene_fields_to_signature
+from rsfstudy.slider import Scene, SceneFields
 from rsfstudy.storage import (
     Comparison,
     check_contains_study_results,
@@ -79,7 +79,7 @@ def studies() -> dict[str, Study]:
 
 
 @error_boundary
-@add_scene_fields_to_signature()
+@SceneFields.add_to_signature()
 def run(
     study: str | Path | Study,
     *,

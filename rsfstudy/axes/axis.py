@@ -19,7 +19,7 @@ from rsfstudy.error_boundary import wrap_methods_in_error_boundary
 from rsfstudy.errors import InvalidValue
 from rsfstudy.formatting import format_value, is_sequence_of_axis_values
 from rsfstudy.quantities import is_variable_name
-from rsfstudy.slider import normalise_field_value
+from rsfstudy.slider import SceneFields
 
 AxisRow = Mapping[str, Any]
 
@@ -482,7 +482,7 @@ def to_plain_value(field_name: str, value: Any) -> Any:
     InvalidValue
         If the value is an array with one or more dimensions.
     """
-    value = normalise_field_value(field_name, value)
+    value = SceneFields.normalise_value(field_name, value)
     if isinstance(value, np.ndarray) and value.ndim:
         raise InvalidValue(field_name, value.tolist(), "must be one number, flag or text")
     value = value.item() if isinstance(value, np.generic | np.ndarray) else value

@@ -30,7 +30,7 @@ from rsfstudy.errors import InvalidValue, RunError, shorten_text
 from rsfstudy.execution import provenance
 from rsfstudy.measures import Measure, Outcome
 from rsfstudy.motion import Accuracy, Engine
-from rsfstudy.slider import Scene, UserPart, register_user_parts
+from rsfstudy.slider import Scene, SceneFields, UserPart
 from rsfstudy.status import Status
 from rsfstudy.storage import OutputPacker, StoredCellRow
 from rsfstudy.study import STUDIES_PACKAGE, Cell, CellChanges
@@ -260,7 +260,7 @@ def compute_batch(serialized_task: bytes, packed_batch: bytes) -> bytes:
         if ours
         else _cpu_time_limits.enforce_in_this_thread(task.time_limit)
     ):
-        register_user_parts(task.user_parts)
+        SceneFields.register_user_parts(task.user_parts)
         Engine.register_user_steppers(task.user_stepper_classes)
         for key, *changes in pickle.loads(zlib.decompress(packed_batch)):
             cell = CellChanges(*changes).build_cell(task.base_scene)

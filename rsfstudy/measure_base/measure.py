@@ -35,7 +35,7 @@ from rsfstudy.motion import (
     suggest_raising_budget,
 )
 from rsfstudy.quantities import Output, Quantity, is_variable_name
-from rsfstudy.slider import SCENE_FIELD_NAMES, Scene, cached_attribute
+from rsfstudy.slider import Scene, SceneFields, cached_attribute
 from rsfstudy.status import Status
 from rsfstudy.vocabulary import FORMULAS_OF_DERIVED_COORDINATES
 
@@ -77,7 +77,7 @@ RESERVED_NAMES = frozenset(
         "message",
         "rhs_evaluations",
         "wall_time",
-        *SCENE_FIELD_NAMES,
+        *SceneFields.NAMES,
         *FORMULAS_OF_DERIVED_COORDINATES,
     }
 )
@@ -566,9 +566,9 @@ def _check_names_declared_by_measure(measure: Measure) -> None:
             odd = about.name if isinstance(about, Quantity) else about
             raise InvalidValue("quantities", odd, "describes nothing measured", choices=known)
     for name in measure.solved_fields:
-        if name not in SCENE_FIELD_NAMES:
+        if name not in SceneFields.NAMES:
             raise InvalidValue(
-                "solved_fields", name, "is not a field of a scene", choices=SCENE_FIELD_NAMES
+                "solved_fields", name, "is not a field of a scene", choices=SceneFields.NAMES
             )
 
 

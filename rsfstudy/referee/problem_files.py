@@ -29,7 +29,7 @@ from rsfstudy.motion import Event, EventKind, Integrator, MotionStopped
 from rsfstudy.parts import Segment
 from rsfstudy.path_checks import check_path
 from rsfstudy.rig import Rig, convert_to_si
-from rsfstudy.slider import Scene, scene_field_defaults
+from rsfstudy.slider import Scene, SceneFields
 
 #: Folder of the shipped problems and their answers.
 SHIPPED_PROBLEM_FOLDER = Path(__file__).with_name("problems")
@@ -279,7 +279,7 @@ class BenchmarkProblem:
         if "V_c" in si:
             fields["cutoff_velocity_ratio"] = si["V_c"] / rig.reference_velocity
         if "V_unstable" in si:
-            period = rig.period or scene_field_defaults()["period"]
+            period = rig.period or SceneFields.defaults()["period"]
             norm = si["V_unstable"] * period / (2.0 * math.pi * rig.slip_distance)
             fields["instability_norm"] = norm
         if self.loading:

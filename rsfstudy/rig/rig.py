@@ -40,7 +40,7 @@ from rsfstudy.rig.rig_quantities import (
     find_si_units_of_field,
 )
 from rsfstudy.rig.units import convert_to_si
-from rsfstudy.slider import Protocol, Scene, add_scene_fields_to_signature, protocol
+from rsfstudy.slider import Protocol, Scene, SceneFields, protocol
 
 __getattr__ = build_getattr_for_former_names(__name__)
 
@@ -187,7 +187,7 @@ class Rig(HtmlTableMixin):
             / self.scales[scale].factor
         )
 
-    @add_scene_fields_to_signature(*RATIO_FIELD_BY_DIMENSIONAL_NAME)
+    @SceneFields.add_to_signature(*RATIO_FIELD_BY_DIMENSIONAL_NAME)
     def scene(self, **fields: Any) -> Scene:
         """Create a scene of this rig.
 

@@ -67,7 +67,6 @@ if TYPE_CHECKING:
         RUPTURE_REGIME,
         Equations,
     )
-    from rsfstudy.slider.field_name_hints import hint_for_unknown_field
     from rsfstudy.slider.fluid import BUILT_IN_PARTS
     from rsfstudy.slider.friction import (
         FrictionFunctions,
@@ -77,20 +76,10 @@ if TYPE_CHECKING:
     from rsfstudy.slider.parameter_layout import LARGEST_LOG_SLIP_RATE
     from rsfstudy.slider.part_registry import (
         FIELDS_OMITTED_IF_NONE,
-        PART_SELECTING_FIELDS,
-        SCENE_FIELD_NAMES,
-        SCENE_FIELD_QUANTITIES,
-        SCENE_FIELD_TYPES,
-        SLOT_NAMES,
         SLOTS,
         UserPart,
-        add_scene_fields_to_signature,
         normalise_field_value,
-        quantities_with_values,
-        register_user_parts,
         replace_names_by_user_parts,
-        scene_field_defaults,
-        scene_field_quantities,
         scene_field_types,
     )
     from rsfstudy.slider.parts import Function, Numbers, field_names
@@ -106,10 +95,15 @@ if TYPE_CHECKING:
         build_sampled_history_from_table,
     )
     from rsfstudy.slider.scene import SINGLE_ENDLESS_SEGMENT_TABLE, Scene
-    from rsfstudy.slider.scene_assembly import find_inapplicable_fields, replace_field_values
+    from rsfstudy.slider.scene_assembly import (
+        replace_field_values,
+    )
     from rsfstudy.slider.scene_caching import cached_attribute, cached_per_scene
+    from rsfstudy.slider.scene_fields import SceneFields
     from rsfstudy.slider.scene_view import SceneView
-    from rsfstudy.slider.slider_parameters import ALTERNATIVE_STIFFNESS_FIELDS, SliderParameters
+    from rsfstudy.slider.slider_parameters import (
+        SliderParameters,
+    )
     from rsfstudy.slider.steady_state import (
         SteadySliding,
     )
@@ -118,7 +112,7 @@ else:
     __getattr__, __dir__ = build_lazy_export_functions(
         __name__,
         {
-            "slider.scene_assembly": ("find_inapplicable_fields", "replace_field_values"),
+            "slider.scene_assembly": ("replace_field_values",),
             "slider.scene_caching": ("cached_attribute", "cached_per_scene"),
             "slider.closed_forms": (
                 "CLOSED_FORMS",
@@ -132,7 +126,6 @@ else:
             ),
             "slider.fluid": ("BUILT_IN_PARTS",),
             "slider.friction": ("FrictionFunctions",),
-            "slider.field_name_hints": ("hint_for_unknown_field",),
             "slider.loading": ("MIN_SEGMENT_DURATION",),
             "slider.parameter_layout": ("LARGEST_LOG_SLIP_RATE",),
             "slider.parts": ("Function", "Numbers", "field_names"),
@@ -144,22 +137,12 @@ else:
             "slider.motion_point": ("MotionPoint",),
             "slider.user_loadings": ("Protocol", "SEGMENT_MAPPING_KEYS", "UserLoading", "protocol"),
             "slider.part_registry": (
-                "SCENE_FIELD_NAMES",
-                "SCENE_FIELD_QUANTITIES",
-                "SCENE_FIELD_TYPES",
-                "FIELDS_OMITTED_IF_NONE",
-                "PART_SELECTING_FIELDS",
-                "SLOTS",
-                "SLOT_NAMES",
-                "UserPart",
-                "scene_field_defaults",
-                "scene_field_types",
-                "replace_names_by_user_parts",
                 "normalise_field_value",
-                "quantities_with_values",
-                "register_user_parts",
-                "scene_field_quantities",
-                "add_scene_fields_to_signature",
+                "replace_names_by_user_parts",
+                "FIELDS_OMITTED_IF_NONE",
+                "SLOTS",
+                "UserPart",
+                "scene_field_types",
             ),
             "slider.sampled_loading": (
                 "STRESS_RATE_COLUMN",
@@ -168,20 +151,21 @@ else:
                 "build_sampled_history_from_table",
             ),
             "slider.scene": ("SINGLE_ENDLESS_SEGMENT_TABLE", "Scene"),
+            "slider.scene_fields": ("SceneFields",),
             "slider.scene_view": ("SceneView",),
-            "slider.slider_parameters": ("ALTERNATIVE_STIFFNESS_FIELDS", "SliderParameters"),
+            "slider.slider_parameters": ("SliderParameters",),
             "slider.steady_state": ("SteadySliding",),
         },
     )
 
 __all__ = [
+    "SceneFields",
+    "normalise_field_value",
+    "replace_names_by_user_parts",
     "BUILT_IN_PARTS",
     "CLOSED_FORMS",
     "SINGLE_ENDLESS_SEGMENT_TABLE",
     "Equations",
-    "SCENE_FIELD_NAMES",
-    "SCENE_FIELD_QUANTITIES",
-    "SCENE_FIELD_TYPES",
     "FrictionFunctions",
     "Function",
     "LARGEST_LOG_SLIP_RATE",
@@ -194,10 +178,7 @@ __all__ = [
     "Protocol",
     "RUPTURE_REGIME",
     "SEGMENT_MAPPING_KEYS",
-    "PART_SELECTING_FIELDS",
     "SLOTS",
-    "SLOT_NAMES",
-    "ALTERNATIVE_STIFFNESS_FIELDS",
     "STOPPED_LOG_SLIP_RATE",
     "STRESS_RATE_COLUMN",
     "SampledHistory",
@@ -212,19 +193,10 @@ __all__ = [
     "cached_per_scene",
     "critical_stiffness_closed_form",
     "effective_friction",
-    "scene_field_defaults",
     "field_names",
     "scene_field_types",
-    "find_inapplicable_fields",
     "build_sampled_history_from_table",
-    "replace_names_by_user_parts",
-    "normalise_field_value",
     "displacement_per_path_length",
     "protocol",
-    "quantities_with_values",
-    "register_user_parts",
     "replace_field_values",
-    "scene_field_quantities",
-    "hint_for_unknown_field",
-    "add_scene_fields_to_signature",
 ]

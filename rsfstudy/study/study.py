@@ -35,16 +35,7 @@ from rsfstudy.rig import (
     replace_rig_quantity,
 )
 from rsfstudy.rig import make_axis_with_units as axis_in_units
-from rsfstudy.slider import (
-    ALTERNATIVE_STIFFNESS_FIELDS,
-    PART_SELECTING_FIELDS,
-    SLOT_NAMES,
-    Scene,
-    UserPart,
-    find_inapplicable_fields,
-    replace_names_by_user_parts,
-    scene_field_quantities,
-)
+from rsfstudy.slider import Scene, SceneFields, UserPart
 from rsfstudy.study import declaration_checks
 from rsfstudy.study.axis_overrides import replace_field_values, select_axis_points, to_plain_values
 from rsfstudy.study.claims import Claim
@@ -58,13 +49,17 @@ from rsfstudy.study.user_parts import find_named_user_parts, user_field_quantiti
 #: bytes, and the names of files have suffixes.
 _MAX_NAME_BYTES = 200
 #: Scene fields that select a part of the slider, such as the friction law.
-_SLOT_AND_PART_SELECTING_FIELDS = frozenset({*SLOT_NAMES, *PART_SELECTING_FIELDS})
+_SLOT_AND_PART_SELECTING_FIELDS = frozenset(
+    {*SceneFields.SLOT_NAMES, *SceneFields.SELECTING_A_PART}
+)
 #: Pairs of equivalent fields. A slip rate can be given as a velocity or as a ratio to the reference
 #: velocity. The spring can be given as a stiffness or as a ratio to the critical stiffness.
 _EQUIVALENT_FIELD_BY_FIELD_NAME = {
     **RATIO_FIELD_BY_DIMENSIONAL_NAME,
     **{ratio: name for name, ratio in RATIO_FIELD_BY_DIMENSIONAL_NAME.items()},
-    **dict(zip(ALTERNATIVE_STIFFNESS_FIELDS, ALTERNATIVE_STIFFNESS_FIELDS[::-1], strict=True)),
+    **dict(
+        zip(SceneFields.ALTERNATIVE_STIFFNESS, SceneFields.ALTERNATIVE_STIFFNESS[::-1], strict=True)
+    ),
 }
 
 
@@ -243,7 +238,7 @@ class Study:
     @cached_property
     def scene_fields(self) -> tuple[str, ...]:
         """Names of all scene fields, including fields of user-defined parts."""
-        return tuple(scene_field_quantities(self.user_parts.values()))
+        return tuple(SceneFields.quantities_with_user_parts(self.user_parts.values()))
 
     @cached_property
     def scene_field_names(self) -> frozenset[str]:
@@ -442,8 +437,8 @@ class Study:
         The set applies to cells in which no axis selects a part.
         """
         parts = self.user_parts
-        return find_inapplicable_fields(
-            replace_names_by_user_parts(self._base_fields, parts), parts.values()
+        return SceneFields.find_inapplicable(
+            SceneFields.replace_names_by_user_parts(self._base_fields, parts), parts.values()
         )
 
     def _compute_cell_changes(self, axis_rows: Sequence[AxisRow]) -> CellChanges:
@@ -466,8 +461,8 @@ class Study:
             for name in row
         }
         parts = self.user_parts
-        values = replace_names_by_user_parts({**self._base_fields, **of_scene}, parts)
-        meaningless = find_inapplicable_fields(values, parts.values()) - stated
+        values = SceneFields.replace_names_by_user_parts({**self._base_fields, **of_scene}, parts)
+        meaningless = SceneFields.find_inapplicable(values, parts.values()) - stated
         return CellChanges({n: values[n] for n in of_scene if n not in meaningless}, of_measure)
 
     def _build_cell(self, axis_rows: Sequence[AxisRow]) -> Cell:
@@ -561,8 +556,8 @@ class Study:
         if self.rig is not None and of_rig:
             rig, base = replace_rig_quantity(self.rig, self.base, field_name, value)
             return replace(self, rig=rig, base=base)
-        if field_name in self.scene_field_names | SLOT_NAMES:
-            changes = replace_names_by_user_parts({field_name: value}, self.user_parts)
+        if field_name in self.scene_field_names | SceneFields.SLOT_NAMES:
+            changes = SceneFields.replace_names_by_user_parts({field_name: value}, self.user_parts)
             return replace(self, base=self.base.with_(**changes))
         return replace(self, measure=self.measure.with_(**{field_name: value}))
 

@@ -6,7 +6,7 @@ from collections.abc import Iterable, Iterator, Mapping
 from typing import Any
 
 from rsfstudy.quantities import Quantity
-from rsfstudy.slider import SCENE_FIELD_NAMES, SLOTS, UserPart, scene_field_quantities
+from rsfstudy.slider import SLOTS, SceneFields, UserPart
 
 
 def find_named_user_parts(
@@ -48,6 +48,6 @@ def user_field_quantities(parts: Iterable[UserPart]) -> Iterator[Quantity]:
     """
     return (
         about
-        for name, about in scene_field_quantities(parts).items()
-        if name not in SCENE_FIELD_NAMES
+        for name, about in SceneFields.quantities_with_user_parts(parts).items()
+        if name not in SceneFields.NAMES
     )
