@@ -101,6 +101,18 @@ NEW_NAME_BY_OWNER_AND_FORMER_NAME: Mapping[str, Mapping[str, str]] = {
         "linear_growth_rates": "Scene.linear_growth_rates",
         "largest_linear_growth_rate": "Scene.largest_linear_growth_rate",
     },
+    "rsfstudy.rig": {
+        "DISPLAY_BASE_UNITS": "DatasetUnits.DISPLAY_UNITS",
+        "NAME_OF_SCALES_ATTRIBUTE": "DatasetUnits.SCALES_ATTRIBUTE",
+        "convert_to_dimensional_name": "DatasetUnits.dimensional_name",
+        "RATIO_FIELD_BY_DIMENSIONAL_NAME": "RigAxes.RATIO_FIELD_BY_DIMENSIONAL_NAME",
+        "make_axis_with_units": "RigAxes.create",
+        "axis_name_and_units": "RigAxes.name_and_units",
+        "convert_values_to_units": "RigAxes.convert_values",
+        "convert_axis_to_stated_units": "RigAxes.convert_to_stated_units",
+        "replace_rig_quantity": "RigAxes.replace_rig_quantity",
+        "convert_scene_and_axes_to_rig": "RigAxes.convert_scene_and_axes",
+    },
     "rsfstudy.errors": {
         "NoAnswer": "NoResultWarning",
         "Incomplete": "IncompleteWarning",

@@ -235,12 +235,10 @@ class DatasetAccessor:
         >>> converted["critical_stiffness"].attrs["units"]
         'kPa um-1'
         """
-        from rsfstudy.rig import convert_dataset_units, read_si_scales
+        from rsfstudy.rig import DatasetUnits
 
         self._require_rsfstudy_dataset()
-        return convert_dataset_units(
-            self._dataset, read_si_scales(self._dataset), stress, length, time
-        )
+        return DatasetUnits(self._dataset).convert(stress, length, time)
 
     @error_boundary
     def check(self) -> pd.DataFrame:

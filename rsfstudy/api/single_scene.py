@@ -17,7 +17,7 @@ from rsfstudy.execution import provenance_attributes
 from rsfstudy.measures import CriticalStep, LimitCycle, Measure
 from rsfstudy.motion import Accuracy, Engine, Integrator
 from rsfstudy.netcdf_encoding import copy_with_cf_encoding
-from rsfstudy.rig import convert_dataset_units, convert_to_si, read_si_scales
+from rsfstudy.rig import DatasetUnits, convert_to_si
 from rsfstudy.slider import Scene
 from rsfstudy.status import Status
 from rsfstudy.vocabulary import find_quantity
@@ -251,7 +251,7 @@ def to_si(
         for name, value in zip(units, given, strict=True)
         if value is not None
     }
-    return convert_dataset_units(dataset, read_si_scales(dataset, **stated), "Pa", "m", "s")
+    return DatasetUnits(dataset).convert("Pa", "m", "s", **stated)
 
 
 def _measure_scene_to_dataset(

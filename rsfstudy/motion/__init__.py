@@ -69,6 +69,8 @@ else:
             ),
             "motion.former_arguments": ("accept_accuracy_and_meter", "adapt_former_compute"),
             "motion.integrator": ("Integrator",),
+            # Former export, which the method of ``Scene`` replaces.
+            "slider.equations": ("slow_manifold_point",),
             "motion.work_meter": (
                 "MotionStopped",
                 "WorkMeter",

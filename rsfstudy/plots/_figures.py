@@ -43,7 +43,7 @@ from rsfstudy.plots._style import style_context as style_context
 from rsfstudy.plots._text import format_number as format_number
 from rsfstudy.plots._text import format_slope as format_slope
 from rsfstudy.plots._text import quantity_symbol, to_mathtext, wrap_text
-from rsfstudy.rig import convert_to_display_units, has_units_unexpected_by_its_figures
+from rsfstudy.rig import DatasetUnits
 from rsfstudy.status import Status
 from rsfstudy.storage import read_declaration
 from rsfstudy.study import Figure as Declared
@@ -178,7 +178,7 @@ def draw_figure(
     if not draws:
         rule = "must be a Figure, or a function or module of yours that draws"
         raise InvalidValue("own", user_figure, rule, remedy="Write def name(dataset, axes): ...")
-    dataset = convert_to_display_units(dataset)
+    dataset = DatasetUnits(dataset).convert_for_display()
     with style_context(style):
         drawing, dataset = _choose_figure(dataset, user_figure, variable)
         panels = drawing.panels
@@ -266,7 +266,7 @@ def _choose_figure(
     further = sorted(varied - known)
     many = math.prod(sizes[dimension] for dimension in further) > _MAX_POINTS_OF_REPEATED_AXES
     plain = variable is not None or user_figure is None or isinstance(user_figure, str)
-    if plain or many or has_units_unexpected_by_its_figures(dataset):
+    if plain or many or DatasetUnits(dataset).are_unexpected_by_figures:
         return _generic_figure(dataset, variable), dataset
     drawing = (
         user_figure

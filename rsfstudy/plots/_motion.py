@@ -32,7 +32,7 @@ from rsfstudy.plots._style import (
     style_context,
 )
 from rsfstudy.plots._text import to_mathtext, wrap_text
-from rsfstudy.rig import DISPLAY_BASE_UNITS, Rig
+from rsfstudy.rig import DatasetUnits, Rig
 from rsfstudy.slider import Scene
 from rsfstudy.storage import read_scene_fields
 
@@ -99,7 +99,7 @@ def plot_motion(
         text = f"{motion.attrs.get('status', '')}: {motion.attrs.get('message', '')}"
         raise DataError(f"there is no motion, and nothing to draw. {text}")
     against = against or _choose_abscissa(motion)
-    shown = motion if rig is None else rig.in_units(motion, **DISPLAY_BASE_UNITS)
+    shown = motion if rig is None else rig.in_units(motion, **DatasetUnits.DISPLAY_UNITS)
     with style_context():
         figure = NotebookFigure(figsize=figure_size(2, 2, PANEL_HEIGHT_MM), layout="constrained")
         grid = figure.add_gridspec(2, 2)

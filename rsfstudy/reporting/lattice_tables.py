@@ -22,7 +22,7 @@ from rsfstudy.reporting.tables import (
     format_number_or_dash,
     format_units,
 )
-from rsfstudy.rig import convert_to_dimensional_name, convert_to_display_units
+from rsfstudy.rig import DatasetUnits
 from rsfstudy.status import STATUS_LABELS, Status
 from rsfstudy.storage import find_primary_output, read_declaration
 
@@ -51,8 +51,8 @@ def build_primary_output_table(dataset: xr.Dataset) -> TextTable:
     name = find_primary_output(dataset)
     if name is None:
         return TextTable([])
-    dataset = convert_to_display_units(dataset)
-    name = name if name in dataset else convert_to_dimensional_name(name)
+    dataset = DatasetUnits(dataset).convert_for_display()
+    name = name if name in dataset else DatasetUnits.dimensional_name(name)
     dims = dataset["status"].dims
     drawn = [n for n in _find_fields_along_numbered_axes(dataset) if n in dataset.coords]
     columns = [Column(format_axis_name(dataset[n]), n, format_value) for n in drawn]
@@ -129,9 +129,9 @@ def summarise_study_as_text_lines(dataset: xr.Dataset) -> list[str]:
     list of str
         Range of the primary output, one line per slope, and the number of cells per status.
     """
-    lines, converted = [], convert_to_display_units(dataset)
+    lines, converted = [], DatasetUnits(dataset).convert_for_display()
     if (name := find_primary_output(dataset)) is not None:
-        values = converted[name if name in converted else convert_to_dimensional_name(name)]
+        values = converted[name if name in converted else DatasetUnits.dimensional_name(name)]
         told, units = np.unique(values.values[np.isfinite(values.values)]), format_units(values)
         ends = " to ".join(map(format_value, dict.fromkeys((*told[:1], *told[-1:]))))
         text = f"{ends}{f' {units}' * (units != '1')}" if ends else "no values"

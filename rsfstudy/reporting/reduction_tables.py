@@ -16,7 +16,7 @@ from rsfstudy.reporting.tables import (
     format_axis_name,
     format_units,
 )
-from rsfstudy.rig import convert_to_display_units
+from rsfstudy.rig import DatasetUnits
 from rsfstudy.storage import read_declaration
 
 #: Headings and formats of the columns of a slope table, by the suffix of the variable name.
@@ -54,7 +54,7 @@ def build_reduction_tables(dataset: xr.Dataset) -> Iterator[TextTable]:
         One table for each reduction with a standard error, such as a slope. If the study compares
         integrators, a final table lists the cheapest integrator for each accuracy.
     """
-    converted = convert_to_display_units(dataset)
+    converted = DatasetUnits(dataset).convert_for_display()
     for slope in names_of_slope_reductions(converted):
         yield _slope_table(converted, slope)
     if {column.variable for column in _INTEGRATOR_COLUMNS} <= set(dataset.data_vars):

@@ -17,7 +17,7 @@ from rsfstudy.formatting import format_list, format_value
 from rsfstudy.measures import RESERVED_NAMES, Measure
 from rsfstudy.motion import Accuracy
 from rsfstudy.quantities import is_variable_name
-from rsfstudy.rig import RATIO_FIELD_BY_DIMENSIONAL_NAME, LatticeScenesOnRig, Rig
+from rsfstudy.rig import LatticeScenesOnRig, Rig, RigAxes
 from rsfstudy.slider import Scene, SceneFields, UserPart
 from rsfstudy.study.claims import Claim
 from rsfstudy.study.reductions.application import Reduction
@@ -111,7 +111,7 @@ def check_fields_not_solved_by_measure(measure: Measure, field_names: Sequence[s
         fields.
     """
     for name in field_names:
-        if {name, RATIO_FIELD_BY_DIMENSIONAL_NAME.get(name)} & set(measure.solved_fields):
+        if {name, RigAxes.RATIO_FIELD_BY_DIMENSIONAL_NAME.get(name)} & set(measure.solved_fields):
             rule = f"{measure.name} solves for {name}; it cannot be an axis or be set"
             raise InvalidValue(name, "...", rule, remedy="Leave it out.")
 
@@ -283,7 +283,8 @@ def check_axes_are_distinct(axes: Sequence[Axis]) -> None:
     taken: dict[str, str] = {}
     for axis in axes:
         for name in {
-            RATIO_FIELD_BY_DIMENSIONAL_NAME.get(n, n) for n in (axis.dimension, *axis.fields)
+            RigAxes.RATIO_FIELD_BY_DIMENSIONAL_NAME.get(n, n)
+            for n in (axis.dimension, *axis.fields)
         }:
             if name in taken:
                 rule = f"varies {name!r}, as {taken[name]!r} does already"

@@ -25,16 +25,7 @@ from rsfstudy.formatting import is_sequence_of_axis_values
 from rsfstudy.measures import Measure
 from rsfstudy.motion import Accuracy, Engine
 from rsfstudy.quantities import Quantity
-from rsfstudy.rig import (
-    RATIO_FIELD_BY_DIMENSIONAL_NAME,
-    LatticeScenesOnRig,
-    Rig,
-    axis_name_and_units,
-    convert_axis_to_stated_units,
-    convert_values_to_units,
-    replace_rig_quantity,
-)
-from rsfstudy.rig import make_axis_with_units as axis_in_units
+from rsfstudy.rig import LatticeScenesOnRig, Rig, RigAxes
 from rsfstudy.slider import Scene, SceneFields, UserPart
 from rsfstudy.study import declaration_checks
 from rsfstudy.study.axis_overrides import replace_field_values, select_axis_points, to_plain_values
@@ -55,8 +46,8 @@ _SLOT_AND_PART_SELECTING_FIELDS = frozenset(
 #: Pairs of equivalent fields. A slip rate can be given as a velocity or as a ratio to the reference
 #: velocity. The spring can be given as a stiffness or as a ratio to the critical stiffness.
 _EQUIVALENT_FIELD_BY_FIELD_NAME = {
-    **RATIO_FIELD_BY_DIMENSIONAL_NAME,
-    **{ratio: name for name, ratio in RATIO_FIELD_BY_DIMENSIONAL_NAME.items()},
+    **RigAxes.RATIO_FIELD_BY_DIMENSIONAL_NAME,
+    **{ratio: name for name, ratio in RigAxes.RATIO_FIELD_BY_DIMENSIONAL_NAME.items()},
     **dict(
         zip(SceneFields.ALTERNATIVE_STIFFNESS, SceneFields.ALTERNATIVE_STIFFNESS[::-1], strict=True)
     ),
@@ -165,7 +156,7 @@ class Study:
         declaration_checks.check_types(vars(self))
         if self.rig is not None:
             object.__setattr__(
-                self, "axes", [convert_axis_to_stated_units(axis) for axis in self.axes]
+                self, "axes", [RigAxes.convert_to_stated_units(axis) for axis in self.axes]
             )
         declaration_checks.check_name_clashes(self.measure, self.reductions, self.axes)
         declaration_checks.check_user_fields(self.measure, self.reductions, self.scene_fields)
@@ -534,7 +525,7 @@ class Study:
         values = list(value) if is_sequence_of_axis_values(value) else [value]
         of_rig = self.rig is not None and bool(values)
         field_name, units = (
-            axis_name_and_units(field_name, values[0]) if of_rig else (field_name, None)
+            RigAxes.name_and_units(field_name, values[0]) if of_rig else (field_name, None)
         )
         for index, axis in enumerate(self.axes):
             if changed := self._override_axis(axis, field_name, values):
@@ -554,7 +545,7 @@ class Study:
         if is_sequence_of_axis_values(value):
             return replace(self, axes=(self._make_axis(field_name, values), *self.axes))
         if self.rig is not None and of_rig:
-            rig, base = replace_rig_quantity(self.rig, self.base, field_name, value)
+            rig, base = RigAxes.replace_rig_quantity(self.rig, self.base, field_name, value)
             return replace(self, rig=rig, base=base)
         if field_name in self.scene_field_names | SceneFields.SLOT_NAMES:
             changes = SceneFields.replace_names_by_user_parts({field_name: value}, self.user_parts)
@@ -580,7 +571,7 @@ class Study:
             return replace_field_values(
                 axis,
                 field_name,
-                convert_values_to_units(field_name, values, units) if units else values,
+                RigAxes.convert_values(field_name, values, units) if units else values,
             )
         if _EQUIVALENT_FIELD_BY_FIELD_NAME.get(field_name) not in axis.fields:
             return None
@@ -604,7 +595,7 @@ class Study:
         """
         if self.rig is None:
             return Axis(field_name, values)
-        return axis_in_units(field_name, values, "" if isinstance(values[0], str) else units)
+        return RigAxes.create(field_name, values, "" if isinstance(values[0], str) else units)
 
     def describe(self) -> dict[str, Any]:
         """Convert the declaration to a dictionary of plain values.

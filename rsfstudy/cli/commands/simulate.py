@@ -125,7 +125,7 @@ def _write_motion_and_figure(
     """Write the figure and the data of a motion, and print a summary."""
     from rsfstudy.cli.figure_files import write_figure
     from rsfstudy.reporting import build_motion_tables_and_sentences
-    from rsfstudy.rig import DISPLAY_BASE_UNITS
+    from rsfstudy.rig import DatasetUnits
     from rsfstudy.storage import write_dataset
 
     status = f"{motion.attrs['status']} {motion.attrs['message']}".strip()
@@ -134,11 +134,11 @@ def _write_motion_and_figure(
         print_line(f"{status}\n{reason}")
         return
     data = given.output.with_suffix(".nc")
-    write_dataset(rig.in_units(motion, **DISPLAY_BASE_UNITS) if rig else motion, data)
+    write_dataset(rig.in_units(motion, **DatasetUnits.DISPLAY_UNITS) if rig else motion, data)
     write_figure(rsfstudy.plot_motion(motion, rig, against=given.against), given.output)
     if not given.quiet:
         found = [motion, motion.rsf.events()]
         if rig:
-            found = [rig.in_units(of, **DISPLAY_BASE_UNITS) for of in found]
+            found = [rig.in_units(of, **DatasetUnits.DISPLAY_UNITS) for of in found]
         print_pieces(build_motion_tables_and_sentences(found[0], motion.rsf.scene, found[1]))
     print_line(f"{status}\nwrote {given.output} and {data}")
