@@ -75,7 +75,7 @@ if TYPE_CHECKING:
     from rsfstudy.slider.motion_point import MotionPoint
     from rsfstudy.slider.parameter_layout import LARGEST_LOG_SLIP_RATE
     from rsfstudy.slider.part_registry import (
-        FIELDS_OMITTED_IF_NONE,
+        OMITTED_DEFAULTS,
         SLOTS,
         UserPart,
         normalise_field_value,
@@ -139,7 +139,7 @@ else:
             "slider.part_registry": (
                 "normalise_field_value",
                 "replace_names_by_user_parts",
-                "FIELDS_OMITTED_IF_NONE",
+                "OMITTED_DEFAULTS",
                 "SLOTS",
                 "UserPart",
                 "scene_field_types",
@@ -172,7 +172,7 @@ __all__ = [
     "MIN_SEGMENT_DURATION",
     "NEGLIGIBLE_SECOND_ORDER_WEIGHT",
     "Numbers",
-    "FIELDS_OMITTED_IF_NONE",
+    "OMITTED_DEFAULTS",
     "LOG_SLIP_RATE_PER_PATH_LENGTH",
     "MotionPoint",
     "Protocol",
