@@ -36,6 +36,7 @@ NEW_NAME_BY_OWNER_AND_FORMER_NAME: Mapping[str, Mapping[str, str]] = {
         "cell": "recompute_cell",
     },
     "rsfstudy.motion": {
+        "adapt_former_compute": "accept_accuracy_and_meter",
         "DEFAULT_RTOL": "Accuracy.DEFAULT_RTOL",
         "MIN_RTOL": "Accuracy.MIN_RTOL",
         "MAX_RTOL": "Accuracy.MAX_RTOL",
@@ -67,6 +68,15 @@ NEW_NAME_BY_OWNER_AND_FORMER_NAME: Mapping[str, Mapping[str, str]] = {
         "point_with_slip_rate": "Integrator.point_with_slip_rate",
     },
     "rsfstudy.slider": {
+        "LARGEST_LOG_SLIP_RATE": "Scene.LARGEST_LOG_SLIP_RATE",
+        "STOPPED_LOG_SLIP_RATE": "Scene.STOPPED_LOG_SLIP_RATE",
+        "RUPTURE_REGIME": "Scene.RUPTURE_REGIME",
+        "OMITTED_DEFAULTS": "SceneFields.OMITTED_DEFAULTS",
+        "SLOTS": "SceneFields.SLOTS",
+        "field_names": "SceneFields.names_of_part",
+        "scene_field_types": "SceneFields.types_with_user_parts",
+        "normalise_field_value": "SceneFields.normalise_value",
+        "replace_names_by_user_parts": "SceneFields.replace_names_by_user_parts",
         "SCENE_FIELD_NAMES": "SceneFields.NAMES",
         "SCENE_FIELD_QUANTITIES": "SceneFields.QUANTITIES",
         "SCENE_FIELD_TYPES": "SceneFields.TYPES",
@@ -112,6 +122,19 @@ NEW_NAME_BY_OWNER_AND_FORMER_NAME: Mapping[str, Mapping[str, str]] = {
         "convert_axis_to_stated_units": "RigAxes.convert_to_stated_units",
         "replace_rig_quantity": "RigAxes.replace_rig_quantity",
         "convert_scene_and_axes_to_rig": "RigAxes.convert_scene_and_axes",
+    },
+    "rsfstudy.limit_cycles": {
+        "SLIP_MODES": "LimitCycle.SLIP_MODES",
+    },
+    "rsfstudy.critical_steps": {
+        "SLOW_INSTABILITY_NORM_WARNING_PREFIX": "CriticalStep.SLOW_NORM_WARNING_PREFIX",
+    },
+    "rsfstudy.study": {
+        "VERDICTS": "Claim.VERDICTS",
+        "NOT_APPLICABLE_VERDICT": "Claim.NOT_APPLICABLE",
+    },
+    "rsfstudy.execution": {
+        "estimate_evaluations_and_time": "CellPlan.estimate_evaluations_and_time",
     },
     "rsfstudy.errors": {
         "NoAnswer": "NoResultWarning",

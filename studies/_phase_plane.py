@@ -11,7 +11,7 @@ import numpy as np
 import xarray as xr
 
 from rsfstudy import Scene
-from rsfstudy.slider import SceneFields, scene_field_types
+from rsfstudy.slider import SceneFields
 from rsfstudy.study import find_named_user_parts
 from rsfstudy.study.figure_declarations import Axes
 
@@ -53,7 +53,7 @@ def scene_from_coordinates(cell: xr.Dataset) -> Scene:
     """
     here = {str(name): cell[name].item() for name in cell.coords if cell[name].ndim == 0}
     parts = find_named_user_parts(here, [here])
-    kinds = scene_field_types(parts.values())
+    kinds = SceneFields.types_with_user_parts(parts.values())
     # Coordinates that do not apply to the cell are NaN or an empty string.
     values = {n: v for n, v in here.items() if n in kinds and v == v and v != ""}
     flags = [name for name in values if kinds[name] in (bool, bool | None)]

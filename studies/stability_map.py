@@ -23,7 +23,6 @@ import xarray as xr
 
 from rsfstudy import Accuracy, Axis, Claim, Figure, Panel, Scene, Study
 from rsfstudy.errors import InvalidValue
-from rsfstudy.limit_cycles import SLIP_MODES
 from rsfstudy.measures import LimitCycle, Quantity, Status
 from rsfstudy.reductions import Boundary, Reduction
 from rsfstudy.study import failed_cell_mask
@@ -245,7 +244,7 @@ def label_slip_modes(case: xr.Dataset, axes: Axes) -> None:
     to_panel = axes.transData + axes.transAxes.inverted()
     heights = to_panel.transform(np.column_stack([np.full(len(y), x[0]), y]))[:, 1]
     box = {"facecolor": "white", "alpha": 0.7, "edgecolor": "none", "pad": 1.0}
-    for mode, name in enumerate(SLIP_MODES):
+    for mode, name in enumerate(LimitCycle.SLIP_MODES):
         here = (case["slip_mode"] == mode).values
         if not here.any():
             continue

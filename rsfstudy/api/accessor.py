@@ -384,7 +384,7 @@ class DatasetAccessor:
         >>> float(converted.rsf.slip_mode("1 m/s"))
         2.0
         """
-        from rsfstudy.limit_cycles import SLIP_MODES
+        from rsfstudy.measures import LimitCycle
         from rsfstudy.rig import compute_conversion_factor, convert_to_si
 
         least = convert_to_si("stick_slip_from", stick_slip_from, "m/s")
@@ -396,7 +396,7 @@ class DatasetAccessor:
             peak * float(compute_conversion_factor("max_slip_rate", peak.attrs["units"], "m/s"))
             >= least
         )
-        modes, slow = self._dataset["slip_mode"], SLIP_MODES.index("slow_slip")
+        modes, slow = self._dataset["slip_mode"], LimitCycle.SLIP_MODES.index("slow_slip")
         return modes.where(~(modes >= slow), slow + fast).assign_attrs(modes.attrs)
 
     @error_boundary

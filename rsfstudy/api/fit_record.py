@@ -17,7 +17,7 @@ import xarray as xr
 
 from rsfstudy.api import study_runs
 from rsfstudy.axes import Axis
-from rsfstudy.defaults import FIT_EVALUATION_BUDGET as BUDGET
+from rsfstudy.defaults import Defaults
 from rsfstudy.error_boundary import error_boundary
 from rsfstudy.errors import InvalidValue
 from rsfstudy.fitting import (
@@ -99,7 +99,7 @@ def fit(
     slip_distance: Any = None,
     engine: str | type | None = None,
     rtol: float = Accuracy.DEFAULT_RTOL,
-    budget: int = BUDGET,
+    budget: int = Defaults.FIT_EVALUATION_BUDGET,
     workers: int = 0,
     command: str = "rsfstudy.fit",
     **scene: Any,

@@ -14,7 +14,7 @@ from rsfstudy.netcdf_encoding import copy_with_cf_encoding
 from rsfstudy.reporting import split_into_single_fits
 from rsfstudy.rig import Rig
 from rsfstudy.slider import Scene
-from rsfstudy.status import STATUS_LABELS
+from rsfstudy.status import Status
 from rsfstudy.storage import build_scene_from_stored, read_declaration
 
 
@@ -63,7 +63,7 @@ def sample_parameters(dataset: xr.Dataset, sample_count: int, seed: int = 0) -> 
     covariance = one["covariance"].values[np.ix_(has, has)]
     if not (has.any() and np.isfinite(covariance).all()):
         raise InvalidValue(
-            "dataset", STATUS_LABELS[int(one["status"])], "has no covariance to draw from"
+            "dataset", Status.labels_by_code()[int(one["status"])], "has no covariance to draw from"
         )
     logs = np.array([name in LOGARITHMIC_PARAMETERS for name in names])
     scales = np.where(logs, at, 1.0)

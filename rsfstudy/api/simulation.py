@@ -28,12 +28,11 @@ from rsfstudy.motion import (
     Recording,
     accept_accuracy_and_meter,
     rise,
-    suggest_raising_budget,
 )
 from rsfstudy.netcdf_encoding import copy_with_cf_encoding
 from rsfstudy.parts import SEGMENT_START, SEGMENT_VELOCITY
 from rsfstudy.quantities import Quantity
-from rsfstudy.slider import RUPTURE_REGIME, MotionPoint, SampledHistory, Scene, UserLoading
+from rsfstudy.slider import MotionPoint, SampledHistory, Scene, UserLoading
 from rsfstudy.status import Status
 from rsfstudy.vocabulary import find_quantity
 
@@ -64,7 +63,12 @@ _INSTABILITY_SLIP_RATE_OVER_LOAD_RATE = 1e6
 _VARIABLES_DERIVED_FROM_SPRING_STRESS = ("shear_stress", "friction_coefficient")
 #: Names of the regimes (forms of the equations of motion) of the built-in dynamics. Regimes of
 #: user-defined dynamics have larger codes.
-_BUILT_IN_REGIME_NAMES = ("quasi_static", "slow_manifold", RUPTURE_REGIME, "quasi_dynamic")
+_BUILT_IN_REGIME_NAMES = (
+    "quasi_static",
+    "slow_manifold",
+    Scene.RUPTURE_REGIME,
+    "quasi_dynamic",
+)
 
 
 @error_boundary
@@ -231,7 +235,7 @@ def simulate(
             raise
         status, message = halt.status, str(halt)
         if status is Status.WORK_BUDGET_SPENT:
-            message += suggest_raising_budget(budget)
+            message += integrator.work_meter.budget_advice
     seen = recording.as_table(scene)
     seen = make_row_times_strictly_increasing(seen) if at is None else seen
     dataset = _recording_to_dataset(scene, seen, recording.regime_names)

@@ -19,14 +19,14 @@ from rsfstudy._deprecation import accept_former_keyword_names
 from rsfstudy.api import dataset_export
 from rsfstudy.api.progress import compile_scenes_with_notice, show_progress
 from rsfstudy.api.result_paths import find_results, output_directory
-from rsfstudy.defaults import CELL_TIME_LIMIT, OUTPUT_DIRECTORY
+from rsfstudy.defaults import Defaults
 from rsfstudy.error_boundary import error_boundary, find_stacklevel_of_user_code
 from rsfstudy.errors import IncompleteWarning, InvalidValue, RsfStudyWarning, shorten_text
 from rsfstudy.execution import OutputOptions, WorkerPool, prepare_study_run, run_fingerprint
 from rsfstudy.measures import Outcome
 from rsfstudy.motion import Engine
 from rsfstudy.netcdf_encoding import copy_with_cf_encoding
-from rsfstudy.quantities import html_table
+from rsfstudy.quantities import HtmlMarkup
 from rsfstudy.reporting import format_notes_on_incomplete_results, note_on_norms_near_load_velocity
 from rsfstudy.slider import Scene, SceneFields
 from rsfstudy.storage import (
@@ -57,7 +57,7 @@ class StudiesByName(dict[str, Study]):
             (name, study.title, f"{study.size:,}", ", ".join({c.id: c for c in study.claims}))
             for name, study in self.items()
         ]
-        return html_table(("study", "title", "cells", "claims"), rows)
+        return HtmlMarkup.table(("study", "title", "cells", "claims"), rows)
 
 
 @error_boundary
@@ -85,13 +85,13 @@ def run(
     *,
     workers: int = 2,
     client: Any = None,
-    output: str | Path | None = OUTPUT_DIRECTORY,
+    output: str | Path | None = Defaults.OUTPUT_DIRECTORY,
     progress: bool = True,
     fresh: bool = False,
     rtol: float | None = None,
     engine: str | None = None,
     budget: int | None = None,
-    time_limit: float = CELL_TIME_LIMIT,
+    time_limit: float = Defaults.CELL_TIME_LIMIT,
     keep_going: bool = False,
     despite_failures: bool = False,
     format: str = "netcdf",
@@ -299,7 +299,7 @@ def prepare_run_with_progress(
 
 
 @error_boundary
-def open(name: str | Path, output: str | Path = OUTPUT_DIRECTORY) -> xr.Dataset:
+def open(name: str | Path, output: str | Path = Defaults.OUTPUT_DIRECTORY) -> xr.Dataset:
     """Load the results of a study into memory.
 
     Parameters
@@ -505,7 +505,7 @@ def rerun(
     client: Any = None,
     output: str | Path | None = None,
     progress: bool = True,
-    time_limit: float = CELL_TIME_LIMIT,
+    time_limit: float = Defaults.CELL_TIME_LIMIT,
 ) -> pd.DataFrame:
     """Recompute the results in a file, and compare the values.
 
@@ -570,7 +570,7 @@ def rerun(
     >>> bool((table["identical"] == table["values"]).all())
     True
     """
-    theirs = read_dataset(find_results(file, OUTPUT_DIRECTORY))
+    theirs = read_dataset(find_results(file, Defaults.OUTPUT_DIRECTORY))
     if is_of_single_scene(theirs):
         if study is not None:
             load_study(str(study))  # The file defines user-defined parts of the scene.

@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 
 from rsfstudy.errors import InvalidValue
-from rsfstudy.execution import CellPlan, estimate_evaluations_and_time
+from rsfstudy.execution import CellPlan
 from rsfstudy.motion import Engine
 from rsfstudy.storage import CellTimings, read_timings
 
@@ -72,7 +72,7 @@ def estimate_study_cost(cell_plan: CellPlan, output_directory: Path) -> CostEsti
     CostEstimate
         Expected work, and measured or estimated time.
     """
-    work, guess = estimate_evaluations_and_time(cell_plan)
+    work, guess = cell_plan.estimate_evaluations_and_time()
     work = round(work, 2 - len(str(work)))  # more digits would not be significant
     journal = output_directory / f"{cell_plan.study.name}.cells.sqlite"
     took, cells = read_timings(journal), len(cell_plan.unique_cell_numbers)
@@ -136,7 +136,7 @@ def compiled_engine_hint(cell_plan: CellPlan, output_directory: Path) -> str:
     saves = (
         engine == Engine.SCIPY
         and measure != _NAME_OF_MEASURE_REQUIRING_SCIPY_ENGINE
-        and estimate_evaluations_and_time(cell_plan)[1] > _MIN_SECONDS_FOR_FASTER_ENGINE_HINT
+        and cell_plan.estimate_evaluations_and_time()[1] > _MIN_SECONDS_FOR_FASTER_ENGINE_HINT
     )
     if not saves or kept.exists() or describe_missing_engine_packages(Engine.COMPILED):
         return ""

@@ -26,7 +26,7 @@ from rsfstudy.reporting import (
     summarise_study_as_fields,
 )
 from rsfstudy.storage import read_declaration
-from rsfstudy.study import NOT_APPLICABLE_VERDICT
+from rsfstudy.study import Claim
 
 
 @dataclass(frozen=True)
@@ -146,7 +146,7 @@ def print_verdicts(verdicts: pd.DataFrame) -> None:
     verdicts : pandas.DataFrame
         Verdicts on the claims.
     """
-    checked = int((verdicts["verdict"] != NOT_APPLICABLE_VERDICT).sum())
+    checked = int((verdicts["verdict"] != Claim.NOT_APPLICABLE).sum())
     if checked:
         print_pieces([claims_table(verdicts)])
     print_unexpected_verdicts(verdicts)

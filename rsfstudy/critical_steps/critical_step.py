@@ -28,6 +28,7 @@ from rsfstudy.critical_steps.critical_path_solution import (
     find_boundary_by_limit_cycle,
 )
 from rsfstudy.critical_steps.loading_checks import (
+    SLOW_INSTABILITY_NORM_WARNING_PREFIX,
     build_slow_instability_norm_warning,
     check_loading_is_single_step,
     outcome_if_norm_is_below_load_velocity,
@@ -145,6 +146,8 @@ class CriticalStep(Measure):
     of: str = "load_velocity_ratio"
     direction: str = "up"
     name: ClassVar[str] = "critical_step"
+    #: Beginning of the warning that the instability norm is a slow slip rate.
+    SLOW_NORM_WARNING_PREFIX: ClassVar = SLOW_INSTABILITY_NORM_WARNING_PREFIX
     typical_work = 4_000
     needs_time: ClassVar[tuple[bool, ...]] = (False,)
 

@@ -25,7 +25,7 @@ from rsfstudy.motion import (
     maximum,
     rise,
 )
-from rsfstudy.slider import RUPTURE_REGIME, STOPPED_LOG_SLIP_RATE, MotionPoint, Scene
+from rsfstudy.slider import MotionPoint, Scene
 from rsfstudy.status import Status
 
 #: Spacing of the levels of ln V at which the motion is tested for further peaks. The first number
@@ -103,7 +103,7 @@ def _build_event_specs_for_held_load_point(
     if scene.state_count > 1:
         specs.append(fall("spring_stress", -scene.mu_star))
         below = _MIN_LEVEL_SPACING
-        while log_slip_rate_at_norm - below > STOPPED_LOG_SLIP_RATE:
+        while log_slip_rate_at_norm - below > Scene.STOPPED_LOG_SLIP_RATE:
             specs.append(fall("log_slip_rate", log_slip_rate_at_norm - below))
             below += max(_MIN_LEVEL_SPACING, _RELATIVE_LEVEL_SPACING * below)
     return specs
@@ -114,7 +114,7 @@ def _no_later_peak_reaches_norm(scene: Scene, event: Event) -> bool:
     slows = event.kind is EventKind.START and event.point.log_slip_rate_derivative <= 0.0
     if scene.state_count == 1:
         return slows or event.kind is EventKind.MAXIMUM
-    if event.regime == RUPTURE_REGIME or not (slows or event.kind is EventKind.FALL):
+    if event.regime == Scene.RUPTURE_REGIME or not (slows or event.kind is EventKind.FALL):
         return False
     return scene.mu_star + event.point.spring_stress <= 0.0 or _stays_below_norm(scene, event.point)
 

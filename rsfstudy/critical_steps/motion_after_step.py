@@ -25,7 +25,7 @@ from rsfstudy.motion import (
     minimum,
     rise,
 )
-from rsfstudy.slider import RUPTURE_REGIME, MotionPoint, Scene, SteadySliding
+from rsfstudy.slider import MotionPoint, Scene, SteadySliding
 from rsfstudy.status import Status
 
 #: Smallest significant difference from neutral stability. The limit applies to the relative
@@ -442,7 +442,7 @@ def _follow_one_orbit(
             if len(peaks) > 1 and _peaks_have_stopped_growing(peaks, steady_state, integrator):
                 return _OrbitOutcome(tuple(peaks), reached_norm=False)
             slow = len(peaks) > 1 and peaks[-1] - peaks[-2] < 0.2 * (norm - top)
-            if slow and not steady_state.is_stable and event.regime != RUPTURE_REGIME:
+            if slow and not steady_state.is_stable and event.regime != Scene.RUPTURE_REGIME:
                 return _OrbitOutcome(tuple(peaks), False, event.point)
     raise AssertionError("a motion never ends by itself")
 

@@ -25,7 +25,7 @@ from typing import TYPE_CHECKING
 import cloudpickle
 import numpy as np
 
-from rsfstudy.defaults import CELL_TIME_LIMIT
+from rsfstudy.defaults import Defaults
 from rsfstudy.errors import InvalidValue, RunError, shorten_text
 from rsfstudy.execution import provenance
 from rsfstudy.measures import Measure, Outcome
@@ -83,7 +83,7 @@ class CellTask:
     base_scene: Scene
     measure: Measure
     accuracy: Accuracy
-    time_limit: float = CELL_TIME_LIMIT
+    time_limit: float = Defaults.CELL_TIME_LIMIT
     user_parts: tuple[UserPart, ...] = ()
     user_stepper_classes: tuple[type, ...] = ()
     code_fingerprint: Mapping[str, str] = field(default_factory=dict)

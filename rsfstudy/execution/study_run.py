@@ -15,7 +15,7 @@ from pathlib import Path
 import numpy as np
 import xarray as xr
 
-from rsfstudy.defaults import RESULT_FORMATS
+from rsfstudy.defaults import Defaults
 from rsfstudy.errors import DataError, Interrupted, InvalidValue, RsfStudyError, RunError
 from rsfstudy.execution import provenance
 from rsfstudy.execution.cell_computation import CellBatchMapper, CellTask, StoredCellRows
@@ -79,8 +79,8 @@ class OutputOptions:
 
     def __post_init__(self) -> None:
         """Check the format and the output directory."""
-        if self.format not in RESULT_FORMATS:
-            raise InvalidValue("format", self.format, "is unknown", choices=RESULT_FORMATS)
+        if self.format not in Defaults.RESULT_FORMATS:
+            raise InvalidValue("format", self.format, "is unknown", choices=Defaults.RESULT_FORMATS)
         if self.format == "zarr":
             check_zarr_installed()
             if self.output is None:

@@ -174,6 +174,8 @@ class LimitCycle(RecordingMeasure):
     phases: int = 400
     events: int = 300
     name: ClassVar[str] = "limit_cycle"
+    #: Values of ``slip_mode``, in the order of their codes.
+    SLIP_MODES: ClassVar = SLIP_MODES
     primary_output = "recurrence_interval"
     typical_work = 9_000
     outputs = _OUTPUTS

@@ -29,7 +29,7 @@ from rsfstudy.motion import (
     minimum,
     rise,
 )
-from rsfstudy.slider import RUPTURE_REGIME, MotionPoint, Scene
+from rsfstudy.slider import MotionPoint, Scene
 
 LN10 = math.log(10.0)
 #: Number of main results of a cycle.
@@ -296,6 +296,6 @@ def _find_arrest_point(events: Sequence[Event]) -> MotionPoint | None:
     fallen = False
     for event in events:
         fallen = fallen or event.kind is _FALL
-        if fallen and event.regime != RUPTURE_REGIME:
+        if fallen and event.regime != Scene.RUPTURE_REGIME:
             return event.point
     return None

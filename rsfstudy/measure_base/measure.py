@@ -31,8 +31,6 @@ from rsfstudy.motion import (
     MotionStopped,
     WorkMeter,
     accept_accuracy_and_meter,
-    adapt_former_compute,
-    suggest_raising_budget,
 )
 from rsfstudy.quantities import Output, Quantity, is_variable_name
 from rsfstudy.slider import Scene, SceneFields, cached_attribute
@@ -150,7 +148,7 @@ class Measure(ConstructorKeywordCheckMixin):
         """Adopt former names of members that the subclass defines."""
         super().__init_subclass__()
         add_new_names_for_former_members(cls)
-        adapt_former_compute(cls)
+        accept_accuracy_and_meter(cls)
 
     @property
     def primary_output(self) -> str:
@@ -379,7 +377,7 @@ class Measure(ConstructorKeywordCheckMixin):
         """
         outcome, meter = self.run_metered(scene, accuracy)
         if outcome.status is Status.WORK_BUDGET_SPENT and meter.evaluations > meter.budget:
-            return replace(outcome, message=outcome.message + suggest_raising_budget(meter.budget))
+            return replace(outcome, message=outcome.message + meter.budget_advice)
         return outcome
 
     @accept_accuracy_and_meter

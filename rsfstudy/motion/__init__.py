@@ -31,7 +31,9 @@ if TYPE_CHECKING:
         minimum,
         rise,
     )
-    from rsfstudy.motion.former_arguments import accept_accuracy_and_meter, adapt_former_compute
+    from rsfstudy.motion.former_arguments import (
+        accept_accuracy_and_meter,
+    )
     from rsfstudy.motion.integrator import Integrator
     from rsfstudy.motion.motion_driver import MotionDriver
     from rsfstudy.motion.neglected_inertia_error import estimate_neglected_inertia_error
@@ -45,7 +47,6 @@ if TYPE_CHECKING:
     from rsfstudy.motion.work_meter import (
         MotionStopped,
         WorkMeter,
-        suggest_raising_budget,
     )
 else:
     __getattr__, __dir__ = build_lazy_export_functions(
@@ -67,14 +68,13 @@ else:
                 "minimum",
                 "rise",
             ),
-            "motion.former_arguments": ("accept_accuracy_and_meter", "adapt_former_compute"),
+            "motion.former_arguments": ("accept_accuracy_and_meter",),
             "motion.integrator": ("Integrator",),
             # Former export, which the method of ``Scene`` replaces.
             "slider.equations": ("slow_manifold_point",),
             "motion.work_meter": (
                 "MotionStopped",
                 "WorkMeter",
-                "suggest_raising_budget",
             ),
             "motion.neglected_inertia_error": ("estimate_neglected_inertia_error",),
             "motion.recorded_motion_readings": ("resample_motion_along_path",),
@@ -95,13 +95,11 @@ __all__ = [
     "Recording",
     "WorkMeter",
     "accept_accuracy_and_meter",
-    "adapt_former_compute",
     "approach_to_steady_state",
     "build_root_finder",
     "estimate_error",
     "estimate_neglected_inertia_error",
     "fall",
-    "suggest_raising_budget",
     "maximum",
     "minimum",
     "rise",

@@ -22,7 +22,7 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure as Figure
 
 from rsfstudy._deprecation import accept_former_keyword_names
-from rsfstudy.defaults import FIGURE_FORMATS
+from rsfstudy.defaults import Defaults
 from rsfstudy.errors import InvalidValue, RsfStudyError
 from rsfstudy.formatting import format_overrides, pluralize
 from rsfstudy.plots import _panel
@@ -407,8 +407,10 @@ def save_figure(
     True
     """
     form = path.suffix[1:].lower()
-    if form not in FIGURE_FORMATS:
-        raise InvalidValue("figure", path.name, "needs an ending we write", choices=FIGURE_FORMATS)
+    if form not in Defaults.FIGURE_FORMATS:
+        raise InvalidValue(
+            "figure", path.name, "needs an ending we write", choices=Defaults.FIGURE_FORMATS
+        )
     try:
         drawn = draw_figure(dataset, user_figure, variable=variable, style=style)
         # The layout is final, so it must not be computed again when the figure is saved.

@@ -13,7 +13,7 @@ import xarray as xr
 from rsfstudy.formatting import format_nonempty_fields, pluralize
 from rsfstudy.reporting.reduction_tables import find_refusal_reasons_of_reductions
 from rsfstudy.reporting.tables import TextTable
-from rsfstudy.status import STATUS_LABELS, Status
+from rsfstudy.status import Status
 from rsfstudy.storage import read_provenance
 
 #: Maximum number of failed cells in a table.
@@ -178,7 +178,8 @@ def build_frame_of_cells(
     """
     at = cell_mask.values
     columns = {name: dataset[name].broadcast_like(cell_mask).values[at] for name in axis_names}
-    columns["status"] = [STATUS_LABELS[code] for code in dataset["status"].values[at].tolist()]
+    labels = Status.labels_by_code()
+    columns["status"] = [labels[code] for code in dataset["status"].values[at].tolist()]
     return pd.DataFrame(columns | {"message": dataset["message"].values[at]})
 
 

@@ -23,7 +23,7 @@ from rsfstudy.reporting.tables import (
     format_units,
 )
 from rsfstudy.rig import DatasetUnits
-from rsfstudy.status import STATUS_LABELS, Status
+from rsfstudy.status import Status
 from rsfstudy.storage import find_primary_output, read_declaration
 
 #: Maximum number of cells in a table that shows all cells.
@@ -65,7 +65,7 @@ def build_primary_output_table(dataset: xr.Dataset) -> TextTable:
     at = select_thinned_points({str(d): dataset.sizes[d] for d in dims}, most)
     few = dataset[[*(column.variable for column in columns), "status"]].isel(at).load()
     if (few["status"] != int(Status.OK)).any():
-        columns.append(Column("status", "status", STATUS_LABELS.__getitem__, "status"))
+        columns.append(Column("status", "status", Status.labels_by_code().__getitem__, "status"))
     units, shown = format_units(dataset[name]), few["status"].size
     caption = str(dataset[name].attrs.get("long_name", name)) + f", in {units}" * (units != "1")
     if shown < size:

@@ -8,8 +8,8 @@ from typing import Any
 
 import xarray as xr
 
-from rsfstudy.critical_steps import SLOW_INSTABILITY_NORM_WARNING_PREFIX
 from rsfstudy.formatting import format_nonempty_fields, pluralize
+from rsfstudy.measures import CriticalStep
 from rsfstudy.reporting.cell_tables import format_status_counts
 from rsfstudy.rig import DIMENSIONLESS_PREFIX, in_display_units
 from rsfstudy.status import Status
@@ -131,5 +131,5 @@ def note_on_norms_near_load_velocity(dataset: xr.Dataset) -> str:
     if read_declaration(dataset).laboratory is None:
         return ""
     ok = dataset["message"].values[dataset["status"].values == int(Status.OK)]
-    near = [text for text in ok.tolist() if text.startswith(SLOW_INSTABILITY_NORM_WARNING_PREFIX)]
+    near = [text for text in ok.tolist() if text.startswith(CriticalStep.SLOW_NORM_WARNING_PREFIX)]
     return f"{len(near)} of {pluralize(len(ok), 'answer')}: {near[0]}" if near else ""

@@ -64,7 +64,6 @@ if TYPE_CHECKING:
     )
     from rsfstudy.slider.dynamics.inertia import NEGLIGIBLE_SECOND_ORDER_WEIGHT
     from rsfstudy.slider.equations import (
-        RUPTURE_REGIME,
         Equations,
     )
     from rsfstudy.slider.fluid import BUILT_IN_PARTS
@@ -73,19 +72,15 @@ if TYPE_CHECKING:
     )
     from rsfstudy.slider.loading import MIN_SEGMENT_DURATION
     from rsfstudy.slider.motion_point import MotionPoint
-    from rsfstudy.slider.parameter_layout import LARGEST_LOG_SLIP_RATE
     from rsfstudy.slider.part_registry import (
-        OMITTED_DEFAULTS,
-        SLOTS,
         UserPart,
-        normalise_field_value,
-        replace_names_by_user_parts,
-        scene_field_types,
     )
-    from rsfstudy.slider.parts import Function, Numbers, field_names
+    from rsfstudy.slider.parts import (
+        Function,
+        Numbers,
+    )
     from rsfstudy.slider.path_length import (
         LOG_SLIP_RATE_PER_PATH_LENGTH,
-        STOPPED_LOG_SLIP_RATE,
         displacement_per_path_length,
     )
     from rsfstudy.slider.sampled_loading import (
@@ -120,30 +115,21 @@ else:
                 "effective_friction",
             ),
             "slider.dynamics.inertia": ("NEGLIGIBLE_SECOND_ORDER_WEIGHT",),
-            "slider.equations": (
-                "Equations",
-                "RUPTURE_REGIME",
-            ),
+            "slider.equations": ("Equations",),
             "slider.fluid": ("BUILT_IN_PARTS",),
             "slider.friction": ("FrictionFunctions",),
             "slider.loading": ("MIN_SEGMENT_DURATION",),
-            "slider.parameter_layout": ("LARGEST_LOG_SLIP_RATE",),
-            "slider.parts": ("Function", "Numbers", "field_names"),
+            "slider.parts": (
+                "Function",
+                "Numbers",
+            ),
             "slider.path_length": (
                 "LOG_SLIP_RATE_PER_PATH_LENGTH",
-                "STOPPED_LOG_SLIP_RATE",
                 "displacement_per_path_length",
             ),
             "slider.motion_point": ("MotionPoint",),
             "slider.user_loadings": ("Protocol", "SEGMENT_MAPPING_KEYS", "UserLoading", "protocol"),
-            "slider.part_registry": (
-                "normalise_field_value",
-                "replace_names_by_user_parts",
-                "OMITTED_DEFAULTS",
-                "SLOTS",
-                "UserPart",
-                "scene_field_types",
-            ),
+            "slider.part_registry": ("UserPart",),
             "slider.sampled_loading": (
                 "STRESS_RATE_COLUMN",
                 "SampledHistory",
@@ -160,26 +146,19 @@ else:
 
 __all__ = [
     "SceneFields",
-    "normalise_field_value",
-    "replace_names_by_user_parts",
     "BUILT_IN_PARTS",
     "CLOSED_FORMS",
     "SINGLE_ENDLESS_SEGMENT_TABLE",
     "Equations",
     "FrictionFunctions",
     "Function",
-    "LARGEST_LOG_SLIP_RATE",
     "MIN_SEGMENT_DURATION",
     "NEGLIGIBLE_SECOND_ORDER_WEIGHT",
     "Numbers",
-    "OMITTED_DEFAULTS",
     "LOG_SLIP_RATE_PER_PATH_LENGTH",
     "MotionPoint",
     "Protocol",
-    "RUPTURE_REGIME",
     "SEGMENT_MAPPING_KEYS",
-    "SLOTS",
-    "STOPPED_LOG_SLIP_RATE",
     "STRESS_RATE_COLUMN",
     "SampledHistory",
     "Scene",
@@ -193,8 +172,6 @@ __all__ = [
     "cached_per_scene",
     "critical_stiffness_closed_form",
     "effective_friction",
-    "field_names",
-    "scene_field_types",
     "build_sampled_history_from_table",
     "displacement_per_path_length",
     "protocol",

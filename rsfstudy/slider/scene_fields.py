@@ -6,7 +6,13 @@ defined in the modules ``part_registry``, ``scene_assembly`` and ``field_name_hi
 
 from __future__ import annotations
 
-from rsfstudy.slider import field_name_hints, part_registry, scene_assembly, slider_parameters
+from rsfstudy.slider import (
+    field_name_hints,
+    part_registry,
+    parts,
+    scene_assembly,
+    slider_parameters,
+)
 
 
 class SceneFields:
@@ -19,9 +25,15 @@ class SceneFields:
     #: Fields whose values are parts, and fields that select a part by their values.
     SLOT_NAMES = part_registry.SLOT_NAMES
     SELECTING_A_PART = part_registry.PART_SELECTING_FIELDS
+    #: Slots of a scene, with the parts that fill them.
+    SLOTS = part_registry.SLOTS
+    #: Values that are omitted from stored scenes.
+    OMITTED_DEFAULTS = part_registry.OMITTED_DEFAULTS
     #: Fields of which a scene has at most one, because each determines the stiffness.
     ALTERNATIVE_STIFFNESS = slider_parameters.ALTERNATIVE_STIFFNESS_FIELDS
 
+    names_of_part = staticmethod(parts.field_names)
+    types_with_user_parts = staticmethod(part_registry.scene_field_types)
     defaults = staticmethod(part_registry.scene_field_defaults)
     quantities_with_user_parts = staticmethod(part_registry.scene_field_quantities)
     quantities_with_values = staticmethod(part_registry.quantities_with_values)

@@ -6,7 +6,14 @@ call the functions directly, because they cannot import the class ``Scene``.
 
 from __future__ import annotations
 
-from rsfstudy.slider import equations, friction, stability, steady_state
+from rsfstudy.slider import (
+    equations,
+    friction,
+    parameter_layout,
+    path_length,
+    stability,
+    steady_state,
+)
 
 
 class SceneFunctions:
@@ -14,6 +21,13 @@ class SceneFunctions:
 
     The methods are not part of the interface for users, and are therefore hidden from ``dir``.
     """
+
+    #: Name of the regime of ruptures with inertia.
+    RUPTURE_REGIME = equations.RUPTURE_REGIME
+    #: Lower limit of ln(V/V_*). A motion without loading ends at this slip rate.
+    STOPPED_LOG_SLIP_RATE = path_length.STOPPED_LOG_SLIP_RATE
+    #: Largest ln(V/V_*) whose exponential is computed.
+    LARGEST_LOG_SLIP_RATE = parameter_layout.LARGEST_LOG_SLIP_RATE
 
     equations_between_ruptures = equations.equations_between_ruptures
     equations_in_rupture = equations.equations_in_rupture

@@ -10,7 +10,7 @@ import math
 import sys
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 import pandas as pd
@@ -104,6 +104,10 @@ class Claim:
     >>> claim.verdict(dataset)
     (0.67, 'reproduced')
     """
+
+    #: Possible verdicts, and the verdict on a claim that does not apply to the results.
+    VERDICTS: ClassVar = VERDICTS
+    NOT_APPLICABLE: ClassVar = NOT_APPLICABLE_VERDICT
 
     id: str
     statement: str

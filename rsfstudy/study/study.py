@@ -616,11 +616,16 @@ class Study:
             "accuracy": asdict(self.accuracy),
             "reductions": [reduction.describe() for reduction in self.reductions],
             "claims": [claim.describe() for claim in self.claims],
-            "plot": name_of_figure(self.plot, self.name),
+            "plot": self.figure_name,
             "references": list(self.references),
             "overrides": dict(self.overrides),
             **({"laboratory": self.rig.as_dict()} if self.rig else {}),
         }
+
+    @property
+    def figure_name(self) -> str:
+        """Name of the figure in the declaration of the study."""
+        return name_of_figure(self.plot, self.name)
 
     def _repr_html_(self) -> str:
         heading = f"{self.name}: {self.title} ({self.size:,} cells)"

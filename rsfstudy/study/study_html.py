@@ -8,7 +8,7 @@ from dataclasses import replace
 from rsfstudy.axes import Axis
 from rsfstudy.formatting import format_list
 from rsfstudy.measures import Measure
-from rsfstudy.quantities import HtmlMarkup, Quantity, escape_html, html_quantities_table
+from rsfstudy.quantities import HtmlMarkup, Quantity, html_quantities_table
 from rsfstudy.slider import Scene, SceneFields
 from rsfstudy.vocabulary import find_quantity
 
@@ -57,7 +57,9 @@ def study_html(
 
 def _html_details(caption: str, content: HtmlMarkup) -> HtmlMarkup:
     """Return HTML code that shows the content after a click on the caption."""
-    return HtmlMarkup(f"<details><summary>{escape_html(caption)}</summary>{content}</details>")
+    return HtmlMarkup(
+        f"<details><summary>{HtmlMarkup.escape(caption)}</summary>{content}</details>"
+    )
 
 
 def _describe_axis_quantity(axis: Axis, known_quantities: Mapping[str, Quantity]) -> Quantity:

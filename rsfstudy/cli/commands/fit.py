@@ -15,7 +15,7 @@ from rsfstudy.cli.command_group import Command
 from rsfstudy.cli.options import DecoratedFunction
 from rsfstudy.cli.printing import print_line, print_pieces
 from rsfstudy.cli.results import EXIT_STATUS_FAILED, EXIT_STATUS_OK, CommandResult, output_result
-from rsfstudy.defaults import FIT_EVALUATION_BUDGET
+from rsfstudy.defaults import Defaults
 from rsfstudy.errors import InvalidValue
 from rsfstudy.motion import Engine
 
@@ -210,7 +210,9 @@ def _make_quantity_option(
     "Set a field of the scene that is not fitted, for example a=0.01."
 )
 @options.make_count_option(
-    "--budget", FIT_EVALUATION_BUDGET, "Maximum number of right-hand-side evaluations per fit."
+    "--budget",
+    Defaults.FIT_EVALUATION_BUDGET,
+    "Maximum number of right-hand-side evaluations per fit.",
 )
 @click.option(
     "--engine",

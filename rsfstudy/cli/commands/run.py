@@ -14,7 +14,7 @@ from rsfstudy.cli import options
 from rsfstudy.cli.command_group import Command
 from rsfstudy.cli.printing import print_line, print_note, print_pieces
 from rsfstudy.cli.results import EXIT_STATUS_FAILED, EXIT_STATUS_OK, CommandResult, output_result
-from rsfstudy.defaults import RESULT_FORMATS
+from rsfstudy.defaults import Defaults
 from rsfstudy.errors import Interrupted, RsfStudyError
 
 if TYPE_CHECKING:
@@ -113,8 +113,8 @@ class Runs(CommandResult):
 @click.option("--despite-failures", is_flag=True, help="Compute reductions even if cells failed.")
 @click.option(
     "--format",
-    type=click.Choice(RESULT_FORMATS),
-    default=RESULT_FORMATS[0],
+    type=click.Choice(Defaults.RESULT_FORMATS),
+    default=Defaults.RESULT_FORMATS[0],
     help="Format of the results: a single NetCDF file, or a chunked Zarr store. An existing Zarr "
     "store is never overwritten.",
 )
