@@ -20,6 +20,7 @@ from __future__ import annotations
 
 import functools
 import importlib
+import operator
 import sys
 import warnings
 from collections.abc import Callable, Mapping
@@ -112,6 +113,10 @@ NEW_NAME_BY_OWNER_AND_FORMER_NAME: Mapping[str, Mapping[str, str]] = {
         "largest_linear_growth_rate": "Scene.largest_linear_growth_rate",
     },
     "rsfstudy.rig": {
+        "RIG_QUANTITIES": "Rig.QUANTITIES",
+        "in_display_units": "Rig.convert_quantities_for_display",
+        "is_stiffness_over_normal_stress": "Rig.is_stiffness_over_stress",
+        "DIMENSIONLESS_PREFIX": "DatasetUnits.DIMENSIONLESS_PREFIX",
         "DISPLAY_BASE_UNITS": "DatasetUnits.DISPLAY_UNITS",
         "NAME_OF_SCALES_ATTRIBUTE": "DatasetUnits.SCALES_ATTRIBUTE",
         "convert_to_dimensional_name": "DatasetUnits.dimensional_name",
@@ -136,6 +141,14 @@ NEW_NAME_BY_OWNER_AND_FORMER_NAME: Mapping[str, Mapping[str, str]] = {
     "rsfstudy.execution": {
         "estimate_evaluations_and_time": "CellPlan.estimate_evaluations_and_time",
     },
+    "rsfstudy.storage": {
+        "read_timings": "CellTimings.read",
+    },
+    "rsfstudy.axes": {
+        "fields_of_axis_point": "Axis.fields_of_point",
+        "check_storable_text": "Axis.check_storable_text",
+        "to_plain_value": "Axis.to_plain_value",
+    },
     "rsfstudy.errors": {
         "NoAnswer": "NoResultWarning",
         "Incomplete": "IncompleteWarning",
@@ -146,6 +159,8 @@ NEW_NAME_BY_OWNER_AND_FORMER_NAME: Mapping[str, Mapping[str, str]] = {
     },
     "rsfstudy.quantities": {
         "ShownAsTable": "HtmlTableMixin",
+        "escape_html": "HtmlMarkup.escape",
+        "html_table": "HtmlMarkup.table",
     },
     "rsfstudy.quantities:Output": {
         "names": "variable_names",
@@ -579,7 +594,7 @@ def build_getattr_for_former_names(module_name: str) -> Callable[[str], Any]:
         if (new := NEW_NAME_BY_OWNER_AND_FORMER_NAME[module_name].get(name)) is None:
             raise AttributeError(f"module {module_name!r} has no attribute {name!r}")
         warn_renamed(name, new, module_name)
-        return getattr(importlib.import_module(module_name), new)
+        return operator.attrgetter(new)(importlib.import_module(module_name))
 
     return __getattr__
 

@@ -34,7 +34,7 @@ from rsfstudy.fitting import (
 from rsfstudy.measures import Fit
 from rsfstudy.motion import Accuracy, Engine
 from rsfstudy.reductions import Range
-from rsfstudy.rig import Rig, convert_to_si, is_stiffness_over_normal_stress
+from rsfstudy.rig import Rig, convert_to_si
 from rsfstudy.slider import Scene
 from rsfstudy.study import Study
 
@@ -464,7 +464,7 @@ def _initial_stiffness(
         remedy = "Give --stiffness (stiffness=), as in '1.6e-3 /um', "
         remedy += "or look for it: --free (free=)."
         raise InvalidValue("stiffness", None, "is needed, and not stated", remedy=remedy)
-    over_stress = isinstance(stated_stiffness, Real) or is_stiffness_over_normal_stress(
+    over_stress = isinstance(stated_stiffness, Real) or Rig.is_stiffness_over_stress(
         stated_stiffness
     )
     if isinstance(stated_stiffness, Real):

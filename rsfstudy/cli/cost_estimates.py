@@ -15,7 +15,7 @@ import numpy as np
 from rsfstudy.errors import InvalidValue
 from rsfstudy.execution import CellPlan
 from rsfstudy.motion import Engine
-from rsfstudy.storage import CellTimings, read_timings
+from rsfstudy.storage import CellTimings
 
 #: Typical speed-up of the compiled engine relative to SciPy, by measure. The page of benchmarks
 #: reports speed-ups by factors from 7 to 12 for critical steps, and from 31 to 72 for limit cycles.
@@ -75,7 +75,7 @@ def estimate_study_cost(cell_plan: CellPlan, output_directory: Path) -> CostEsti
     work, guess = cell_plan.estimate_evaluations_and_time()
     work = round(work, 2 - len(str(work)))  # more digits would not be significant
     journal = output_directory / f"{cell_plan.study.name}.cells.sqlite"
-    took, cells = read_timings(journal), len(cell_plan.unique_cell_numbers)
+    took, cells = CellTimings.read(journal), len(cell_plan.unique_cell_numbers)
     if (
         took is None
         or not _timings_match_accuracy_and_engine(cell_plan, took)

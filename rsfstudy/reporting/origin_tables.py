@@ -11,7 +11,7 @@ import xarray as xr
 from rsfstudy.formatting import format_nonempty_fields, pluralize
 from rsfstudy.measures import CriticalStep
 from rsfstudy.reporting.cell_tables import format_status_counts
-from rsfstudy.rig import DIMENSIONLESS_PREFIX, in_display_units
+from rsfstudy.rig import DatasetUnits, Rig
 from rsfstudy.status import Status
 from rsfstudy.storage import read_declaration, read_provenance
 
@@ -42,7 +42,7 @@ def describe_scene_and_rig_fields(
         instability norm. Empty descriptions are omitted.
     """
     scene_fields = {n: v for n, v in scene_fields.items() if n not in varied_names}
-    sizes = in_display_units(rig_values, varied_names)
+    sizes = Rig.convert_quantities_for_display(rig_values, varied_names)
     told = {
         heading: format_nonempty_fields({n: v for n, v in scene_fields.items() if v}),
         "zero": ", ".join(n for n, v in scene_fields.items() if not v and v is not None),
@@ -76,13 +76,13 @@ def find_constant_fields(dataset: xr.Dataset) -> tuple[dict[str, Any], dict[str,
     """
     declared = read_declaration(dataset)
     varied = {
-        str(n).removeprefix(DIMENSIONLESS_PREFIX)
+        str(n).removeprefix(DatasetUnits.DIMENSIONLESS_PREFIX)
         for n, along in dataset.coords.items()
         if along.dims
     }
     scene = {n: v for n, v in declared.base.items() if n not in varied}
     rig = declared.laboratory or {}
-    return scene, {name: rig[name] for name in in_display_units(rig, varied)}
+    return scene, {name: rig[name] for name in Rig.convert_quantities_for_display(rig, varied)}
 
 
 def describe_study_origin(dataset: xr.Dataset) -> dict[str, str]:

@@ -13,17 +13,9 @@ from typing import TYPE_CHECKING
 from rsfstudy._lazy_exports import build_lazy_export_functions
 
 if TYPE_CHECKING:
-    from rsfstudy.rig.dataset_scales import (
-        DIMENSIONLESS_PREFIX,
-    )
     from rsfstudy.rig.dataset_units import DatasetUnits
     from rsfstudy.rig.rig import Rig
     from rsfstudy.rig.rig_axes import RigAxes
-    from rsfstudy.rig.rig_quantities import (
-        RIG_QUANTITIES,
-        in_display_units,
-        is_stiffness_over_normal_stress,
-    )
     from rsfstudy.rig.rig_scenes import (
         LatticeScenesOnRig,
     )
@@ -38,18 +30,12 @@ else:
     __getattr__, __dir__ = build_lazy_export_functions(
         __name__,
         {
-            "rig.rig_quantities": (
-                "RIG_QUANTITIES",
-                "in_display_units",
-                "is_stiffness_over_normal_stress",
-            ),
             "rig.rig": ("Rig",),
             "rig.rig_axes": ("RigAxes",),
             "rig.dataset_units": ("DatasetUnits",),
             "rig.rig_scenes": ("LatticeScenesOnRig",),
             # Except for the prefix, these are former exports, which ``DatasetUnits`` replaces.
             "rig.dataset_scales": (
-                "DIMENSIONLESS_PREFIX",
                 "convert_dataset_units",
                 "convert_to_display_units",
                 "find_scale_of_variable",
@@ -71,14 +57,10 @@ __all__ = [
     "DatasetUnits",
     "RigAxes",
     "Column",
-    "DIMENSIONLESS_PREFIX",
-    "RIG_QUANTITIES",
     "Rig",
     "LatticeScenesOnRig",
     "convert_to_si",
     "expand_range",
-    "in_display_units",
-    "is_stiffness_over_normal_stress",
     "parse_number",
     "read_table",
     "compute_conversion_factor",

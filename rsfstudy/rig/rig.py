@@ -10,7 +10,7 @@ import contextlib
 import json
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, fields
-from typing import Any
+from typing import Any, ClassVar
 
 import xarray as xr
 
@@ -38,6 +38,8 @@ from rsfstudy.rig.rig_quantities import (
     convert_rig_value_to_si,
     derive_scene_fields_from_rig,
     find_si_units_of_field,
+    in_display_units,
+    is_stiffness_over_normal_stress,
 )
 from rsfstudy.rig.units import convert_to_si
 from rsfstudy.slider import Protocol, Scene, SceneFields, protocol
@@ -112,6 +114,11 @@ class Rig(HtmlTableMixin):
     >>> round(scene.parts.loading.hold_time, 9)
     100.0
     """
+
+    #: Quantities of a rig by name, with their units and limits.
+    QUANTITIES: ClassVar = RIG_QUANTITIES
+    is_stiffness_over_stress = staticmethod(is_stiffness_over_normal_stress)
+    convert_quantities_for_display = staticmethod(in_display_units)
 
     normal_stress: Any
     slip_distance: Any

@@ -18,7 +18,7 @@ from typing import Any
 import numpy as np
 
 from rsfstudy._deprecation import accept_former_keyword_names, add_former_member_names
-from rsfstudy.axes import Axis, AxisRow, check_storable_text
+from rsfstudy.axes import Axis, AxisRow
 from rsfstudy.error_boundary import error_boundary, wrap_methods_in_error_boundary
 from rsfstudy.errors import InvalidValue
 from rsfstudy.formatting import is_sequence_of_axis_values
@@ -146,7 +146,7 @@ class Study:
             rule = f"must have at most {_MAX_NAME_BYTES} bytes, because it names files"
             raise InvalidValue("name", self.name, rule)
         for name in ("title", "summary", "source_file"):
-            check_storable_text(name, getattr(self, name))
+            Axis.check_storable_text(name, getattr(self, name))
         check_figure(self.plot)
         whole = isinstance(self.version, int) and not isinstance(self.version, bool)
         if not whole or self.version < 1:
