@@ -69,6 +69,8 @@ NEW_NAME_BY_OWNER_AND_FORMER_NAME: Mapping[str, Mapping[str, str]] = {
         "point_with_slip_rate": "Integrator.point_with_slip_rate",
     },
     "rsfstudy.slider": {
+        "build_sampled_history": "SampledHistory.from_samples",
+        "build_sampled_history_from_table": "SampledHistory.from_table",
         "LARGEST_LOG_SLIP_RATE": "Scene.LARGEST_LOG_SLIP_RATE",
         "STOPPED_LOG_SLIP_RATE": "Scene.STOPPED_LOG_SLIP_RATE",
         "RUPTURE_REGIME": "Scene.RUPTURE_REGIME",

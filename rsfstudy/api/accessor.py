@@ -96,11 +96,11 @@ class DatasetAccessor:
         """
         from rsfstudy.api.fitted_parameters import fitted_scene
         from rsfstudy.reporting import is_fit
-        from rsfstudy.storage import scene_of_dataset
+        from rsfstudy.storage import StoredDataset
 
         if is_fit(self._dataset):
             return fitted_scene(self._dataset)
-        return scene_of_dataset(self._dataset, self.study if self._is_study else None)
+        return StoredDataset(self._dataset).find_scene(self.study if self._is_study else None)
 
     @property
     @error_boundary
@@ -148,10 +148,10 @@ class DatasetAccessor:
         InvalidValue
             If the study contains user-defined code.
         """
-        from rsfstudy.storage import study_of_dataset
+        from rsfstudy.storage import StoredDataset
 
         self._require_study()
-        return study_of_dataset(self._dataset)
+        return StoredDataset(self._dataset).study
 
     @error_boundary
     def to_si(self, **scale_values: Any) -> xr.Dataset:
@@ -508,10 +508,10 @@ class DatasetAccessor:
 
         from rsfstudy.reporting import build_frame_of_cells
         from rsfstudy.status import Status
-        from rsfstudy.storage import read_declaration
+        from rsfstudy.storage import StoredDataset
 
         if self._is_study:
-            axes = [axis.dimension for axis in read_declaration(self._dataset).axes]
+            axes = [axis.dimension for axis in StoredDataset(self._dataset).declaration.axes]
             return build_frame_of_cells(
                 self._dataset, self._dataset["status"] != int(Status.OK), axes
             )
@@ -532,9 +532,9 @@ class DatasetAccessor:
 
     def _require_all_cells_present(self, requested_action: str) -> None:
         """Raise ``DataError`` if a selection has removed an axis."""
-        from rsfstudy.storage import read_declaration
+        from rsfstudy.storage import StoredDataset
 
-        axes = [axis.dimension for axis in read_declaration(self._dataset).axes]
+        axes = [axis.dimension for axis in StoredDataset(self._dataset).declaration.axes]
         selected = [name for name in axes if name not in self._dataset["status"].dims]
         if selected:
             text = (

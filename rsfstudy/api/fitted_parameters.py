@@ -15,7 +15,7 @@ from rsfstudy.reporting import split_into_single_fits
 from rsfstudy.rig import Rig
 from rsfstudy.slider import Scene
 from rsfstudy.status import Status
-from rsfstudy.storage import build_scene_from_stored, read_declaration
+from rsfstudy.storage import StoredDataset, build_scene_from_stored
 
 
 def _require_single_fit(dataset: xr.Dataset) -> xr.Dataset:
@@ -110,7 +110,7 @@ def fitted_scene(dataset: xr.Dataset) -> Scene:
         Scene of the fit.
     """
     one = _require_single_fit(dataset)
-    declared = read_declaration(dataset)
+    declared = StoredDataset(dataset).declaration
     first = build_scene_from_stored(declared.base)
     if "law" in one.coords:
         first = first.with_(law=str(one["law"].item()))

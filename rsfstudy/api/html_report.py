@@ -41,7 +41,7 @@ from rsfstudy.reporting import (
     summarise_verdicts,
 )
 from rsfstudy.status import Status
-from rsfstudy.storage import is_of_single_scene, read_dataset, read_declaration
+from rsfstudy.storage import StoredDataset, read_dataset
 
 _UNREADABLE_FILE_STATUS = "cannot be read"
 #: HTML tag that identifies reports of rsfstudy, and signature at the beginning of PNG files.
@@ -229,7 +229,7 @@ def _build_section_of_dataset(results_path: Path, dataset: xr.Dataset) -> _Resul
     title = str(dataset.attrs.get("title", "answer for one scene"))
     numbers = dataset_html(dataset)
     # The module uses the accessor without an import, because the accessor imports this module.
-    if is_of_single_scene(dataset):
+    if StoredDataset(dataset).is_of_single_scene:
         figure = (
             _format_figure_as_html(results_path, dataset.rsf.plot)
             if "slip" in dataset.variables
@@ -240,7 +240,7 @@ def _build_section_of_dataset(results_path: Path, dataset: xr.Dataset) -> _Resul
         return _ResultSection(
             results_path, title, "", status.label.replace("_", " "), colour, (figure, numbers)
         )
-    about = read_declaration(dataset)
+    about = StoredDataset(dataset).declaration
     parts = [_format_summary_piece_as_html(about.summary)] if about.summary else []
     if about.overrides:
         parts.append(
@@ -284,7 +284,7 @@ def dataset_html(dataset: xr.Dataset) -> str:
         the claims, and other datasets are followed by their provenance.
     """
     parts = list(map(_format_summary_piece_as_html, build_summary_tables_and_sentences(dataset)))
-    if is_of_single_scene(dataset):
+    if StoredDataset(dataset).is_of_single_scene:
         parts.append(_format_summary_piece_as_html(describe_dataset_origin(dataset)))
     elif claimed := claims_table(study_runs.check(dataset)):
         parts += ["<h3>Claims</h3>", _format_summary_piece_as_html(claimed)]

@@ -31,16 +31,12 @@ from rsfstudy.reporting import format_notes_on_incomplete_results, note_on_norms
 from rsfstudy.slider import Scene, SceneFields
 from rsfstudy.storage import (
     Comparison,
-    check_contains_study_results,
+    StoredDataset,
     compare_results,
     compare_same_lattice,
     find_cell_number,
     find_fingerprint_differences,
-    is_of_single_scene,
     read_dataset,
-    read_declaration,
-    read_provenance,
-    rebuild_study,
 )
 from rsfstudy.study import Study, build_verdict_table, load_study, study_names
 
@@ -369,7 +365,7 @@ def read_results(path: Path) -> xr.Dataset:
         belongs to one scene.
     """
     dataset = read_dataset(path)
-    check_contains_study_results(dataset, shorten_text(path))
+    StoredDataset(dataset).check_contains_study_results(shorten_text(path))
     return dataset
 
 
@@ -377,7 +373,7 @@ def _open_dataset_if_name_or_path(dataset: xr.Dataset | str | Path) -> xr.Datase
     """Return results, and load the results first if a name or a path is passed."""
     if not isinstance(dataset, xr.Dataset):
         return open(dataset)
-    check_contains_study_results(dataset, "the dataset")
+    StoredDataset(dataset).check_contains_study_results("the dataset")
     return dataset
 
 
@@ -492,7 +488,7 @@ def check(dataset: xr.Dataset | str | Path) -> pd.DataFrame:
     0
     """
     results = _open_dataset_if_name_or_path(dataset)
-    declared = read_declaration(results)
+    declared = StoredDataset(results).declaration
     return build_verdict_table(results, list(declared.claims), declared.overrides)
 
 
@@ -571,11 +567,11 @@ def rerun(
     True
     """
     theirs = read_dataset(find_results(file, Defaults.OUTPUT_DIRECTORY))
-    if is_of_single_scene(theirs):
+    if StoredDataset(theirs).is_of_single_scene:
         if study is not None:
             load_study(str(study))  # The file defines user-defined parts of the scene.
         return dataset_export.rerun_and_compare_motion(theirs)
-    declared = rebuild_study(theirs, study)
+    declared = StoredDataset(theirs).rebuild_study(study)
     place = output_directory(output)
     if place is not None:
         for taken in place.glob(f"{declared.name}.*"):
@@ -735,10 +731,10 @@ def _find_cell_in_results_file(
     """
     results = open(results_file)
     number = find_cell_number(results, cell_coordinates)
-    declared = rebuild_study(results, study_file)
+    declared = StoredDataset(results).rebuild_study(study_file)
     now = run_fingerprint(declared, [declared.scene(number)])
     return (
         declared,
         number,
-        find_fingerprint_differences(read_provenance(results)["fingerprint"], now),
+        find_fingerprint_differences(StoredDataset(results).provenance["fingerprint"], now),
     )

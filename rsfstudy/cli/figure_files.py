@@ -18,7 +18,7 @@ from rsfstudy.plots import (
     style_context,
     write_image,
 )
-from rsfstudy.storage import read_declaration, read_provenance
+from rsfstudy.storage import StoredDataset
 from rsfstudy.study import load_study
 
 if TYPE_CHECKING:
@@ -86,7 +86,7 @@ def load_user_figure_or_default(dataset: xr.Dataset, study_file: Path | None) ->
         the figure cannot be loaded and the user passed no study file, the function prints a note
         and returns "lines", so that maps or lines are drawn.
     """
-    if read_declaration(dataset).plot in FIGURE_NAMES:
+    if StoredDataset(dataset).declaration.plot in FIGURE_NAMES:
         return None
     try:
         return load_user_figure(dataset, study_file)
@@ -156,8 +156,8 @@ def load_user_figure(results: xr.Dataset, study_file: str | Path | None = None) 
     because the results may come from an untrusted source.
     """
     name, named_in = (
-        read_declaration(results).plot,
-        read_provenance(results)["declared_in"],
+        StoredDataset(results).declaration.plot,
+        StoredDataset(results).provenance["declared_in"],
     )
     if study_file is None:
         remedy = f"Pass the file that declares the figure: --study {named_in or 'FILE'}."

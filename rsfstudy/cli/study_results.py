@@ -25,7 +25,7 @@ from rsfstudy.reporting import (
     failures_table,
     summarise_study_as_fields,
 )
-from rsfstudy.storage import read_declaration
+from rsfstudy.storage import StoredDataset
 from rsfstudy.study import Claim
 
 
@@ -52,7 +52,7 @@ class StudyResults:
     @property
     def overrides(self) -> Mapping[str, Any]:
         """Values that differ from the declaration of the study."""
-        return read_declaration(self.dataset).overrides
+        return StoredDataset(self.dataset).declaration.overrides
 
     @property
     def pending_count(self) -> int:

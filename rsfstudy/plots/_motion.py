@@ -34,7 +34,7 @@ from rsfstudy.plots._style import (
 from rsfstudy.plots._text import to_mathtext, wrap_text
 from rsfstudy.rig import DatasetUnits, Rig
 from rsfstudy.slider import Scene
-from rsfstudy.storage import read_scene_fields
+from rsfstudy.storage import StoredDataset
 
 #: Height of a panel in mm.
 PANEL_HEIGHT_MM = 48.0
@@ -213,7 +213,7 @@ def _draw_phase_plane(motion: xr.Dataset, displayed_motion: xr.Dataset, axes: Ax
         scale * 10.0 ** logs[0], friction[0], "o", color=cycle_style(0)["color"], label="its start"
     )
     beyond = np.linspace(float(logs.min()) - 0.3, float(logs.max()) + 0.3, 201)
-    steady = _compute_steady_friction(read_scene_fields(motion), beyond)
+    steady = _compute_steady_friction(StoredDataset(motion).scene_fields, beyond)
     if steady is not None:
         axes.plot(scale * 10.0**beyond, steady, "--", color="0.4", label="steady sliding")
     set_log_scale(axes, "x")

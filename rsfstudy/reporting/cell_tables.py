@@ -14,7 +14,7 @@ from rsfstudy.formatting import format_nonempty_fields, pluralize
 from rsfstudy.reporting.reduction_tables import find_refusal_reasons_of_reductions
 from rsfstudy.reporting.tables import TextTable
 from rsfstudy.status import Status
-from rsfstudy.storage import read_provenance
+from rsfstudy.storage import StoredDataset
 
 #: Maximum number of failed cells in a table.
 _MAX_FAILURES = 20
@@ -203,7 +203,7 @@ def format_recompute_command(
         Command for a shell.
     """
     words = ["rsfstudy", "rerun", results_file]
-    declared_in = read_provenance(dataset)["declared_in"]
+    declared_in = StoredDataset(dataset).provenance["declared_in"]
     if declared_in:
         words += ["--study", declared_in]
     for name, value in cell_coordinates.items():

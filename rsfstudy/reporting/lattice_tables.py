@@ -24,7 +24,7 @@ from rsfstudy.reporting.tables import (
 )
 from rsfstudy.rig import DatasetUnits
 from rsfstudy.status import Status
-from rsfstudy.storage import find_primary_output, read_declaration
+from rsfstudy.storage import StoredDataset
 
 #: Maximum number of cells in a table that shows all cells.
 _MAX_CELLS_SHOWN_WITHOUT_THINNING = 36
@@ -48,7 +48,7 @@ def build_primary_output_table(dataset: xr.Dataset) -> TextTable:
     TextTable
         Table of the primary output. The table is empty if the study has no primary output.
     """
-    name = find_primary_output(dataset)
+    name = StoredDataset(dataset).primary_output
     if name is None:
         return TextTable([])
     dataset = DatasetUnits(dataset).convert_for_display()
@@ -80,7 +80,7 @@ def build_primary_output_table(dataset: xr.Dataset) -> TextTable:
 
 def _find_fields_along_numbered_axes(dataset: xr.Dataset) -> list[str]:
     """Return the fields that vary along numbered axes, such as samples."""
-    axes = [axis.values for axis in read_declaration(dataset).axes]
+    axes = [axis.values for axis in StoredDataset(dataset).declaration.axes]
     columns = [
         v for v in axes if isinstance(v, Mapping) and isinstance(next(iter(v.values())), list)
     ]
@@ -130,7 +130,7 @@ def summarise_study_as_text_lines(dataset: xr.Dataset) -> list[str]:
         Range of the primary output, one line per slope, and the number of cells per status.
     """
     lines, converted = [], DatasetUnits(dataset).convert_for_display()
-    if (name := find_primary_output(dataset)) is not None:
+    if (name := StoredDataset(dataset).primary_output) is not None:
         values = converted[name if name in converted else DatasetUnits.dimensional_name(name)]
         told, units = np.unique(values.values[np.isfinite(values.values)]), format_units(values)
         ends = " to ".join(map(format_value, dict.fromkeys((*told[:1], *told[-1:]))))

@@ -13,7 +13,7 @@ from rsfstudy.measures import CriticalStep
 from rsfstudy.reporting.cell_tables import format_status_counts
 from rsfstudy.rig import DatasetUnits, Rig
 from rsfstudy.status import Status
-from rsfstudy.storage import read_declaration, read_provenance
+from rsfstudy.storage import StoredDataset
 
 
 def describe_scene_and_rig_fields(
@@ -74,7 +74,7 @@ def find_constant_fields(dataset: xr.Dataset) -> tuple[dict[str, Any], dict[str,
     rig : dict of str to float
         Quantities of the rig in SI units. The dictionary is empty if the study has no rig.
     """
-    declared = read_declaration(dataset)
+    declared = StoredDataset(dataset).declaration
     varied = {
         str(n).removeprefix(DatasetUnits.DIMENSIONLESS_PREFIX)
         for n, along in dataset.coords.items()
@@ -98,7 +98,7 @@ def describe_study_origin(dataset: xr.Dataset) -> dict[str, str]:
     dict of str to str
         Descriptions of the lattice, the fixed fields, the cells, the command and the versions.
     """
-    attrs, about = dataset.attrs, read_provenance(dataset)
+    attrs, about = dataset.attrs, StoredDataset(dataset).provenance
     dims = dataset["status"].dims
     scene, rig = find_constant_fields(dataset)
     reduced = attrs.get("reduced_despite")
@@ -128,7 +128,7 @@ def note_on_norms_near_load_velocity(dataset: xr.Dataset) -> str:
         message of the first such result. The string is empty if there is no such result, or if the
         study has no rig.
     """
-    if read_declaration(dataset).laboratory is None:
+    if StoredDataset(dataset).declaration.laboratory is None:
         return ""
     ok = dataset["message"].values[dataset["status"].values == int(Status.OK)]
     near = [text for text in ok.tolist() if text.startswith(CriticalStep.SLOW_NORM_WARNING_PREFIX)]

@@ -84,10 +84,7 @@ if TYPE_CHECKING:
         displacement_per_path_length,
     )
     from rsfstudy.slider.sampled_loading import (
-        STRESS_RATE_COLUMN,
         SampledHistory,
-        build_sampled_history,
-        build_sampled_history_from_table,
     )
     from rsfstudy.slider.scene import SINGLE_ENDLESS_SEGMENT_TABLE, Scene
     from rsfstudy.slider.scene_assembly import (
@@ -130,12 +127,7 @@ else:
             "slider.motion_point": ("MotionPoint",),
             "slider.user_loadings": ("Protocol", "SEGMENT_MAPPING_KEYS", "UserLoading", "protocol"),
             "slider.part_registry": ("UserPart",),
-            "slider.sampled_loading": (
-                "STRESS_RATE_COLUMN",
-                "SampledHistory",
-                "build_sampled_history",
-                "build_sampled_history_from_table",
-            ),
+            "slider.sampled_loading": ("SampledHistory",),
             "slider.scene": ("SINGLE_ENDLESS_SEGMENT_TABLE", "Scene"),
             "slider.scene_fields": ("SceneFields",),
             "slider.scene_view": ("SceneView",),
@@ -159,7 +151,6 @@ __all__ = [
     "MotionPoint",
     "Protocol",
     "SEGMENT_MAPPING_KEYS",
-    "STRESS_RATE_COLUMN",
     "SampledHistory",
     "Scene",
     "SceneView",
@@ -167,12 +158,10 @@ __all__ = [
     "SteadySliding",
     "UserLoading",
     "UserPart",
-    "build_sampled_history",
     "cached_attribute",
     "cached_per_scene",
     "critical_stiffness_closed_form",
     "effective_friction",
-    "build_sampled_history_from_table",
     "displacement_per_path_length",
     "protocol",
     "replace_field_values",

@@ -24,33 +24,20 @@ if TYPE_CHECKING:
         read_dataset,
         write_dataset,
     )
-    from rsfstudy.storage.dataset_scenes import scene_of_dataset
     from rsfstudy.storage.declarations import build_scene_from_stored
     from rsfstudy.storage.fingerprints import find_fingerprint_differences
     from rsfstudy.storage.lattice_coordinates import LatticeCoordinates
     from rsfstudy.storage.lattice_datasets import assemble_dataset
-    from rsfstudy.storage.rebuild_from_file import (
-        find_primary_output,
-        rebuild_study,
-        study_of_dataset,
-    )
-    from rsfstudy.storage.schema import (
-        check_contains_study_results,
-        is_of_single_scene,
-        read_declaration,
-        read_json_attribute,
-        read_provenance,
-        read_scene_fields,
-    )
+    from rsfstudy.storage.stored_dataset import StoredDataset
     from rsfstudy.storage.zarr_store import ZarrStore
 else:
     __getattr__, __dir__ = build_lazy_export_functions(
         __name__,
         {
             "storage.zarr_store": ("ZarrStore",),
+            "storage.stored_dataset": ("StoredDataset",),
             "storage.cell_numbers": ("find_cell_number",),
             "storage.comparison": ("Comparison", "compare_results", "compare_same_lattice"),
-            "storage.dataset_scenes": ("scene_of_dataset",),
             "storage.cell_columns": ("CellColumns", "StoredCellRow", "OutputPacker"),
             "storage.cell_journal": (
                 "CellTimings",
@@ -60,19 +47,6 @@ else:
             "storage.fingerprints": ("find_fingerprint_differences",),
             "storage.lattice_coordinates": ("LatticeCoordinates",),
             "storage.lattice_datasets": ("assemble_dataset",),
-            "storage.rebuild_from_file": (
-                "find_primary_output",
-                "rebuild_study",
-                "study_of_dataset",
-            ),
-            "storage.schema": (
-                "check_contains_study_results",
-                "is_of_single_scene",
-                "read_declaration",
-                "read_json_attribute",
-                "read_provenance",
-                "read_scene_fields",
-            ),
             "storage.dataset_files": (
                 "convert_attributes_for_netcdf",
                 "read_dataset",
@@ -82,6 +56,7 @@ else:
     )
 
 __all__ = [
+    "StoredDataset",
     "ZarrStore",
     "CellColumns",
     "StoredCellRow",
@@ -92,21 +67,11 @@ __all__ = [
     "OutputPacker",
     "assemble_dataset",
     "build_scene_from_stored",
-    "check_contains_study_results",
     "convert_attributes_for_netcdf",
     "compare_results",
     "compare_same_lattice",
     "find_cell_number",
     "find_fingerprint_differences",
-    "find_primary_output",
-    "is_of_single_scene",
     "read_dataset",
-    "read_declaration",
-    "read_json_attribute",
-    "read_provenance",
-    "read_scene_fields",
-    "rebuild_study",
-    "scene_of_dataset",
-    "study_of_dataset",
     "write_dataset",
 ]

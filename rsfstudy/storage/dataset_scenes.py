@@ -9,14 +9,7 @@ import numpy as np
 import xarray as xr
 
 from rsfstudy.errors import InvalidValue
-from rsfstudy.slider import (
-    Scene,
-    SceneFields,
-    UserLoading,
-    UserPart,
-    build_sampled_history_from_table,
-    protocol,
-)
+from rsfstudy.slider import SampledHistory, Scene, SceneFields, UserLoading, UserPart, protocol
 from rsfstudy.storage.declarations import build_scene_from_stored
 from rsfstudy.storage.lattice_coordinates import build_dimension_coordinates
 from rsfstudy.storage.plain_data import invalid_part_error
@@ -118,9 +111,7 @@ def read_scene_from_attributes(dataset: xr.Dataset) -> Scene:
     if digest:
         told = dataset["history_samples"]
         pressure, stress = (bool(told.attrs.get(n)) for n in ("of_pressure", "of_stress"))
-        sampled = build_sampled_history_from_table(
-            told.values, stress, loading, of_pressure=pressure
-        )
+        sampled = SampledHistory.from_table(told.values, stress, loading, of_pressure=pressure)
         if sampled.digest != digest:
             raise invalid_part_error("history_samples", f"are not those of the scene ({digest})")
         own[SceneFields.normalise_value("loading", sampled)] = sampled

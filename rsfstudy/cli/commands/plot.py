@@ -51,10 +51,10 @@ def _draw_figure(results: Path, figure_path: Path, given: options.CommandOptions
     """Draw the figure of a file, and return the paths of the figures that were written."""
     from rsfstudy.cli import figure_files
     from rsfstudy.cli.study_options import read_results_file
-    from rsfstudy.storage import is_of_single_scene
+    from rsfstudy.storage import StoredDataset
 
     dataset = read_results_file(results, given.study)
-    if is_of_single_scene(dataset):
+    if StoredDataset(dataset).is_of_single_scene:
         drawing = dataset.rsf.plot(against=given.against)
         figure_files.write_figure(drawing, figure_path, given.style)
         return [figure_path]
