@@ -6,7 +6,6 @@ The main function is ``fit``. The function checks the arguments, builds a study 
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from numbers import Real
@@ -16,6 +15,12 @@ import numpy as np
 import xarray as xr
 
 from rsfstudy.api import study_runs
+from rsfstudy.api.record_checks import (
+    check_displacement_is_not_slip,
+    check_displacement_was_not_reset,
+    check_normal_stress_changes_for_alpha,
+    check_step_can_be_fitted,
+)
 from rsfstudy.axes import Axis
 from rsfstudy.defaults import Defaults
 from rsfstudy.error_boundary import error_boundary
@@ -25,10 +30,9 @@ from rsfstudy.fitting import (
     MEAN,
     TRAILING_MEAN,
     FitWindow,
-    LoadingStep,
     Record,
     check_free_parameters,
-    noise_variance,
+    compute_weighted_mean,
     parameters_of_law,
 )
 from rsfstudy.measures import Fit
@@ -56,19 +60,12 @@ _EVOLUTION_EFFECT_PARAMETERS = ("b", "b1", "b2")
 _REMEDY_FOR_WRONG_STATE_PARAMETERS = (
     "One state has b; two states have b1, b2, slip_distance and slip_distance_2."
 )
+#: Value of the argument ``stiffness`` for a stiffness that is measured in the records.
+STIFFNESS_FROM_RECORD = "from record"
 #: Initial guess of the slip distance, as a fraction of the load point displacement after a step.
 _SLIP_DISTANCE_GUESS_OVER_DISPLACEMENT = 0.05
 #: Maximum value of the argument ``windows``.
 _MAX_FIT_WINDOW_COUNT = 1000
-#: A decrease of the load point displacement between two rows is a reset to zero if the decrease
-#: exceeds three limits: a multiple of the noise of displacement, a multiple of the changes between
-#: the neighbouring rows, and a fraction of the range of displacement. The noise is estimated only
-#: if the record has more than 20 rows.
-(
-    _MIN_DISPLACEMENT_RESET_OVER_NOISE,
-    _MIN_DISPLACEMENT_RESET_OVER_EXTENT,
-    _MIN_ROWS_FOR_NOISE_ESTIMATE,
-) = 10.0, 0.01, 20
 #: Length of the shortest window of a fit, as a fraction of the load point displacement after a
 #: step.
 _MIN_WINDOW_LENGTH_OVER_FULL_LENGTH = 0.5
@@ -155,7 +152,8 @@ def fit(
     averaging : quantity, optional
         Time over which the data logger averaged friction around each row, such as "1 s", or a
         number in s. Use "trailing 1 s" if the average ends at the row. The same average is applied
-        to the model. By default, the fit assumes that friction was not averaged.
+        to the model. By default, the fit applies the filter with which `read_record` filtered the
+        record, or assumes that friction was not averaged.
     low_pass : str, optional
         Low-pass filter that was applied to friction, with its corner frequency: "first_order 2 Hz",
         "butterworth_2 2 Hz" or "butterworth_4 2 Hz". The same filter is applied to the model. By
@@ -170,9 +168,12 @@ def fit(
     stiffness : quantity, optional
         Stiffness of the machine. The argument is required if no rig is passed. The stiffness is a
         string in MPa/um, a string in 1/um such as "1.6e-3 1/um" (stiffness divided by normal
-        stress), or a number in 1/um. Stiffness in MPa/um is divided by the mean normal stress in
-        the window before each step. If ``free`` contains "stiffness", the argument is the initial
-        guess. In a joint fit, the stiffness in 1/um refers to the first window, and is scaled by
+        stress), or a number in 1/um. With "from record", the stiffness is measured in the locked
+        portions of the records (see ``Record.stiffness``), and the standard errors of the
+        parameters include the standard error of this stiffness. Stiffness in MPa/um is divided by
+        the mean normal stress in the window before each step. If ``free`` contains "stiffness", the
+        argument is the initial guess. In a joint fit, the stiffness in 1/um refers to the first
+        window, and is scaled by
         normal stress for the other windows.
     slip_distance : quantity, optional
         Initial guess of the slip distance, such as "10 um", or a number in um. The fit tries five
@@ -271,12 +272,14 @@ def fit(
     if "alpha" in scene:
         scene = {"normal_stress": "imposed", **scene}
     if "alpha" in free:
-        _check_normal_stress_changes_for_alpha(records, loading, numbers)
+        check_normal_stress_changes_for_alpha(records, loading, numbers)
         scene = {"normal_stress": "imposed", **scene}
-    ratio, machine = _initial_stiffness(rig, stiffness, free, records)
+    ratio, machine, stiffness_error = _initial_stiffness(rig, stiffness, free, records)
     if machine:
         _check_normal_stress_is_compressive(records, numbers)
         ratio = machine / FitWindow(records[0], numbers[0]).mean_normal_stress_before_step
+    if "stiffness" not in free:
+        check_displacement_is_not_slip(records, numbers, ratio, machine)
     first = _initial_scene(laws, scene, ratio * guess)
     sought = _free_parameters(free, laws, first)
     there = tuple((one.name, n) for one in records for n in numbers if n <= len(one.loading_steps))
@@ -291,9 +294,10 @@ def fit(
         after=_to_micrometres("after", after),
         noise=noise,
         loading=loading,
-        filter=_describe_filter(averaging, low_pass),
+        filter=_find_common_filter(records, _describe_filter(averaging, low_pass)),
         posterior=posterior,
         machine_stiffness=machine,
+        stiffness_relative_stderr=stiffness_error,
     )
     axes = [Axis("law", list(laws))]
     if len(records) > 1 and not together:
@@ -322,9 +326,11 @@ def fit(
         plot="fits",
         accuracy=Accuracy(rtol, budget, engine=chosen),
     )
-    return study_runs.run(
+    fits = study_runs.run(
         study, workers=workers, output=None, progress=False, keep_going=True, command=command
     )
+    processing = [f"{one.name}: {text}" for one in records for text in one.processing]
+    return fits.assign_attrs({"processing": "; ".join(processing)} if processing else {})
 
 
 def _select_step_numbers(records: Sequence[Record], steps: Sequence[int]) -> tuple[int, ...]:
@@ -339,7 +345,7 @@ def _select_step_numbers(records: Sequence[Record], steps: Sequence[int]) -> tup
         move forward.
     """
     for record in records:
-        _check_displacement_was_not_reset(record)
+        check_displacement_was_not_reset(record)
     count = max(len(one.loading_steps) for one in records)
     if not count:
         remedy = "State them: record.with_steps([(begins, ends, before, after)])."
@@ -352,76 +358,8 @@ def _select_step_numbers(records: Sequence[Record], steps: Sequence[int]) -> tup
             raise InvalidValue("steps", number, rule)
         for record in records:
             for step in record.loading_steps[number - 1 : number]:
-                _check_step_can_be_fitted(record, number, step)
+                check_step_can_be_fitted(record, number, step)
     return numbers
-
-
-def _check_displacement_was_not_reset(record: Record) -> None:
-    """Raise ``InvalidValue`` if the load point displacement was reset to zero.
-
-    A reset appears as a large decrease of displacement between two successive rows.
-    """
-    time, moved = record.time, record.columns["displacement"]
-    jumps = np.diff(moved)
-    row = int(np.argmin(jumps))
-    noise = (
-        math.sqrt(noise_variance(time, moved)) if len(time) > _MIN_ROWS_FOR_NOISE_ESTIMATE else 0.0
-    )
-    beside = np.abs(np.delete(jumps[max(row - 5, 0) : row + 6], min(row, 5))).max(initial=0.0)
-    back = -float(jumps[row]) > max(
-        _MIN_DISPLACEMENT_RESET_OVER_NOISE * beside,
-        _MIN_DISPLACEMENT_RESET_OVER_NOISE * noise,
-        _MIN_DISPLACEMENT_RESET_OVER_EXTENT * np.ptp(moved),
-    )
-    if record.specified_steps is None and back:
-        rule = f"falls back between two rows at {time[row + 1]:g} s in {record.name}, as a load "
-        rule += "point does that is set to zero again"
-        remedy = f"Fit its parts, as in record.window({time[0]:g}, {time[row]:g}), or add the "
-        remedy += "offset to the later rows."
-        raise InvalidValue("displacement", f"{jumps[row]:.4g} um", rule, remedy=remedy)
-
-
-def _check_step_can_be_fitted(record: Record, step_number: int, step: LoadingStep) -> None:
-    """Raise ``InvalidValue`` if a step cannot be fitted.
-
-    A step cannot be fitted if it is outside the record, or if the load point does not move forward.
-    """
-    time, moved = record.time, record.columns["displacement"]
-    if not time[0] < step.start <= step.end < time[-1]:
-        rule = f"is stated outside of {record.name}, {time[0]:g} to {time[-1]:g} s"
-        remedy = "State steps in s, by the clock of the record: record.with_steps([...])."
-        raise InvalidValue(f"step {step_number}", tuple(step), rule, remedy=remedy)
-    if min(step.velocity_before, step.velocity_after) < 0.0 or not moved[-1] > np.interp(
-        step.end, time, moved
-    ):
-        told = (
-            f"{step.velocity_before:.4g} um/s before step {step_number}, "
-            f"{step.velocity_after:.4g} um/s after it"
-        )
-        rule = "must grow: a load point moves forward"
-        remedy = "Reverse its sign, or say which column is which: --columns (columns=)."
-        raise InvalidValue("displacement", told, rule, remedy=remedy)
-
-
-def _check_normal_stress_changes_for_alpha(
-    records: Sequence[Record], loading_kind: str, step_numbers: Sequence[int]
-) -> None:
-    """Raise ``InvalidValue`` if ``alpha`` cannot be fitted.
-
-    The parameter ``alpha`` cannot be fitted at constant normal stress.
-    """
-    for record in records:
-        stress = record.columns.get("normal_stress", np.zeros(1))
-        steps = [
-            record.loading_steps[n - 1] for n in step_numbers if n <= len(record.loading_steps)
-        ]
-        by_steps = loading_kind == "steps" and any(step.stress_ratio != 1.0 for step in steps)
-        if not by_steps and not (loading_kind == "recorded" and np.ptp(stress) > 0.0):
-            rule = "needs a normal stress that changes: "
-            rule += f"that of {record.name} has no step among those that are fitted"
-            remedy = "Leave alpha out, name a step of normal stress (steps=), or follow the "
-            remedy += "recorded normal stress with --loading recorded (loading=)."
-            raise InvalidValue("free", "alpha", rule, remedy=remedy)
 
 
 def _guess_slip_distance(
@@ -444,7 +382,7 @@ def _initial_stiffness(
     stated_stiffness: Any,
     free_parameters: Sequence[str],
     records: Sequence[Record],
-) -> tuple[float, float]:
+) -> tuple[float, float, float]:
     """Return the initial stiffness of the fit.
 
     A stiffness in MPa/um is returned as ``machine``, and a stiffness in 1/um as ``ratio``.
@@ -455,12 +393,16 @@ def _initial_stiffness(
         Stiffness divided by normal stress in 1/um. The ratio is 0 if ``machine`` is positive.
     machine : float
         Stiffness of the machine in Pa/um. The value is 0 if ``ratio`` is positive.
+    relative_stderr : float
+        Relative standard error of a stiffness that is measured in the records, or 0.
     """
+    if stated_stiffness == STIFFNESS_FROM_RECORD:
+        return _measure_stiffness(records)
     if stated_stiffness is None:
         if rig is not None and rig.stiffness is not None:
-            return 0.0, float(rig.stiffness * 1e-6)
+            return 0.0, float(rig.stiffness * 1e-6), 0.0
         if "stiffness" in free_parameters:
-            return 1e-3, 0.0
+            return 1e-3, 0.0, 0.0
         remedy = "Give --stiffness (stiffness=), as in '1.6e-3 /um', "
         remedy += "or look for it: --free (free=)."
         raise InvalidValue("stiffness", None, "is needed, and not stated", remedy=remedy)
@@ -476,13 +418,40 @@ def _initial_stiffness(
     if not found > 0.0:
         raise InvalidValue("stiffness", stated_stiffness, "must be positive")
     if over_stress:
-        return found, 0.0
+        return found, 0.0, 0.0
     for record in records:
         if "normal_stress" not in record.columns:
             remedy = "Give --normal-stress (normal_stress of read_record), or stiffness in 1/um."
             rule = f"needs a normal stress, and {record.name} has none"
             raise InvalidValue("stiffness", stated_stiffness, rule, remedy=remedy)
-    return 0.0, found
+    return 0.0, found, 0.0
+
+
+def _measure_stiffness(records: Sequence[Record]) -> tuple[float, float, float]:
+    """Measure the stiffness in the records.
+
+    Returns
+    -------
+    ratio, machine, relative_stderr : float
+        Stiffness in the format of ``_initial_stiffness``.
+
+    Raises
+    ------
+    InvalidValue
+        If the records have no portion in which the fault is locked.
+    """
+    stressed = all("normal_stress" in record.columns for record in records)
+    name = "machine_stiffness" if stressed else "stiffness"
+    tables = [record.stiffness() for record in records]
+    found = np.array([(float(of[name]), float(of[f"{name}_stderr"])) for of in tables])
+    found = found[np.isfinite(found).all(axis=1)]
+    if not len(found):
+        rule = "needs a portion of the record in which the fault is locked: the reloading after a "
+        rule += "hold, an unloading and reloading, or the initial loading"
+        remedy = "Pass the stiffness as a quantity, as in '1.6e-3 1/um', or fit it: --free (free=)."
+        raise InvalidValue("stiffness", STIFFNESS_FROM_RECORD, rule, remedy=remedy)
+    value, stderr = compute_weighted_mean(*found.T)
+    return (0.0, value, stderr / value) if stressed else (value, 0.0, stderr / value)
 
 
 def _check_normal_stress_is_compressive(
@@ -589,6 +558,23 @@ def _describe_filter(averaging: Any, low_pass: str) -> str:
     else:
         return ""
     return f"{kind} {seconds!r}"
+
+
+def _find_common_filter(records: Sequence[Record], stated_filter: str) -> str:
+    """Return the filter that was applied to the friction of all records.
+
+    A filter that was applied while a record was read is part of the record.
+    """
+    filters = {record.filter for record in records if record.filter}
+    if not filters:
+        return stated_filter
+    if stated_filter:
+        remedy = "Leave averaging= and low_pass= out, or read the record without filter=."
+        raise InvalidValue("filter", stated_filter, "follows another filter", remedy=remedy)
+    if len({record.filter for record in records}) > 1:
+        remedy = "Read all records with the same filter=, or fit them separately."
+        raise InvalidValue("filter", sorted(filters), "differs between the records", remedy=remedy)
+    return filters.pop()
 
 
 def _to_micrometres(argument_name: str, value: Any) -> float:

@@ -8,7 +8,7 @@ from scipy.linalg import cholesky_banded, solve_banded
 #: The first value is added to the diagonal of the correlation matrix, so that frequencies without
 #: noise do not receive an infinite weight in the fit. The second value is the largest number of
 #: rows within an averaging time.
-_UNAVERAGED_NOISE_VARIANCE_FRACTION, _MAX_ROWS_PER_AVERAGING_TIME = 0.002, 200
+_UNAVERAGED_NOISE_VARIANCE_FRACTION, MAX_ROWS_PER_AVERAGING_TIME = 0.002, 200
 
 
 class AveragedNoiseCorrelation:
@@ -38,7 +38,7 @@ class AveragedNoiseCorrelation:
     def __init__(self, time: np.ndarray, averaging_time: float) -> None:
         clock = np.concatenate([[0], np.cumsum(np.diff(time) <= 0.0)])
         band = [np.full(len(time), 1.0 + _UNAVERAGED_NOISE_VARIANCE_FRACTION)]
-        for lag in range(1, min(_MAX_ROWS_PER_AVERAGING_TIME, len(time) - 1)):
+        for lag in range(1, min(MAX_ROWS_PER_AVERAGING_TIME, len(time) - 1)):
             apart = np.abs(time[lag:] - time[:-lag]) / averaging_time
             overlap = np.where(clock[lag:] == clock[:-lag], np.maximum(1.0 - apart, 0.0), 0.0)
             if not overlap.any():
@@ -73,11 +73,11 @@ class AveragedNoiseCorrelation:
 
 
 def apply_running_mean(
-    time: np.ndarray, sample_columns: np.ndarray, averaging_time: float
+    time: np.ndarray, sample_columns: np.ndarray, averaging_time: float, centre: float = 0.0
 ) -> np.ndarray:
     """Compute the running mean of each column of an array.
 
-    The averaging time is centred at each row. The function interpolates the columns linearly
+    The function interpolates the columns linearly
     between the rows, and assumes that they are constant before the first row and after the last
     row.
 
@@ -89,6 +89,8 @@ def apply_running_mean(
         Array whose columns are averaged.
     averaging_time : float
         Averaging time in s.
+    centre : float, default: 0.0
+        Time in s from a row to the centre of its averaging time.
 
     Returns
     -------
@@ -101,6 +103,6 @@ def apply_running_mean(
     sums = np.concatenate([np.zeros((1, sample_columns.shape[1])), np.cumsum(pieces, axis=0)])
     ends = [
         np.column_stack([np.interp(time + side, at, column) for column in sums.T])
-        for side in (0.5 * averaging_time, -0.5 * averaging_time)
+        for side in (centre + 0.5 * averaging_time, centre - 0.5 * averaging_time)
     ]
     return np.asarray((ends[0] - ends[1]) / averaging_time)

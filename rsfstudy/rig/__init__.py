@@ -13,28 +13,34 @@ from typing import TYPE_CHECKING
 from rsfstudy._lazy_exports import build_lazy_export_functions
 
 if TYPE_CHECKING:
+    from rsfstudy.rig.column_reading import ColumnsOfSource, ReadingOptions, read_columns
+    from rsfstudy.rig.columns import Column
     from rsfstudy.rig.dataset_units import DatasetUnits
+    from rsfstudy.rig.ranges import expand_range
+    from rsfstudy.rig.record_files import read_record
     from rsfstudy.rig.rig import Rig
     from rsfstudy.rig.rig_axes import RigAxes
     from rsfstudy.rig.rig_scenes import (
         LatticeScenesOnRig,
     )
-    from rsfstudy.rig.table_files import Column, read_table
+    from rsfstudy.rig.table_files import read_table
     from rsfstudy.rig.units import (
         compute_conversion_factor,
         convert_to_si,
-        expand_range,
         parse_number,
     )
+    from rsfstudy.rig.usual_headings import UsableColumns, has_time_column
 else:
     __getattr__, __dir__ = build_lazy_export_functions(
         __name__,
         {
+            "rig.ranges": ("expand_range",),
+            "rig.record_files": ("read_record",),
             "rig.rig": ("Rig",),
             "rig.rig_axes": ("RigAxes",),
             "rig.dataset_units": ("DatasetUnits",),
             "rig.rig_scenes": ("LatticeScenesOnRig",),
-            # Except for the prefix, these are former exports, which ``DatasetUnits`` replaces.
+            # These are former exports, which ``DatasetUnits`` replaces.
             "rig.dataset_scales": (
                 "convert_dataset_units",
                 "convert_to_display_units",
@@ -43,10 +49,12 @@ else:
                 "read_si_scales",
                 "slip_rate_from_log",
             ),
-            "rig.table_files": ("Column", "read_table"),
+            "rig.columns": ("Column",),
+            "rig.column_reading": ("ColumnsOfSource", "ReadingOptions", "read_columns"),
+            "rig.table_files": ("read_table",),
+            "rig.usual_headings": ("UsableColumns", "has_time_column"),
             "rig.units": (
                 "convert_to_si",
-                "expand_range",
                 "parse_number",
                 "compute_conversion_factor",
             ),
@@ -57,11 +65,17 @@ __all__ = [
     "DatasetUnits",
     "RigAxes",
     "Column",
+    "ColumnsOfSource",
+    "ReadingOptions",
     "Rig",
+    "UsableColumns",
     "LatticeScenesOnRig",
     "convert_to_si",
     "expand_range",
+    "has_time_column",
     "parse_number",
+    "read_columns",
+    "read_record",
     "read_table",
     "compute_conversion_factor",
 ]

@@ -29,6 +29,8 @@ MODULE_BY_COMMAND = {
     "export": "export",
     "simulate": "simulate",
     "fit": "fit",
+    "events": "events",
+    "healing": "healing",
     "problems": "problems",
     "verify": "verify",
 }
