@@ -20,6 +20,7 @@ from __future__ import annotations
 
 import functools
 import importlib
+import operator
 import sys
 import warnings
 from collections.abc import Callable, Mapping
@@ -35,6 +36,121 @@ NEW_NAME_BY_OWNER_AND_FORMER_NAME: Mapping[str, Mapping[str, str]] = {
         "picture": "plot_motion",
         "cell": "recompute_cell",
     },
+    "rsfstudy.motion": {
+        "adapt_former_compute": "accept_accuracy_and_meter",
+        "DEFAULT_RTOL": "Accuracy.DEFAULT_RTOL",
+        "MIN_RTOL": "Accuracy.MIN_RTOL",
+        "MAX_RTOL": "Accuracy.MAX_RTOL",
+        "DEFAULT_EVALUATION_BUDGET": "Accuracy.DEFAULT_BUDGET",
+        "MAX_ERROR_OVER_RTOL": "Accuracy.MAX_ERROR_OVER_RTOL",
+        "RELATIVE_ROUNDING_ERROR": "Accuracy.RELATIVE_ROUNDING_ERROR",
+        "MIN_LOCAL_TOLERANCE": "Integrator.MIN_LOCAL_TOLERANCE",
+        "SCIPY": "Engine.SCIPY",
+        "PYTHON": "Engine.PYTHON",
+        "COMPILED": "Engine.COMPILED",
+        "ENGINES": "Engine.NAMES",
+        "compilation_log": "Engine.compilation_log",
+        "is_engine_installed": "Engine.is_installed",
+        "check_engine_is_usable": "Engine.check_is_usable",
+        "import_compiled_engine": "Engine.import_compiled",
+        "find_user_stepper": "Engine.find_user_stepper",
+        "register_user_steppers": "Engine.register_user_steppers",
+        "RECORDED_VARIABLES": "Recording.VARIABLES",
+        "MOTION_VARIABLES": "Recording.MOTION_VARIABLES",
+        "REGIME_COLUMN": "Recording.REGIME_COLUMN",
+        "SAMPLE_COLUMN": "Recording.SAMPLE_COLUMN",
+        "FIRST_STATE_COLUMN": "Recording.FIRST_STATE_COLUMN",
+        "recorded_row": "Recording.row_at_point",
+        "recorded_friction_coefficient": "Recording.friction_coefficient",
+        "recorded_load_point_displacement": "Recording.load_point_displacement",
+        "initial_point": "Integrator.initial_point",
+        "point_before_start": "Integrator.point_before_start",
+        "compute_restart_point": "Integrator.restart_point",
+        "point_with_slip_rate": "Integrator.point_with_slip_rate",
+    },
+    "rsfstudy.slider": {
+        "build_sampled_history": "SampledHistory.from_samples",
+        "build_sampled_history_from_table": "SampledHistory.from_table",
+        "LARGEST_LOG_SLIP_RATE": "Scene.LARGEST_LOG_SLIP_RATE",
+        "STOPPED_LOG_SLIP_RATE": "Scene.STOPPED_LOG_SLIP_RATE",
+        "RUPTURE_REGIME": "Scene.RUPTURE_REGIME",
+        "OMITTED_DEFAULTS": "SceneFields.OMITTED_DEFAULTS",
+        "SLOTS": "SceneFields.SLOTS",
+        "field_names": "SceneFields.names_of_part",
+        "scene_field_types": "SceneFields.types_with_user_parts",
+        "normalise_field_value": "SceneFields.normalise_value",
+        "replace_names_by_user_parts": "SceneFields.replace_names_by_user_parts",
+        "SCENE_FIELD_NAMES": "SceneFields.NAMES",
+        "SCENE_FIELD_QUANTITIES": "SceneFields.QUANTITIES",
+        "SCENE_FIELD_TYPES": "SceneFields.TYPES",
+        "SLOT_NAMES": "SceneFields.SLOT_NAMES",
+        "PART_SELECTING_FIELDS": "SceneFields.SELECTING_A_PART",
+        "ALTERNATIVE_STIFFNESS_FIELDS": "SceneFields.ALTERNATIVE_STIFFNESS",
+        "scene_field_defaults": "SceneFields.defaults",
+        "scene_field_quantities": "SceneFields.quantities_with_user_parts",
+        "quantities_with_values": "SceneFields.quantities_with_values",
+        "add_scene_fields_to_signature": "SceneFields.add_to_signature",
+        "find_inapplicable_fields": "SceneFields.find_inapplicable",
+        "hint_for_unknown_field": "SceneFields.hint_for_unknown",
+        "register_user_parts": "SceneFields.register_user_parts",
+        "equations_between_ruptures": "Scene.equations_between_ruptures",
+        "equations_in_rupture": "Scene.equations_in_rupture",
+        "equations_without_mass": "Scene.equations_without_mass",
+        "equations_at_imposed_slip_rate": "Scene.equations_at_imposed_slip_rate",
+        "build_equations_against_displacement": "Scene.equations_against_displacement",
+        "build_equations_against_inertial_time": "Scene.equations_against_inertial_time",
+        "quasi_static_log_slip_rate": "Scene.quasi_static_log_slip_rate",
+        "build_friction_relation": "Scene.friction_relation",
+        "build_state_evolution_function": "Scene.state_evolution_function",
+        "compute_steady_states": "Scene.compute_steady_states",
+        "effective_normal_stress_at": "Scene.effective_normal_stress_at",
+        "steady_sliding": "Scene.steady_sliding",
+        "steady_friction_minus_reference": "Scene.steady_friction_minus_reference",
+        "frictional_stress_after_jump": "Scene.frictional_stress_after_jump",
+        "frictional_stress_for_friction": "Scene.frictional_stress_for_friction",
+        "min_steady_log_slip_rate": "Scene.min_steady_log_slip_rate",
+        "critical_stiffness": "Scene.critical_stiffness_at",
+        "all_critical_stiffnesses": "Scene.all_critical_stiffnesses",
+        "linear_growth_rates": "Scene.linear_growth_rates",
+        "largest_linear_growth_rate": "Scene.largest_linear_growth_rate",
+    },
+    "rsfstudy.rig": {
+        "RIG_QUANTITIES": "Rig.QUANTITIES",
+        "in_display_units": "Rig.convert_quantities_for_display",
+        "is_stiffness_over_normal_stress": "Rig.is_stiffness_over_stress",
+        "DIMENSIONLESS_PREFIX": "DatasetUnits.DIMENSIONLESS_PREFIX",
+        "DISPLAY_BASE_UNITS": "DatasetUnits.DISPLAY_UNITS",
+        "NAME_OF_SCALES_ATTRIBUTE": "DatasetUnits.SCALES_ATTRIBUTE",
+        "convert_to_dimensional_name": "DatasetUnits.dimensional_name",
+        "RATIO_FIELD_BY_DIMENSIONAL_NAME": "RigAxes.RATIO_FIELD_BY_DIMENSIONAL_NAME",
+        "make_axis_with_units": "RigAxes.create",
+        "axis_name_and_units": "RigAxes.name_and_units",
+        "convert_values_to_units": "RigAxes.convert_values",
+        "convert_axis_to_stated_units": "RigAxes.convert_to_stated_units",
+        "replace_rig_quantity": "RigAxes.replace_rig_quantity",
+        "convert_scene_and_axes_to_rig": "RigAxes.convert_scene_and_axes",
+    },
+    "rsfstudy.limit_cycles": {
+        "SLIP_MODES": "LimitCycle.SLIP_MODES",
+    },
+    "rsfstudy.critical_steps": {
+        "SLOW_INSTABILITY_NORM_WARNING_PREFIX": "CriticalStep.SLOW_NORM_WARNING_PREFIX",
+    },
+    "rsfstudy.study": {
+        "VERDICTS": "Claim.VERDICTS",
+        "NOT_APPLICABLE_VERDICT": "Claim.NOT_APPLICABLE",
+    },
+    "rsfstudy.execution": {
+        "estimate_evaluations_and_time": "CellPlan.estimate_evaluations_and_time",
+    },
+    "rsfstudy.storage": {
+        "read_timings": "CellTimings.read",
+    },
+    "rsfstudy.axes": {
+        "fields_of_axis_point": "Axis.fields_of_point",
+        "check_storable_text": "Axis.check_storable_text",
+        "to_plain_value": "Axis.to_plain_value",
+    },
     "rsfstudy.errors": {
         "NoAnswer": "NoResultWarning",
         "Incomplete": "IncompleteWarning",
@@ -45,6 +161,8 @@ NEW_NAME_BY_OWNER_AND_FORMER_NAME: Mapping[str, Mapping[str, str]] = {
     },
     "rsfstudy.quantities": {
         "ShownAsTable": "HtmlTableMixin",
+        "escape_html": "HtmlMarkup.escape",
+        "html_table": "HtmlMarkup.table",
     },
     "rsfstudy.quantities:Output": {
         "names": "variable_names",
@@ -478,7 +596,7 @@ def build_getattr_for_former_names(module_name: str) -> Callable[[str], Any]:
         if (new := NEW_NAME_BY_OWNER_AND_FORMER_NAME[module_name].get(name)) is None:
             raise AttributeError(f"module {module_name!r} has no attribute {name!r}")
         warn_renamed(name, new, module_name)
-        return getattr(importlib.import_module(module_name), new)
+        return operator.attrgetter(new)(importlib.import_module(module_name))
 
     return __getattr__
 

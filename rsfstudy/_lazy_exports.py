@@ -6,6 +6,7 @@ A package imports a module when one of the exported names of the module is first
 from __future__ import annotations
 
 import importlib
+import operator
 import sys
 from collections.abc import Callable, Iterable, Mapping
 from typing import Any
@@ -41,7 +42,7 @@ def build_lazy_export_functions(
     def get(name: str) -> Any:
         if name in renamed:
             warn_renamed(name, renamed[name], package_name)
-            return getattr(sys.modules[package_name], renamed[name])
+            return operator.attrgetter(renamed[name])(sys.modules[package_name])
         if name not in sources:
             raise AttributeError(f"module {package_name!r} has no attribute {name!r}")
         module, original = sources[name]

@@ -238,63 +238,63 @@ _HTML_TAG_BY_SUB_OR_SUPERSCRIPT_MARK = {"_": "sub", "^": "sup"}
 _HTML_CELL_STYLE_ATTRIBUTE = 'style="text-align: left; vertical-align: top"'
 
 
-def escape_html(text: object) -> str:
-    """Escape a string for HTML, and make control characters visible.
-
-    Parameters
-    ----------
-    text : object
-        Text, or an object that is converted to a string.
-
-    Returns
-    -------
-    str
-        Text that can be inserted in an HTML page.
-    """
-    return escape(escape_control_characters(str(text)))
-
-
 class HtmlMarkup(str):
     """String of HTML markup that needs no further escaping."""
 
     __slots__ = ()
 
+    @staticmethod
+    def escape(text: object) -> str:
+        """Escape a string for HTML, and make control characters visible.
 
-def html_table(
-    headings: Sequence[str], rows: Iterable[Sequence[object]], caption: str = ""
-) -> HtmlMarkup:
-    """Format a table in HTML.
+        Parameters
+        ----------
+        text : object
+            Text, or an object that is converted to a string.
 
-    All strings except ``HtmlMarkup`` objects are escaped.
+        Returns
+        -------
+        str
+            Text that can be inserted in an HTML page.
+        """
+        return escape(escape_control_characters(str(text)))
 
-    Parameters
-    ----------
-    headings : sequence of str
-        Column headings.
-    rows : iterable of sequence
-        Rows of strings and numbers. Each row has one item per heading.
-    caption : str, default: ""
-        Text above the table.
+    @classmethod
+    def table(
+        cls, headings: Sequence[str], rows: Iterable[Sequence[object]], caption: str = ""
+    ) -> HtmlMarkup:
+        """Format a table in HTML.
 
-    Returns
-    -------
-    HtmlMarkup
-        Table with inline styles.
-    """
-    above = f"<p><b>{_format_html_table_cell(caption)}</b></p>" if caption else ""
-    head = "".join(
-        f"<th {_HTML_CELL_STYLE_ATTRIBUTE}>{_format_html_table_cell(text)}</th>"
-        for text in headings
-    )
-    lines = (
-        "".join(
-            f"<td {_HTML_CELL_STYLE_ATTRIBUTE}>{_format_html_table_cell(value)}</td>"
-            for value in row
+        All strings except ``HtmlMarkup`` objects are escaped.
+
+        Parameters
+        ----------
+        headings : sequence of str
+            Column headings.
+        rows : iterable of sequence
+            Rows of strings and numbers. Each row has one item per heading.
+        caption : str, default: ""
+            Text above the table.
+
+        Returns
+        -------
+        HtmlMarkup
+            Table with inline styles.
+        """
+        above = f"<p><b>{_format_html_table_cell(caption)}</b></p>" if caption else ""
+        head = "".join(
+            f"<th {_HTML_CELL_STYLE_ATTRIBUTE}>{_format_html_table_cell(text)}</th>"
+            for text in headings
         )
-        for row in rows
-    )
-    body = "".join(f"<tr>{line}</tr>" for line in lines)
-    return HtmlMarkup(f"{above}<table><thead><tr>{head}</tr></thead><tbody>{body}</tbody></table>")
+        lines = (
+            "".join(
+                f"<td {_HTML_CELL_STYLE_ATTRIBUTE}>{_format_html_table_cell(value)}</td>"
+                for value in row
+            )
+            for row in rows
+        )
+        body = "".join(f"<tr>{line}</tr>" for line in lines)
+        return cls(f"{above}<table><thead><tr>{head}</tr></thead><tbody>{body}</tbody></table>")
 
 
 def html_quantities_table(
@@ -318,7 +318,7 @@ def html_quantities_table(
     """
     shown = [n for n, text in enumerate(_QUANTITY_TABLE_HEADINGS) if with_values or text != "value"]
     table = (_quantity_row(about, value) for about, value in rows)
-    return html_table(
+    return HtmlMarkup.table(
         [_QUANTITY_TABLE_HEADINGS[n] for n in shown],
         ([row[n] for n in shown] for row in table),
         caption,
@@ -376,8 +376,8 @@ def html_symbol(formula: str) -> HtmlMarkup:
         Symbol in italics, with Greek letters, subscripts and superscripts.
     """
     if "$" not in formula:
-        return HtmlMarkup(escape_html(formula))
-    text = escape_html(formula.strip("$"))
+        return HtmlMarkup(HtmlMarkup.escape(formula))
+    text = HtmlMarkup.escape(formula.strip("$"))
     text = re.sub(r"\\([A-Za-z]+)", lambda found: _html_character_entity(found[1]), text)
     text = re.sub(r"([_^])(?:\{([^{}]*)\}|(&\w+;|.))", _format_html_script, text)
     bare = re.sub(r"[{}]|\\.", "", text)
@@ -401,7 +401,7 @@ def html_unit(quantity: Quantity) -> HtmlMarkup:
     if quantity.scale:
         scale = quantity.scale.replace("sigma", r"\sigma")
         return html_symbol(f"${scale}$")
-    return HtmlMarkup(escape_html(quantity.units if quantity.units != "1" else ""))
+    return HtmlMarkup(HtmlMarkup.escape(quantity.units if quantity.units != "1" else ""))
 
 
 def _html_character_entity(character_name: str) -> str:
@@ -431,4 +431,4 @@ def _format_html_table_cell(value: Any) -> str:
         return "yes" if value else "no"
     if isinstance(value, float):
         return "" if math.isnan(value) else f"{value:.6g}"
-    return escape_html(value)
+    return HtmlMarkup.escape(value)

@@ -70,6 +70,17 @@ class Status(IntEnum):
         """Name of the status in the NetCDF flag meanings."""
         return self.name.lower()
 
+    @staticmethod
+    def labels_by_code() -> dict[int, str]:
+        """Return the labels of all statuses by their integer codes in results files.
+
+        Returns
+        -------
+        dict of int to str
+            Label of each status.
+        """
+        return {int(status): status.label for status in Status}
+
     @property
     def has_values(self) -> bool:
         """True if the cell has usable values.
@@ -85,7 +96,3 @@ class Status(IntEnum):
         An answer may be a statement without a number, for example that a slider is always stable.
         """
         return self < Status.WORK_BUDGET_SPENT
-
-
-#: Mapping from the integer codes in results files to the labels of the statuses.
-STATUS_LABELS = {int(status): status.label for status in Status}

@@ -16,7 +16,7 @@ from types import MappingProxyType
 from typing import Any
 
 from rsfstudy.quantities import Quantity
-from rsfstudy.slider import SCENE_FIELD_QUANTITIES as SCENE
+from rsfstudy.slider import SceneFields
 
 
 def _read_vocabulary() -> Iterator[Quantity]:
@@ -32,7 +32,7 @@ def _read_vocabulary() -> Iterator[Quantity]:
 
 
 QUANTITY_BY_NAME: dict[str, Quantity] = {
-    about.name: about for about in (*SCENE, *_read_vocabulary())
+    about.name: about for about in (*SceneFields.QUANTITIES, *_read_vocabulary())
 }
 
 _DESCRIPTION_BY_VARIABLE_SUFFIX = {

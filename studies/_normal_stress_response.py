@@ -21,7 +21,7 @@ from rsfstudy.measure_base._recorded_motion import VARIABLES_RECORDED_ALONG_PHAS
 from rsfstudy.measures import Outcome, Output, Status
 from rsfstudy.motion import Event, Integrator
 from rsfstudy.responses import estimate_errors_at_instants
-from rsfstudy.slider import MotionPoint, linear_growth_rates, steady_sliding
+from rsfstudy.slider import MotionPoint
 from rsfstudy.slider.loading.oscillation import NormalStressOscillation
 from rsfstudy.slider.stability import spring_response_to_normal_stress
 
@@ -321,10 +321,10 @@ class NormalStressResponse(RecordingMeasure):
             rule = "begins later or ends: the response is that to one that goes on for ever"
             remedy = "Leave out oscillation_begin and oscillation_cycles, or read it by simulate."
             raise InvalidValue("loading", loading.name, rule, remedy=remedy)
-        if not scene.load_velocity or steady_sliding(scene, scene.log_load_velocity) is None:
+        if not scene.load_velocity or scene.steady_sliding(scene.log_load_velocity) is None:
             why = "the load point is held, or steady sliding is not possible at its velocity"
             return Outcome(Status.NO_STEADY_STATE, message=why)
-        decay = -scene.load_velocity * linear_growth_rates(scene, scene.log_load_velocity)[0].real
+        decay = -scene.load_velocity * scene.linear_growth_rates(scene.log_load_velocity)[0].real
         if not decay > 0.0:
             why = "steady sliding is unstable: no transient decays"
             return Outcome(Status.NOT_APPLICABLE, message=why)

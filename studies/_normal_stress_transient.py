@@ -21,16 +21,7 @@ from rsfstudy.measure_base import (
 )
 from rsfstudy.measure_base._recorded_motion import VARIABLES_RECORDED_ALONG_PHASE
 from rsfstudy.measures import Outcome, Output, Status
-from rsfstudy.motion import (
-    MOTION_VARIABLES,
-    RECORDED_VARIABLES,
-    RELATIVE_ROUNDING_ERROR,
-    Event,
-    Integrator,
-    Recording,
-    recorded_friction_coefficient,
-    resample_motion_along_path,
-)
+from rsfstudy.motion import Accuracy, Event, Integrator, Recording, resample_motion_along_path
 from rsfstudy.responses import compute_settled_friction_flag, estimate_errors_at_instants
 
 #: Fraction of the record over which friction must be constant. This part is the end of the record.
@@ -44,7 +35,7 @@ _SPRING_RESPONSE_LOG_RATE = math.log(2.0)
 #: second value is the smallest ln(V/V_*) in these iterations.
 _MAX_EXTENSIONS, _MIN_LOG_SLIP_RATE = 3, -600.0
 #: Largest immediate change of friction, relative to mu_*, that is attributed to rounding errors.
-_NEGLIGIBLE_DIRECT_CHANGE = 10.0 * RELATIVE_ROUNDING_ERROR
+_NEGLIGIBLE_DIRECT_CHANGE = 10.0 * Accuracy.RELATIVE_ROUNDING_ERROR
 
 _OUTPUTS = (
     Output(
@@ -107,7 +98,7 @@ class _TransientRecord(NamedTuple):
     @property
     def final_friction(self) -> float:
         """Friction at the end of the record."""
-        return float(recorded_friction_coefficient(self.rows[-1:])[0])
+        return float(Recording.friction_coefficient(self.rows[-1:])[0])
 
     def remaining_transient(self, slip: float) -> float:
         """Return the remaining transient of friction at a slip.
@@ -208,7 +199,7 @@ class NormalStressTransient(RecordingMeasure):
         ratio = 1.0 + scene.parts.loading.segments[0].normal_stress
         distance = values["apparent_slip_distance"]
         size = abs(values["apparent_alpha"] * math.log(ratio)) * math.exp(-self.fit_to / distance)
-        part = 1.0 + scene.a / max(size, RELATIVE_ROUNDING_ERROR * scene.a)
+        part = 1.0 + scene.a / max(size, Accuracy.RELATIVE_ROUNDING_ERROR * scene.a)
         names = ("apparent_alpha", "apparent_slip_distance", "evolution_left")
         return {name: part * abs(values[name]) for name in names}
 
@@ -259,7 +250,7 @@ class NormalStressTransient(RecordingMeasure):
             why = "friction does not change at once, so that no part of that can be left"
             del values["evolution_left"], errors["evolution_left_error"]
             return Outcome(Status.NOT_APPLICABLE, {**values, **errors, **shown}, why)
-        rounded = RELATIVE_ROUNDING_ERROR * scene.mu_star / abs(direct)
+        rounded = Accuracy.RELATIVE_ROUNDING_ERROR * scene.mu_star / abs(direct)
         errors["evolution_left_error"] += rounded * abs(values["evolution_left"])
         return Outcome(Status.OK, {**values, **errors, **shown})
 
@@ -295,10 +286,10 @@ class NormalStressTransient(RecordingMeasure):
             scene, with_time=True, recording=recording, until=self.record
         )
         rows = recording.as_table(scene)
-        slip = rows[:, MOTION_VARIABLES.index("slip")]
+        slip = rows[:, Recording.MOTION_VARIABLES.index("slip")]
         if slip.max() < max(self.fit_to, 1.0):
             return None
-        rate = rows[:, MOTION_VARIABLES.index("log10_slip_rate")]
+        rate = rows[:, Recording.MOTION_VARIABLES.index("log10_slip_rate")]
         taken_up = (
             abs(np.interp(self.fit_from, slip, rate)) * math.log(10.0) <= _SPRING_RESPONSE_LOG_RATE
         )
@@ -320,7 +311,9 @@ class NormalStressTransient(RecordingMeasure):
         stress = 1.0 + scene.parts.loading.segments[0].normal_stress
         for slip in sorted({self.fit_from, 1.0, self.fit_to}):
             wait = (
-                float(np.interp(slip, rows[:, MOTION_VARIABLES.index("slip")], rows[:, 0]))
+                float(
+                    np.interp(slip, rows[:, Recording.MOTION_VARIABLES.index("slip")], rows[:, 0])
+                )
                 - elapsed
             )
             for _ in range(_MAX_EXTENSIONS):
@@ -392,13 +385,13 @@ class NormalStressTransient(RecordingMeasure):
         self, scene: Scene, record: _TransientRecord
     ) -> dict[str, float | np.ndarray]:
         """Return the recorded variables, and the results that need no exponential fit."""
-        rows, friction = record.rows, recorded_friction_coefficient(record.rows)
+        rows, friction = record.rows, Recording.friction_coefficient(record.rows)
         late = rows[:, 0] >= (1.0 - _FINAL_SHARE) * self.record
         is_flat = bool(
             np.ptp(friction[late])
             < _FINAL_FRICTION_RTOL * abs(record.remaining_transient(self.fit_from))
         )
-        path = resample_motion_along_path(rows, self.phases, RECORDED_VARIABLES)
+        path = resample_motion_along_path(rows, self.phases, Recording.VARIABLES)
         return {
             "direct_change": _direct_change(scene, record),
             "settled": compute_settled_friction_flag(scene.segment_scene(-1), is_flat=is_flat),
@@ -433,13 +426,13 @@ class NormalStressTransient(RecordingMeasure):
         law, coupling = scene.parts.law, scene.parts.normal_stress.coupling
         if law.relaxation is None or law.depends_on_stress or coupling is None:
             return math.nan
-        slip = record.rows[:, MOTION_VARIABLES.index("slip")]
+        slip = record.rows[:, Recording.MOTION_VARIABLES.index("slip")]
         read = slip >= self.fit_from
         ratio = 1.0 + scene.parts.loading.segments[0].normal_stress
         # If b is zero, alpha is zero too, and friction does not evolve.
         away = -coupling[1] / scene.b * math.log(ratio) if scene.b else 0.0
         left = np.array([law.relaxation(away, at) for at in slip[read].tolist()])
-        seen = recorded_friction_coefficient(record.rows[read]) - scene.mu_star
+        seen = Recording.friction_coefficient(record.rows[read]) - scene.mu_star
         return float(np.abs(seen - scene.b * left).max())
 
 

@@ -11,12 +11,7 @@ import numpy as np
 import xarray as xr
 
 from rsfstudy import Scene
-from rsfstudy.slider import (
-    find_inapplicable_fields,
-    frictional_stress_for_friction,
-    scene_field_types,
-    steady_friction_minus_reference,
-)
+from rsfstudy.slider import SceneFields
 from rsfstudy.study import find_named_user_parts
 from rsfstudy.study.figure_declarations import Axes
 
@@ -40,7 +35,7 @@ def steady_line_key(cell: xr.Dataset) -> tuple[str, float, float]:
         mu_*.
     """
     scene = scene_from_coordinates(cell)
-    return scene.normal_stress, scene.phi or 0.0, steady_friction_minus_reference(scene, LN10)
+    return scene.normal_stress, scene.phi or 0.0, scene.steady_friction_minus_reference(LN10)
 
 
 def scene_from_coordinates(cell: xr.Dataset) -> Scene:
@@ -58,12 +53,12 @@ def scene_from_coordinates(cell: xr.Dataset) -> Scene:
     """
     here = {str(name): cell[name].item() for name in cell.coords if cell[name].ndim == 0}
     parts = find_named_user_parts(here, [here])
-    kinds = scene_field_types(parts.values())
+    kinds = SceneFields.types_with_user_parts(parts.values())
     # Coordinates that do not apply to the cell are NaN or an empty string.
     values = {n: v for n, v in here.items() if n in kinds and v == v and v != ""}
     flags = [name for name in values if kinds[name] in (bool, bool | None)]
     values |= {name: bool(values[name]) for name in flags}
-    for name in find_inapplicable_fields(Scene().as_dict() | values, parts.values()):
+    for name in SceneFields.find_inapplicable(Scene().as_dict() | values, parts.values()):
         values.pop(name, None)
     return Scene(**values)
 
@@ -84,9 +79,7 @@ def steady_line(cell: xr.Dataset, log10_rates: np.ndarray) -> np.ndarray:
         Shear stress in sigma_*. The stress is NaN at slip rates without steady sliding.
     """
     scene = scene_from_coordinates(cell)
-    excesses = [
-        steady_friction_minus_reference(scene, rate * LN10) for rate in log10_rates.tolist()
-    ]
+    excesses = [scene.steady_friction_minus_reference(rate * LN10) for rate in log10_rates.tolist()]
     return _stresses_from_friction(scene, np.array(excesses))
 
 
@@ -113,7 +106,7 @@ def constant_state_line(cell: xr.Dataset, state: float, log10_rates: np.ndarray)
 
 def _stresses_from_friction(scene: Scene, excesses: np.ndarray) -> np.ndarray:
     """Compute shear stresses from differences of the friction coefficient from mu_*."""
-    stresses = (frictional_stress_for_friction(scene, excess) for excess in excesses.tolist())
+    stresses = (scene.frictional_stress_for_friction(excess) for excess in excesses.tolist())
     return np.array([math.nan if g is None else scene.mu_star + g for g in stresses])
 
 

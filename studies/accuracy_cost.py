@@ -29,15 +29,7 @@ from rsfstudy.measures import (
     Status,
     StepResponse,
 )
-from rsfstudy.motion import (
-    COMPILED,
-    MAX_RTOL,
-    MIN_RTOL,
-    SCIPY,
-    Integrator,
-    WorkMeter,
-    is_engine_installed,
-)
+from rsfstudy.motion import Engine, Integrator, WorkMeter
 from rsfstudy.motion.steppers.scipy import SCIPY_SOLVER_BY_METHOD_NAME
 from rsfstudy.reductions import LinearFit
 from rsfstudy.study.figure_declarations import Axes, horizontal_line, reference_line
@@ -118,7 +110,7 @@ _METHODS_BY_INTEGRATOR: Mapping[str, RegimeMethods] = {
 INTEGRATORS = tuple(
     name
     for name in _METHODS_BY_INTEGRATOR
-    if name != _COMPILED_NAME or is_engine_installed(COMPILED)
+    if name != _COMPILED_NAME or Engine.is_installed(Engine.COMPILED)
 )
 
 
@@ -184,14 +176,14 @@ class WorkPrecision(ProblemMeasure):
         try:
             Accuracy(10.0**-self.requested_digits)
         except (InvalidValue, OverflowError) as error:
-            least, most = -math.log10(MAX_RTOL), -math.log10(MIN_RTOL)
+            least, most = -math.log10(Accuracy.MAX_RTOL), -math.log10(Accuracy.MIN_RTOL)
             rule = f"must lie between {least:g} and {most:g}"
             raise InvalidValue("requested_digits", self.requested_digits, rule) from error
 
     @property
     def _requested_accuracy(self) -> Accuracy:
         """Accuracy and integrators of the run."""
-        engine = COMPILED if self.integrator == _COMPILED_NAME else SCIPY
+        engine = Engine.COMPILED if self.integrator == _COMPILED_NAME else Engine.SCIPY
         methods = _METHODS_BY_INTEGRATOR[self.integrator]
         return Accuracy(10.0**-self.requested_digits, self.run_budget, methods, engine)
 
@@ -222,7 +214,7 @@ class WorkPrecision(ProblemMeasure):
         problem = self.problem_of_scene(scene)
         if self.integrator in _INTEGRATOR_PAIRS and not scene.inertia:
             return Outcome(Status.NOT_APPLICABLE, message=f"{self.integrator} needs mass")
-        if self._requested_accuracy.engine == COMPILED:
+        if self._requested_accuracy.engine == Engine.COMPILED:
             problem.measure(scene, self._requested_accuracy)  # compiles the equations
         before = _time_run(problem, scene, _YARDSTICK_ACCURACY)[0]
         seconds, outcome, spent = _time_run(problem, scene, self._requested_accuracy)

@@ -21,7 +21,7 @@ import xarray as xr
 from rsfstudy import Axis, Claim, Figure, Panel, Scene, Study
 from rsfstudy.errors import InvalidValue
 from rsfstudy.measures import Measure, Outcome, Output, Quantity, Status
-from rsfstudy.motion import MIN_RTOL, Integrator
+from rsfstudy.motion import Accuracy, Integrator
 from rsfstudy.reductions import Reduction
 from rsfstudy.study.figure_declarations import Axes
 
@@ -121,7 +121,7 @@ class Coverage(Measure):
         except InvalidValue as error:  # e.g. normal stress is constant
             return Outcome(Status.NOT_APPLICABLE, message=str(error))
         asked = replace(integrator.accuracy, rtol=10.0**-self.requested_digits)
-        rtol = max(_TIGHTER_RTOL_FACTOR * asked.rtol, MIN_RTOL)
+        rtol = max(_TIGHTER_RTOL_FACTOR * asked.rtol, Accuracy.MIN_RTOL)
         tighter = replace(asked, rtol=rtol, budget=_MAX_TIGHTER_WORK * asked.budget)
         (outcome, spent), (truth, more) = (measure.run_metered(drawn, a) for a in (asked, tighter))
         integrator.work_meter.add_evaluations("asked", spent.evaluations)

@@ -23,7 +23,7 @@ from rsfstudy import Axis, Claim, Figure, Panel, Scene, Study
 from rsfstudy.measures import LimitCycle, Measure, Outcome, Output
 from rsfstudy.motion import Integrator, MotionStopped
 from rsfstudy.reductions import RelativeDifference
-from rsfstudy.slider import Equations, equations_between_ruptures, equations_in_rupture
+from rsfstudy.slider import Equations
 from rsfstudy.study import DrawFunction
 from rsfstudy.study.figure_declarations import Axes
 
@@ -143,15 +143,15 @@ def _measure_costs(scene: Scene) -> dict[str, float]:
     dict
         Results by name, for the equations between ruptures and, with inertia, during ruptures.
     """
-    slow = equations_between_ruptures(scene, with_time=False)
+    slow = scene.equations_between_ruptures(with_time=False)
     forms: dict[str, tuple[Equations, tuple[float, ...]]] = {"": (slow, _SLOW_UNKNOWNS)}
     if scene.inertia:
-        forms["_in_rupture"] = equations_in_rupture(scene), _RUPTURE_UNKNOWNS
+        forms["_in_rupture"] = scene.equations_in_rupture(), _RUPTURE_UNKNOWNS
     plainest = scene.with_(
         normal_stress="constant", fluid="drained", inertia=False, radiation_damping=0.0
     )
     timed = {
-        "plainest": (equations_between_ruptures(plainest, with_time=False), _SLOW_UNKNOWNS),
+        "plainest": (plainest.equations_between_ruptures(with_time=False), _SLOW_UNKNOWNS),
         **forms,
     }
     turns = [

@@ -21,7 +21,7 @@ from scipy.optimize import brentq
 
 from rsfstudy import Accuracy, Axis, Claim, Figure, Panel, Scene, Study, history
 from rsfstudy.measures import Measure, Outcome, Output, Status
-from rsfstudy.motion import MOTION_VARIABLES, Integrator, Recording
+from rsfstudy.motion import Integrator, Recording
 from rsfstudy.slider import SampledHistory
 from rsfstudy.slider.sampled_loading import TIME_COLUMN
 from rsfstudy.study.figure_declarations import Axes, horizontal_line
@@ -31,7 +31,7 @@ from rsfstudy.study.figure_declarations import Axes, horizontal_line
 #: fraction of the length of the record.
 INITIAL_DEPARTURE, SAMPLING_INTERVAL, EXTREMUM_WINDOW = 1e-5, 0.25, 1.0 / 16.0
 
-LOG_SLIP_RATE_COLUMN = MOTION_VARIABLES.index("log10_slip_rate")
+LOG_SLIP_RATE_COLUMN = Recording.MOTION_VARIABLES.index("log10_slip_rate")
 GROWTH_ENDS, GROWTH_BEGINS = "end", "begin"
 _GROWTH_DESCRIPTIONS = {
     GROWTH_ENDS: "stop growing as pressure rises",

@@ -17,7 +17,6 @@ import xarray as xr
 from rsfstudy import Axis, Claim, Figure, Panel, Scene, Study
 from rsfstudy.measures import LinearStability
 from rsfstudy.reductions import Inverse, LinearFit
-from rsfstudy.slider import critical_stiffness, min_steady_log_slip_rate
 from rsfstudy.study.figure_declarations import Axes
 
 from ._paper import PAPER, REFERENCE
@@ -109,11 +108,11 @@ def critical_stiffness_curve(row: xr.Dataset) -> tuple[np.ndarray, np.ndarray]:
         scene_from_coordinates(row.isel(load_velocity_ratio=-1)),
         row["load_velocity_ratio"].values,
     )
-    slowest = max(min_steady_log_slip_rate(scene), math.log(rates.min()))
+    slowest = max(scene.min_steady_log_slip_rate(), math.log(rates.min()))
     if slowest > math.log(rates.max()) - 0.05:
         return np.full(1, math.nan), np.full(1, math.nan)
     logs = slowest + np.geomspace(0.05, math.log(rates.max()) - slowest, 200)
-    stiffnesses = np.array([critical_stiffness(scene, x, quasi_static=True) for x in logs])
+    stiffnesses = np.array([scene.critical_stiffness_at(x, quasi_static=True) for x in logs])
     return np.exp(logs), np.where(stiffnesses > 0.0, stiffnesses, math.nan)
 
 
@@ -131,7 +130,7 @@ def plot_slowest_steady_rate(dataset: xr.Dataset, axes: Axes) -> None:
 
     for number in range(dataset.sizes["phi"]):
         row = dataset.isel(phi=number, load_velocity_ratio=-1)
-        slowest = math.exp(min_steady_log_slip_rate(scene_from_coordinates(row)))
+        slowest = math.exp(scene_from_coordinates(row).min_steady_log_slip_rate())
         if slowest > float(dataset["load_velocity_ratio"].min()):
             axes.axvline(slowest, color=cycle_style(number)["color"], linestyle=":", linewidth=0.8)
             soon = slowest < 1e3 * float(dataset["load_velocity_ratio"].min())

@@ -23,10 +23,8 @@ import xarray as xr
 
 from rsfstudy import Accuracy, Axis, Claim, Figure, Panel, Scene, Study
 from rsfstudy.errors import InvalidValue
-from rsfstudy.limit_cycles import SLIP_MODES
 from rsfstudy.measures import LimitCycle, Quantity, Status
 from rsfstudy.reductions import Boundary, Reduction
-from rsfstudy.slider import critical_stiffness
 from rsfstudy.study import failed_cell_mask
 from rsfstudy.study.figure_declarations import Axes
 from rsfstudy.study.reductions.base import dimension_of_coordinate, refused_result_mask
@@ -169,7 +167,7 @@ def _linear_boundary(places: xr.DataArray, dataset: xr.Dataset) -> xr.DataArray 
         except InvalidValue:
             return None
         values[place] = (
-            critical_stiffness(scene, scene.log_load_velocity) / scene.critical_stiffness
+            scene.critical_stiffness_at(scene.log_load_velocity) / scene.critical_stiffness
         )
     return places.copy(data=values)
 
@@ -246,7 +244,7 @@ def label_slip_modes(case: xr.Dataset, axes: Axes) -> None:
     to_panel = axes.transData + axes.transAxes.inverted()
     heights = to_panel.transform(np.column_stack([np.full(len(y), x[0]), y]))[:, 1]
     box = {"facecolor": "white", "alpha": 0.7, "edgecolor": "none", "pad": 1.0}
-    for mode, name in enumerate(SLIP_MODES):
+    for mode, name in enumerate(LimitCycle.SLIP_MODES):
         here = (case["slip_mode"] == mode).values
         if not here.any():
             continue

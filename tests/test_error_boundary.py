@@ -19,7 +19,7 @@ from rsfstudy.argument_checks import MAX_ITEMS_OF_LIST_ARGUMENT, describe_type, 
 from rsfstudy.error_boundary import error_boundary
 from rsfstudy.errors import CallError, DataError, IncompleteWarning, InvalidValue, RsfStudyError
 from rsfstudy.measures import Measure
-from rsfstudy.quantities import html_table
+from rsfstudy.quantities import HtmlMarkup
 from rsfstudy.reductions import ClosedFormRatio, LinearFit, PowerLaw, Range
 from rsfstudy.responses.linear_stability import LinearStability
 from rsfstudy.responses.velocity_step import VelocityStep
@@ -264,7 +264,7 @@ ESCAPE = "\x1b]0;x\x07\x1b[31m"
 
 
 def test_headings_of_html_are_spelt_out():
-    shown = html_table([f"zeta ({ESCAPE})"], [[ESCAPE]], ESCAPE)
+    shown = HtmlMarkup.table([f"zeta ({ESCAPE})"], [[ESCAPE]], ESCAPE)
     assert shown.isprintable()
     assert shown.count("x1b[31m") == 3
 

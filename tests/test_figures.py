@@ -20,7 +20,7 @@ from study_runs import call_main, named_results, run
 
 import rsfstudy
 from rsfstudy import Axis, Scene, Study, plots
-from rsfstudy.defaults import FIGURE_FORMATS
+from rsfstudy.defaults import Defaults
 from rsfstudy.errors import InvalidValue
 from rsfstudy.plots import _style, _text
 from rsfstudy.quantities import Quantity
@@ -402,7 +402,7 @@ def results(tmp_path_factory):
     return path
 
 
-@pytest.mark.parametrize("form", FIGURE_FORMATS)
+@pytest.mark.parametrize("form", Defaults.FIGURE_FORMATS)
 def test_plot_writes_the_file_it_is_told_to(form, results, tmp_path):
     target = tmp_path / "deep" / f"fig.{form}"
     ran = call_main("plot", results, "--output", target)

@@ -15,7 +15,7 @@ from synthetic_records import EXACT_PARAMETERS, STEP_UP, deviation_in_stderrs
 import rsfstudy
 from rsfstudy.errors import InvalidValue
 from rsfstudy.fitting.record import Record
-from rsfstudy.status import STATUS_LABELS
+from rsfstudy.status import Status
 
 #: Stiffness of the machine in MPa/um, equal to the true stiffness at 8 MPa.
 MACHINE = 8.0 * EXACT_PARAMETERS["stiffness"]
@@ -98,7 +98,7 @@ def test_a_free_stiffness_of_a_joint_fit_is_that_of_one_machine() -> None:
 def test_a_normal_stress_that_varies_within_the_window_is_refused() -> None:
     record = record_at(8.0, 1, "rising", later=8.4)
     fit = rsfstudy.fit(record, **OPTIONS).squeeze()
-    assert STATUS_LABELS[int(fit.status)] == "not_applicable"
+    assert Status.labels_by_code()[int(fit.status)] == "not_applicable"
     assert "normal stress varies from 8 to 8.4 MPa" in str(fit.message.values)
     assert "after=" in str(fit.message.values)
 
@@ -111,7 +111,7 @@ def test_noise_of_normal_stress_is_no_change() -> None:
         {**record.columns, "normal_stress": 1e-6 * sigma}, name="noisy"
     ).with_steps([(40.0, 40.0, 1.0, 10.0)])
     fit = rsfstudy.fit(noisy, **OPTIONS).squeeze()
-    assert STATUS_LABELS[int(fit.status)] == "ok"
+    assert Status.labels_by_code()[int(fit.status)] == "ok"
 
 
 def test_a_normal_stress_that_is_not_compressive_is_refused() -> None:

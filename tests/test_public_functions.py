@@ -372,7 +372,7 @@ def test_a_journal_of_other_things_is_refused(change, place, tmp_path):
     with contextlib.closing(sqlite3.connect(kept)) as db, db:
         db.executescript(change)
     answered(lambda: run(LATTICE, output=tmp_path))
-    answered(lambda: cell_journal.read_timings(kept))
+    answered(lambda: cell_journal.CellTimings.read(kept))
 
 
 def test_a_store_with_a_link_is_refused(tmp_path):

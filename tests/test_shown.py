@@ -16,7 +16,7 @@ import rsfstudy
 from rsfstudy import Axis, Scene, Study
 from rsfstudy.critical_steps.critical_step import CriticalStep
 from rsfstudy.errors import IncompleteWarning
-from rsfstudy.quantities import html_symbol, html_table
+from rsfstudy.quantities import HtmlMarkup, html_symbol
 from rsfstudy.reductions import SobolIndices
 from rsfstudy.reporting import lattice_tables
 from rsfstudy.reporting.tables import build_single_scene_result_table, format_rounded_to_error
@@ -104,7 +104,7 @@ def test_symbols_need_no_mathjax(formula, written):
 
 
 def test_texts_of_strangers_stay_texts():
-    assert "<script>" not in html_table(["<script>"], [["<script>"]], "<script>")
+    assert "<script>" not in HtmlMarkup.table(["<script>"], [["<script>"]], "<script>")
 
 
 def test_the_accessor_shows_numbers_and_verdicts():

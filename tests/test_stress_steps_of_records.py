@@ -14,7 +14,7 @@ from synthetic_records import deviation_in_stderrs
 import rsfstudy
 from rsfstudy.fitting.record import Record
 from rsfstudy.fitting.stress_steps import find_stress_steps
-from rsfstudy.status import STATUS_LABELS
+from rsfstudy.status import Status
 
 #: Parameters in um and s. The stiffness of the machine is in MPa/um.
 TRUTH = {"a": 0.009, "b": 0.012, "slip_distance": 15.0, "alpha": 0.3, "mu_star": 0.55}
@@ -116,14 +116,14 @@ def test_the_response_to_a_step_of_normal_stress_is_fitted(loading: str, stated:
     if stated:
         record = record.with_steps([(BEGINS, ENDS, VELOCITY, VELOCITY)])
     fit = rsfstudy.fit(record, **OPTIONS, free=FREE, loading=loading).squeeze()
-    assert STATUS_LABELS[int(fit.status)] == "ok"
+    assert Status.labels_by_code()[int(fit.status)] == "ok"
     for name in FREE:
         assert abs(deviation_in_stderrs(fit, name, TRUTH[name])) < 3.5, name
 
 
 def test_a_step_of_normal_stress_at_constant_normal_stress_is_refused() -> None:
     fit = rsfstudy.fit(stressed(), **OPTIONS).squeeze()
-    assert STATUS_LABELS[int(fit.status)] == "not_applicable"
+    assert Status.labels_by_code()[int(fit.status)] == "not_applicable"
     assert "normal stress varies from 6 to 7.5 MPa" in str(fit.message.values)
     assert "normal_stress=imposed" in str(fit.message.values)
 
@@ -132,6 +132,6 @@ def test_a_step_that_changes_nothing_is_an_answer() -> None:
     columns = {n: v for n, v in stressed().columns.items() if n != "normal_stress"}
     record = rsfstudy.read_record(columns).with_steps([(BEGINS, ENDS, VELOCITY, VELOCITY)])
     fit = rsfstudy.fit(record, **OPTIONS | {"stiffness": 5e-3}).squeeze()
-    assert STATUS_LABELS[int(fit.status)] == "not_identified"
+    assert Status.labels_by_code()[int(fit.status)] == "not_identified"
     guess = rsfstudy.fit(record, **OPTIONS | {"stiffness": 5e-3}, b_over_a=1e12).squeeze()
-    assert STATUS_LABELS[int(guess.status)] != "cell_raised"
+    assert Status(int(guess.status)).label != "cell_raised"

@@ -13,7 +13,7 @@ import rsfstudy
 from rsfstudy.errors import InvalidValue
 from rsfstudy.fitting.linear_friction_before_step import find_start_of_linear_friction
 from rsfstudy.fitting.record import Record
-from rsfstudy.status import STATUS_LABELS
+from rsfstudy.status import Status
 
 LOADING = ((0.0, 2.0), (150.0, 20.0))
 OPTIONS: dict[str, Any] = {
@@ -68,7 +68,7 @@ def test_outliers_do_not_cut_the_window() -> None:
 def test_stated_extents_that_are_cut_are_reported() -> None:
     record = run_in(depth=0.0)
     fit = rsfstudy.fit(record, **OPTIONS, before="400 um", after="500 um").squeeze()
-    assert STATUS_LABELS[int(fit.status)] == "ok"
+    assert Status.labels_by_code()[int(fit.status)] == "ok"
     message = str(fit.message.values)
     assert "before= is cut from 400 to 300 um" in message
     assert "after= is cut from 500 to 179 um by the end of the record" in message
@@ -88,5 +88,5 @@ def test_negative_friction_is_refused_with_the_remedy() -> None:
     record = run_in(depth=0.0)
     negative = rsfstudy.read_record({**record.columns, "friction": -record.columns["friction"]})
     fit = rsfstudy.fit(negative, **OPTIONS).squeeze()
-    assert STATUS_LABELS[int(fit.status)] == "not_applicable"
+    assert Status.labels_by_code()[int(fit.status)] == "not_applicable"
     assert "reverse it with a scale of -1" in str(fit.message.values)

@@ -96,11 +96,11 @@ class DatasetAccessor:
         """
         from rsfstudy.api.fitted_parameters import fitted_scene
         from rsfstudy.reporting import is_fit
-        from rsfstudy.storage import scene_of_dataset
+        from rsfstudy.storage import StoredDataset
 
         if is_fit(self._dataset):
             return fitted_scene(self._dataset)
-        return scene_of_dataset(self._dataset, self.study if self._is_study else None)
+        return StoredDataset(self._dataset).find_scene(self.study if self._is_study else None)
 
     @property
     @error_boundary
@@ -148,10 +148,10 @@ class DatasetAccessor:
         InvalidValue
             If the study contains user-defined code.
         """
-        from rsfstudy.storage import study_of_dataset
+        from rsfstudy.storage import StoredDataset
 
         self._require_study()
-        return study_of_dataset(self._dataset)
+        return StoredDataset(self._dataset).study
 
     @error_boundary
     def to_si(self, **scale_values: Any) -> xr.Dataset:
@@ -235,12 +235,10 @@ class DatasetAccessor:
         >>> converted["critical_stiffness"].attrs["units"]
         'kPa um-1'
         """
-        from rsfstudy.rig import convert_dataset_units, read_si_scales
+        from rsfstudy.rig import DatasetUnits
 
         self._require_rsfstudy_dataset()
-        return convert_dataset_units(
-            self._dataset, read_si_scales(self._dataset), stress, length, time
-        )
+        return DatasetUnits(self._dataset).convert(stress, length, time)
 
     @error_boundary
     def check(self) -> pd.DataFrame:
@@ -418,7 +416,7 @@ class DatasetAccessor:
         >>> float(converted.rsf.slip_mode("1 m/s"))
         2.0
         """
-        from rsfstudy.limit_cycles import SLIP_MODES
+        from rsfstudy.measures import LimitCycle
         from rsfstudy.rig import compute_conversion_factor, convert_to_si
 
         least = convert_to_si("stick_slip_from", stick_slip_from, "m/s")
@@ -430,7 +428,7 @@ class DatasetAccessor:
             peak * float(compute_conversion_factor("max_slip_rate", peak.attrs["units"], "m/s"))
             >= least
         )
-        modes, slow = self._dataset["slip_mode"], SLIP_MODES.index("slow_slip")
+        modes, slow = self._dataset["slip_mode"], LimitCycle.SLIP_MODES.index("slow_slip")
         return modes.where(~(modes >= slow), slow + fast).assign_attrs(modes.attrs)
 
     @error_boundary
@@ -542,10 +540,10 @@ class DatasetAccessor:
 
         from rsfstudy.reporting import build_frame_of_cells
         from rsfstudy.status import Status
-        from rsfstudy.storage import read_declaration
+        from rsfstudy.storage import StoredDataset
 
         if self._is_study:
-            axes = [axis.dimension for axis in read_declaration(self._dataset).axes]
+            axes = [axis.dimension for axis in StoredDataset(self._dataset).declaration.axes]
             return build_frame_of_cells(
                 self._dataset, self._dataset["status"] != int(Status.OK), axes
             )
@@ -566,9 +564,9 @@ class DatasetAccessor:
 
     def _require_all_cells_present(self, requested_action: str) -> None:
         """Raise ``DataError`` if a selection has removed an axis."""
-        from rsfstudy.storage import read_declaration
+        from rsfstudy.storage import StoredDataset
 
-        axes = [axis.dimension for axis in read_declaration(self._dataset).axes]
+        axes = [axis.dimension for axis in StoredDataset(self._dataset).declaration.axes]
         selected = [name for name in axes if name not in self._dataset["status"].dims]
         if selected:
             text = (

@@ -13,7 +13,7 @@ import xarray as xr
 
 from rsfstudy.api.simulation import simulate
 from rsfstudy.errors import DataError
-from rsfstudy.rig import NAME_OF_SCALES_ATTRIBUTE, Rig
+from rsfstudy.rig import DatasetUnits, Rig
 from rsfstudy.storage import compare_same_lattice
 
 
@@ -76,7 +76,7 @@ def rerun_and_compare_motion(motion: xr.Dataset) -> pd.DataFrame:
             f"simulate`) without times; this is of one scene ({title}). With the options that made "
             f"it, {call}, rtol={about.get('rtol', '...')}) computes it anew."
         )
-    if NAME_OF_SCALES_ATTRIBUTE in about and "laboratory" not in about:
+    if DatasetUnits.SCALES_ATTRIBUTE in about and "laboratory" not in about:
         raise DataError(
             "it is in units of no rig: keep motions as simulate gives them, or by a rig"
         )

@@ -22,7 +22,7 @@ from rsfstudy.api.record_checks import (
     check_step_can_be_fitted,
 )
 from rsfstudy.axes import Axis
-from rsfstudy.defaults import FIT_EVALUATION_BUDGET as BUDGET
+from rsfstudy.defaults import Defaults
 from rsfstudy.error_boundary import error_boundary
 from rsfstudy.errors import InvalidValue
 from rsfstudy.fitting import (
@@ -36,9 +36,9 @@ from rsfstudy.fitting import (
     parameters_of_law,
 )
 from rsfstudy.measures import Fit
-from rsfstudy.motion import COMPILED, DEFAULT_RTOL, SCIPY, Accuracy, is_engine_installed
+from rsfstudy.motion import Accuracy, Engine
 from rsfstudy.reductions import Range
-from rsfstudy.rig import Rig, convert_to_si, is_stiffness_over_normal_stress
+from rsfstudy.rig import Rig, convert_to_si
 from rsfstudy.slider import Scene
 from rsfstudy.study import Study
 
@@ -95,8 +95,8 @@ def fit(
     stiffness: Any = None,
     slip_distance: Any = None,
     engine: str | type | None = None,
-    rtol: float = DEFAULT_RTOL,
-    budget: int = BUDGET,
+    rtol: float = Accuracy.DEFAULT_RTOL,
+    budget: int = Defaults.FIT_EVALUATION_BUDGET,
     workers: int = 0,
     command: str = "rsfstudy.fit",
     **scene: Any,
@@ -315,7 +315,7 @@ def fit(
         reductions = [Range(f"{n}_windows", n, over="part") for n in measure.parameters]
     chosen: Any = engine
     if engine is None:
-        chosen = COMPILED if is_engine_installed(COMPILED) else SCIPY
+        chosen = Engine.COMPILED if Engine.is_installed(Engine.COMPILED) else Engine.SCIPY
     study = Study(
         name="fit",
         title="Friction parameters of a record",
@@ -406,7 +406,7 @@ def _initial_stiffness(
         remedy = "Give --stiffness (stiffness=), as in '1.6e-3 /um', "
         remedy += "or look for it: --free (free=)."
         raise InvalidValue("stiffness", None, "is needed, and not stated", remedy=remedy)
-    over_stress = isinstance(stated_stiffness, Real) or is_stiffness_over_normal_stress(
+    over_stress = isinstance(stated_stiffness, Real) or Rig.is_stiffness_over_stress(
         stated_stiffness
     )
     if isinstance(stated_stiffness, Real):

@@ -14,8 +14,8 @@ from rsfstudy.netcdf_encoding import copy_with_cf_encoding
 from rsfstudy.reporting import split_into_single_fits
 from rsfstudy.rig import Rig
 from rsfstudy.slider import Scene
-from rsfstudy.status import STATUS_LABELS
-from rsfstudy.storage import build_scene_from_stored, read_declaration
+from rsfstudy.status import Status
+from rsfstudy.storage import StoredDataset, build_scene_from_stored
 
 
 def _require_single_fit(dataset: xr.Dataset) -> xr.Dataset:
@@ -63,7 +63,7 @@ def sample_parameters(dataset: xr.Dataset, sample_count: int, seed: int = 0) -> 
     covariance = one["covariance"].values[np.ix_(has, has)]
     if not (has.any() and np.isfinite(covariance).all()):
         raise InvalidValue(
-            "dataset", STATUS_LABELS[int(one["status"])], "has no covariance to draw from"
+            "dataset", Status.labels_by_code()[int(one["status"])], "has no covariance to draw from"
         )
     logs = np.array([name in LOGARITHMIC_PARAMETERS for name in names])
     scales = np.where(logs, at, 1.0)
@@ -110,7 +110,7 @@ def fitted_scene(dataset: xr.Dataset) -> Scene:
         Scene of the fit.
     """
     one = _require_single_fit(dataset)
-    declared = read_declaration(dataset)
+    declared = StoredDataset(dataset).declaration
     first = build_scene_from_stored(declared.base)
     if "law" in one.coords:
         first = first.with_(law=str(one["law"].item()))

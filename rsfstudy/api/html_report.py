@@ -22,12 +22,12 @@ import xarray as xr
 
 from rsfstudy.api import study_runs
 from rsfstudy.api.result_paths import output_directory
-from rsfstudy.defaults import FIGURE_FORMATS, OUTPUT_DIRECTORY
+from rsfstudy.defaults import Defaults
 from rsfstudy.error_boundary import check_regular_file, error_boundary, format_exception
 from rsfstudy.errors import DataError, InvalidValue, RsfStudyError, shorten_text
 from rsfstudy.execution import provenance_attributes
 from rsfstudy.formatting import format_overrides, pluralize
-from rsfstudy.quantities import HtmlMarkup, escape_html, html_table
+from rsfstudy.quantities import HtmlMarkup
 from rsfstudy.reporting import (
     SummaryTableOrSentence,
     TextTable,
@@ -41,7 +41,7 @@ from rsfstudy.reporting import (
     summarise_verdicts,
 )
 from rsfstudy.status import Status
-from rsfstudy.storage import is_of_single_scene, read_dataset, read_declaration
+from rsfstudy.storage import StoredDataset, read_dataset
 
 _UNREADABLE_FILE_STATUS = "cannot be read"
 #: HTML tag that identifies reports of rsfstudy, and signature at the beginning of PNG files.
@@ -67,7 +67,9 @@ class _ResultSection:
 
 
 @error_boundary
-def report(directory: str | Path = OUTPUT_DIRECTORY, output: str | Path | None = None) -> Path:
+def report(
+    directory: str | Path = Defaults.OUTPUT_DIRECTORY, output: str | Path | None = None
+) -> Path:
     """Write an HTML report of all results in a directory.
 
     The report is a single page with verdicts, figures, reductions, failed cells and the provenance
@@ -227,7 +229,7 @@ def _build_section_of_dataset(results_path: Path, dataset: xr.Dataset) -> _Resul
     title = str(dataset.attrs.get("title", "answer for one scene"))
     numbers = dataset_html(dataset)
     # The module uses the accessor without an import, because the accessor imports this module.
-    if is_of_single_scene(dataset):
+    if StoredDataset(dataset).is_of_single_scene:
         figure = (
             _format_figure_as_html(results_path, dataset.rsf.plot)
             if "slip" in dataset.variables
@@ -238,7 +240,7 @@ def _build_section_of_dataset(results_path: Path, dataset: xr.Dataset) -> _Resul
         return _ResultSection(
             results_path, title, "", status.label.replace("_", " "), colour, (figure, numbers)
         )
-    about = read_declaration(dataset)
+    about = StoredDataset(dataset).declaration
     parts = [_format_summary_piece_as_html(about.summary)] if about.summary else []
     if about.overrides:
         parts.append(
@@ -282,7 +284,7 @@ def dataset_html(dataset: xr.Dataset) -> str:
         the claims, and other datasets are followed by their provenance.
     """
     parts = list(map(_format_summary_piece_as_html, build_summary_tables_and_sentences(dataset)))
-    if is_of_single_scene(dataset):
+    if StoredDataset(dataset).is_of_single_scene:
         parts.append(_format_summary_piece_as_html(describe_dataset_origin(dataset)))
     elif claimed := claims_table(study_runs.check(dataset)):
         parts += ["<h3>Claims</h3>", _format_summary_piece_as_html(claimed)]
@@ -294,7 +296,7 @@ def dataset_html(dataset: xr.Dataset) -> str:
 
 def _escape(text: object) -> str:
     """Escape a string and its control characters for HTML."""
-    return escape_html(text)
+    return HtmlMarkup.escape(text)
 
 
 def _html_paragraph(text: str, colour: str = "") -> str:
@@ -321,7 +323,7 @@ def _format_summary_piece_as_html(piece: SummaryTableOrSentence) -> str:
         rows_.append([HtmlMarkup(f'<span class="{whole[h]}">{t}</span>') for h, t in texts.items()])
     caption = _html_paragraph(piece.caption) if piece.caption else ""
     return (
-        f'{caption}<div class="wide">{html_table(list(piece.rows[0]), rows_)}</div>'
+        f'{caption}<div class="wide">{HtmlMarkup.table(list(piece.rows[0]), rows_)}</div>'
         if rows_
         else ""
     )
@@ -368,7 +370,7 @@ def _format_file_links_as_html(results_path: Path, page_directory: Path) -> str:
     """
     endings = [
         results_path.suffix,
-        *(f".{form}" for form in FIGURE_FORMATS),
+        *(f".{form}" for form in Defaults.FIGURE_FORMATS),
         ".csv",
         ".mat",
         ".cells.sqlite",

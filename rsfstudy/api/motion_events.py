@@ -14,7 +14,7 @@ from scipy.optimize import brentq
 from rsfstudy.api.event_catalogue import build_event_catalogue
 from rsfstudy.errors import DataError, InvalidValue
 from rsfstudy.fitting import EventNumbers
-from rsfstudy.rig import slip_rate_from_log
+from rsfstudy.rig import DatasetUnits
 from rsfstudy.slider import Scene
 
 #: Limit of the ratio of slip rate to load point velocity. An event begins when the ratio exceeds
@@ -80,7 +80,9 @@ def find_motion_events(
     if "slip_rate" in motion and motion.sizes["time"]:  # The motion has units.
         rate = motion["slip_rate"]
         size = float(rate[0]) / 10.0 ** float(motion["log10_slip_rate"][0])
-        told = told.assign(slip_rate_from_log(told, "peak_log10_slip_rate", size, rate.units))
+        told = told.assign(
+            DatasetUnits(told).slip_rate_from_log("peak_log10_slip_rate", size, rate.units)
+        )
     return told
 
 

@@ -12,7 +12,7 @@ from rich import progress as bars
 from rich.console import Console
 
 from rsfstudy.execution import ProgressCallback
-from rsfstudy.motion import compilation_log, import_compiled_engine
+from rsfstudy.motion import Engine
 from rsfstudy.slider import Scene
 
 #: Maximum number of progress lines of a run, and minimum time in s between two lines.
@@ -99,13 +99,13 @@ def compile_scenes_with_notice(
     is_shown : bool
         If False, nothing is displayed.
     """
-    console, before = Console(stderr=True, quiet=not is_shown), replace(compilation_log)
+    console, before = Console(stderr=True, quiet=not is_shown), replace(Engine.compilation_log)
     with console.status("compiling the equations ..."):
         for scene, clock in itertools.product(example_scenes, with_time_variable_flags):
-            import_compiled_engine().compile_equations_of_scene(scene, with_time=clock)
+            Engine.import_compiled().compile_equations_of_scene(scene, with_time=clock)
     programs, seconds = (
-        compilation_log.compiled_program_count - before.compiled_program_count,
-        compilation_log.total_compilation_seconds - before.total_compilation_seconds,
+        Engine.compilation_log.compiled_program_count - before.compiled_program_count,
+        Engine.compilation_log.total_compilation_seconds - before.total_compilation_seconds,
     )
     if programs:
         console.print(f"compiled the equations ({programs} programs) in {seconds:.0f} s, once")

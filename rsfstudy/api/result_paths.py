@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from rsfstudy.defaults import OUTPUT_DIRECTORY
+from rsfstudy.defaults import Defaults
 from rsfstudy.errors import DataError, InvalidValue, shorten_text
 from rsfstudy.path_checks import check_path
 from rsfstudy.study import load_study, study_names
@@ -67,7 +67,9 @@ def find_results(study_or_file: str | Path, output_path: str | Path | None) -> P
         return path
     study = load_study(str(path)).name if path.suffix == ".py" else str(study_or_file)
     try:
-        return _result_path_of_study(study, output_directory(output_path) or OUTPUT_DIRECTORY)
+        return _result_path_of_study(
+            study, output_directory(output_path) or Defaults.OUTPUT_DIRECTORY
+        )
     except OSError as error:
         raise DataError(
             f"{shorten_text(study_or_file)} cannot be looked for: {error.strerror}"

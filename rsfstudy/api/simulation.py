@@ -19,30 +19,20 @@ from rsfstudy.error_boundary import error_boundary
 from rsfstudy.errors import IncompleteWarning, InvalidValue, NoResultWarning, shorten_text
 from rsfstudy.execution import provenance_attributes
 from rsfstudy.motion import (
-    DEFAULT_EVALUATION_BUDGET,
-    DEFAULT_RTOL,
-    FIRST_STATE_COLUMN,
-    MOTION_VARIABLES,
-    REGIME_COLUMN,
-    SAMPLE_COLUMN,
-    SCIPY,
     Accuracy,
+    Engine,
     Event,
     EventKind,
     Integrator,
     MotionStopped,
     Recording,
     accept_accuracy_and_meter,
-    check_engine_is_usable,
-    recorded_friction_coefficient,
-    recorded_load_point_displacement,
     rise,
-    suggest_raising_budget,
 )
 from rsfstudy.netcdf_encoding import copy_with_cf_encoding
 from rsfstudy.parts import SEGMENT_START, SEGMENT_VELOCITY
 from rsfstudy.quantities import Quantity
-from rsfstudy.slider import RUPTURE_REGIME, MotionPoint, SampledHistory, Scene, UserLoading
+from rsfstudy.slider import MotionPoint, SampledHistory, Scene, UserLoading
 from rsfstudy.status import Status
 from rsfstudy.vocabulary import find_quantity
 
@@ -73,7 +63,12 @@ _INSTABILITY_SLIP_RATE_OVER_LOAD_RATE = 1e6
 _VARIABLES_DERIVED_FROM_SPRING_STRESS = ("shear_stress", "friction_coefficient")
 #: Names of the regimes (forms of the equations of motion) of the built-in dynamics. Regimes of
 #: user-defined dynamics have larger codes.
-_BUILT_IN_REGIME_NAMES = ("quasi_static", "slow_manifold", RUPTURE_REGIME, "quasi_dynamic")
+_BUILT_IN_REGIME_NAMES = (
+    "quasi_static",
+    "slow_manifold",
+    Scene.RUPTURE_REGIME,
+    "quasi_dynamic",
+)
 
 
 @error_boundary
@@ -84,9 +79,9 @@ def simulate(
     duration: float | None = None,
     times: Sequence[float] | np.ndarray | None = None,
     start: xr.Dataset | None = None,
-    rtol: float = DEFAULT_RTOL,
-    budget: int = DEFAULT_EVALUATION_BUDGET,
-    engine: Any = SCIPY,
+    rtol: float = Accuracy.DEFAULT_RTOL,
+    budget: int = Accuracy.DEFAULT_BUDGET,
+    engine: Any = Engine.SCIPY,
     integrator: Integrator | None = None,
 ) -> xr.Dataset:
     """Integrate the motion of a scene.
@@ -240,7 +235,7 @@ def simulate(
             raise
         status, message = halt.status, str(halt)
         if status is Status.WORK_BUDGET_SPENT:
-            message += suggest_raising_budget(budget)
+            message += integrator.work_meter.budget_advice
     seen = recording.as_table(scene)
     seen = make_row_times_strictly_increasing(seen) if at is None else seen
     dataset = _recording_to_dataset(scene, seen, recording.regime_names)
@@ -305,7 +300,7 @@ def check_integrator(integrator: Any) -> None:
     if not isinstance(integrator, Integrator):
         remedy = "Pass integrator=integrator, as Measure.compute receives it."
         raise InvalidValue("integrator", integrator, "must be an Integrator", remedy=remedy)
-    check_engine_is_usable(integrator.engine)
+    Engine.check_is_usable(integrator.engine)
 
 
 def _recording_to_dataset(
@@ -315,20 +310,22 @@ def _recording_to_dataset(
     fluid = scene.parts.fluid.unknowns
     columns = {
         find_quantity(name): recorded_rows[:, column]
-        for column, name in enumerate(MOTION_VARIABLES)
+        for column, name in enumerate(Recording.MOTION_VARIABLES)
     }
-    first = FIRST_STATE_COLUMN + scene.state_count - len(fluid)
+    first = Recording.FIRST_STATE_COLUMN + scene.state_count - len(fluid)
     columns |= {about: recorded_rows[:, first + i] for i, about in enumerate(fluid)}
     if scene.parts.law.state_count > 1:
         of_law = range(scene.parts.law.state_count)
         columns |= {
-            _build_state_variable_quantity(i + 1): recorded_rows[:, FIRST_STATE_COLUMN + i]
+            _build_state_variable_quantity(i + 1): recorded_rows[
+                :, Recording.FIRST_STATE_COLUMN + i
+            ]
             for i in of_law
         }
-    columns[find_quantity("load_point_displacement")] = recorded_load_point_displacement(
+    columns[find_quantity("load_point_displacement")] = Recording.load_point_displacement(
         scene, recorded_rows
     )
-    columns[find_quantity("friction_coefficient")] = recorded_friction_coefficient(recorded_rows)
+    columns[find_quantity("friction_coefficient")] = Recording.friction_coefficient(recorded_rows)
     dataset = xr.Dataset(
         {
             q.name: ("time", values, motion_variable_attributes(q, scene))
@@ -340,7 +337,7 @@ def _recording_to_dataset(
         "flag_values": np.arange(len(regime_names), dtype=np.int8),
         "flag_meanings": " ".join(regime_names),
     }
-    dataset["regime"] = "time", recorded_rows[:, REGIME_COLUMN].astype(np.int8), flags
+    dataset["regime"] = "time", recorded_rows[:, Recording.REGIME_COLUMN].astype(np.int8), flags
     about_rate = find_quantity("reference_rate").attributes
     dataset["reference_rate"] = (), scene.reference_rate, about_rate
     return dataset.set_coords(["slip", "reference_rate"])
@@ -479,9 +476,12 @@ def make_row_times_strictly_increasing(table: np.ndarray) -> np.ndarray:
     numpy.ndarray
         Recorded motion with strictly increasing times.
     """
-    same = (np.diff(np.delete(table, [REGIME_COLUMN, SAMPLE_COLUMN], axis=1), axis=0) == 0.0).all(
-        axis=1
-    )
+    same = (
+        np.diff(
+            np.delete(table, [Recording.REGIME_COLUMN, Recording.SAMPLE_COLUMN], axis=1), axis=0
+        )
+        == 0.0
+    ).all(axis=1)
     table = table[~np.append(same, np.zeros(min(len(table), 1), dtype=bool))]
     times, earliest = table[:, 0].tolist(), -math.inf
     for place, time in enumerate(times):

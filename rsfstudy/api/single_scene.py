@@ -15,15 +15,9 @@ from rsfstudy.error_boundary import error_boundary
 from rsfstudy.errors import NoResultWarning, RsfStudyWarning
 from rsfstudy.execution import provenance_attributes
 from rsfstudy.measures import CriticalStep, LimitCycle, Measure
-from rsfstudy.motion import (
-    DEFAULT_EVALUATION_BUDGET,
-    DEFAULT_RTOL,
-    SCIPY,
-    Accuracy,
-    Integrator,
-)
+from rsfstudy.motion import Accuracy, Engine, Integrator
 from rsfstudy.netcdf_encoding import copy_with_cf_encoding
-from rsfstudy.rig import convert_dataset_units, convert_to_si, read_si_scales
+from rsfstudy.rig import DatasetUnits, convert_to_si
 from rsfstudy.slider import Scene
 from rsfstudy.status import Status
 from rsfstudy.vocabulary import find_quantity
@@ -35,9 +29,9 @@ def critical_step(
     of: str = "load_velocity_ratio",
     direction: str = "up",
     *,
-    rtol: float = DEFAULT_RTOL,
-    engine: Any = SCIPY,
-    budget: int = DEFAULT_EVALUATION_BUDGET,
+    rtol: float = Accuracy.DEFAULT_RTOL,
+    engine: Any = Engine.SCIPY,
+    budget: int = Accuracy.DEFAULT_BUDGET,
     integrator: Integrator | None = None,
 ) -> xr.Dataset:
     r"""Compute the smallest step that causes an instability.
@@ -123,9 +117,9 @@ def limit_cycle(
     scene: Scene,
     *,
     events: int = LimitCycle.events,
-    rtol: float = DEFAULT_RTOL,
-    engine: Any = SCIPY,
-    budget: int = DEFAULT_EVALUATION_BUDGET,
+    rtol: float = Accuracy.DEFAULT_RTOL,
+    engine: Any = Engine.SCIPY,
+    budget: int = Accuracy.DEFAULT_BUDGET,
     integrator: Integrator | None = None,
 ) -> xr.Dataset:
     r"""Compute the stick-slip limit cycle of a scene.
@@ -257,7 +251,7 @@ def to_si(
         for name, value in zip(units, given, strict=True)
         if value is not None
     }
-    return convert_dataset_units(dataset, read_si_scales(dataset, **stated), "Pa", "m", "s")
+    return DatasetUnits(dataset).convert("Pa", "m", "s", **stated)
 
 
 def _measure_scene_to_dataset(

@@ -19,28 +19,24 @@ from rsfstudy._deprecation import accept_former_keyword_names
 from rsfstudy.api import dataset_export
 from rsfstudy.api.progress import compile_scenes_with_notice, show_progress
 from rsfstudy.api.result_paths import find_results, output_directory
-from rsfstudy.defaults import CELL_TIME_LIMIT, OUTPUT_DIRECTORY
+from rsfstudy.defaults import Defaults
 from rsfstudy.error_boundary import error_boundary, find_stacklevel_of_user_code
 from rsfstudy.errors import IncompleteWarning, InvalidValue, RsfStudyWarning, shorten_text
 from rsfstudy.execution import OutputOptions, WorkerPool, prepare_study_run, run_fingerprint
 from rsfstudy.measures import Outcome
-from rsfstudy.motion import COMPILED, check_engine_is_usable
+from rsfstudy.motion import Engine
 from rsfstudy.netcdf_encoding import copy_with_cf_encoding
-from rsfstudy.quantities import html_table
+from rsfstudy.quantities import HtmlMarkup
 from rsfstudy.reporting import format_notes_on_incomplete_results, note_on_norms_near_load_velocity
-from rsfstudy.slider import Scene, add_scene_fields_to_signature
+from rsfstudy.slider import Scene, SceneFields
 from rsfstudy.storage import (
     Comparison,
-    check_contains_study_results,
+    StoredDataset,
     compare_results,
     compare_same_lattice,
     find_cell_number,
     find_fingerprint_differences,
-    is_of_single_scene,
     read_dataset,
-    read_declaration,
-    read_provenance,
-    rebuild_study,
 )
 from rsfstudy.study import Study, build_verdict_table, load_study, study_names
 
@@ -57,7 +53,7 @@ class StudiesByName(dict[str, Study]):
             (name, study.title, f"{study.size:,}", ", ".join({c.id: c for c in study.claims}))
             for name, study in self.items()
         ]
-        return html_table(("study", "title", "cells", "claims"), rows)
+        return HtmlMarkup.table(("study", "title", "cells", "claims"), rows)
 
 
 @error_boundary
@@ -79,19 +75,19 @@ def studies() -> dict[str, Study]:
 
 
 @error_boundary
-@add_scene_fields_to_signature()
+@SceneFields.add_to_signature()
 def run(
     study: str | Path | Study,
     *,
     workers: int = 2,
     client: Any = None,
-    output: str | Path | None = OUTPUT_DIRECTORY,
+    output: str | Path | None = Defaults.OUTPUT_DIRECTORY,
     progress: bool = True,
     fresh: bool = False,
     rtol: float | None = None,
     engine: str | None = None,
     budget: int | None = None,
-    time_limit: float = CELL_TIME_LIMIT,
+    time_limit: float = Defaults.CELL_TIME_LIMIT,
     keep_going: bool = False,
     despite_failures: bool = False,
     format: str = "netcdf",
@@ -283,12 +279,12 @@ def prepare_run_with_progress(
     InvalidValue
         If the study or an option is invalid.
     """
-    check_engine_is_usable(study.accuracy.engine)
+    Engine.check_is_usable(study.accuracy.engine)
     ready = prepare_study_run(study, output_options, worker_pool)
 
     def run() -> xr.Dataset:
         """Compile the equations if necessary, and run the study."""
-        if study.accuracy.engine == COMPILED:
+        if study.accuracy.engine == Engine.COMPILED:
             compile_scenes_with_notice(
                 ready.plan.example_scenes, study.measure.needs_time, show_progress_bar
             )
@@ -299,7 +295,7 @@ def prepare_run_with_progress(
 
 
 @error_boundary
-def open(name: str | Path, output: str | Path = OUTPUT_DIRECTORY) -> xr.Dataset:
+def open(name: str | Path, output: str | Path = Defaults.OUTPUT_DIRECTORY) -> xr.Dataset:
     """Load the results of a study into memory.
 
     Parameters
@@ -369,7 +365,7 @@ def read_results(path: Path) -> xr.Dataset:
         belongs to one scene.
     """
     dataset = read_dataset(path)
-    check_contains_study_results(dataset, shorten_text(path))
+    StoredDataset(dataset).check_contains_study_results(shorten_text(path))
     return dataset
 
 
@@ -377,7 +373,7 @@ def _open_dataset_if_name_or_path(dataset: xr.Dataset | str | Path) -> xr.Datase
     """Return results, and load the results first if a name or a path is passed."""
     if not isinstance(dataset, xr.Dataset):
         return open(dataset)
-    check_contains_study_results(dataset, "the dataset")
+    StoredDataset(dataset).check_contains_study_results("the dataset")
     return dataset
 
 
@@ -492,7 +488,7 @@ def check(dataset: xr.Dataset | str | Path) -> pd.DataFrame:
     0
     """
     results = _open_dataset_if_name_or_path(dataset)
-    declared = read_declaration(results)
+    declared = StoredDataset(results).declaration
     return build_verdict_table(results, list(declared.claims), declared.overrides)
 
 
@@ -505,7 +501,7 @@ def rerun(
     client: Any = None,
     output: str | Path | None = None,
     progress: bool = True,
-    time_limit: float = CELL_TIME_LIMIT,
+    time_limit: float = Defaults.CELL_TIME_LIMIT,
 ) -> pd.DataFrame:
     """Recompute the results in a file, and compare the values.
 
@@ -570,12 +566,12 @@ def rerun(
     >>> bool((table["identical"] == table["values"]).all())
     True
     """
-    theirs = read_dataset(find_results(file, OUTPUT_DIRECTORY))
-    if is_of_single_scene(theirs):
+    theirs = read_dataset(find_results(file, Defaults.OUTPUT_DIRECTORY))
+    if StoredDataset(theirs).is_of_single_scene:
         if study is not None:
             load_study(str(study))  # The file defines user-defined parts of the scene.
         return dataset_export.rerun_and_compare_motion(theirs)
-    declared = rebuild_study(theirs, study)
+    declared = StoredDataset(theirs).rebuild_study(study)
     place = output_directory(output)
     if place is not None:
         for taken in place.glob(f"{declared.name}.*"):
@@ -735,10 +731,10 @@ def _find_cell_in_results_file(
     """
     results = open(results_file)
     number = find_cell_number(results, cell_coordinates)
-    declared = rebuild_study(results, study_file)
+    declared = StoredDataset(results).rebuild_study(study_file)
     now = run_fingerprint(declared, [declared.scene(number)])
     return (
         declared,
         number,
-        find_fingerprint_differences(read_provenance(results)["fingerprint"], now),
+        find_fingerprint_differences(StoredDataset(results).provenance["fingerprint"], now),
     )

@@ -15,10 +15,6 @@ if TYPE_CHECKING:
     from rsfstudy.axes.axis import (
         Axis,
         AxisRow,
-        check_storable_text,
-        classify_axis_rows_by_fields_and_texts,
-        fields_of_axis_point,
-        to_plain_value,
     )
 else:
     __getattr__, __dir__ = build_lazy_export_functions(
@@ -27,10 +23,6 @@ else:
             "axes.axis": (
                 "Axis",
                 "AxisRow",
-                "check_storable_text",
-                "fields_of_axis_point",
-                "classify_axis_rows_by_fields_and_texts",
-                "to_plain_value",
             ),
         },
     )
@@ -38,8 +30,4 @@ else:
 __all__ = [
     "Axis",
     "AxisRow",
-    "check_storable_text",
-    "fields_of_axis_point",
-    "classify_axis_rows_by_fields_and_texts",
-    "to_plain_value",
 ]

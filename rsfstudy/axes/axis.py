@@ -19,9 +19,84 @@ from rsfstudy.error_boundary import wrap_methods_in_error_boundary
 from rsfstudy.errors import InvalidValue
 from rsfstudy.formatting import format_value, is_sequence_of_axis_values
 from rsfstudy.quantities import is_variable_name
-from rsfstudy.slider import normalise_field_value
+from rsfstudy.slider import SceneFields
 
 AxisRow = Mapping[str, Any]
+
+
+def fields_of_axis_point(axis_point: Any) -> Any:
+    """Return the field values that an object, such as a rig, sets on an axis.
+
+    Parameters
+    ----------
+    axis_point : object
+        Point of a zipped axis.
+
+    Returns
+    -------
+    object
+        Mapping of fields to values. An object without the attribute ``axis_fields`` is returned
+        unchanged.
+    """
+    if hasattr(axis_point, "axis_fields"):
+        return axis_point.axis_fields
+    if hasattr(axis_point, "on_axis"):
+        warn_renamed("on_axis", "axis_fields", type(axis_point).__name__)
+        return axis_point.on_axis
+    return axis_point
+
+
+def check_storable_text(argument_name: str, text: object) -> None:
+    """Check that a value is a string that can be stored in files.
+
+    Parameters
+    ----------
+    argument_name : str
+        Name of the argument for error messages.
+    text : object
+        Value to check.
+
+    Raises
+    ------
+    InvalidValue
+        If the value is not a string, contains a null character, or cannot be encoded as UTF-8.
+    """
+    if not isinstance(text, str) or "\0" in text:
+        raise InvalidValue(argument_name, text, "must be a text")
+    try:
+        text.encode()
+    except UnicodeError as error:
+        raise InvalidValue(argument_name, text, "must be a text that UTF-8 can hold") from error
+
+
+def to_plain_value(field_name: str, value: Any) -> Any:
+    """Convert a field value to a float, a bool or a string.
+
+    Parameters
+    ----------
+    field_name : str
+        Name of the field.
+    value : object
+        Value to convert. Integers become floats. A user-defined part becomes its name.
+
+    Returns
+    -------
+    object
+        Value of a built-in type. Values that cannot be converted are returned unchanged, and the
+        axis rejects the unconverted values.
+
+    Raises
+    ------
+    InvalidValue
+        If the value is an array with one or more dimensions.
+    """
+    value = SceneFields.normalise_value(field_name, value)
+    if isinstance(value, np.ndarray) and value.ndim:
+        raise InvalidValue(field_name, value.tolist(), "must be one number, flag or text")
+    value = value.item() if isinstance(value, np.generic | np.ndarray) else value
+    if not isinstance(value, int) or isinstance(value, bool):
+        return value
+    return float(value) if abs(value) < 2**1023 else math.inf
 
 
 @accept_former_keyword_names
@@ -69,6 +144,10 @@ class Axis:
     >>> zipped.point_names
     ['granite', 'gouge']
     """
+
+    fields_of_point = staticmethod(fields_of_axis_point)
+    check_storable_text = staticmethod(check_storable_text)
+    to_plain_value = staticmethod(to_plain_value)
 
     dimension: str
     rows: tuple[AxisRow, ...]
@@ -314,6 +393,26 @@ class Axis:
         """Return the number of points."""
         return len(self.rows)
 
+    def classify_rows(self) -> np.ndarray:
+        """Assign each row of the axis to a group of similar rows.
+
+        All rows of a group set the same fields. Within a group, the strings and flags of a field
+        are equal, and the numbers of a field are either all zero or all nonzero. Scenes that are
+        built from rows of the same group therefore have the same parts.
+
+        Returns
+        -------
+        ndarray of int
+            Group number of each row. Groups are numbered from 0 in the order of their first row.
+        """
+        known: dict[tuple[Any, ...], int] = {}
+        return np.array(
+            [
+                known.setdefault(_build_classification_key_of_row(row), len(known))
+                for row in self.rows
+            ]
+        )
+
     def describe(self) -> dict[str, Any]:
         """Return a description of the axis as built-in Python types.
 
@@ -340,56 +439,11 @@ class Axis:
         return list(self.labels or values)
 
 
-def classify_axis_rows_by_fields_and_texts(axis_rows: Sequence[AxisRow]) -> np.ndarray:
-    """Assign each row of an axis to a group of similar rows.
-
-    All rows of a group set the same fields. Within a group, the strings and flags of a field are
-    equal, and the numbers of a field are either all zero or all nonzero. Scenes that are built from
-    rows of the same group therefore have the same parts.
-
-    Parameters
-    ----------
-    axis_rows : sequence of mapping
-        Rows of an axis.
-
-    Returns
-    -------
-    ndarray of int
-        Group number of each row. Groups are numbered from 0 in the order of their first row.
-    """
-    known: dict[tuple[Any, ...], int] = {}
-    return np.array(
-        [known.setdefault(_build_classification_key_of_row(row), len(known)) for row in axis_rows]
-    )
-
-
 def _build_classification_key_of_row(axis_row: AxisRow) -> tuple[Any, ...]:
     return tuple(
         (name, type(value), bool(value) if isinstance(value, float) else value)
         for name, value in axis_row.items()
     )
-
-
-def fields_of_axis_point(axis_point: Any) -> Any:
-    """Return the field values that an object, such as a rig, sets on an axis.
-
-    Parameters
-    ----------
-    axis_point : object
-        Point of a zipped axis.
-
-    Returns
-    -------
-    object
-        Mapping of fields to values. An object without the attribute ``axis_fields`` is returned
-        unchanged.
-    """
-    if hasattr(axis_point, "axis_fields"):
-        return axis_point.axis_fields
-    if hasattr(axis_point, "on_axis"):
-        warn_renamed("on_axis", "axis_fields", type(axis_point).__name__)
-        return axis_point.on_axis
-    return axis_point
 
 
 def _rows_from_points(dimension: str, labelled_points: Mapping[str, Any]) -> tuple[AxisRow, ...]:
@@ -436,56 +490,3 @@ def rows_to_field_columns(rows: Sequence[AxisRow]) -> dict[str, list[Any]]:
         Values of each field.
     """
     return {name: [row[name] for row in rows] for name in rows[0]}
-
-
-def check_storable_text(argument_name: str, text: object) -> None:
-    """Check that a value is a string that can be stored in files.
-
-    Parameters
-    ----------
-    argument_name : str
-        Name of the argument for error messages.
-    text : object
-        Value to check.
-
-    Raises
-    ------
-    InvalidValue
-        If the value is not a string, contains a null character, or cannot be encoded as UTF-8.
-    """
-    if not isinstance(text, str) or "\0" in text:
-        raise InvalidValue(argument_name, text, "must be a text")
-    try:
-        text.encode()
-    except UnicodeError as error:
-        raise InvalidValue(argument_name, text, "must be a text that UTF-8 can hold") from error
-
-
-def to_plain_value(field_name: str, value: Any) -> Any:
-    """Convert a field value to a float, a bool or a string.
-
-    Parameters
-    ----------
-    field_name : str
-        Name of the field.
-    value : object
-        Value to convert. Integers become floats. A user-defined part becomes its name.
-
-    Returns
-    -------
-    object
-        Value of a built-in type. Values that cannot be converted are returned unchanged, and the
-        axis rejects the unconverted values.
-
-    Raises
-    ------
-    InvalidValue
-        If the value is an array with one or more dimensions.
-    """
-    value = normalise_field_value(field_name, value)
-    if isinstance(value, np.ndarray) and value.ndim:
-        raise InvalidValue(field_name, value.tolist(), "must be one number, flag or text")
-    value = value.item() if isinstance(value, np.generic | np.ndarray) else value
-    if not isinstance(value, int) or isinstance(value, bool):
-        return value
-    return float(value) if abs(value) < 2**1023 else math.inf

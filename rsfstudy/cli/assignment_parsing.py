@@ -13,7 +13,7 @@ from typing import Any
 
 from rsfstudy import Rig, Study, history, read_protocol
 from rsfstudy.errors import InvalidValue
-from rsfstudy.rig import RIG_QUANTITIES, expand_range, has_time_column, parse_number
+from rsfstudy.rig import expand_range, has_time_column, parse_number
 from rsfstudy.slider import UserLoading
 
 _FLAG_VALUE_BY_WORD = {"true": True, "yes": True, "false": False, "no": False}
@@ -150,7 +150,7 @@ def parse_rig(option_texts: Mapping[str, str]) -> Rig:
     stated = {
         name: parse_number_or_text(text)
         for name, text in option_texts.items()
-        if name in RIG_QUANTITIES
+        if name in Rig.QUANTITIES
     }
     for field in fields(Rig):
         if field.default is MISSING and field.name not in stated:

@@ -14,9 +14,9 @@ from typing import Any
 import numpy as np
 
 from rsfstudy.errors import InvalidValue
-from rsfstudy.execution import CellPlan, estimate_evaluations_and_time
-from rsfstudy.motion import COMPILED, SCIPY, check_engine_is_usable
-from rsfstudy.storage import CellTimings, read_timings
+from rsfstudy.execution import CellPlan
+from rsfstudy.motion import Engine
+from rsfstudy.storage import CellTimings
 
 #: Typical speed-up of the compiled engine relative to SciPy, by measure. The page of benchmarks
 #: reports speed-ups by factors from 7 to 12 for critical steps, and from 31 to 72 for limit cycles.
@@ -73,10 +73,10 @@ def estimate_study_cost(cell_plan: CellPlan, output_directory: Path) -> CostEsti
     CostEstimate
         Expected work, and measured or estimated time.
     """
-    work, guess = estimate_evaluations_and_time(cell_plan)
+    work, guess = cell_plan.estimate_evaluations_and_time()
     work = round(work, 2 - len(str(work)))  # more digits would not be significant
     journal = output_directory / f"{cell_plan.study.name}.cells.sqlite"
-    took, cells = read_timings(journal), len(cell_plan.unique_cell_numbers)
+    took, cells = CellTimings.read(journal), len(cell_plan.unique_cell_numbers)
     if (
         took is None
         or not _timings_match_accuracy_and_engine(cell_plan, took)
@@ -158,11 +158,11 @@ def compiled_engine_hint(cell_plan: CellPlan, output_directory: Path) -> str:
     measure, engine = cell_plan.study.measure.describe()["name"], cell_plan.study.accuracy.engine
     kept = output_directory / f"{cell_plan.study.name}.cells.sqlite"
     saves = (
-        engine == SCIPY
+        engine == Engine.SCIPY
         and measure != _NAME_OF_MEASURE_REQUIRING_SCIPY_ENGINE
-        and estimate_evaluations_and_time(cell_plan)[1] > _MIN_SECONDS_FOR_FASTER_ENGINE_HINT
+        and cell_plan.estimate_evaluations_and_time()[1] > _MIN_SECONDS_FOR_FASTER_ENGINE_HINT
     )
-    if not saves or kept.exists() or describe_missing_engine_packages(COMPILED):
+    if not saves or kept.exists() or describe_missing_engine_packages(Engine.COMPILED):
         return ""
     if measure in _COMPILED_SPEEDUP_BY_MEASURE:
         return (
@@ -227,9 +227,9 @@ def describe_missing_engine_packages(engine_name: str) -> str:
         If the engine is unknown.
     """
     try:
-        check_engine_is_usable(engine_name)
+        Engine.check_is_usable(engine_name)
     except InvalidValue:
-        if engine_name != COMPILED:
+        if engine_name != Engine.COMPILED:
             raise
         return "needs Numba (pip install 'rsfstudy[fast]')"
     return ""

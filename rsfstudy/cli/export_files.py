@@ -2,7 +2,7 @@
 
 A new export format needs a function in this module, an entry in the dictionary ``writers`` of
 ``commands/export.py``, and an option of the command ``export`` in the same file. The formats in
-``rsfstudy.defaults.RESULT_FORMATS`` are formats of results files, not export formats.
+``rsfstudy.defaults.Defaults.RESULT_FORMATS`` are formats of results files, not export formats.
 """
 
 from __future__ import annotations

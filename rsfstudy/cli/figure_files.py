@@ -9,7 +9,7 @@ import xarray as xr
 
 from rsfstudy.cli.options import CommandOptions
 from rsfstudy.cli.printing import print_note
-from rsfstudy.defaults import FIGURE_FORMATS
+from rsfstudy.defaults import Defaults
 from rsfstudy.errors import DataError, InvalidValue, RsfStudyError
 from rsfstudy.plots import (
     FIGURE_NAMES,
@@ -18,8 +18,8 @@ from rsfstudy.plots import (
     style_context,
     write_image,
 )
-from rsfstudy.storage import read_declaration, read_provenance
-from rsfstudy.study import load_study, name_of_figure
+from rsfstudy.storage import StoredDataset
+from rsfstudy.study import load_study
 
 if TYPE_CHECKING:
     from rsfstudy.plots import Figure
@@ -65,7 +65,7 @@ def default_figure_path(results_path: Path, options: CommandOptions) -> Path:
         Path with the format of ``--figure``.
     """
     name = results_path.name.removesuffix(".nc").removesuffix(".zarr")
-    words = [name, options.variable, options.form or FIGURE_FORMATS[0]]
+    words = [name, options.variable, options.form or Defaults.FIGURE_FORMATS[0]]
     return results_path.with_name(".".join(filter(None, words)))
 
 
@@ -86,7 +86,7 @@ def load_user_figure_or_default(dataset: xr.Dataset, study_file: Path | None) ->
         the figure cannot be loaded and the user passed no study file, the function prints a note
         and returns "lines", so that maps or lines are drawn.
     """
-    if read_declaration(dataset).plot in FIGURE_NAMES:
+    if StoredDataset(dataset).declaration.plot in FIGURE_NAMES:
         return None
     try:
         return load_user_figure(dataset, study_file)
@@ -156,14 +156,14 @@ def load_user_figure(results: xr.Dataset, study_file: str | Path | None = None) 
     because the results may come from an untrusted source.
     """
     name, named_in = (
-        read_declaration(results).plot,
-        read_provenance(results)["declared_in"],
+        StoredDataset(results).declaration.plot,
+        StoredDataset(results).provenance["declared_in"],
     )
     if study_file is None:
         remedy = f"Pass the file that declares the figure: --study {named_in or 'FILE'}."
         raise InvalidValue("plot", name, "is not a figure of rsfstudy", remedy=remedy)
     study = load_study(str(study_file))
-    if study.name != results.attrs["id"] or name_of_figure(study.plot, study.name) != name:
+    if study.name != results.attrs["id"] or study.figure_name != name:
         rule = f"does not draw {name!r} of {results.attrs['id']!r}"
         raise InvalidValue("study", str(study_file), rule)
     return None if isinstance(study.plot, str) else study.plot

@@ -16,10 +16,10 @@ from typing import Any, TypeVar
 
 import click
 
-from rsfstudy.defaults import CELL_TIME_LIMIT, FIGURE_FORMATS, OUTPUT_DIRECTORY
+from rsfstudy.defaults import Defaults
 from rsfstudy.error_boundary import check_regular_file
 from rsfstudy.errors import InvalidValue
-from rsfstudy.motion import ENGINES
+from rsfstudy.motion import Engine
 from rsfstudy.path_checks import check_path
 
 DecoratedFunction = TypeVar("DecoratedFunction", bound=Callable[..., Any])
@@ -182,7 +182,9 @@ study_name_or_all_argument = combine_option_decorators(
     click.argument("name", required=False),
     click.option("--all", "every", is_flag=True, help="Process all named studies."),
 )
-output_option = make_output_option("Directory of the results.", OUTPUT_DIRECTORY, file_okay=False)
+output_option = make_output_option(
+    "Directory of the results.", Defaults.OUTPUT_DIRECTORY, file_okay=False
+)
 set_values_option = click.option(
     "--set",
     "settings",
@@ -201,7 +203,7 @@ rtol_option = click.option(
 )
 engine_option = click.option(
     "--engine",
-    type=click.Choice(ENGINES),
+    type=click.Choice(Engine.NAMES),
     help="Integration engine. The engine compiled requires Numba and is much faster.  "
     "[default: engine of the study, scipy]",
 )
@@ -221,7 +223,7 @@ worker_options = combine_option_decorators(
         "--time-limit",
         type=float,
         metavar="SECONDS",
-        default=CELL_TIME_LIMIT,
+        default=Defaults.CELL_TIME_LIMIT,
         help="CPU time limit for each cell on a worker.",
     ),
     click.option("--quiet", is_flag=True, help="Do not show progress."),
@@ -267,7 +269,7 @@ figure_options = combine_option_decorators(
     click.option(
         "--figure",
         "form",
-        type=click.Choice(FIGURE_FORMATS),
+        type=click.Choice(Defaults.FIGURE_FORMATS),
         help="File format of figures.  [default: png]",
     ),
     click.option(

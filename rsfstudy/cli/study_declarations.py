@@ -14,7 +14,7 @@ from rsfstudy.cli.printing import print_line, print_pieces
 from rsfstudy.cli.results import EXIT_STATUS_OK, CommandResult
 from rsfstudy.execution import CellPlan
 from rsfstudy.reporting import describe_scene_and_rig_fields
-from rsfstudy.rig import in_display_units
+from rsfstudy.rig import Rig
 
 #: Maximum number of printed values of an axis.
 _MAX_PRINTED_AXIS_POINTS = 40
@@ -77,7 +77,8 @@ class StudyDeclaration(CommandResult):
                 if name not in varied and value is not None
             },
             "rig": {
-                n: self.rig_quantities[n] for n in in_display_units(self.rig_quantities, varied)
+                n: self.rig_quantities[n]
+                for n in Rig.convert_quantities_for_display(self.rig_quantities, varied)
             },
             "measure": self.measure_fields,
             "outputs": [

@@ -15,7 +15,7 @@ from rsfstudy.api import apply_overrides_to_study
 from rsfstudy.cli import assignment_parsing
 from rsfstudy.cli.options import CommandOptions
 from rsfstudy.execution import WorkerPool, connect_to_cluster
-from rsfstudy.rig import RIG_QUANTITIES, parse_number
+from rsfstudy.rig import Rig, parse_number
 from rsfstudy.storage import read_dataset
 from rsfstudy.study import convert_study_to_rig_units, load_study, study_names
 
@@ -75,7 +75,7 @@ def build_study_from_options(study_name: str, options: CommandOptions) -> Study:
         stated = {name: text for name, text in stated.items() if name in taken}
     in_si = {
         "load_velocity": "m/s",
-        **{name: about.si_units for name, about in RIG_QUANTITIES.items()},
+        **{name: about.si_units for name, about in Rig.QUANTITIES.items()},
     }
     texts = {n: t if parse_number(t) is None else f"{t} {in_si[n]}" for n, t in stated.items()}
     changes = texts | assignment_parsing.parse_overrides(study, options.settings)

@@ -25,8 +25,8 @@ from rsfstudy.reporting import (
     failures_table,
     summarise_study_as_fields,
 )
-from rsfstudy.storage import read_declaration
-from rsfstudy.study import NOT_APPLICABLE_VERDICT
+from rsfstudy.storage import StoredDataset
+from rsfstudy.study import Claim
 
 
 @dataclass(frozen=True)
@@ -52,7 +52,7 @@ class StudyResults:
     @property
     def overrides(self) -> Mapping[str, Any]:
         """Values that differ from the declaration of the study."""
-        return read_declaration(self.dataset).overrides
+        return StoredDataset(self.dataset).declaration.overrides
 
     @property
     def pending_count(self) -> int:
@@ -146,7 +146,7 @@ def print_verdicts(verdicts: pd.DataFrame) -> None:
     verdicts : pandas.DataFrame
         Verdicts on the claims.
     """
-    checked = int((verdicts["verdict"] != NOT_APPLICABLE_VERDICT).sum())
+    checked = int((verdicts["verdict"] != Claim.NOT_APPLICABLE).sum())
     if checked:
         print_pieces([claims_table(verdicts)])
     print_unexpected_verdicts(verdicts)

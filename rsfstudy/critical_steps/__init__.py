@@ -13,20 +13,17 @@ from rsfstudy._lazy_exports import build_lazy_export_functions
 
 if TYPE_CHECKING:
     from rsfstudy.critical_steps.critical_step import CriticalStep
-    from rsfstudy.critical_steps.loading_checks import SLOW_INSTABILITY_NORM_WARNING_PREFIX
     from rsfstudy.critical_steps.triggered import Triggered
 else:
     __getattr__, __dir__ = build_lazy_export_functions(
         __name__,
         {
             "critical_steps.critical_step": ("CriticalStep",),
-            "critical_steps.loading_checks": ("SLOW_INSTABILITY_NORM_WARNING_PREFIX",),
             "critical_steps.triggered": ("Triggered",),
         },
     )
 
 __all__ = [
     "CriticalStep",
-    "SLOW_INSTABILITY_NORM_WARNING_PREFIX",
     "Triggered",
 ]

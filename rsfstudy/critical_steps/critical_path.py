@@ -29,7 +29,7 @@ from functools import cache, lru_cache
 from typing import Any, NamedTuple
 
 from rsfstudy.motion import (
-    COMPILED,
+    Engine,
     Event,
     EventKind,
     EventSpecification,
@@ -38,19 +38,11 @@ from rsfstudy.motion import (
     MotionStopped,
     build_root_finder,
     fall,
-    import_compiled_engine,
     maximum,
     rise,
 )
 from rsfstudy.parts import LOAD_VELOCITY, LOG_LOAD_VELOCITY, STIFFNESS, A, B
-from rsfstudy.slider import (
-    FrictionFunctions,
-    Function,
-    MotionPoint,
-    Numbers,
-    Scene,
-    equations_between_ruptures,
-)
+from rsfstudy.slider import FrictionFunctions, Function, MotionPoint, Numbers, Scene
 from rsfstudy.status import Status
 
 #: Maximum number of right-hand-side evaluations in the search for the start of a critical path. The
@@ -118,7 +110,7 @@ class CriticalPath(NamedTuple):
         CriticalPath
             Path with the load point velocity of the scene.
         """
-        slow, x = equations_between_ruptures(scene, with_time=False), scene.log_instability_rate
+        slow, x = scene.equations_between_ruptures(with_time=False), scene.log_instability_rate
         weakest = scene.parts.normal_stress.min_frictional_stress(scene)
         begin = (scene.spring_stress_step, *(0.0,) * scene.state_count)
         tangency, planar = (
@@ -442,7 +434,7 @@ def prepare_scalar_function_for_engine(
         The compiled function, or ``function`` itself if the engine is not the compiled engine.
     """
     return (
-        import_compiled_engine().compile_scalar_function(function, *arguments)
-        if engine == COMPILED
+        Engine.import_compiled().compile_scalar_function(function, *arguments)
+        if engine == Engine.COMPILED
         else function
     )

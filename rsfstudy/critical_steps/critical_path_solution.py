@@ -16,7 +16,7 @@ from rsfstudy.critical_steps.critical_path import CriticalPath
 from rsfstudy.critical_steps.shooting_steps import LOCAL_TOLERANCE_OF_FIRST_ROOT, StepFamily
 from rsfstudy.critical_steps.slow_manifold_accuracy import slow_manifold_relative_error
 from rsfstudy.critical_steps.stability_after_step import stability_margin
-from rsfstudy.motion import MIN_LOCAL_TOLERANCE, Integrator
+from rsfstudy.motion import Integrator
 
 #: Minimum error estimate of a critical step, divided by the requested relative accuracy. The
 #: minimum is necessary because two integrations of a path may have the same error by chance.
@@ -151,6 +151,6 @@ def _find_boundary_with_error(
 def _decreasing_local_tolerances(integrator: Integrator) -> Iterator[float]:
     """Yield local tolerances, each a tenth of the previous tolerance."""
     for _ in range(_MAX_LOCAL_TOLERANCES_TRIED_PER_PATH):
-        if integrator.local_tolerance > MIN_LOCAL_TOLERANCE:
+        if integrator.local_tolerance > Integrator.MIN_LOCAL_TOLERANCE:
             yield integrator.local_tolerance
         integrator = integrator.refined()

@@ -28,6 +28,7 @@ from rsfstudy.critical_steps.critical_path_solution import (
     find_boundary_by_limit_cycle,
 )
 from rsfstudy.critical_steps.loading_checks import (
+    SLOW_INSTABILITY_NORM_WARNING_PREFIX,
     build_slow_instability_norm_warning,
     check_loading_is_single_step,
     outcome_if_norm_is_below_load_velocity,
@@ -42,7 +43,7 @@ from rsfstudy.critical_steps.step_types import (
 from rsfstudy.error_boundary import wrap_methods_in_error_boundary
 from rsfstudy.errors import InvalidValue
 from rsfstudy.measure_base import Measure, Outcome
-from rsfstudy.motion import MIN_RTOL, RELATIVE_ROUNDING_ERROR, Integrator, MotionStopped
+from rsfstudy.motion import Accuracy, Integrator, MotionStopped
 from rsfstudy.quantities import Output
 from rsfstudy.slider import Scene
 from rsfstudy.status import Status
@@ -145,6 +146,8 @@ class CriticalStep(Measure):
     of: str = "load_velocity_ratio"
     direction: str = "up"
     name: ClassVar[str] = "critical_step"
+    #: Beginning of the warning that the instability norm is a slow slip rate.
+    SLOW_NORM_WARNING_PREFIX: ClassVar = SLOW_INSTABILITY_NORM_WARNING_PREFIX
     typical_work = 4_000
     needs_time: ClassVar[tuple[bool, ...]] = (False,)
 
@@ -400,7 +403,8 @@ class CriticalStep(Measure):
         """
         stable, unstable = log_size_bracket
         tolerance = max(
-            step_family.size_tolerance(math.exp(unstable), integrator.result_tolerance()), MIN_RTOL
+            step_family.size_tolerance(math.exp(unstable), integrator.result_tolerance()),
+            Accuracy.MIN_RTOL,
         )
         integrator = integrator.with_rtol(tolerance)
 
@@ -458,7 +462,11 @@ class CriticalStep(Measure):
         if step_family.largest_step_reaches_norm and not step_family.scene.has_mass and not reason:
             value = step_family.step_size_to_field_value(largest_size)
             values = self._output_values(
-                step_family, largest_size, largest_size * RELATIVE_ROUNDING_ERROR, value, value
+                step_family,
+                largest_size,
+                largest_size * Accuracy.RELATIVE_ROUNDING_ERROR,
+                value,
+                value,
             )
             return Outcome(
                 Status.OK, values, "the jump of slip rate at the step itself is critical"

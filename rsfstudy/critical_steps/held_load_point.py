@@ -25,15 +25,7 @@ from rsfstudy.motion import (
     maximum,
     rise,
 )
-from rsfstudy.slider import (
-    RUPTURE_REGIME,
-    STOPPED_LOG_SLIP_RATE,
-    MotionPoint,
-    Scene,
-    build_friction_relation,
-    build_state_evolution_function,
-    compute_steady_states,
-)
+from rsfstudy.slider import MotionPoint, Scene
 from rsfstudy.status import Status
 
 #: Spacing of the levels of ln V at which the motion is tested for further peaks. The first number
@@ -111,7 +103,7 @@ def _build_event_specs_for_held_load_point(
     if scene.state_count > 1:
         specs.append(fall("spring_stress", -scene.mu_star))
         below = _MIN_LEVEL_SPACING
-        while log_slip_rate_at_norm - below > STOPPED_LOG_SLIP_RATE:
+        while log_slip_rate_at_norm - below > Scene.STOPPED_LOG_SLIP_RATE:
             specs.append(fall("log_slip_rate", log_slip_rate_at_norm - below))
             below += max(_MIN_LEVEL_SPACING, _RELATIVE_LEVEL_SPACING * below)
     return specs
@@ -122,7 +114,7 @@ def _no_later_peak_reaches_norm(scene: Scene, event: Event) -> bool:
     slows = event.kind is EventKind.START and event.point.log_slip_rate_derivative <= 0.0
     if scene.state_count == 1:
         return slows or event.kind is EventKind.MAXIMUM
-    if event.regime == RUPTURE_REGIME or not (slows or event.kind is EventKind.FALL):
+    if event.regime == Scene.RUPTURE_REGIME or not (slows or event.kind is EventKind.FALL):
         return False
     return scene.mu_star + event.point.spring_stress <= 0.0 or _stays_below_norm(scene, event.point)
 
@@ -137,10 +129,8 @@ def _stays_below_norm(scene: Scene, point: MotionPoint) -> bool:
     Pore pressure raises ln V by at most the loss of strength due to pore pressure, divided by a. At
     the increased ln V, the states must weaken friction more slowly than spring stress decreases.
     """
-    _value, slope, shift, shift_slope = build_friction_relation(scene, point.psis)(
-        point.frictional_stress
-    )
-    states, evolve = range(scene.parts.law.state_count), build_state_evolution_function(scene)
+    _value, slope, shift, shift_slope = scene.friction_relation(point.psis)(point.frictional_stress)
+    states, evolve = range(scene.parts.law.state_count), scene.state_evolution_function()
     strengthening = evolve(point.log_slip_rate, point.psis, shift)
     if min(strengthening[i] for i in states) < 0.0:
         return False
@@ -150,9 +140,9 @@ def _stays_below_norm(scene: Scene, point: MotionPoint) -> bool:
     fallen = scene.stiffness * slope * (1.0 - _MAX_WEAKENING_OVER_SPRING_UNLOADING)
     for distance in _TESTED_LOG_RATE_DECREASES:
         x = point.log_slip_rate - distance
-        rest = compute_steady_states(scene, x, shift)
-        later = compute_steady_states(
-            scene, x - fallen / scene.a, shift - scene.stiffness * shift_slope
+        rest = scene.compute_steady_states(x, shift)
+        later = scene.compute_steady_states(
+            x - fallen / scene.a, shift - scene.stiffness * shift_slope
         )
         weakening = evolve(x + raised, rest, least_shift)
         if -sum(weakening[i] for i in states) > fallen or any(later[i] < rest[i] for i in states):
@@ -169,7 +159,7 @@ def _bound_pore_pressure_effect(scene: Scene, point: MotionPoint) -> tuple[float
     increase.
     """
     fluid, psis = scene.parts.fluid, point.psis
-    value, _slope, shift, _ = build_friction_relation(scene, psis)(point.frictional_stress)
+    value, _slope, shift, _ = scene.friction_relation(psis)(point.frictional_stress)
     if not fluid.unknowns:
         return 0.0, shift
     own = psis[-len(fluid.unknowns) :]
@@ -177,7 +167,7 @@ def _bound_pore_pressure_effect(scene: Scene, point: MotionPoint) -> tuple[float
         pressure = fluid.highest_pressure(point.log_slip_rate + bound, own)
         if math.isinf(pressure):
             break
-        weaker, _slope, shift, _ = build_friction_relation(scene, (*psis[:-1], pressure))(
+        weaker, _slope, shift, _ = scene.friction_relation((*psis[:-1], pressure))(
             point.frictional_stress
         )
         if weaker - value < bound * scene.a:

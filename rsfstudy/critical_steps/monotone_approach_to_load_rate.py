@@ -20,15 +20,7 @@ from collections.abc import Callable
 import numpy as np
 
 from rsfstudy.motion import EventSpecification, rise
-from rsfstudy.slider import (
-    MotionPoint,
-    Scene,
-    build_friction_relation,
-    build_state_evolution_function,
-    compute_steady_states,
-    frictional_stress_for_friction,
-    steady_friction_minus_reference,
-)
+from rsfstudy.slider import MotionPoint, Scene
 
 #: Differences ln V_0 - ln V at which the motion is tested for a monotonic rise.
 _TESTED_LOG_DISTANCES_BELOW_LOAD_RATE = (
@@ -116,7 +108,7 @@ def rises_monotonically_to_load_rate(scene: Scene, point: MotionPoint) -> bool:
     def farthest(x: float) -> float:
         return _LAG_FACTOR * change(x, 0.0)[1]
 
-    lag = point.state - compute_steady_states(scene, point.log_slip_rate, 0.0)[0]
+    lag = point.state - scene.compute_steady_states(point.log_slip_rate, 0.0)[0]
     # The sign of the lag is the sign of b.
     side = math.copysign(1.0, scene.b)
     if not 0.0 <= side * lag <= side * farthest(point.log_slip_rate):
@@ -144,26 +136,26 @@ def _build_log_rate_and_state_lag_derivatives(
     no stress corresponds to the friction at this slip rate and lag.
     """
     relation, evolution = (
-        build_friction_relation(scene),
+        scene.friction_relation(),
         build_single_state_evolution_function(scene),
     )
 
     def at(x: float, lag: float) -> tuple[float, float]:
-        friction = frictional_stress_for_friction(
-            scene, steady_friction_minus_reference(scene, x) + lag
+        friction = scene.frictional_stress_for_friction(
+            scene.steady_friction_minus_reference(x) + lag
         )
         if friction is None:
             return np.nan, np.nan
         _value, slope, _shift, shift_slope = relation(friction)
         rest, damping = (
-            compute_steady_states(scene, x, 0.0)[0],
+            scene.compute_steady_states(x, 0.0)[0],
             scene.dynamics.radiated_stress_slope(x),
         )
         pulled = scene.stiffness * float(np.expm1(scene.log_load_velocity - x))
         evolves = evolution(x, rest + lag)
         faster = (slope * pulled - evolves) / (scene.a + slope * damping)
         follows = (
-            compute_steady_states(scene, x + _DIFFERENCE_STEP, 0.0)[0] - rest
+            scene.compute_steady_states(x + _DIFFERENCE_STEP, 0.0)[0] - rest
         ) / _DIFFERENCE_STEP
         return faster, evolves - shift_slope * (pulled - damping * faster) - follows * faster
 
@@ -183,5 +175,5 @@ def build_single_state_evolution_function(scene: Scene) -> Callable[[float, floa
     callable
         Function ``(ln(V/V_*), state) -> change of the state per unit slip``.
     """
-    evolve = build_state_evolution_function(scene)
+    evolve = scene.state_evolution_function()
     return lambda log_slip_rate, state: evolve(log_slip_rate, (state,), 0.0)[0]

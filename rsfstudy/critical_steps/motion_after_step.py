@@ -25,13 +25,11 @@ from rsfstudy.motion import (
     EventKind,
     Integrator,
     approach_to_steady_state,
-    initial_point,
     maximum,
     minimum,
     rise,
-    slow_manifold_point,
 )
-from rsfstudy.slider import RUPTURE_REGIME, MotionPoint, Scene, equations_without_mass
+from rsfstudy.slider import MotionPoint, Scene
 
 #: Largest amplitude of ln V for which linear theory predicts the growth of oscillations.
 _MAX_LINEAR_LOG_RATE_AMPLITUDE = 0.05
@@ -160,9 +158,9 @@ def _max_log_slip_rate_of_closed_orbit(scene: Scene, integrator: Integrator) -> 
     integrated backwards in time to the previous peak. The rest of the orbit may reach slip rates of
     1e-40 V_*, at which an integration would lose all digits.
     """
-    begin = initial_point(scene)
+    begin = Integrator.initial_point(scene)
     equations, start = (
-        equations_without_mass(scene, with_time=False),
+        scene.equations_without_mass(with_time=False),
         (begin.spring_stress, begin.psi),
     )
     rising, norm = (
@@ -218,7 +216,7 @@ def _slow_orbit_grows_to_norm(
                 strict=True,
             )
         )
-        beyond = slow_manifold_point(scene, spring_stress, tuple(psis))
+        beyond = scene.slow_manifold_point(spring_stress, tuple(psis))
         orbit = _follow_one_orbit(
             scene, steady_state, beyond, integrator, with_inertia=with_inertia
         )
@@ -286,7 +284,7 @@ def _follow_one_orbit(
             if len(peaks) > 1 and _peaks_have_stopped_growing(peaks, steady_state, integrator):
                 return _OrbitOutcome(tuple(peaks), reached_norm=False)
             slow = len(peaks) > 1 and peaks[-1] - peaks[-2] < 0.2 * (norm - top)
-            if slow and not steady_state.is_stable and event.regime != RUPTURE_REGIME:
+            if slow and not steady_state.is_stable and event.regime != Scene.RUPTURE_REGIME:
                 return _OrbitOutcome(tuple(peaks), False, event.point)
     raise AssertionError("a motion never ends by itself")
 

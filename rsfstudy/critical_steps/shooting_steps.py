@@ -19,7 +19,7 @@ from scipy.optimize import brentq
 from rsfstudy.critical_steps.critical_path import CriticalPath
 from rsfstudy.critical_steps.stability_after_step import is_linearly_stable
 from rsfstudy.motion import Integrator
-from rsfstudy.slider import Scene, quasi_static_log_slip_rate
+from rsfstudy.slider import Scene
 
 #: Smallest step size of the search. The second number is the largest ratio of the smallest to the
 #: largest step size.
@@ -300,7 +300,7 @@ def slip_lag_due_to_inertia(scene: Scene) -> tuple[float, float]:
     rate : float
         Slip rate immediately after the step without inertia, in units of V_*.
     """
-    rate = math.exp(quasi_static_log_slip_rate(scene, scene.spring_stress_step, 0.0))
+    rate = math.exp(scene.quasi_static_log_slip_rate(scene.spring_stress_step, 0.0))
     return scene.stiffness / scene.a * (scene.inertial_time * rate) ** 2, rate
 
 

@@ -7,13 +7,7 @@ from dataclasses import dataclass
 from functools import cached_property
 
 from rsfstudy.motion import MotionStopped
-from rsfstudy.slider import (
-    Scene,
-    SteadySliding,
-    critical_stiffness,
-    linear_growth_rates,
-    steady_sliding,
-)
+from rsfstudy.slider import Scene, SteadySliding
 from rsfstudy.status import Status
 
 #: Smallest significant difference from neutral stability. The limit applies to the relative
@@ -51,7 +45,7 @@ class SteadySlidingWithMargin(SteadySliding):
         if at_every_rate and not scene.has_mass and not scene.parts.loading.unknowns:
             margin = stiffness_ratio_after_step(scene) - 1.0
         else:
-            critical = critical_stiffness(scene, self.log_slip_rate)
+            critical = scene.critical_stiffness_at(self.log_slip_rate)
             margin = scene.stiffness / critical - 1.0 if critical > 0.0 else math.inf
         if (
             margin < -_NEUTRAL_STABILITY_MARGIN
@@ -219,7 +213,7 @@ def steady_sliding_with_margin(scene: Scene) -> SteadySlidingWithMargin:
         If sliding cannot be steady at the load point velocity.
     """
     load = scene.log_load_velocity
-    sliding = steady_sliding(scene, load)
+    sliding = scene.steady_sliding(load)
     if sliding is None:
         raise MotionStopped(
             Status.NO_STEADY_STATE,
@@ -234,5 +228,5 @@ def _is_stable_to_small_perturbations(scene: Scene) -> bool:
     With several states, perturbations may decay below the critical stiffness.
     """
     return bool(
-        linear_growth_rates(scene, scene.log_load_velocity)[0].real < -_NEUTRAL_STABILITY_MARGIN
+        scene.linear_growth_rates(scene.log_load_velocity)[0].real < -_NEUTRAL_STABILITY_MARGIN
     )

@@ -26,15 +26,10 @@ from rsfstudy.critical_steps.stability_after_step import (
     may_have_closed_orbits,
     stability_margin,
 )
-from rsfstudy.motion import Integrator, MotionStopped, slow_manifold_point
+from rsfstudy.motion import Integrator, MotionStopped
 from rsfstudy.slider import (
     Scene,
-    compute_steady_states,
     effective_friction,
-    frictional_stress_after_jump,
-    min_steady_log_slip_rate,
-    quasi_static_log_slip_rate,
-    steady_sliding,
 )
 from rsfstudy.status import Status
 
@@ -116,7 +111,7 @@ class LoadVelocityStepFamily(ShootingStepFamily):
         """
         if self.sign > 0:
             return self.scene.log_instability_rate
-        scene, slowest = self.scene, min_steady_log_slip_rate(self.scene)
+        scene, slowest = self.scene, self.scene.min_steady_log_slip_rate()
         return (
             min(-math.log(MIN_LOAD_VELOCITY), -slowest) if scene.log_instability_rate > 0.0 else 0.0
         )
@@ -194,7 +189,7 @@ class DisplacementStepFamily(StepFamily):
         """
 
         def after(step: float) -> float:
-            log_slip_rate = quasi_static_log_slip_rate(self.scene, self.scene.stiffness * step, 0.0)
+            log_slip_rate = self.scene.quasi_static_log_slip_rate(self.scene.stiffness * step, 0.0)
             return math.exp(log_slip_rate) if log_slip_rate < _LOG_OF_MAX_FLOAT else math.inf
 
         weakening = self.scene.parts.law.b_over_a - 1.0
@@ -238,8 +233,8 @@ class DisplacementStepFamily(StepFamily):
             weakest = scene.parts.normal_stress.min_frictional_stress(scene)
             return min(scene.mu_star, -weakest) / scene.stiffness
         farther = LOG_RATE_EXTENSION_OF_MAX_STEP_FOR_INERTIA if scene.has_mass else 0.0
-        friction = frictional_stress_after_jump(
-            scene, scene.a * (scene.log_instability_rate + farther)
+        friction = scene.frictional_stress_after_jump(
+            scene.a * (scene.log_instability_rate + farther)
         )
         if friction is None:
             return _MAX_SPRING_STRESS / scene.stiffness
@@ -416,13 +411,13 @@ class NormalStressStepFamily(ShootingStepFamily):
         """
         scene = self.scene_with_step(step_size)
         load = scene.log_load_velocity
-        return load == -math.inf or steady_sliding(scene, load) is not None
+        return load == -math.inf or scene.steady_sliding(load) is not None
 
     def _log_slip_rate_after_step(self, step_size: float) -> float:
         """Return ln(V/V_*) immediately after the step, without inertia."""
         scene = self.scene_with_step(step_size).without_mass()
-        steady_states = compute_steady_states(scene, 0.0, 0.0)
-        return slow_manifold_point(scene, scene.spring_stress_step, steady_states).log_slip_rate
+        steady_states = scene.compute_steady_states(0.0, 0.0)
+        return scene.slow_manifold_point(scene.spring_stress_step, steady_states).log_slip_rate
 
 
 def _reaches_norm_at_loose_tolerance(scene: Scene, integrator: Integrator) -> bool:

@@ -13,7 +13,9 @@ from typing import TYPE_CHECKING
 from rsfstudy._lazy_exports import build_lazy_export_functions
 
 if TYPE_CHECKING:
-    from rsfstudy.execution.cell_plan import CellPlan, estimate_evaluations_and_time
+    from rsfstudy.execution.cell_plan import (
+        CellPlan,
+    )
     from rsfstudy.execution.clusters import connect_to_cluster
     from rsfstudy.execution.preparation import prepare_study_run
     from rsfstudy.execution.provenance import provenance_attributes, run_fingerprint
@@ -24,7 +26,7 @@ else:
         __name__,
         {
             "execution.clusters": ("connect_to_cluster",),
-            "execution.cell_plan": ("CellPlan", "estimate_evaluations_and_time"),
+            "execution.cell_plan": ("CellPlan",),
             "execution.preparation": ("prepare_study_run",),
             "execution.provenance": ("provenance_attributes", "run_fingerprint"),
             "execution.study_run": ("OutputOptions", "ProgressCallback"),
@@ -38,7 +40,6 @@ __all__ = [
     "ProgressCallback",
     "WorkerPool",
     "connect_to_cluster",
-    "estimate_evaluations_and_time",
     "prepare_study_run",
     "provenance_attributes",
     "run_fingerprint",

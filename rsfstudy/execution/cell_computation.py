@@ -25,12 +25,12 @@ from typing import TYPE_CHECKING
 import cloudpickle
 import numpy as np
 
-from rsfstudy.defaults import CELL_TIME_LIMIT
+from rsfstudy.defaults import Defaults
 from rsfstudy.errors import InvalidValue, RunError, shorten_text
 from rsfstudy.execution import provenance
 from rsfstudy.measures import Measure, Outcome
-from rsfstudy.motion import Accuracy, compilation_log, register_user_steppers
-from rsfstudy.slider import Scene, UserPart, register_user_parts
+from rsfstudy.motion import Accuracy, Engine
+from rsfstudy.slider import Scene, SceneFields, UserPart
 from rsfstudy.status import Status
 from rsfstudy.storage import OutputPacker, StoredCellRow
 from rsfstudy.study import STUDIES_PACKAGE, Cell, CellChanges
@@ -83,7 +83,7 @@ class CellTask:
     base_scene: Scene
     measure: Measure
     accuracy: Accuracy
-    time_limit: float = CELL_TIME_LIMIT
+    time_limit: float = Defaults.CELL_TIME_LIMIT
     user_parts: tuple[UserPart, ...] = ()
     user_stepper_classes: tuple[type, ...] = ()
     code_fingerprint: Mapping[str, str] = field(default_factory=dict)
@@ -254,14 +254,14 @@ def compute_batch(serialized_task: bytes, packed_batch: bytes) -> bytes:
         task.origin_process_id == _PROCESS_ID
     )  # A worker may be a thread of the process of the user.
     if not ours:
-        compilation_log.create_context_while_compiling = _cpu_time_limits.suspend_temporarily
+        Engine.compilation_log.create_context_while_compiling = _cpu_time_limits.suspend_temporarily
     with (
         contextlib.nullcontext()
         if ours
         else _cpu_time_limits.enforce_in_this_thread(task.time_limit)
     ):
-        register_user_parts(task.user_parts)
-        register_user_steppers(task.user_stepper_classes)
+        SceneFields.register_user_parts(task.user_parts)
+        Engine.register_user_steppers(task.user_stepper_classes)
         for key, *changes in pickle.loads(zlib.decompress(packed_batch)):
             cell = CellChanges(*changes).build_cell(task.base_scene)
             finished.append(task.output_packer.pack_cell(key, *compute_cell(task, cell)))
@@ -294,7 +294,7 @@ def compute_cell(
     wall_time : float
         Wall time in s, excluding the compilation of code.
     """
-    begin = time.perf_counter() - compilation_log.total_compilation_seconds
+    begin = time.perf_counter() - Engine.compilation_log.total_compilation_seconds
     try:
         outcome = task.measure.with_(**cell.measure_changes)(cell.scene, task.accuracy)
     except propagated_exceptions:
@@ -305,7 +305,7 @@ def compute_cell(
         outcome = Outcome(Status.CELL_RAISED, message=text)
     if outcome.message:
         outcome = replace(outcome, message=_shorten_message_for_storage(outcome.message))
-    return outcome, time.perf_counter() - compilation_log.total_compilation_seconds - begin
+    return outcome, time.perf_counter() - Engine.compilation_log.total_compilation_seconds - begin
 
 
 def _shorten_message_for_storage(message: str) -> str:

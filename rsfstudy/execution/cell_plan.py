@@ -18,7 +18,7 @@ import numpy as np
 
 from rsfstudy.errors import InvalidValue
 from rsfstudy.measures import Measure
-from rsfstudy.motion import COMPILED, PYTHON, SCIPY
+from rsfstudy.motion import Engine
 from rsfstudy.slider import Scene
 from rsfstudy.storage import LatticeCoordinates
 from rsfstudy.study import CellChanges, Study
@@ -29,7 +29,7 @@ _GOLDEN_SECTION_RATIO = (math.sqrt(5.0) - 1.0) / 2.0
 #: cells of its batch are lost.
 _TARGET_SECONDS_PER_BATCH, MAX_BATCH_SIZE = 0.3, 5000
 #: Typical time per right-hand-side evaluation in s, by engine, including all overheads.
-_SECONDS_PER_RHS_EVALUATION = {SCIPY: 1.2e-5, PYTHON: 8e-6, COMPILED: 5e-7}
+_SECONDS_PER_RHS_EVALUATION = {Engine.SCIPY: 1.2e-5, Engine.PYTHON: 8e-6, Engine.COMPILED: 5e-7}
 
 
 def compute_cell_key(scene: Scene, measure: Measure) -> bytes:
@@ -139,6 +139,25 @@ class CellPlan:
         """
         keys: list[bytes] = self.keys[cell_numbers].tolist()
         return zip(keys, map(self.study.cell_changes, cell_numbers.tolist()), strict=True)
+
+    def estimate_evaluations_and_time(self) -> tuple[int, float]:
+        """Estimate the cost of the distinct cells of a study.
+
+        The estimate uses a typical number of right-hand-side evaluations for the measure. The
+        estimate does not depend on the scenes of the cells.
+
+        Returns
+        -------
+        rhs_evaluations : int
+            Expected number of right-hand-side evaluations at the accuracy of the study.
+        seconds : float
+            Expected time in s on one core.
+        """
+        accuracy = self.study.accuracy
+        work = len(self.unique_cell_numbers) * self.study.measure.expected_work(accuracy)
+        return round(work), work * _SECONDS_PER_RHS_EVALUATION.get(
+            accuracy.engine, _SECONDS_PER_RHS_EVALUATION[Engine.SCIPY]
+        )
 
 
 def _add_failure_counts_to_error(
@@ -254,28 +273,3 @@ def order_cells_by_golden_section(cell_numbers: np.ndarray) -> np.ndarray:
     while math.gcd(stride, count) > 1:
         stride += 1
     return np.asarray(cell_numbers[np.arange(count) * stride % max(1, count)])
-
-
-def estimate_evaluations_and_time(plan: CellPlan) -> tuple[int, float]:
-    """Estimate the cost of the distinct cells of a study.
-
-    The estimate uses a typical number of right-hand-side evaluations for the measure. The estimate
-    does not depend on the scenes of the cells.
-
-    Parameters
-    ----------
-    plan : CellPlan
-        Plan of the study.
-
-    Returns
-    -------
-    rhs_evaluations : int
-        Expected number of right-hand-side evaluations at the accuracy of the study.
-    seconds : float
-        Expected time in s on one core.
-    """
-    accuracy = plan.study.accuracy
-    work = len(plan.unique_cell_numbers) * plan.study.measure.expected_work(accuracy)
-    return round(work), work * _SECONDS_PER_RHS_EVALUATION.get(
-        accuracy.engine, _SECONDS_PER_RHS_EVALUATION[SCIPY]
-    )

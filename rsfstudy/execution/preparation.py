@@ -6,7 +6,7 @@ from rsfstudy.execution import provenance
 from rsfstudy.execution.cell_computation import CellTask, compute_serially, serialize_task
 from rsfstudy.execution.study_run import OutputOptions, StudyRun
 from rsfstudy.execution.worker_pool import WorkerPool
-from rsfstudy.motion import find_user_stepper
+from rsfstudy.motion import Engine
 from rsfstudy.study import Study
 
 
@@ -38,7 +38,7 @@ def prepare_study_run(study: Study, options: OutputOptions, workers: WorkerPool)
         study.accuracy,
         workers.cell_time_limit,
         user_parts=tuple(study.user_parts.values()),
-        user_stepper_classes=find_user_stepper(study.accuracy.engine),
+        user_stepper_classes=Engine.find_user_stepper(study.accuracy.engine),
         code_fingerprint=provenance.code_fingerprint(study.accuracy.engine, study.user_classes),
     )
     if workers.make_cell_batch_mapper() is not compute_serially:

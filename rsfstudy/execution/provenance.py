@@ -21,7 +21,7 @@ from typing import TYPE_CHECKING, Any
 
 from rsfstudy.execution import code_digest
 from rsfstudy.execution.module_graph import ModuleGraph
-from rsfstudy.motion import COMPILED, SCIPY
+from rsfstudy.motion import Engine
 from rsfstudy.slider import Scene
 
 if TYPE_CHECKING:
@@ -69,7 +69,9 @@ def read_physics_sources(package_directory: Path) -> dict[str, bytes]:
 _modules_at_import = ModuleGraph(read_physics_sources(_PACKAGE_DIRECTORY))
 
 
-def code_fingerprint(engine: str = SCIPY, user_classes: Iterable[object] = ()) -> dict[str, str]:
+def code_fingerprint(
+    engine: str = Engine.SCIPY, user_classes: Iterable[object] = ()
+) -> dict[str, str]:
     """Collect the versions and code digests that affect the results of cells.
 
     Parameters
@@ -284,7 +286,7 @@ def package_versions(name: str) -> dict[str, str]:
         Versions by package name. The dictionary is empty unless the engine compiles the equations
         of motion.
     """
-    if name != COMPILED:
+    if name != Engine.COMPILED:
         return {}
     # The versions are read from the metadata, because importing numba would delay every command.
     from importlib.metadata import PackageNotFoundError, version

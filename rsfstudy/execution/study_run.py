@@ -15,7 +15,7 @@ from pathlib import Path
 import numpy as np
 import xarray as xr
 
-from rsfstudy.defaults import RESULT_FORMATS
+from rsfstudy.defaults import Defaults
 from rsfstudy.errors import DataError, Interrupted, InvalidValue, RsfStudyError, RunError
 from rsfstudy.execution import provenance
 from rsfstudy.execution.cell_computation import CellBatchMapper, CellTask, StoredCellRows
@@ -25,12 +25,10 @@ from rsfstudy.status import Status
 from rsfstudy.storage import (
     CellColumns,
     CellJournal,
+    ZarrStore,
     assemble_dataset,
-    check_store_does_not_exist,
-    check_zarr_installed,
     convert_attributes_for_netcdf,
     write_dataset,
-    write_store,
 )
 from rsfstudy.study import Study
 
@@ -79,10 +77,10 @@ class OutputOptions:
 
     def __post_init__(self) -> None:
         """Check the format and the output directory."""
-        if self.format not in RESULT_FORMATS:
-            raise InvalidValue("format", self.format, "is unknown", choices=RESULT_FORMATS)
+        if self.format not in Defaults.RESULT_FORMATS:
+            raise InvalidValue("format", self.format, "is unknown", choices=Defaults.RESULT_FORMATS)
         if self.format == "zarr":
-            check_zarr_installed()
+            ZarrStore.check_installed()
             if self.output is None:
                 raise InvalidValue("output", None, "must name a directory for a Zarr store")
 
@@ -197,7 +195,7 @@ class StudyRun:
         """
         keeping = self.options
         if keeping.format == "zarr":
-            check_store_does_not_exist(self.output_path(".zarr"))
+            ZarrStore(self.output_path(".zarr")).check_does_not_exist()
         path = None if keeping.output is None else self.output_path(".cells.sqlite")
         fingerprint, layout = self.provenance["fingerprint"], self.task.output_packer
         with CellJournal(path, fingerprint, layout, fresh=keeping.fresh) as journal:
@@ -305,13 +303,12 @@ class StudyRun:
         def read(some: slice) -> CellColumns:
             return journal.read_cells(self.plan.keys[some])
 
-        return write_store(
+        return ZarrStore(self.output_path(".zarr")).write(
             self.study,
             self.plan.coordinates,
             read,
             self.provenance,
             self._apply_reductions,
-            self.output_path(".zarr"),
         )
 
     def _save_partial_results(self, journal: CellJournal, error: BaseException) -> RunError:

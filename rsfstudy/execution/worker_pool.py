@@ -22,7 +22,7 @@ from typing import Any
 
 import numpy as np
 
-from rsfstudy.defaults import CELL_TIME_LIMIT
+from rsfstudy.defaults import Defaults
 from rsfstudy.errors import InvalidValue, RunError
 from rsfstudy.execution.cell_computation import (
     WALL_TIME_LIMIT_OVER_CPU_TIME_LIMIT,
@@ -82,7 +82,7 @@ class WorkerPool(contextlib.ExitStack):
         self,
         process_count: int = 2,
         dask_client: Any = None,
-        cell_time_limit: float = CELL_TIME_LIMIT,
+        cell_time_limit: float = Defaults.CELL_TIME_LIMIT,
         log_path: Path | None = None,
     ) -> None:
         super().__init__()

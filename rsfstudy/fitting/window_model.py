@@ -16,14 +16,9 @@ import numpy as np
 
 from rsfstudy.errors import InvalidValue
 from rsfstudy.fitting.filters import Filter
-from rsfstudy.motion import (
-    Integrator,
-    MotionStopped,
-    Recording,
-    recorded_friction_coefficient,
-)
+from rsfstudy.motion import Integrator, MotionStopped, Recording
 from rsfstudy.quantities import Quantity
-from rsfstudy.slider import Scene, build_sampled_history_from_table, replace_field_values
+from rsfstudy.slider import SampledHistory, Scene, replace_field_values
 from rsfstudy.status import Status
 
 #: Parameter values by name.
@@ -270,7 +265,7 @@ class WindowModel:
         columns[:, 1] = self.loading_segments[:, 1] / velocity
         columns[:, 2] = 1.0 - self.loading_segments[:, 2]
         columns[:, 3] = self.loading_segments[:, 3] * distance / velocity
-        history = build_sampled_history_from_table(columns, self.has_normal_stress_change, "record")
+        history = SampledHistory.from_table(columns, self.has_normal_stress_change, "record")
         parts = self.scene.parts._replace(loading=history)
         return Scene(replace_field_values(parts, parameters_to_fields(values, velocity)))
 
@@ -341,7 +336,7 @@ class WindowModel:
             return nothing
         finally:
             self.integrator.work_meter.budget = budget
-        found = recorded_friction_coefficient(recording.as_table(scene))
+        found = Recording.friction_coefficient(recording.as_table(scene))
         if len(found) != len(times):
             return nothing
         return self.filter.apply(self.time, found) if self.filter else found

@@ -12,16 +12,17 @@ from typing import TYPE_CHECKING
 from rsfstudy._lazy_exports import build_lazy_export_functions
 
 if TYPE_CHECKING:
-    from rsfstudy.limit_cycles.limit_cycle import SLIP_MODES, LimitCycle
+    from rsfstudy.limit_cycles.limit_cycle import (
+        LimitCycle,
+    )
 else:
     __getattr__, __dir__ = build_lazy_export_functions(
         __name__,
         {
-            "limit_cycles.limit_cycle": ("LimitCycle", "SLIP_MODES"),
+            "limit_cycles.limit_cycle": ("LimitCycle",),
         },
     )
 
 __all__ = [
     "LimitCycle",
-    "SLIP_MODES",
 ]

@@ -43,15 +43,15 @@ from rsfstudy.measure_base import (
     create_outputs_along_phase,
 )
 from rsfstudy.motion import (
-    MAX_ERROR_OVER_RTOL,
-    MOTION_VARIABLES,
+    Accuracy,
     Integrator,
     MotionStopped,
+    Recording,
     resample_motion_along_path,
 )
 from rsfstudy.parts import Segment
 from rsfstudy.quantities import Output
-from rsfstudy.slider import Scene, linear_growth_rates
+from rsfstudy.slider import Scene
 from rsfstudy.status import Status
 
 #: Minimum error estimate of a result, divided by the requested relative accuracy. The minimum is
@@ -112,7 +112,7 @@ _OUTPUTS = (
         "what the slider does in the end, by its peak slip rate",
         flags=SLIP_MODES,
     ),
-    *create_outputs_along_phase(*MOTION_VARIABLES),
+    *create_outputs_along_phase(*Recording.MOTION_VARIABLES),
 )
 
 
@@ -174,6 +174,8 @@ class LimitCycle(RecordingMeasure):
     phases: int = 400
     events: int = 300
     name: ClassVar[str] = "limit_cycle"
+    #: Values of ``slip_mode``, in the order of their codes.
+    SLIP_MODES: ClassVar = SLIP_MODES
     primary_output = "recurrence_interval"
     typical_work = 9_000
     outputs = _OUTPUTS
@@ -334,7 +336,7 @@ def outcome_of_settling_motion(scene: Scene) -> Outcome:
         Outcome with the status ``no_limit_cycle`` and the slip mode.
     """
     try:
-        last = linear_growth_rates(scene, scene.log_load_velocity)[0]
+        last = scene.linear_growth_rates(scene.log_load_velocity)[0]
     except ValueError:
         # The growth rates have no closed form.
         return STEADY_SLIDING_OUTCOME
@@ -411,7 +413,7 @@ def status_from_output_errors(
         Largest relative error, or an empty string.
     """
     worst = float((output_errors / _primary_output_error_scales(orbit))[outputs].max())
-    if worst <= integrator.result_tolerance(MAX_ERROR_OVER_RTOL):
+    if worst <= integrator.result_tolerance(Accuracy.MAX_ERROR_OVER_RTOL):
         return Status.OK, ""
     asked = integrator.result_tolerance()
     why = f"the cycle is known to {worst:.1e} only, where {asked:g} was asked for"

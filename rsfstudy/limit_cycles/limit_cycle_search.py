@@ -54,7 +54,7 @@ from rsfstudy.limit_cycles.stick_slip_cycles import (
     suggest_raising_event_limit,
 )
 from rsfstudy.motion import Integrator, MotionStopped
-from rsfstudy.slider import Scene, critical_stiffness
+from rsfstudy.slider import Scene
 from rsfstudy.status import Status
 
 #: Limits of the contraction ratio, the ratio of successive distances to the limit cycle. If the
@@ -173,7 +173,7 @@ class LimitCycleSearch:
 
         The explanation is an empty string if the stiffness is not close to critical.
         """
-        critical = critical_stiffness(self._scene, self._scene.log_load_velocity)
+        critical = self._scene.critical_stiffness_at(self._scene.log_load_velocity)
         off = abs(self._scene.stiffness / critical - 1.0) if critical else math.inf
         if off > _CRITICAL_STIFFNESS_TOLERANCE:
             return ""

@@ -48,15 +48,8 @@ from rsfstudy.limit_cycles.stick_slip_cycles import (
     Cycle,
     iterate_cycles,
 )
-from rsfstudy.motion import (
-    Accuracy,
-    Integrator,
-    MotionStopped,
-    Recording,
-    compute_restart_point,
-    point_with_slip_rate,
-)
-from rsfstudy.slider import MotionPoint, Numbers, Scene, equations_without_mass
+from rsfstudy.motion import Accuracy, Integrator, MotionStopped, Recording
+from rsfstudy.slider import MotionPoint, Numbers, Scene
 from rsfstudy.status import Status
 
 #: Step of the finite differences of the return map, divided by the product of a and the range of ln
@@ -271,9 +264,9 @@ class ReturnMap:
             If forward slip is impossible at this spring stress.
         """
         spring_stress, *psis = section.tolist()
-        point = compute_restart_point(self.scene, spring_stress, tuple(psis))
+        point = Integrator.restart_point(self.scene, spring_stress, tuple(psis))
         return (
-            point_with_slip_rate(self.scene, point, self.scene.log_load_velocity)
+            Integrator.point_with_slip_rate(self.scene, point, self.scene.log_load_velocity)
             if self._inertia_matters_at(point)
             else point
         )
@@ -400,7 +393,7 @@ class ReturnMap:
         spring_stress = point.frictional_stress + scene.dynamics.radiated_stress(
             scene.log_load_velocity
         )
-        rates = equations_without_mass(scene, with_time=True).evaluate_rates(
+        rates = scene.equations_without_mass(with_time=True).evaluate_rates(
             (spring_stress, *point.psis, 0.0)
         )
         rest = (0.0,) * (PRIMARY_OUTPUT_COUNT_PER_CYCLE - 1)

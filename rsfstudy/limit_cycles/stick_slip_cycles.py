@@ -27,10 +27,9 @@ from rsfstudy.motion import (
     fall,
     maximum,
     minimum,
-    recorded_row,
     rise,
 )
-from rsfstudy.slider import RUPTURE_REGIME, MotionPoint, Scene
+from rsfstudy.slider import MotionPoint, Scene
 
 LN10 = math.log(10.0)
 #: Number of main results of a cycle.
@@ -230,9 +229,9 @@ def recorded_rows_of_cycles(
     slip = (
         scene.load_velocity * passed - (end.spring_stress - begin.spring_stress) / scene.stiffness
     )
-    last = recorded_row(scene, passed, slip, end, 0)
+    last = Recording.row_at_point(scene, passed, slip, end, 0)
     if recording is None:
-        return np.stack([recorded_row(scene, 0.0, 0.0, begin, 0), last])
+        return np.stack([Recording.row_at_point(scene, 0.0, 0.0, begin, 0), last])
     # The last integration step extends beyond the end of the last cycle.
     return recording.table_up_to_row(scene, last)
 
@@ -297,6 +296,6 @@ def _find_arrest_point(events: Sequence[Event]) -> MotionPoint | None:
     fallen = False
     for event in events:
         fallen = fallen or event.kind is _FALL
-        if fallen and event.regime != RUPTURE_REGIME:
+        if fallen and event.regime != Scene.RUPTURE_REGIME:
             return event.point
     return None

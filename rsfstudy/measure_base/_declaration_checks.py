@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from rsfstudy.errors import InvalidValue
-from rsfstudy.motion import DEFAULT_RTOL, MAX_RTOL, MIN_RTOL, Accuracy
+from rsfstudy.motion import Accuracy
 
 #: Type of a result: a number, or an array along inner dimensions.
 OutputValue = float | np.ndarray
@@ -40,7 +40,7 @@ def check_declared_work_estimates(
     """
     if not isinstance(typical_work, int | float) or not 0 < typical_work < np.inf:
         raise InvalidValue("typical_work", typical_work, "must be a number greater than 0")
-    for tolerance in (MIN_RTOL, DEFAULT_RTOL, MAX_RTOL):
+    for tolerance in (Accuracy.MIN_RTOL, Accuracy.DEFAULT_RTOL, Accuracy.MAX_RTOL):
         expected = expected_work(Accuracy(tolerance))
         if not 0 < expected < np.inf:
             raise InvalidValue("expected_work", expected, f"must exceed 0, at rtol {tolerance:g}")

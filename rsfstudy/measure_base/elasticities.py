@@ -16,12 +16,12 @@ from rsfstudy.errors import InvalidValue
 from rsfstudy.measure_base.measure import Measure, Outcome, OutputValue
 from rsfstudy.motion import Integrator, MotionStopped
 from rsfstudy.quantities import Output, Quantity
-from rsfstudy.slider import SCENE_FIELD_TYPES, Scene
+from rsfstudy.slider import Scene, SceneFields
 from rsfstudy.status import Status
 
 #: Fields of a scene that hold numbers.
 NUMERIC_SCENE_FIELDS = tuple(
-    name for name, kind in SCENE_FIELD_TYPES.items() if kind in (float, float | None)
+    name for name, kind in SceneFields.TYPES.items() if kind in (float, float | None)
 )
 #: Parameters of a rig that are not fields of a scene, and advice on computing elasticities with
 #: respect to these parameters.

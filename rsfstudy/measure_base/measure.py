@@ -26,17 +26,14 @@ from rsfstudy.measure_base import _declaration_checks
 from rsfstudy.measure_base._declaration_checks import OutputValue as OutputValue
 from rsfstudy.measure_base._declaration_checks import PlainValue
 from rsfstudy.motion import (
-    MAX_ERROR_OVER_RTOL,
     Accuracy,
     Integrator,
     MotionStopped,
     WorkMeter,
     accept_accuracy_and_meter,
-    adapt_former_compute,
-    suggest_raising_budget,
 )
 from rsfstudy.quantities import Output, Quantity, is_variable_name
-from rsfstudy.slider import SCENE_FIELD_NAMES, Scene, cached_attribute
+from rsfstudy.slider import Scene, SceneFields, cached_attribute
 from rsfstudy.status import Status
 from rsfstudy.vocabulary import FORMULAS_OF_DERIVED_COORDINATES
 
@@ -78,7 +75,7 @@ RESERVED_NAMES = frozenset(
         "message",
         "rhs_evaluations",
         "wall_time",
-        *SCENE_FIELD_NAMES,
+        *SceneFields.NAMES,
         *FORMULAS_OF_DERIVED_COORDINATES,
     }
 )
@@ -151,7 +148,7 @@ class Measure(ConstructorKeywordCheckMixin):
         """Adopt former names of members that the subclass defines."""
         super().__init_subclass__()
         add_new_names_for_former_members(cls)
-        adapt_former_compute(cls)
+        accept_accuracy_and_meter(cls)
 
     @property
     def primary_output(self) -> str:
@@ -380,7 +377,7 @@ class Measure(ConstructorKeywordCheckMixin):
         """
         outcome, meter = self.run_metered(scene, accuracy)
         if outcome.status is Status.WORK_BUDGET_SPENT and meter.evaluations > meter.budget:
-            return replace(outcome, message=outcome.message + suggest_raising_budget(meter.budget))
+            return replace(outcome, message=outcome.message + meter.budget_advice)
         return outcome
 
     @accept_accuracy_and_meter
@@ -493,7 +490,7 @@ class Measure(ConstructorKeywordCheckMixin):
         values, doubts = outcome.values, []
         for name, scale in self.error_scales(scene, values).items():
             error, asked = values.get(f"{name}_error", 0.0), integrator.result_tolerance() * scale
-            if error > MAX_ERROR_OVER_RTOL * asked:
+            if error > Accuracy.MAX_ERROR_OVER_RTOL * asked:
                 text = f"{name} = {values[name]:.6g} is known to {error:.2g}, and {asked:.2g}"
                 doubts.append(f"{text} was asked for")
         if not doubts:
@@ -567,9 +564,9 @@ def _check_names_declared_by_measure(measure: Measure) -> None:
             odd = about.name if isinstance(about, Quantity) else about
             raise InvalidValue("quantities", odd, "describes nothing measured", choices=known)
     for name in measure.solved_fields:
-        if name not in SCENE_FIELD_NAMES:
+        if name not in SceneFields.NAMES:
             raise InvalidValue(
-                "solved_fields", name, "is not a field of a scene", choices=SCENE_FIELD_NAMES
+                "solved_fields", name, "is not a field of a scene", choices=SceneFields.NAMES
             )
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from rsfstudy.motion import MotionStopped
-from rsfstudy.slider import Scene, largest_linear_growth_rate
+from rsfstudy.slider import Scene
 from rsfstudy.status import Status
 
 
@@ -26,7 +26,7 @@ def steady_sliding_is_linearly_stable(scene: Scene) -> bool:
         With the status ``no_steady_state`` if steady sliding does not exist, and with the status
         ``unverified`` if the largest growth rate is zero within its error.
     """
-    growth = largest_linear_growth_rate(scene.segment_scene(-1), scene.log_load_velocity)
+    growth = scene.segment_scene(-1).largest_linear_growth_rate(scene.log_load_velocity)
     if growth is None:
         text = f"no steady state exists at V_0/V_* = {scene.load_velocity:.3g}"
         raise MotionStopped(Status.NO_STEADY_STATE, text)

@@ -17,26 +17,10 @@ from rsfstudy._lazy_exports import build_lazy_export_functions
 
 if TYPE_CHECKING:
     from rsfstudy.motion.accuracy import (
-        DEFAULT_EVALUATION_BUDGET,
-        DEFAULT_RTOL,
-        MAX_ERROR_OVER_RTOL,
-        MAX_RTOL,
-        MIN_RTOL,
-        RELATIVE_ROUNDING_ERROR,
         Accuracy,
         estimate_error,
     )
-    from rsfstudy.motion.engine_factory import check_engine_is_usable, import_compiled_engine
-    from rsfstudy.motion.engines import (
-        COMPILED,
-        ENGINES,
-        PYTHON,
-        SCIPY,
-        compilation_log,
-        find_user_stepper,
-        is_engine_installed,
-        register_user_steppers,
-    )
+    from rsfstudy.motion.engine_factory import Engine
     from rsfstudy.motion.events import (
         Event,
         EventKind,
@@ -47,37 +31,22 @@ if TYPE_CHECKING:
         minimum,
         rise,
     )
-    from rsfstudy.motion.former_arguments import accept_accuracy_and_meter, adapt_former_compute
-    from rsfstudy.motion.initial_points import (
-        compute_restart_point,
-        initial_point,
-        point_before_start,
-        point_with_slip_rate,
-        slow_manifold_point,
+    from rsfstudy.motion.former_arguments import (
+        accept_accuracy_and_meter,
     )
     from rsfstudy.motion.integrator import Integrator
     from rsfstudy.motion.motion_driver import MotionDriver
     from rsfstudy.motion.neglected_inertia_error import estimate_neglected_inertia_error
     from rsfstudy.motion.recorded_motion_readings import (
-        recorded_friction_coefficient,
-        recorded_load_point_displacement,
         resample_motion_along_path,
     )
     from rsfstudy.motion.recording import (
-        FIRST_STATE_COLUMN,
-        MOTION_VARIABLES,
-        RECORDED_VARIABLES,
-        REGIME_COLUMN,
-        SAMPLE_COLUMN,
         Recording,
-        recorded_row,
     )
     from rsfstudy.motion.root_finding import build_root_finder
     from rsfstudy.motion.work_meter import (
-        MIN_LOCAL_TOLERANCE,
         MotionStopped,
         WorkMeter,
-        suggest_raising_budget,
     )
 else:
     __getattr__, __dir__ = build_lazy_export_functions(
@@ -85,26 +54,10 @@ else:
         {
             "motion.accuracy": (
                 "Accuracy",
-                "DEFAULT_EVALUATION_BUDGET",
-                "DEFAULT_RTOL",
-                "MAX_ERROR_OVER_RTOL",
-                "MAX_RTOL",
-                "MIN_RTOL",
-                "RELATIVE_ROUNDING_ERROR",
                 "estimate_error",
             ),
             "motion.motion_driver": ("MotionDriver",),
-            "motion.engine_factory": ("check_engine_is_usable", "import_compiled_engine"),
-            "motion.engines": (
-                "COMPILED",
-                "ENGINES",
-                "PYTHON",
-                "SCIPY",
-                "compilation_log",
-                "is_engine_installed",
-                "register_user_steppers",
-                "find_user_stepper",
-            ),
+            "motion.engine_factory": ("Engine",),
             "motion.events": (
                 "Event",
                 "EventKind",
@@ -115,90 +68,40 @@ else:
                 "minimum",
                 "rise",
             ),
-            "motion.initial_points": (
-                "initial_point",
-                "slow_manifold_point",
-                "point_before_start",
-                "compute_restart_point",
-                "point_with_slip_rate",
-            ),
-            "motion.former_arguments": ("accept_accuracy_and_meter", "adapt_former_compute"),
+            "motion.former_arguments": ("accept_accuracy_and_meter",),
             "motion.integrator": ("Integrator",),
+            # Former export, which the method of ``Scene`` replaces.
+            "slider.equations": ("slow_manifold_point",),
             "motion.work_meter": (
-                "MIN_LOCAL_TOLERANCE",
                 "MotionStopped",
                 "WorkMeter",
-                "suggest_raising_budget",
             ),
             "motion.neglected_inertia_error": ("estimate_neglected_inertia_error",),
-            "motion.recorded_motion_readings": (
-                "recorded_friction_coefficient",
-                "recorded_load_point_displacement",
-                "resample_motion_along_path",
-            ),
-            "motion.recording": (
-                "FIRST_STATE_COLUMN",
-                "MOTION_VARIABLES",
-                "RECORDED_VARIABLES",
-                "REGIME_COLUMN",
-                "Recording",
-                "SAMPLE_COLUMN",
-                "recorded_row",
-            ),
+            "motion.recorded_motion_readings": ("resample_motion_along_path",),
+            "motion.recording": ("Recording",),
             "motion.root_finding": ("build_root_finder",),
         },
     )
 
 __all__ = [
+    "Engine",
     "Accuracy",
-    "COMPILED",
-    "DEFAULT_EVALUATION_BUDGET",
-    "DEFAULT_RTOL",
-    "ENGINES",
     "Event",
     "EventKind",
     "EventSpecification",
-    "FIRST_STATE_COLUMN",
     "Integrator",
-    "MAX_ERROR_OVER_RTOL",
-    "MAX_RTOL",
-    "MIN_LOCAL_TOLERANCE",
-    "MIN_RTOL",
-    "MOTION_VARIABLES",
     "MotionDriver",
     "MotionStopped",
-    "PYTHON",
-    "RECORDED_VARIABLES",
-    "REGIME_COLUMN",
-    "RELATIVE_ROUNDING_ERROR",
     "Recording",
-    "SAMPLE_COLUMN",
-    "SCIPY",
     "WorkMeter",
     "accept_accuracy_and_meter",
-    "adapt_former_compute",
     "approach_to_steady_state",
     "build_root_finder",
-    "check_engine_is_usable",
-    "compilation_log",
-    "import_compiled_engine",
     "estimate_error",
     "estimate_neglected_inertia_error",
     "fall",
-    "recorded_friction_coefficient",
-    "initial_point",
-    "is_engine_installed",
-    "suggest_raising_budget",
-    "recorded_load_point_displacement",
-    "slow_manifold_point",
     "maximum",
     "minimum",
-    "point_before_start",
-    "recorded_row",
-    "register_user_steppers",
-    "compute_restart_point",
     "rise",
     "resample_motion_along_path",
-    "find_user_stepper",
-    "point_with_slip_rate",
 ]

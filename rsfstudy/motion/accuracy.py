@@ -6,6 +6,7 @@ import math
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from numbers import Real
+from typing import ClassVar
 
 from rsfstudy._deprecation import add_former_member_names
 from rsfstudy.error_boundary import wrap_methods_in_error_boundary
@@ -69,6 +70,17 @@ class Accuracy:
     >>> accuracy.refined().refinement
     0.1
     """
+
+    #: Default value and limits of ``rtol``.
+    DEFAULT_RTOL: ClassVar = DEFAULT_RTOL
+    MIN_RTOL: ClassVar = MIN_RTOL
+    MAX_RTOL: ClassVar = MAX_RTOL
+    #: Default value of ``budget``.
+    DEFAULT_BUDGET: ClassVar = DEFAULT_EVALUATION_BUDGET
+    #: Maximum ratio of a reliable error estimate to ``rtol``.
+    MAX_ERROR_OVER_RTOL: ClassVar = MAX_ERROR_OVER_RTOL
+    #: Relative rounding error that each error estimate includes.
+    RELATIVE_ROUNDING_ERROR: ClassVar = RELATIVE_ROUNDING_ERROR
 
     rtol: float = DEFAULT_RTOL
     budget: int = DEFAULT_EVALUATION_BUDGET

@@ -8,6 +8,7 @@ from functools import cache
 from typing import TYPE_CHECKING, Any
 
 from rsfstudy.errors import InvalidValue
+from rsfstudy.motion import engines
 from rsfstudy.motion.engines import (
     COMPILED,
     ENGINES,
@@ -125,3 +126,19 @@ def call_array_function_by_engine(
         )(*arrays)
     else:
         function(*(memoryview(array) for array in arrays))  # type: ignore[arg-type]
+
+
+class Engine:
+    """Names of the engines, and functions that find, check and compile engines."""
+
+    SCIPY, PYTHON, COMPILED = engines.ENGINES
+    #: Names of the engines of the package, without user-defined steppers.
+    NAMES = engines.ENGINES
+    #: Record of the compilations in this process.
+    compilation_log = engines.compilation_log
+
+    is_installed = staticmethod(engines.is_engine_installed)
+    check_is_usable = staticmethod(check_engine_is_usable)
+    import_compiled = staticmethod(import_compiled_engine)
+    find_user_stepper = staticmethod(find_user_stepper)
+    register_user_steppers = staticmethod(engines.register_user_steppers)

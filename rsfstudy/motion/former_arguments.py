@@ -33,14 +33,19 @@ def accept_accuracy_and_meter(function: AnyFunction) -> AnyFunction:
 
     Parameters
     ----------
-    function : callable
-        Function or method that is wrapped in the error boundary, which converts the arguments.
+    function : callable or type
+        Function or method that is wrapped in the error boundary, which converts the arguments. If
+        the argument is the class of a measure, its method ``compute`` accepts the former arguments,
+        or a user-defined method with the former signature is adapted.
 
     Returns
     -------
-    callable
-        The same function.
+    callable or type
+        The same function or class.
     """
+    if isinstance(function, type):
+        _adapt_former_compute(function)
+        return function
     function.convert_arguments = replace_accuracy_and_meter  # type: ignore[attr-defined]
     return function
 
@@ -92,16 +97,11 @@ def replace_accuracy_and_meter(
     return rest, {**others, "integrator": Integrator(accuracy).counted_by(meter)}
 
 
-def adapt_former_compute(measure_class: type) -> None:
+def _adapt_former_compute(measure_class: type) -> None:
     """Let the method ``compute`` of a measure take an integrator.
 
     A method with the former parameters ``scene``, ``accuracy`` and ``meter`` is replaced by a
-    method that takes an integrator.
-
-    Parameters
-    ----------
-    measure_class : type
-        Class of a measure. The class is modified in place.
+    method that takes an integrator. The class is modified in place.
     """
     compute = vars(measure_class).get("compute")
     if not inspect.isfunction(compute):

@@ -13,15 +13,7 @@ from scipy.optimize import newton
 from rsfstudy.motion import regime_switching
 from rsfstudy.motion.work_meter import MotionStopped
 from rsfstudy.parts import Segment
-from rsfstudy.slider import (
-    MotionPoint,
-    Numbers,
-    Scene,
-    compute_steady_states,
-    effective_normal_stress_at,
-    equations_between_ruptures,
-    frictional_stress_after_jump,
-)
+from rsfstudy.slider import MotionPoint, Numbers, Scene
 from rsfstudy.status import Status
 
 _NAN_FOR_UNEVALUATED_POINT_FIELDS = (math.nan,) * len(MotionPoint._fields[5:-1])
@@ -51,7 +43,7 @@ def initial_point(scene: Scene) -> MotionPoint:
         If normal stress vanishes or shear stress changes sign in the loading step.
     """
     check_forward_slip_is_possible_at_start(scene)
-    psis, log_slip_rate = compute_steady_states(scene, 0.0, 0.0), 0.0
+    psis, log_slip_rate = scene.compute_steady_states(0.0, 0.0), 0.0
     if scene.starts_unsteady:
         psis, log_slip_rate = _find_specified_initial_states(scene, psis)
     psis = _reset_loading_unknowns(scene, psis)
@@ -74,10 +66,10 @@ def point_before_start(scene: Scene) -> MotionPoint:
         Point on the slow manifold.
     """
     before = scene.with_segment(Segment(1.0))
-    psis = compute_steady_states(before, 0.0, 0.0)
+    psis = before.compute_steady_states(0.0, 0.0)
     if scene.starts_unsteady:
         psis = _find_specified_initial_states(scene, psis)[0]
-    return slow_manifold_point(before, scene.parts.slider.initial_stress, psis)
+    return before.slow_manifold_point(scene.parts.slider.initial_stress, psis)
 
 
 def point_without_derived_values(
@@ -135,7 +127,7 @@ def compute_restart_point(scene: Scene, spring_stress: float, states: Numbers) -
     MotionStopped
         If the spring stress is incompatible with forward slip.
     """
-    balance = equations_between_ruptures(scene, with_time=False).force_balance_function
+    balance = scene.equations_between_ruptures(with_time=False).force_balance_function
     assert balance is not None
     x, friction, _shift = balance(spring_stress, states, scene.parameter_values)
     point = point_without_derived_values(scene, spring_stress, states, x, friction)
@@ -162,7 +154,7 @@ def _find_specified_initial_states(scene: Scene, steady_states: Numbers) -> tupl
     others = steady_states[1 : before.state_count]
 
     def begun(psi: float) -> MotionPoint:
-        return slow_manifold_point(before, scene.initial_stress, (psi, *others))
+        return before.slow_manifold_point(scene.initial_stress, (psi, *others))
 
     def missing(psi: float) -> float:
         return scene.initial_state - begun(psi).state
@@ -224,32 +216,10 @@ def point_with_slip_rate(scene: Scene, point: MotionPoint, log_slip_rate: float)
         If normal stress vanishes.
     """
     excess = scene.a * log_slip_rate + point.psi
-    friction = frictional_stress_after_jump(scene, excess, point.psis)
+    friction = scene.frictional_stress_after_jump(excess, point.psis)
     if friction is None:
         raise MotionStopped(Status.NORMAL_STRESS_LOST, "the step takes normal stress away")
     return point._replace(log_slip_rate=log_slip_rate, frictional_stress=friction)
-
-
-def slow_manifold_point(scene: Scene, spring_stress: float, states: Numbers) -> MotionPoint:
-    """Return the point on the slow manifold for a spring stress and states.
-
-    Parameters
-    ----------
-    scene : Scene
-        Scene of the motion.
-    spring_stress : float
-        Spring stress :math:`f`, in sigma_*.
-    states : tuple of float
-        States of the friction law, followed by the unknowns of the loading and the fluid.
-
-    Returns
-    -------
-    MotionPoint
-        Point with all fields.
-    """
-    return equations_between_ruptures(scene, with_time=False).evaluate_point(
-        (spring_stress, *states)
-    )
 
 
 def check_forward_slip_is_possible_at_start(
@@ -276,7 +246,7 @@ def check_forward_slip_is_possible_at_start(
     lost = spring_stress <= scene.parts.normal_stress.min_frictional_stress(scene)
     if lost or (
         start_point
-        and effective_normal_stress_at(scene, spring_stress, start_point.psis)
+        and scene.effective_normal_stress_at(spring_stress, start_point.psis)
         <= regime_switching.MIN_NORMAL_STRESS
     ):
         raise MotionStopped(Status.NORMAL_STRESS_LOST, "the step takes normal stress away")

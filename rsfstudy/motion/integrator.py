@@ -12,6 +12,7 @@ import math
 from collections.abc import Iterator, Sequence
 
 from rsfstudy.error_boundary import wrap_methods_in_error_boundary
+from rsfstudy.motion import initial_points
 from rsfstudy.motion.accuracy import Accuracy, estimate_error
 from rsfstudy.motion.events import Event, EventKind, EventSpecification
 from rsfstudy.motion.initial_points import initial_point, point_after_loading_jump
@@ -26,7 +27,7 @@ from rsfstudy.motion.segment_chains import (
     select_event_specs,
     truncate_segments_at,
 )
-from rsfstudy.motion.work_meter import WorkMeter
+from rsfstudy.motion.work_meter import MIN_LOCAL_TOLERANCE, WorkMeter
 from rsfstudy.parts import (
     LOADING,
     LOG_LOAD_VELOCITY,
@@ -61,6 +62,14 @@ class Integrator:
     """
 
     __slots__ = ("accuracy", "work_meter")
+
+    #: Smallest possible value of ``local_tolerance``.
+    MIN_LOCAL_TOLERANCE = MIN_LOCAL_TOLERANCE
+
+    initial_point = staticmethod(initial_points.initial_point)
+    point_before_start = staticmethod(initial_points.point_before_start)
+    restart_point = staticmethod(initial_points.compute_restart_point)
+    point_with_slip_rate = staticmethod(initial_points.point_with_slip_rate)
 
     def __init__(self, accuracy: Accuracy) -> None:
         """Create an integrator whose count starts at zero."""

@@ -38,15 +38,7 @@ from rsfstudy.motion.work_meter import (
     WorkMeter,
 )
 from rsfstudy.parts import SEGMENT_STRESS_FALL
-from rsfstudy.slider import (
-    Equations,
-    MotionPoint,
-    Numbers,
-    Scene,
-    cached_per_scene,
-    equations_between_ruptures,
-    equations_in_rupture,
-)
+from rsfstudy.slider import Equations, MotionPoint, Numbers, Scene, cached_per_scene
 from rsfstudy.status import Status
 
 #: Minimum number of rows of the event table, and number of rows of the recording table.
@@ -296,8 +288,8 @@ def get_motion_driver(
         Driver of the scene. The driver is cached in the scene.
     """
     return MotionDriver(
-        equations_between_ruptures(scene, with_time=with_time),
-        equations_in_rupture(scene, with_time=with_time) if scene.has_mass else None,
+        scene.equations_between_ruptures(with_time=with_time),
+        scene.equations_in_rupture(with_time=with_time) if scene.has_mass else None,
         engine=engine,
         methods=methods,
         unknowns_behind_fluid=len(scene.parts.fluid.unknowns)

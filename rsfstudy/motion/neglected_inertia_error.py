@@ -31,12 +31,7 @@ from rsfstudy.parts import (
     SEGMENT_VELOCITY,
     A,
 )
-from rsfstudy.slider import (
-    NEGLIGIBLE_SECOND_ORDER_WEIGHT,
-    Numbers,
-    Scene,
-    build_equations_against_displacement,
-)
+from rsfstudy.slider import NEGLIGIBLE_SECOND_ORDER_WEIGHT, Numbers, Scene
 
 #: Safety factor of the error estimate. Without the safety factor, the error of friction is up to
 #: 1.4 times the error estimate in random scenes. In these scenes, the thresholds for changes of
@@ -163,7 +158,7 @@ def _compute_force_balance_residual(
 
     The recorded row must belong to the slow-manifold regime.
     """
-    equations = build_equations_against_displacement(segment_scene)
+    equations = segment_scene.equations_against_displacement()
     state = (
         recorded_row[SHEAR_STRESS_COLUMNS][0] - segment_scene.mu_star,
         *recorded_row[FIRST_STATE_COLUMN : FIRST_STATE_COLUMN + segment_scene.state_count].tolist(),

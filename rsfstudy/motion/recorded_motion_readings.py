@@ -1,4 +1,4 @@
-"""Quantities that a rig measures along a motion, and resampling of motions."""
+"""Resampling of recorded motions at a given number of points."""
 
 from __future__ import annotations
 
@@ -10,57 +10,15 @@ from rsfstudy.motion.engine_factory import call_array_function_by_engine
 from rsfstudy.motion.engines import SCIPY
 from rsfstudy.motion.recording import (
     MOTION_VARIABLES,
-    RECORDED_VARIABLES,
     SAMPLE_COLUMN,
     SAMPLES_PER_STEP,
     resample_along_path,
 )
-from rsfstudy.slider import Scene
 
 #: Columns of a recorded motion. The path length is computed from these columns.
 _COLUMNS_DEFINING_PATH_LENGTH = tuple(
     MOTION_VARIABLES.index(name) for name in ("time", "log10_slip_rate", "shear_stress")
 )
-
-
-def recorded_friction_coefficient(motion_table: np.ndarray) -> np.ndarray:
-    """Return the apparent friction coefficient along a recorded motion.
-
-    Parameters
-    ----------
-    motion_table : ndarray
-        Rows of a recorded motion.
-
-    Returns
-    -------
-    ndarray
-        Friction coefficient of each row.
-    """
-    return motion_table[:, RECORDED_VARIABLES.index("friction_coefficient")]
-
-
-def recorded_load_point_displacement(scene: Scene, motion_table: np.ndarray) -> np.ndarray:
-    """Compute the load point displacement along a recorded motion.
-
-    The displacement is the sum of the slip and the elongation of the spring. The displacement is
-    zero before the first loading step.
-
-    Parameters
-    ----------
-    scene : Scene
-        Scene of the motion.
-    motion_table : ndarray
-        Rows of a recorded motion.
-
-    Returns
-    -------
-    ndarray
-        Displacement of each row, in D_c.
-    """
-    longer = (
-        motion_table[:, MOTION_VARIABLES.index("shear_stress")] - scene.mu_star
-    ) / scene.stiffness
-    return np.asarray(motion_table[:, MOTION_VARIABLES.index("slip")] + longer)
 
 
 def resample_motion_along_path(

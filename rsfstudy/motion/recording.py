@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 from scipy.optimize import brentq
@@ -58,6 +58,14 @@ class Recording:
         If a loading segment begins at a requested time, the end of the previous segment is
         recorded. By default, the motion is recorded at even intervals within each step.
     """
+
+    #: Names of the first columns of a recorded motion, and of all recorded variables.
+    MOTION_VARIABLES: ClassVar = MOTION_VARIABLES
+    VARIABLES: ClassVar = RECORDED_VARIABLES
+    #: Columns after the recorded variables.
+    REGIME_COLUMN: ClassVar = REGIME_COLUMN
+    SAMPLE_COLUMN: ClassVar = SAMPLE_COLUMN
+    FIRST_STATE_COLUMN: ClassVar = FIRST_STATE_COLUMN
 
     regime_names: list[str] = field(default_factory=list)
     sample_times: np.ndarray | None = None
@@ -173,6 +181,72 @@ class Recording:
         """
         return truncate_recording_at_row(self.as_table(scene), last_row)
 
+    @staticmethod
+    def row_at_point(
+        scene: Scene, time: float, slip: float, point: MotionPoint, regime: int
+    ) -> np.ndarray:
+        """Convert a point of the motion to a row of ``Recording.as_table``.
+
+        Parameters
+        ----------
+        scene : Scene
+            Scene of the motion.
+        time, slip : float
+            Time in D_c/V_* and slip in D_c since the start.
+        point : MotionPoint
+            Point to convert.
+        regime : int
+            Index of the regime.
+
+        Returns
+        -------
+        ndarray
+            Row in the units of recorded motions. The sample number of the row is 0.
+        """
+        return convert_to_recorded_units(
+            scene, np.array(pack_recorded_row(time, slip, point, regime))
+        )
+
+    @staticmethod
+    def friction_coefficient(motion_table: np.ndarray) -> np.ndarray:
+        """Return the apparent friction coefficient along a recorded motion.
+
+        Parameters
+        ----------
+        motion_table : ndarray
+            Rows of a recorded motion.
+
+        Returns
+        -------
+        ndarray
+            Friction coefficient of each row.
+        """
+        return motion_table[:, RECORDED_VARIABLES.index("friction_coefficient")]
+
+    @staticmethod
+    def load_point_displacement(scene: Scene, motion_table: np.ndarray) -> np.ndarray:
+        """Compute the load point displacement along a recorded motion.
+
+        The displacement is the sum of the slip and the elongation of the spring. The displacement
+        is zero before the first loading step.
+
+        Parameters
+        ----------
+        scene : Scene
+            Scene of the motion.
+        motion_table : ndarray
+            Rows of a recorded motion.
+
+        Returns
+        -------
+        ndarray
+            Displacement of each row, in D_c.
+        """
+        longer = (
+            motion_table[:, MOTION_VARIABLES.index("shear_stress")] - scene.mu_star
+        ) / scene.stiffness
+        return np.asarray(motion_table[:, MOTION_VARIABLES.index("slip")] + longer)
+
 
 def convert_to_recorded_units(scene: Scene, rows: np.ndarray) -> np.ndarray:
     """Convert recorded rows from event loop units to output units, in place.
@@ -221,30 +295,6 @@ def pack_recorded_row(
         *(time, slip, point.log_slip_rate, *stresses, point.state, point.apparent_friction),
         *(regime_number, 0.0, *point.psis),
     )
-
-
-def recorded_row(
-    scene: Scene, time: float, slip: float, point: MotionPoint, regime: int
-) -> np.ndarray:
-    """Convert a point of the motion to a row of ``Recording.as_table``.
-
-    Parameters
-    ----------
-    scene : Scene
-        Scene of the motion.
-    time, slip : float
-        Time in D_c/V_* and slip in D_c since the start.
-    point : MotionPoint
-        Point to convert.
-    regime : int
-        Index of the regime.
-
-    Returns
-    -------
-    ndarray
-        Row in the units of recorded motions. The sample number of the row is 0.
-    """
-    return convert_to_recorded_units(scene, np.array(pack_recorded_row(time, slip, point, regime)))
 
 
 def truncate_recording_at_row(motion_table: np.ndarray, last_row: np.ndarray) -> np.ndarray:

@@ -17,8 +17,6 @@ from typing import NamedTuple
 from rsfstudy.motion.accuracy import Accuracy
 from rsfstudy.motion.work_meter import MotionStopped
 from rsfstudy.slider import (
-    LARGEST_LOG_SLIP_RATE,
-    STOPPED_LOG_SLIP_RATE,
     MotionPoint,
     Scene,
     cached_per_scene,
@@ -32,6 +30,9 @@ MIN_NORMAL_STRESS, MAX_NORMAL_STRESS = 1e-9, 1e6
 MIN_POSITIVE_NORMAL_STRESS = 1e-300
 #: Upper limit of ln(V/V_*) without inertia. The slip rate is unbounded above 10^120 V_*.
 MAX_LOG_SLIP_RATE_WITHOUT_INERTIA = 120.0 * math.log(10.0)
+#: Limits of ln(V/V_*) as constants of this module, because compiled functions read them.
+LARGEST_LOG_SLIP_RATE = Scene.LARGEST_LOG_SLIP_RATE
+STOPPED_LOG_SLIP_RATE = Scene.STOPPED_LOG_SLIP_RATE
 #: Codes for the termination status of a motion.
 CONTINUES, NORMAL_STRESS_VANISHED, NORMAL_STRESS_UNBOUNDED, SLIP_STOPPED, SLIP_RATE_UNBOUNDED = (
     range(5)

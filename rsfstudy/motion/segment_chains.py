@@ -11,13 +11,7 @@ from rsfstudy.motion.event_spec_table import find_events_at_jump
 from rsfstudy.motion.events import Event, EventKind, EventSpecification
 from rsfstudy.motion.initial_points import point_after_loading_jump
 from rsfstudy.parts import SEGMENT_END, SEGMENT_START
-from rsfstudy.slider import (
-    SINGLE_ENDLESS_SEGMENT_TABLE,
-    MotionPoint,
-    Numbers,
-    Scene,
-    largest_linear_growth_rate,
-)
+from rsfstudy.slider import SINGLE_ENDLESS_SEGMENT_TABLE, MotionPoint, Numbers, Scene
 
 
 def list_segment_chains(
@@ -200,5 +194,5 @@ def _is_steady_sliding_unstable(scene: Scene) -> bool:
     """Return True if perturbations of steady sliding grow in the last loading segment."""
     if scene.log_load_velocity == -math.inf:
         return False
-    growth = largest_linear_growth_rate(scene.segment_scene(-1), scene.log_load_velocity)
+    growth = scene.segment_scene(-1).largest_linear_growth_rate(scene.log_load_velocity)
     return growth is not None and growth.is_positive

@@ -18,22 +18,6 @@ TOLERANCE_FOR_SPECIFIED_MAX_STEP_LENGTHS = 1e-7
 MIN_LOCAL_TOLERANCE = 5e-14
 
 
-def suggest_raising_budget(budget: int) -> str:
-    """Return the end of a message that suggests a larger budget.
-
-    Parameters
-    ----------
-    budget : int
-        Budget that was exceeded.
-
-    Returns
-    -------
-    str
-        Advice to use four times the budget.
-    """
-    return f"; --budget {4 * budget} (budget=) allows more"
-
-
 class MotionStopped(RsfStudyError):
     """Exception raised if a motion cannot continue.
 
@@ -107,6 +91,11 @@ class WorkMeter:
             self.evaluations_by_regime.get(regime_name, 0) + evaluations
         )
         self.evaluations += evaluations
+
+    @property
+    def budget_advice(self) -> str:
+        """End of a message that suggests a budget four times as large."""
+        return f"; --budget {4 * self.budget} (budget=) allows more"
 
     def check_budget(self) -> None:
         """Raise MotionStopped if the evaluations exceed the budget.

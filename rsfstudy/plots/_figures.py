@@ -22,7 +22,7 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure as Figure
 
 from rsfstudy._deprecation import accept_former_keyword_names
-from rsfstudy.defaults import FIGURE_FORMATS
+from rsfstudy.defaults import Defaults
 from rsfstudy.errors import InvalidValue, RsfStudyError
 from rsfstudy.formatting import format_overrides, pluralize
 from rsfstudy.plots import _panel
@@ -43,9 +43,9 @@ from rsfstudy.plots._style import style_context as style_context
 from rsfstudy.plots._text import format_number as format_number
 from rsfstudy.plots._text import format_slope as format_slope
 from rsfstudy.plots._text import quantity_symbol, to_mathtext, wrap_text
-from rsfstudy.rig import convert_to_display_units, has_units_unexpected_by_its_figures
+from rsfstudy.rig import DatasetUnits
 from rsfstudy.status import Status
-from rsfstudy.storage import read_declaration
+from rsfstudy.storage import StoredDataset
 from rsfstudy.study import Figure as Declared
 from rsfstudy.study import Panel, Study, load_study, read_quantities_not_in_vocabulary, study_names
 from rsfstudy.study import failed_cell_mask as failed_cell_mask
@@ -178,7 +178,7 @@ def draw_figure(
     if not draws:
         rule = "must be a Figure, or a function or module of yours that draws"
         raise InvalidValue("own", user_figure, rule, remedy="Write def name(dataset, axes): ...")
-    dataset = convert_to_display_units(dataset)
+    dataset = DatasetUnits(dataset).convert_for_display()
     with style_context(style):
         drawing, dataset = _choose_figure(dataset, user_figure, variable)
         panels = drawing.panels
@@ -196,7 +196,10 @@ def draw_figure(
                 freeze_tick_label_size(scale)
         add_panel_letters(drawn)
         merge_common_legends(figure, drawn)
-        lacking, overrides = _missing_cells_note(dataset), read_declaration(dataset).overrides
+        lacking, overrides = (
+            _missing_cells_note(dataset),
+            StoredDataset(dataset).declaration.overrides,
+        )
         said = [_format_note_on_overrides(dataset, columns)] if overrides else []
         if said or lacking:
             color = "tab:red" if lacking else "0.4"
@@ -223,8 +226,13 @@ def _missing_cells_note(dataset: xr.Dataset) -> str:
 def _format_note_on_overrides(dataset: xr.Dataset, max_line_characters: int) -> str:
     """Return a note about settings that differ from the study declaration."""
     own = read_quantities_not_in_vocabulary(dataset)
-    names = {n: quantity_symbol(find_quantity(n, own)) for n in read_declaration(dataset).overrides}
-    values = {names[name]: value for name, value in read_declaration(dataset).overrides.items()}
+    names = {
+        n: quantity_symbol(find_quantity(n, own))
+        for n in StoredDataset(dataset).declaration.overrides
+    }
+    values = {
+        names[name]: value for name, value in StoredDataset(dataset).declaration.overrides.items()
+    }
     text = to_mathtext(
         format_overrides(values).replace("=", " = ").replace(",", ", ").replace(",  ", ", ")
     )
@@ -243,7 +251,7 @@ def _choose_figure(
     more axes than the declared figure can display, the function chooses a generic figure of maps or
     lines.
     """
-    name, sizes = read_declaration(dataset).plot, dataset["status"].sizes
+    name, sizes = StoredDataset(dataset).declaration.plot, dataset["status"].sizes
     study = load_study(name) if name in study_names() else None
     if name == _NAME_OF_FITS_FIGURE and user_figure is variable is None:
         return Declared(
@@ -261,12 +269,12 @@ def _choose_figure(
         if isinstance(user_figure, Declared) and not user_figure.allow_extra_dims:
             known = set(study.dimensions)
     elif isinstance(user_figure, Declared):
-        known -= set(read_declaration(dataset).overrides) - user_figure.dimensions
+        known -= set(StoredDataset(dataset).declaration.overrides) - user_figure.dimensions
     varied = {str(dimension) for dimension, points in sizes.items() if points > 1}
     further = sorted(varied - known)
     many = math.prod(sizes[dimension] for dimension in further) > _MAX_POINTS_OF_REPEATED_AXES
     plain = variable is not None or user_figure is None or isinstance(user_figure, str)
-    if plain or many or has_units_unexpected_by_its_figures(dataset):
+    if plain or many or DatasetUnits(dataset).are_unexpected_by_figures:
         return _generic_figure(dataset, variable), dataset
     drawing = (
         user_figure
@@ -303,7 +311,7 @@ def _expand_panels_of_figure(
     named = [panel.y for panel in figure_declaration.panels if isinstance(panel.y, str) and panel.y]
     if not found and named and not any(name in dataset for name in named):
         rule = "does not fit these results (they have none of its variables)"
-        raise InvalidValue("plot", read_declaration(dataset).plot, rule)
+        raise InvalidValue("plot", StoredDataset(dataset).declaration.plot, rule)
     return found
 
 
@@ -407,8 +415,10 @@ def save_figure(
     True
     """
     form = path.suffix[1:].lower()
-    if form not in FIGURE_FORMATS:
-        raise InvalidValue("figure", path.name, "needs an ending we write", choices=FIGURE_FORMATS)
+    if form not in Defaults.FIGURE_FORMATS:
+        raise InvalidValue(
+            "figure", path.name, "needs an ending we write", choices=Defaults.FIGURE_FORMATS
+        )
     try:
         drawn = draw_figure(dataset, user_figure, variable=variable, style=style)
         # The layout is final, so it must not be computed again when the figure is saved.
@@ -419,7 +429,7 @@ def save_figure(
         raise
     except Exception as error:
         rule = f"does not fit these results ({type(error).__name__}: {error})"
-        raise InvalidValue("plot", read_declaration(dataset).plot, rule) from error
+        raise InvalidValue("plot", StoredDataset(dataset).declaration.plot, rule) from error
     write_image(image, path)
 
 

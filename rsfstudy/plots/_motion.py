@@ -32,9 +32,9 @@ from rsfstudy.plots._style import (
     style_context,
 )
 from rsfstudy.plots._text import to_mathtext, wrap_text
-from rsfstudy.rig import DISPLAY_BASE_UNITS, Rig
-from rsfstudy.slider import Scene, steady_friction_minus_reference
-from rsfstudy.storage import read_scene_fields
+from rsfstudy.rig import DatasetUnits, Rig
+from rsfstudy.slider import Scene
+from rsfstudy.storage import StoredDataset
 
 #: Height of a panel in mm.
 PANEL_HEIGHT_MM = 48.0
@@ -99,7 +99,7 @@ def plot_motion(
         text = f"{motion.attrs.get('status', '')}: {motion.attrs.get('message', '')}"
         raise DataError(f"there is no motion, and nothing to draw. {text}")
     against = against or _choose_abscissa(motion)
-    shown = motion if rig is None else rig.in_units(motion, **DISPLAY_BASE_UNITS)
+    shown = motion if rig is None else rig.in_units(motion, **DatasetUnits.DISPLAY_UNITS)
     with style_context():
         figure = NotebookFigure(figsize=figure_size(2, 2, PANEL_HEIGHT_MM), layout="constrained")
         grid = figure.add_gridspec(2, 2)
@@ -213,7 +213,7 @@ def _draw_phase_plane(motion: xr.Dataset, displayed_motion: xr.Dataset, axes: Ax
         scale * 10.0 ** logs[0], friction[0], "o", color=cycle_style(0)["color"], label="its start"
     )
     beyond = np.linspace(float(logs.min()) - 0.3, float(logs.max()) + 0.3, 201)
-    steady = _compute_steady_friction(read_scene_fields(motion), beyond)
+    steady = _compute_steady_friction(StoredDataset(motion).scene_fields, beyond)
     if steady is not None:
         axes.plot(scale * 10.0**beyond, steady, "--", color="0.4", label="steady sliding")
     set_log_scale(axes, "x")
@@ -238,7 +238,7 @@ def _compute_steady_friction(
     except InvalidValue:
         return None
     rates = log10_rates * NATURAL_LOG_OF_10
-    excess = [steady_friction_minus_reference(scene, x) for x in rates.tolist()]
+    excess = [scene.steady_friction_minus_reference(x) for x in rates.tolist()]
     return np.asarray(scene.mu_star + np.array(excess))
 
 

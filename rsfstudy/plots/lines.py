@@ -27,7 +27,7 @@ from rsfstudy.plots._axes import (
 )
 from rsfstudy.plots._style import add_grey_legend_entry, cycle_marker, cycle_style
 from rsfstudy.plots._text import format_quantity_axis_label, to_mathtext
-from rsfstudy.storage import read_declaration
+from rsfstudy.storage import StoredDataset
 from rsfstudy.study import Panel, read_quantities_not_in_vocabulary
 from rsfstudy.vocabulary import find_quantity
 
@@ -66,7 +66,7 @@ def panels(dataset: xr.Dataset, variable: str | None = None) -> Sequence[Panel]:
             or read_flag_meanings_of_variable(dataset[variable])
         )
         names = [variable] if drawn else []
-    named = len(names) == 1 and not read_declaration(dataset).overrides
+    named = len(names) == 1 and not StoredDataset(dataset).declaration.overrides
     return [
         _build_panel(dataset, name, dataset.attrs.get("title", "") if named else "")
         for name in names

@@ -15,7 +15,7 @@ from pathlib import Path
 import numpy as np
 
 from rsfstudy.errors import RsfStudyError
-from rsfstudy.motion import COMPILED, SCIPY, Accuracy, is_engine_installed
+from rsfstudy.motion import Accuracy, Engine
 from rsfstudy.referee import reference_answers
 from rsfstudy.referee.external_answers import ReportedQuantity
 from rsfstudy.referee.problem_files import BenchmarkProblem
@@ -185,7 +185,7 @@ def known_answer(
     if answer_path is not None:
         table = read_table(answer_path)
         return problem, {name: column.values for name, column in table.items()}
-    engine = COMPILED if is_engine_installed(COMPILED) else SCIPY
+    engine = Engine.COMPILED if Engine.is_installed(Engine.COMPILED) else Engine.SCIPY
     rough, fine = (
         reference_answers.compute_answer(
             problem, Accuracy(tolerance, reference_answers.ANSWER_EVALUATION_BUDGET, engine=engine)

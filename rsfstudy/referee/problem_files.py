@@ -25,22 +25,11 @@ from scipy.special import lambertw
 
 from rsfstudy.error_boundary import check_regular_file, format_exception
 from rsfstudy.errors import DataError, InvalidValue, shorten_text
-from rsfstudy.motion import (
-    Event,
-    EventKind,
-    MotionStopped,
-    point_with_slip_rate,
-    slow_manifold_point,
-)
+from rsfstudy.motion import Event, EventKind, Integrator, MotionStopped
 from rsfstudy.parts import Segment
 from rsfstudy.path_checks import check_path
 from rsfstudy.rig import Rig, convert_to_si
-from rsfstudy.slider import (
-    Scene,
-    build_friction_relation,
-    compute_steady_states,
-    scene_field_defaults,
-)
+from rsfstudy.slider import Scene, SceneFields
 
 #: Folder of the shipped problems and their answers.
 SHIPPED_PROBLEM_FOLDER = Path(__file__).with_name("problems")
@@ -290,7 +279,7 @@ class BenchmarkProblem:
         if "V_c" in si:
             fields["cutoff_velocity_ratio"] = si["V_c"] / rig.reference_velocity
         if "V_unstable" in si:
-            period = rig.period or scene_field_defaults()["period"]
+            period = rig.period or SceneFields.defaults()["period"]
             norm = si["V_unstable"] * period / (2.0 * math.pi * rig.slip_distance)
             fields["instability_norm"] = norm
         if self.loading:
@@ -348,15 +337,15 @@ class BenchmarkProblem:
         if scene.parts.law.regularised:
             above = (scene.mu_star + friction) / scene.a
             friction = scene.a * math.asinh(0.5 * math.exp(above)) - scene.mu_star
-        taken = compute_steady_states(before, 0.0, build_friction_relation(before)(friction)[2])
+        taken = before.compute_steady_states(0.0, before.friction_relation()(friction)[2])
         psis = (
             *map(add, states, taken),
             *taken[len(states) :],
             *scene.parts.loading.initial_unknowns(scene),
         )
         radiated = before.dynamics.radiated_stress(x)
-        point = slow_manifold_point(acting, friction + radiated + acting.spring_stress_step, psis)
-        point = point_with_slip_rate(acting, point, x) if scene.has_mass else point
+        point = acting.slow_manifold_point(friction + radiated + acting.spring_stress_step, psis)
+        point = Integrator.point_with_slip_rate(acting, point, x) if scene.has_mass else point
         return Event(EventKind.START, None, 0.0, 0.0, point, "", 0, 0.0)
 
     def _initial_state_variables(self) -> tuple[float, ...]:

@@ -10,18 +10,8 @@ import numpy as np
 
 from rsfstudy.errors import RsfStudyError
 from rsfstudy.measures import CriticalStep, LimitCycle, Measure
-from rsfstudy.motion import (
-    FIRST_STATE_COLUMN,
-    MOTION_VARIABLES,
-    Accuracy,
-    EventKind,
-    Integrator,
-    MotionStopped,
-    Recording,
-    maximum,
-)
+from rsfstudy.motion import Accuracy, EventKind, Integrator, MotionStopped, Recording, maximum
 from rsfstudy.referee.problem_files import BenchmarkProblem
-from rsfstudy.slider import critical_stiffness, linear_growth_rates
 from rsfstudy.status import Status
 
 AnswerColumnByQuantity = dict[str, np.ndarray]
@@ -99,9 +89,9 @@ def _compute_series_answer(problem: BenchmarkProblem, accuracy: Accuracy) -> Ans
     for _ in moving:
         pass
     seen = recording.as_table(scene)
-    told = dict(zip(MOTION_VARIABLES, seen.T, strict=False))
+    told = dict(zip(Recording.MOTION_VARIABLES, seen.T, strict=False))
     sigma, b = rig.normal_stress, np.array(problem.b)
-    states = seen[:, FIRST_STATE_COLUMN : FIRST_STATE_COLUMN + len(b)]
+    states = seen[:, Recording.FIRST_STATE_COLUMN : Recording.FIRST_STATE_COLUMN + len(b)]
     taken = states.sum(axis=1) - told["state_variable"]
     states = states - np.outer(taken, np.abs(b) / np.abs(b).sum())
     thetas = (np.array(problem.theta_star) * np.exp(states / b)).T
@@ -167,8 +157,8 @@ def _run_measure_of_problem(
 def _compute_stability_numbers(problem: BenchmarkProblem, accuracy: Accuracy) -> tuple[float, ...]:
     """Compute the critical stiffness, the growth rate and the frequency."""
     scene, rig = problem.scene, problem.rig
-    growth = linear_growth_rates(scene, scene.log_load_velocity)[0] * scene.load_velocity
-    stiffness = critical_stiffness(scene, scene.log_load_velocity)
+    growth = scene.linear_growth_rates(scene.log_load_velocity)[0] * scene.load_velocity
+    stiffness = scene.critical_stiffness_at(scene.log_load_velocity)
     scale, rate = rig.normal_stress / rig.slip_distance, rig.dimensionless("1 s")
     return stiffness * scale, growth.real * rate, abs(growth.imag) * rate
 

@@ -13,8 +13,8 @@ import xarray as xr
 from rsfstudy.formatting import format_nonempty_fields, pluralize
 from rsfstudy.reporting.reduction_tables import find_refusal_reasons_of_reductions
 from rsfstudy.reporting.tables import TextTable
-from rsfstudy.status import STATUS_LABELS, Status
-from rsfstudy.storage import read_provenance
+from rsfstudy.status import Status
+from rsfstudy.storage import StoredDataset
 
 #: Maximum number of failed cells in a table.
 _MAX_FAILURES = 20
@@ -178,7 +178,8 @@ def build_frame_of_cells(
     """
     at = cell_mask.values
     columns = {name: dataset[name].broadcast_like(cell_mask).values[at] for name in axis_names}
-    columns["status"] = [STATUS_LABELS[code] for code in dataset["status"].values[at].tolist()]
+    labels = Status.labels_by_code()
+    columns["status"] = [labels[code] for code in dataset["status"].values[at].tolist()]
     return pd.DataFrame(columns | {"message": dataset["message"].values[at]})
 
 
@@ -202,7 +203,7 @@ def format_recompute_command(
         Command for a shell.
     """
     words = ["rsfstudy", "rerun", results_file]
-    declared_in = read_provenance(dataset)["declared_in"]
+    declared_in = StoredDataset(dataset).provenance["declared_in"]
     if declared_in:
         words += ["--study", declared_in]
     for name, value in cell_coordinates.items():

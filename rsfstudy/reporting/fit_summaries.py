@@ -20,7 +20,7 @@ from rsfstudy.reporting.fit_tables import (
 )
 from rsfstudy.reporting.tables import TextTable
 from rsfstudy.status import Status
-from rsfstudy.storage import read_declaration
+from rsfstudy.storage import StoredDataset
 
 #: Maximum number of fits next to each other in a table.
 _MAX_FITS_PER_TABLE = 3
@@ -56,7 +56,7 @@ def summarise_fits(dataset: xr.Dataset) -> Iterator[TextTable | str]:
     for one in split_into_single_fits(dataset):
         where = ", ".join(f"{n} {value}" for n, value in record_and_step_of_fit(one).items())
         places.setdefault(where, []).append(one)
-    measure: Any = read_declaration(dataset).measure
+    measure: Any = StoredDataset(dataset).declaration.measure
     together = ", ".join(f"step {step} of {record}" for record, step in measure.get("together", ()))
     several, unfitted = len(places) > 1, []
     for where, fits in places.items():

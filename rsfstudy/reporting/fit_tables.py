@@ -15,7 +15,7 @@ from rsfstudy.fitting import (
     split_window_number,
 )
 from rsfstudy.reporting.tables import format_units
-from rsfstudy.status import STATUS_LABELS, Status
+from rsfstudy.status import Status
 
 #: Names that laboratories use for parameters, if the names in rsfstudy are different.
 _LABORATORY_NAME_BY_PARAMETER_NAME = {
@@ -261,7 +261,7 @@ def status_label_of_fit(fit: xr.Dataset) -> str:
     str
         Label such as ``ok`` or ``not_identified``.
     """
-    return STATUS_LABELS[int(fit["status"])]
+    return Status.labels_by_code()[int(fit["status"])]
 
 
 def all_fits_are_valid(dataset: xr.Dataset) -> bool:

@@ -22,9 +22,9 @@ from rsfstudy.reporting.tables import (
     format_number_or_dash,
     format_units,
 )
-from rsfstudy.rig import convert_to_dimensional_name, convert_to_display_units
-from rsfstudy.status import STATUS_LABELS, Status
-from rsfstudy.storage import find_primary_output, read_declaration
+from rsfstudy.rig import DatasetUnits
+from rsfstudy.status import Status
+from rsfstudy.storage import StoredDataset
 
 #: Maximum number of cells in a table that shows all cells.
 _MAX_CELLS_SHOWN_WITHOUT_THINNING = 36
@@ -48,11 +48,11 @@ def build_primary_output_table(dataset: xr.Dataset) -> TextTable:
     TextTable
         Table of the primary output. The table is empty if the study has no primary output.
     """
-    name = find_primary_output(dataset)
+    name = StoredDataset(dataset).primary_output
     if name is None:
         return TextTable([])
-    dataset = convert_to_display_units(dataset)
-    name = name if name in dataset else convert_to_dimensional_name(name)
+    dataset = DatasetUnits(dataset).convert_for_display()
+    name = name if name in dataset else DatasetUnits.dimensional_name(name)
     dims = dataset["status"].dims
     drawn = [n for n in _find_fields_along_numbered_axes(dataset) if n in dataset.coords]
     columns = [Column(format_axis_name(dataset[n]), n, format_value) for n in drawn]
@@ -65,7 +65,7 @@ def build_primary_output_table(dataset: xr.Dataset) -> TextTable:
     at = select_thinned_points({str(d): dataset.sizes[d] for d in dims}, most)
     few = dataset[[*(column.variable for column in columns), "status"]].isel(at).load()
     if (few["status"] != int(Status.OK)).any():
-        columns.append(Column("status", "status", STATUS_LABELS.__getitem__, "status"))
+        columns.append(Column("status", "status", Status.labels_by_code().__getitem__, "status"))
     units, shown = format_units(dataset[name]), few["status"].size
     caption = str(dataset[name].attrs.get("long_name", name)) + f", in {units}" * (units != "1")
     if shown < size:
@@ -80,7 +80,7 @@ def build_primary_output_table(dataset: xr.Dataset) -> TextTable:
 
 def _find_fields_along_numbered_axes(dataset: xr.Dataset) -> list[str]:
     """Return the fields that vary along numbered axes, such as samples."""
-    axes = [axis.values for axis in read_declaration(dataset).axes]
+    axes = [axis.values for axis in StoredDataset(dataset).declaration.axes]
     columns = [
         v for v in axes if isinstance(v, Mapping) and isinstance(next(iter(v.values())), list)
     ]
@@ -129,9 +129,9 @@ def summarise_study_as_text_lines(dataset: xr.Dataset) -> list[str]:
     list of str
         Range of the primary output, one line per slope, and the number of cells per status.
     """
-    lines, converted = [], convert_to_display_units(dataset)
-    if (name := find_primary_output(dataset)) is not None:
-        values = converted[name if name in converted else convert_to_dimensional_name(name)]
+    lines, converted = [], DatasetUnits(dataset).convert_for_display()
+    if (name := StoredDataset(dataset).primary_output) is not None:
+        values = converted[name if name in converted else DatasetUnits.dimensional_name(name)]
         told, units = np.unique(values.values[np.isfinite(values.values)]), format_units(values)
         ends = " to ".join(map(format_value, dict.fromkeys((*told[:1], *told[-1:]))))
         text = f"{ends}{f' {units}' * (units != '1')}" if ends else "no values"

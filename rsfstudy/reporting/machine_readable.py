@@ -18,12 +18,7 @@ from rsfstudy.reporting.origin_tables import find_constant_fields
 from rsfstudy.reporting.reduction_tables import build_reduction_tables, missing_result_reasons
 from rsfstudy.reporting.summaries import is_motion, measure_motion
 from rsfstudy.reporting.tables import TextTable, build_single_scene_result_table
-from rsfstudy.storage import (
-    is_of_single_scene,
-    read_declaration,
-    read_provenance,
-    read_scene_fields,
-)
+from rsfstudy.storage import StoredDataset
 from rsfstudy.vocabulary import find_coverage_content_type
 
 
@@ -48,7 +43,7 @@ def summarise_study_as_fields(dataset: xr.Dataset, file: str) -> dict[str, Any]:
         "title": dataset.attrs["title"],
         "file": file,
         "completeness": dataset.attrs["completeness"],
-        "overrides": read_declaration(dataset).overrides,
+        "overrides": StoredDataset(dataset).declaration.overrides,
         "statuses": count_statuses(dataset),
         "rhs_evaluations": int(dataset["rhs_evaluations"].sum()),
         "pending_cells": count_pending_cells(dataset),
@@ -74,7 +69,7 @@ def classify_contents(dataset: xr.Dataset) -> str:
     """
     if is_fit(dataset):
         return "fit"
-    if not is_of_single_scene(dataset):
+    if not StoredDataset(dataset).is_of_single_scene:
         return "results"
     return "motion" if is_motion(dataset) else "scene"
 
@@ -102,7 +97,7 @@ def summarise_file_as_fields(dataset: xr.Dataset, file: str) -> dict[str, Any]:
         return about | {"fits": list_fit_values(dataset)}
     about["status"] = dataset.attrs["status"]
     about["message"] = dataset.attrs.get("message", "")
-    scene = {"scene": _select_applicable_fields(read_scene_fields(dataset))}
+    scene = {"scene": _select_applicable_fields(StoredDataset(dataset).scene_fields)}
     if kind == "motion":
         return about | scene | {"motion": measure_motion(dataset)}
     return about | scene | {"values": build_single_scene_result_table(dataset).values}
@@ -110,7 +105,7 @@ def summarise_file_as_fields(dataset: xr.Dataset, file: str) -> dict[str, Any]:
 
 def _summarise_results(dataset: xr.Dataset, file: str) -> dict[str, Any]:
     """Summarise the results and the provenance of a study."""
-    about, sizes = read_provenance(dataset), dataset.sizes
+    about, sizes = StoredDataset(dataset).provenance, dataset.sizes
     scene, rig = find_constant_fields(dataset)
     return summarise_study_as_fields(dataset, file) | {
         "lattice": {str(dimension): sizes[dimension] for dimension in dataset["status"].dims},

@@ -8,12 +8,12 @@ from typing import Any
 
 import xarray as xr
 
-from rsfstudy.critical_steps import SLOW_INSTABILITY_NORM_WARNING_PREFIX
 from rsfstudy.formatting import format_nonempty_fields, pluralize
+from rsfstudy.measures import CriticalStep
 from rsfstudy.reporting.cell_tables import format_status_counts
-from rsfstudy.rig import DIMENSIONLESS_PREFIX, in_display_units
+from rsfstudy.rig import DatasetUnits, Rig
 from rsfstudy.status import Status
-from rsfstudy.storage import read_declaration, read_provenance
+from rsfstudy.storage import StoredDataset
 
 
 def describe_scene_and_rig_fields(
@@ -42,7 +42,7 @@ def describe_scene_and_rig_fields(
         instability norm. Empty descriptions are omitted.
     """
     scene_fields = {n: v for n, v in scene_fields.items() if n not in varied_names}
-    sizes = in_display_units(rig_values, varied_names)
+    sizes = Rig.convert_quantities_for_display(rig_values, varied_names)
     told = {
         heading: format_nonempty_fields({n: v for n, v in scene_fields.items() if v}),
         "zero": ", ".join(n for n, v in scene_fields.items() if not v and v is not None),
@@ -74,15 +74,15 @@ def find_constant_fields(dataset: xr.Dataset) -> tuple[dict[str, Any], dict[str,
     rig : dict of str to float
         Quantities of the rig in SI units. The dictionary is empty if the study has no rig.
     """
-    declared = read_declaration(dataset)
+    declared = StoredDataset(dataset).declaration
     varied = {
-        str(n).removeprefix(DIMENSIONLESS_PREFIX)
+        str(n).removeprefix(DatasetUnits.DIMENSIONLESS_PREFIX)
         for n, along in dataset.coords.items()
         if along.dims
     }
     scene = {n: v for n, v in declared.base.items() if n not in varied}
     rig = declared.laboratory or {}
-    return scene, {name: rig[name] for name in in_display_units(rig, varied)}
+    return scene, {name: rig[name] for name in Rig.convert_quantities_for_display(rig, varied)}
 
 
 def describe_study_origin(dataset: xr.Dataset) -> dict[str, str]:
@@ -98,7 +98,7 @@ def describe_study_origin(dataset: xr.Dataset) -> dict[str, str]:
     dict of str to str
         Descriptions of the lattice, the fixed fields, the cells, the command and the versions.
     """
-    attrs, about = dataset.attrs, read_provenance(dataset)
+    attrs, about = dataset.attrs, StoredDataset(dataset).provenance
     dims = dataset["status"].dims
     scene, rig = find_constant_fields(dataset)
     reduced = attrs.get("reduced_despite")
@@ -128,8 +128,8 @@ def note_on_norms_near_load_velocity(dataset: xr.Dataset) -> str:
         message of the first such result. The string is empty if there is no such result, or if the
         study has no rig.
     """
-    if read_declaration(dataset).laboratory is None:
+    if StoredDataset(dataset).declaration.laboratory is None:
         return ""
     ok = dataset["message"].values[dataset["status"].values == int(Status.OK)]
-    near = [text for text in ok.tolist() if text.startswith(SLOW_INSTABILITY_NORM_WARNING_PREFIX)]
+    near = [text for text in ok.tolist() if text.startswith(CriticalStep.SLOW_NORM_WARNING_PREFIX)]
     return f"{len(near)} of {pluralize(len(ok), 'answer')}: {near[0]}" if near else ""

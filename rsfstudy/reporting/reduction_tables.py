@@ -16,8 +16,8 @@ from rsfstudy.reporting.tables import (
     format_axis_name,
     format_units,
 )
-from rsfstudy.rig import convert_to_display_units
-from rsfstudy.storage import read_declaration
+from rsfstudy.rig import DatasetUnits
+from rsfstudy.storage import StoredDataset
 
 #: Headings and formats of the columns of a slope table, by the suffix of the variable name.
 _COLUMNS_OF_SLOPE_TABLE = {
@@ -54,7 +54,7 @@ def build_reduction_tables(dataset: xr.Dataset) -> Iterator[TextTable]:
         One table for each reduction with a standard error, such as a slope. If the study compares
         integrators, a final table lists the cheapest integrator for each accuracy.
     """
-    converted = convert_to_display_units(dataset)
+    converted = DatasetUnits(dataset).convert_for_display()
     for slope in names_of_slope_reductions(converted):
         yield _slope_table(converted, slope)
     if {column.variable for column in _INTEGRATOR_COLUMNS} <= set(dataset.data_vars):
@@ -94,7 +94,7 @@ def names_of_slope_reductions(dataset: xr.Dataset) -> list[str]:
     list of str
         Names in the order of the declaration.
     """
-    named = [reduction["name"] for reduction in read_declaration(dataset).reductions]
+    named = [reduction["name"] for reduction in StoredDataset(dataset).declaration.reductions]
     return [name for name in named if {name, f"{name}_stderr"} <= set(dataset.data_vars)]
 
 
@@ -129,7 +129,7 @@ def find_refusal_reasons_of_reductions(dataset: xr.Dataset) -> dict[str, str]:
     dict of str to str
         Reasons by reduction name.
     """
-    named = [str(reduction["name"]) for reduction in read_declaration(dataset).reductions]
+    named = [str(reduction["name"]) for reduction in StoredDataset(dataset).declaration.reductions]
     named.sort(key=len, reverse=True)  # A name may begin with another name.
     found: dict[str, str] = {}
     for result, values in dataset.data_vars.items():
@@ -153,7 +153,7 @@ def missing_result_reasons(dataset: xr.Dataset) -> dict[str, str]:
         Reasons by reduction name.
     """
     found, there = find_refusal_reasons_of_reductions(dataset), tuple(map(str, dataset.data_vars))
-    for stated_as in read_declaration(dataset).reductions:
+    for stated_as in StoredDataset(dataset).declaration.reductions:
         about: Mapping[str, Any] = {**stated_as}
         if not any(name.startswith(about["name"]) for name in there):
             least, most = map(format_value, about.get("within") or ("", ""))

@@ -30,7 +30,7 @@ from rsfstudy.reporting.tables import (
     format_units,
 )
 from rsfstudy.slider import Scene
-from rsfstudy.storage import is_of_single_scene, read_json_attribute, read_scene_fields
+from rsfstudy.storage import StoredDataset
 
 SummaryTableOrSentence = TextTable | Mapping[str, str] | str
 
@@ -52,7 +52,7 @@ def build_summary_tables_and_sentences(dataset: xr.Dataset) -> Iterator[SummaryT
     """
     if fit_tables.is_fit(dataset):
         yield from summarise_fits(dataset)
-    elif not is_of_single_scene(dataset):
+    elif not StoredDataset(dataset).is_of_single_scene:
         yield build_primary_output_table(dataset)
         yield from build_reduction_tables(dataset)
         yield {
@@ -122,11 +122,11 @@ def describe_dataset_origin(dataset: xr.Dataset) -> dict[str, str]:
     dict of str to str
         Descriptions of the scene or the lattice, the command, the versions and the status.
     """
-    if not is_of_single_scene(dataset):
+    if not StoredDataset(dataset).is_of_single_scene:
         return origin_tables.describe_study_origin(dataset)
-    about, scene = dataset.attrs, read_scene_fields(dataset)
+    about, scene = dataset.attrs, StoredDataset(dataset).scene_fields
     fields = {n: v for n, v in scene.items() if n not in ("segments", "samples")}
-    rig = read_json_attribute(dataset, "laboratory") if "laboratory" in about else {}
+    rig = StoredDataset(dataset).read_json("laboratory") if "laboratory" in about else {}
     return {
         **origin_tables.describe_scene_and_rig_fields("scene", fields, rig),
         "command": about.get("history", "unknown"),

@@ -8,7 +8,7 @@ import xarray as xr
 from rsfstudy.formatting import pluralize
 from rsfstudy.reporting.cell_tables import count_failures
 from rsfstudy.reporting.tables import TextTable
-from rsfstudy.study import NOT_APPLICABLE_VERDICT, VERDICTS, format_verdict_row
+from rsfstudy.study import Claim, format_verdict_row
 
 
 def claims_table(verdicts: pd.DataFrame) -> TextTable | str:
@@ -26,7 +26,7 @@ def claims_table(verdicts: pd.DataFrame) -> TextTable | str:
         empty if there are no claims.
     """
     rows = verdicts.to_dict("records")
-    if not any(row["verdict"] != NOT_APPLICABLE_VERDICT for row in rows):
+    if not any(row["verdict"] != Claim.NOT_APPLICABLE for row in rows):
         return f"{pluralize(len(rows), 'claim')} not checked: {count_verdicts(verdicts)}" * bool(
             rows
         )
@@ -55,9 +55,9 @@ def count_verdicts(verdicts: pd.DataFrame) -> str:
         Number of claims per verdict. If no claim applies, the string contains the reason.
     """
     given = list(verdicts["verdict"])
-    if set(given) == {NOT_APPLICABLE_VERDICT}:
+    if set(given) == {Claim.NOT_APPLICABLE}:
         return "no published values for overrides or other units"
-    return ", ".join(f"{given.count(v)} {v}" for v in VERDICTS if v in given)
+    return ", ".join(f"{given.count(v)} {v}" for v in Claim.VERDICTS if v in given)
 
 
 def summarise_verdicts(dataset: xr.Dataset, verdicts: pd.DataFrame) -> tuple[str, list[str]]:

@@ -7,7 +7,6 @@ import math
 from rsfstudy.motion import Event
 from rsfstudy.slider import (
     LOG_SLIP_RATE_PER_PATH_LENGTH,
-    RUPTURE_REGIME,
     MotionPoint,
     Scene,
     displacement_per_path_length,
@@ -65,7 +64,7 @@ def growth_rate_along_path(scene: Scene, event: Event, load_velocity: float) -> 
         Growth rate per unit path length.
     """
     growth = event.point.log_slip_rate_derivative
-    if event.regime != RUPTURE_REGIME:
+    if event.regime != Scene.RUPTURE_REGIME:
         return growth
     norm = scene.inertial_time * (math.exp(event.point.log_slip_rate) + load_velocity)
     slant = growth / (

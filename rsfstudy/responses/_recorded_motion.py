@@ -9,7 +9,6 @@ from typing import NamedTuple
 import numpy as np
 
 from rsfstudy.motion import (
-    SAMPLE_COLUMN,
     Event,
     EventKind,
     EventSpecification,
@@ -17,10 +16,8 @@ from rsfstudy.motion import (
     MotionStopped,
     Recording,
     estimate_neglected_inertia_error,
-    point_before_start,
-    recorded_friction_coefficient,
 )
-from rsfstudy.slider import Scene, largest_linear_growth_rate
+from rsfstudy.slider import Scene
 
 #: Minimum error estimate of a result, divided by the requested relative accuracy. The minimum is
 #: necessary because two runs may have the same error by chance.
@@ -148,14 +145,14 @@ def record_motion_of_segment(
     except MotionStopped:
         if peak is None or not allow_early_stop:
             raise
-    rows, start = recording.as_table(scene), point_before_start(scene)
+    rows, start = recording.as_table(scene), Integrator.point_before_start(scene)
     slow = recording.index_of_regime(scene.dynamics.regime)
     neglected = estimate_neglected_inertia_error(scene, rows, slow, start.log_slip_rate)
     shown = rows[:, 0] >= begun[first_segment].time
     rows, neglected = rows[shown], neglected[shown]
     # The other samples of the step that ends at the first row are not part of the record.
-    rows[0, SAMPLE_COLUMN] = 0.0
-    friction, later = recorded_friction_coefficient(rows), begun[max(first_segment, 1) :]
+    rows[0, Recording.SAMPLE_COLUMN] = 0.0
+    friction, later = Recording.friction_coefficient(rows), begun[max(first_segment, 1) :]
     before = [float(friction[rows[:, 0] == each.time][0]) for each in later]
     if first_segment == 0:
         before.insert(0, start.apparent_friction)
@@ -300,7 +297,7 @@ def compute_settled_friction_flag(scene: Scene, *, is_flat: bool) -> float:
     """
     if not is_flat:
         return 0.0
-    growth = largest_linear_growth_rate(scene, scene.log_load_velocity)
+    growth = scene.largest_linear_growth_rate(scene.log_load_velocity)
     if growth is not None and growth.is_zero_within_error:
         return math.nan
     return 0.0 if growth is not None and growth.is_positive else 1.0

@@ -18,15 +18,13 @@ from rsfstudy.measure_base import (
     steady_sliding_is_linearly_stable,
 )
 from rsfstudy.motion import (
-    RECORDED_VARIABLES,
     Event,
     EventKind,
     Integrator,
     MotionStopped,
+    Recording,
     approach_to_steady_state,
     maximum,
-    recorded_friction_coefficient,
-    recorded_load_point_displacement,
     resample_motion_along_path,
 )
 from rsfstudy.parts import Segment
@@ -226,7 +224,7 @@ class Healing(RecordingMeasure):
             values, refined, by_friction, scene, integrator, neglected
         )
         above = again.peak_event.point.apparent_friction - float(
-            recorded_friction_coefficient(again.recorded_rows)[-1]
+            Recording.friction_coefficient(again.recorded_rows)[-1]
         )
         # Near steady sliding, friction may have spurious peaks on which both runs agree.
         if above <= max(
@@ -254,8 +252,8 @@ class Healing(RecordingMeasure):
         self, scene: Scene, record: RecordedMotion
     ) -> dict[str, np.ndarray]:
         """Return the recorded quantities along ``phase``, from the hold onwards."""
-        path = resample_motion_along_path(record.recorded_rows, self.phases, RECORDED_VARIABLES)
-        moved = recorded_load_point_displacement(scene, np.column_stack([*path.values()]))
+        path = resample_motion_along_path(record.recorded_rows, self.phases, Recording.VARIABLES)
+        moved = Recording.load_point_displacement(scene, np.column_stack([*path.values()]))
         return {
             **path_relative_to_start(record.start_event, path),
             "load_point_displacement": moved - moved[0],

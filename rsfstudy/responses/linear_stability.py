@@ -17,19 +17,7 @@ from rsfstudy.error_boundary import wrap_methods_in_error_boundary
 from rsfstudy.measure_base import Measure, Outcome
 from rsfstudy.motion import Integrator
 from rsfstudy.quantities import Output
-from rsfstudy.slider import (
-    Equations,
-    Scene,
-    SteadySliding,
-    all_critical_stiffnesses,
-    build_equations_against_displacement,
-    build_equations_against_inertial_time,
-    critical_stiffness,
-    critical_stiffness_closed_form,
-    effective_normal_stress_at,
-    steady_friction_minus_reference,
-    steady_sliding,
-)
+from rsfstudy.slider import Equations, Scene, SteadySliding, critical_stiffness_closed_form
 from rsfstudy.status import Status
 
 #: Step of the central differences, in units of the scale of an unknown. Rounding and truncation
@@ -138,18 +126,18 @@ class LinearStability(Measure):
         load = scene.log_load_velocity
         if load == -math.inf:
             return Outcome(Status.NO_STEADY_STATE, message="the load point is held")
-        steady = steady_sliding(scene, load)
+        steady = scene.steady_sliding(load)
         if steady is None:
             return Outcome(
                 Status.NO_STEADY_STATE,
-                {"steady_friction": scene.mu_star + steady_friction_minus_reference(scene, load)},
+                {"steady_friction": scene.mu_star + scene.steady_friction_minus_reference(load)},
                 "phi < atan(mu_ss): the slider locks while stress rises, and runs while it falls",
             )
-        sigma_ss = effective_normal_stress_at(scene, steady.frictional_stress)
+        sigma_ss = scene.effective_normal_stress_at(steady.frictional_stress)
         mu_ss = (scene.mu_star + steady.frictional_stress) / sigma_ss
         values = {"steady_friction": mu_ss, "steady_normal_stress": sigma_ss}
-        massless = critical_stiffness(scene, load, quasi_static=True)
-        critical = critical_stiffness(scene, load)
+        massless = scene.critical_stiffness_at(load, quasi_static=True)
+        critical = scene.critical_stiffness_at(load)
         if critical <= 0.0:
             return Outcome(
                 Status.STABLE_AT_ANY_STIFFNESS,
@@ -220,20 +208,18 @@ def _find_stiffness_at_zero_growth(
     def growth_at(stiffness: float) -> float:
         changed = scene.with_(stiffness=stiffness)
         if with_mass:
-            equations = build_equations_against_inertial_time(changed)
+            equations = changed.equations_against_inertial_time()
             stress = steady_state.spring_stress
             state = (stress, steady_state.log_slip_rate, stress, *steady_state.states[1:])
         else:
-            equations = build_equations_against_displacement(changed)
+            equations = changed.equations_against_displacement()
             state = (steady_state.spring_stress, *steady_state.states)
         integrator.work_meter.charge(equations.regime, 2 * len(state))
         return max_growth_rate(compute_jacobian(equations, state))
 
     # With several states, sliding may be stable again below the next smaller critical stiffness.
     before = [
-        k
-        for k in all_critical_stiffnesses(scene, steady_state.log_slip_rate)
-        if k < stiffness_guess
+        k for k in scene.all_critical_stiffnesses(steady_state.log_slip_rate) if k < stiffness_guess
     ]
     softer = max(0.5 * stiffness_guess, math.sqrt(stiffness_guess * before[-1]) if before else 0.0)
     if not growth_at(softer) > 0.0 > growth_at(2.0 * stiffness_guess):

@@ -12,24 +12,10 @@ import numpy as np
 from rsfstudy.error_boundary import wrap_methods_in_error_boundary
 from rsfstudy.errors import InvalidValue
 from rsfstudy.measure_base import Measure, Outcome
-from rsfstudy.motion import (
-    RECORDED_VARIABLES,
-    EventKind,
-    Integrator,
-    MotionStopped,
-    Recording,
-    fall,
-    rise,
-)
+from rsfstudy.motion import EventKind, Integrator, MotionStopped, Recording, fall, rise
 from rsfstudy.quantities import Output
 from rsfstudy.responses._recorded_motion import estimate_error_at_instant
-from rsfstudy.slider import (
-    Scene,
-    compute_steady_states,
-    equations_at_imposed_slip_rate,
-    frictional_stress_after_jump,
-    steady_sliding,
-)
+from rsfstudy.slider import Scene
 from rsfstudy.status import Status
 
 #: Smallest evolution of friction after a step, as a fraction of a. Smaller changes are dominated by
@@ -191,7 +177,7 @@ class RigidResponse(Measure):
             return Outcome(Status.NO_STEP, message="V = V_* is no step")
         if log_slip_rate == -math.inf:
             return Outcome(Status.NO_STEADY_STATE, message="the load point is held: nothing slips")
-        sliding = steady_sliding(scene, log_slip_rate)
+        sliding = scene.steady_sliding(log_slip_rate)
         if sliding is None:
             return Outcome(Status.NO_STEADY_STATE, message="no steady state at this slip rate")
         start, steady = (
@@ -249,10 +235,10 @@ class RigidResponse(Measure):
         """
         at, distance = self.inner_coordinates["slip"], math.nan
         recording = Recording(sample_times=np.union1d(at, [1.0]))
-        equations = equations_at_imposed_slip_rate(scene, scene.log_load_velocity)
+        equations = scene.equations_at_imposed_slip_rate(scene.log_load_velocity)
         watches = (rise("frictional_stress", stress_level), fall("frictional_stress", stress_level))
         # The step does not change the states Psi, which have their values of steady sliding at V_*.
-        state = (start_stress, *compute_steady_states(scene, 0.0, 0.0)[1:])
+        state = (start_stress, *scene.compute_steady_states(0.0, 0.0)[1:])
         complete = False
         for event in integrator.follow_equations(equations, state, watches, recording=recording):
             if event.specification is not None and math.isnan(distance):
@@ -261,7 +247,7 @@ class RigidResponse(Measure):
             if complete and not math.isnan(distance):
                 break
         names = ("slip", "frictional_stress", "state_variable", "normal_stress_ratio")
-        columns = [RECORDED_VARIABLES.index(name) for name in names]
+        columns = [Recording.VARIABLES.index(name) for name in names]
         slips, *values = recording.as_table(scene)[:, columns].T
         values[0] = values[0] - scene.mu_star
         rows = np.stack(values, axis=1)
@@ -297,7 +283,7 @@ def _compute_step_asymmetries(scene: Scene, log_slip_rate: float) -> dict[str, f
     The dictionary contains the asymmetries of the direct effect and of the evolution to steady
     sliding. If sliding cannot be steady after one of the two steps, the dictionary is empty.
     """
-    steady, inverse_steady = (steady_sliding(scene, x) for x in (log_slip_rate, -log_slip_rate))
+    steady, inverse_steady = (scene.steady_sliding(x) for x in (log_slip_rate, -log_slip_rate))
     if steady is None or inverse_steady is None:
         return {}
     direct, inverse = (
@@ -334,7 +320,7 @@ def frictional_stress_after_rate_step(scene: Scene, log_slip_rate: float) -> flo
         With the status ``normal_stress_lost`` if a decrease of friction would open the fault, and
         with the status ``locked`` if no stress balances an increase of friction.
     """
-    friction = frictional_stress_after_jump(scene, scene.a * log_slip_rate)
+    friction = scene.frictional_stress_after_jump(scene.a * log_slip_rate)
     if friction is None and log_slip_rate < 0.0:
         raise MotionStopped(Status.NORMAL_STRESS_LOST, "the direct effect takes normal stress away")
     if friction is None:

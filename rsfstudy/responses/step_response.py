@@ -19,7 +19,6 @@ from rsfstudy.measure_base import (
     steady_sliding_is_linearly_stable,
 )
 from rsfstudy.motion import (
-    MOTION_VARIABLES,
     Event,
     EventKind,
     Integrator,
@@ -48,7 +47,7 @@ _OUTPUTS = (
         "oscillations repeat",
     ),
     Output("peak_log10_slip_rate", dims=("peak",)),
-    *create_outputs_along_phase(*MOTION_VARIABLES),
+    *create_outputs_along_phase(*Recording.MOTION_VARIABLES),
 )
 
 

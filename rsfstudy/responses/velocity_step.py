@@ -18,15 +18,13 @@ from rsfstudy.measure_base import (
     create_outputs_along_phase,
 )
 from rsfstudy.motion import (
-    MOTION_VARIABLES,
-    RECORDED_VARIABLES,
     Event,
     Integrator,
     MotionStopped,
+    Recording,
     fall,
     maximum,
     minimum,
-    recorded_friction_coefficient,
     resample_motion_along_path,
     rise,
 )
@@ -43,7 +41,7 @@ from rsfstudy.responses._recorded_motion import (
     path_relative_to_start,
     record_motion_of_segment,
 )
-from rsfstudy.slider import Scene, steady_friction_minus_reference
+from rsfstudy.slider import Scene
 from rsfstudy.status import Status
 
 #: Length of the last part of the record, in which friction must be constant, as a fraction of the
@@ -376,7 +374,7 @@ class VelocityStep(RecordingMeasure):
         """Return the record, ``settled`` and the closed-form departure."""
         rows, friction = (
             recorded_motion.recorded_rows,
-            recorded_friction_coefficient(recorded_motion.recorded_rows),
+            Recording.friction_coefficient(recorded_motion.recorded_rows),
         )
         late = recorded_motion.last_event.time - _SETTLING_WINDOW_FRACTION * evaluated_step.duration
         # The last tenth of the record may contain few samples, because time steps may be long.
@@ -385,7 +383,7 @@ class VelocityStep(RecordingMeasure):
         direct = turned.point.apparent_friction - recorded_motion.friction_before_segments[0]
         path = path_relative_to_start(
             recorded_motion.start_event,
-            resample_motion_along_path(rows, self.phases, RECORDED_VARIABLES),
+            resample_motion_along_path(rows, self.phases, Recording.VARIABLES),
         )
         stepped = scene.segment_scene(self.step_number - 1)
         is_flat = bool(np.ptp(last) < _SETTLING_TOLERANCE * abs(direct))
@@ -418,11 +416,11 @@ def _max_departure_from_closed_form(
         math.log(evaluated_step.velocity_before),
         math.log(evaluated_step.velocity_after),
     )
-    steady = steady_friction_minus_reference(scene, after) - steady_friction_minus_reference(
-        scene, before
+    steady = scene.steady_friction_minus_reference(after) - scene.steady_friction_minus_reference(
+        before
     )
     steady += scene.dynamics.radiated_stress(after) - scene.dynamics.radiated_stress(before)
-    slip = recorded_motion.recorded_rows[:, MOTION_VARIABLES.index("slip")]
+    slip = recorded_motion.recorded_rows[:, Recording.MOTION_VARIABLES.index("slip")]
     later = recorded_motion.recorded_rows[:, 0] >= recorded_motion.peak_event.time
     left = np.array(
         [
@@ -432,7 +430,7 @@ def _max_departure_from_closed_form(
     )
     expected = steady + scene.b * left
     seen = (
-        recorded_friction_coefficient(recorded_motion.recorded_rows)
+        Recording.friction_coefficient(recorded_motion.recorded_rows)
         - recorded_motion.friction_before_segments[0]
     )[later]
     return float(np.abs(seen - expected).max())

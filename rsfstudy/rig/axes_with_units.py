@@ -9,7 +9,7 @@ from collections.abc import Mapping, Sequence
 from fractions import Fraction
 from typing import Any
 
-from rsfstudy.axes import Axis, AxisRow, fields_of_axis_point, to_plain_value
+from rsfstudy.axes import Axis, AxisRow
 from rsfstudy.errors import InvalidValue
 from rsfstudy.formatting import is_sequence_of_axis_values
 from rsfstudy.quantities import is_variable_name
@@ -71,7 +71,7 @@ def make_axis_with_units(dimension: str, values: Any, units: str | Mapping[str, 
         return Axis(dimension, values)
     if hasattr(values, "keys"):
         if isinstance(values, Mapping) and any(
-            isinstance(fields_of_axis_point(point), Mapping) for point in values.values()
+            isinstance(Axis.fields_of_point(point), Mapping) for point in values.values()
         ):
             return convert_axis_to_stated_units(Axis(dimension, values))
         stated: Any = units or None
@@ -176,7 +176,7 @@ def convert_values_to_units(quantity_name: str, values: Sequence[Any], units: st
         number, written = (
             split_number_and_units(value)
             if isinstance(value, str)
-            else (to_plain_value(quantity_name, value), units)
+            else (Axis.to_plain_value(quantity_name, value), units)
         )
         if isinstance(number, float) and written == units:
             found.append(number)

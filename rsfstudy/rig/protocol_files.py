@@ -25,7 +25,6 @@ from rsfstudy.slider import (
     SEGMENT_MAPPING_KEYS,
     Protocol,
     SampledHistory,
-    build_sampled_history,
     protocol,
 )
 
@@ -145,7 +144,7 @@ def history(
         rule = "leaves no normal stress: it must stay positive, less pore pressure"
         found[key].check_values(key, fall >= 1.0, rule)
     of_pressure = "pore_pressure" in found and "normal_stress" not in found
-    return build_sampled_history(
+    return SampledHistory.from_samples(
         time, velocity, fall, name, of_pressure=of_pressure, first_reversal=back
     )
 

@@ -10,7 +10,7 @@ import contextlib
 import json
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, fields
-from typing import Any
+from typing import Any, ClassVar
 
 import xarray as xr
 
@@ -38,9 +38,11 @@ from rsfstudy.rig.rig_quantities import (
     convert_rig_value_to_si,
     derive_scene_fields_from_rig,
     find_si_units_of_field,
+    in_display_units,
+    is_stiffness_over_normal_stress,
 )
 from rsfstudy.rig.units import convert_to_si
-from rsfstudy.slider import Protocol, Scene, add_scene_fields_to_signature, protocol
+from rsfstudy.slider import Protocol, Scene, SceneFields, protocol
 
 __getattr__ = build_getattr_for_former_names(__name__)
 
@@ -112,6 +114,11 @@ class Rig(HtmlTableMixin):
     >>> round(scene.parts.loading.hold_time, 9)
     100.0
     """
+
+    #: Quantities of a rig by name, with their units and limits.
+    QUANTITIES: ClassVar = RIG_QUANTITIES
+    is_stiffness_over_stress = staticmethod(is_stiffness_over_normal_stress)
+    convert_quantities_for_display = staticmethod(in_display_units)
 
     normal_stress: Any
     slip_distance: Any
@@ -187,7 +194,7 @@ class Rig(HtmlTableMixin):
             / self.scales[scale].factor
         )
 
-    @add_scene_fields_to_signature(*RATIO_FIELD_BY_DIMENSIONAL_NAME)
+    @SceneFields.add_to_signature(*RATIO_FIELD_BY_DIMENSIONAL_NAME)
     def scene(self, **fields: Any) -> Scene:
         """Create a scene of this rig.
 

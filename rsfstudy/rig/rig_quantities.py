@@ -15,7 +15,7 @@ import numpy as np
 from rsfstudy.error_boundary import find_stacklevel_of_user_code
 from rsfstudy.errors import InvalidValue, RsfStudyWarning
 from rsfstudy.rig.units import compute_conversion_factor, convert_to_si, multiply_by_exact_fraction
-from rsfstudy.slider import SCENE_FIELD_QUANTITIES
+from rsfstudy.slider import SceneFields
 
 
 class RigQuantity(NamedTuple):
@@ -68,7 +68,7 @@ SI_UNIT_BY_SCALE = {
 #: Units in tables and figures, keyed by SI units.
 DISPLAY_UNIT_BY_SI_UNIT = {"Pa": "MPa", "m": "um", "m/s": "um/s", "Pa/m": "MPa/um"}
 #: Descriptions of scene fields by name.
-SCENE_QUANTITY_BY_FIELD_NAME = {about.name: about for about in SCENE_FIELD_QUANTITIES}
+SCENE_QUANTITY_BY_FIELD_NAME = {about.name: about for about in SceneFields.QUANTITIES}
 #: Names of velocity ratios in scenes, keyed by the names of the corresponding velocities.
 RATIO_FIELD_BY_DIMENSIONAL_NAME = {
     name.removesuffix("_ratio"): name

@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from rsfstudy.axes import Axis, AxisRow, classify_axis_rows_by_fields_and_texts
+from rsfstudy.axes import Axis, AxisRow
 from rsfstudy.errors import InvalidValue
 from rsfstudy.rig.axes_with_units import factor_to_si, make_axis_with_units
 from rsfstudy.rig.dataset_scales import DIMENSIONLESS_PREFIX, build_scales_of_rig
@@ -372,6 +372,6 @@ def group_axis_rows_by_field_names(axes: Sequence[Axis]) -> Iterator[tuple[np.nd
     tuple of ndarray of int
         Indices of the points on each axis, for one combination of groups.
     """
-    every = [classify_axis_rows_by_fields_and_texts(axis.rows) for axis in axes]
+    every = [axis.classify_rows() for axis in axes]
     for kind in np.ndindex(*(int(of.max()) + 1 for of in every)):
         yield tuple(np.flatnonzero(of == n) for of, n in zip(every, kind, strict=True))

@@ -17,7 +17,7 @@ from typing import Any
 
 import numpy as np
 
-from rsfstudy.axes import to_plain_value
+from rsfstudy.axes import Axis
 from rsfstudy.errors import InvalidValue
 
 #: Conversion factor to SI units, and the exponents of kilogram, metre and second.
@@ -163,7 +163,7 @@ def convert_to_si_as_fraction(quantity_name: str, value: Any, units: str) -> Fra
     elif hasattr(value, "to") and hasattr(value, "magnitude"):
         found = _convert_pint_quantity(quantity_name, value, value, units)
     else:
-        found = to_plain_value(quantity_name, value)
+        found = Axis.to_plain_value(quantity_name, value)
     if isinstance(found, bool) or not isinstance(found, int | float | Fraction):
         remedy = f"Give a number in {units}, or a text with units."
         raise InvalidValue(quantity_name, value, "is no quantity", remedy=remedy)
@@ -342,7 +342,7 @@ def _convert_pint_quantity(quantity_name: str, value: Any, quantity: Any, units:
         magnitude = quantity.to(units).magnitude
     except Exception as error:
         raise _incompatible_units_error(quantity_name, value, units) from error
-    return to_plain_value(quantity_name, magnitude)
+    return Axis.to_plain_value(quantity_name, magnitude)
 
 
 def find_size_of_units(units: str) -> SiFactorAndExponents | None:

@@ -64,83 +64,47 @@ if TYPE_CHECKING:
     )
     from rsfstudy.slider.dynamics.inertia import NEGLIGIBLE_SECOND_ORDER_WEIGHT
     from rsfstudy.slider.equations import (
-        RUPTURE_REGIME,
         Equations,
-        build_equations_against_displacement,
-        build_equations_against_inertial_time,
-        equations_at_imposed_slip_rate,
-        equations_between_ruptures,
-        equations_in_rupture,
-        equations_without_mass,
-        quasi_static_log_slip_rate,
     )
-    from rsfstudy.slider.field_name_hints import hint_for_unknown_field
     from rsfstudy.slider.fluid import BUILT_IN_PARTS
     from rsfstudy.slider.friction import (
         FrictionFunctions,
-        build_friction_relation,
-        build_state_evolution_function,
-        compute_steady_states,
-        effective_normal_stress_at,
     )
     from rsfstudy.slider.loading import MIN_SEGMENT_DURATION
     from rsfstudy.slider.motion_point import MotionPoint
-    from rsfstudy.slider.parameter_layout import LARGEST_LOG_SLIP_RATE
     from rsfstudy.slider.part_registry import (
-        OMITTED_DEFAULTS,
-        PART_SELECTING_FIELDS,
-        SCENE_FIELD_NAMES,
-        SCENE_FIELD_QUANTITIES,
-        SCENE_FIELD_TYPES,
-        SLOT_NAMES,
-        SLOTS,
         UserPart,
-        add_scene_fields_to_signature,
-        normalise_field_value,
-        quantities_with_values,
-        register_user_parts,
-        replace_names_by_user_parts,
-        scene_field_defaults,
-        scene_field_quantities,
-        scene_field_types,
     )
-    from rsfstudy.slider.parts import Function, Numbers, field_names
+    from rsfstudy.slider.parts import (
+        Function,
+        Numbers,
+    )
     from rsfstudy.slider.path_length import (
         LOG_SLIP_RATE_PER_PATH_LENGTH,
-        STOPPED_LOG_SLIP_RATE,
         displacement_per_path_length,
     )
     from rsfstudy.slider.sampled_loading import (
-        STRESS_RATE_COLUMN,
         SampledHistory,
-        build_sampled_history,
-        build_sampled_history_from_table,
     )
     from rsfstudy.slider.scene import SINGLE_ENDLESS_SEGMENT_TABLE, Scene
-    from rsfstudy.slider.scene_assembly import find_inapplicable_fields, replace_field_values
+    from rsfstudy.slider.scene_assembly import (
+        replace_field_values,
+    )
     from rsfstudy.slider.scene_caching import cached_attribute, cached_per_scene
+    from rsfstudy.slider.scene_fields import SceneFields
     from rsfstudy.slider.scene_view import SceneView
-    from rsfstudy.slider.slider_parameters import ALTERNATIVE_STIFFNESS_FIELDS, SliderParameters
-    from rsfstudy.slider.stability import (
-        all_critical_stiffnesses,
-        critical_stiffness,
-        largest_linear_growth_rate,
-        linear_growth_rates,
+    from rsfstudy.slider.slider_parameters import (
+        SliderParameters,
     )
     from rsfstudy.slider.steady_state import (
         SteadySliding,
-        frictional_stress_after_jump,
-        frictional_stress_for_friction,
-        min_steady_log_slip_rate,
-        steady_friction_minus_reference,
-        steady_sliding,
     )
     from rsfstudy.slider.user_loadings import SEGMENT_MAPPING_KEYS, Protocol, UserLoading, protocol
 else:
     __getattr__, __dir__ = build_lazy_export_functions(
         __name__,
         {
-            "slider.scene_assembly": ("find_inapplicable_fields", "replace_field_values"),
+            "slider.scene_assembly": ("replace_field_values",),
             "slider.scene_caching": ("cached_attribute", "cached_per_scene"),
             "slider.closed_forms": (
                 "CLOSED_FORMS",
@@ -148,106 +112,45 @@ else:
                 "effective_friction",
             ),
             "slider.dynamics.inertia": ("NEGLIGIBLE_SECOND_ORDER_WEIGHT",),
-            "slider.equations": (
-                "Equations",
-                "RUPTURE_REGIME",
-                "equations_between_ruptures",
-                "build_equations_against_displacement",
-                "build_equations_against_inertial_time",
-                "equations_in_rupture",
-                "equations_at_imposed_slip_rate",
-                "equations_without_mass",
-                "quasi_static_log_slip_rate",
-            ),
+            "slider.equations": ("Equations",),
             "slider.fluid": ("BUILT_IN_PARTS",),
-            "slider.friction": (
-                "FrictionFunctions",
-                "build_friction_relation",
-                "build_state_evolution_function",
-                "compute_steady_states",
-                "effective_normal_stress_at",
-            ),
-            "slider.field_name_hints": ("hint_for_unknown_field",),
+            "slider.friction": ("FrictionFunctions",),
             "slider.loading": ("MIN_SEGMENT_DURATION",),
-            "slider.parameter_layout": ("LARGEST_LOG_SLIP_RATE",),
-            "slider.parts": ("Function", "Numbers", "field_names"),
+            "slider.parts": (
+                "Function",
+                "Numbers",
+            ),
             "slider.path_length": (
                 "LOG_SLIP_RATE_PER_PATH_LENGTH",
-                "STOPPED_LOG_SLIP_RATE",
                 "displacement_per_path_length",
             ),
             "slider.motion_point": ("MotionPoint",),
             "slider.user_loadings": ("Protocol", "SEGMENT_MAPPING_KEYS", "UserLoading", "protocol"),
-            "slider.part_registry": (
-                "SCENE_FIELD_NAMES",
-                "SCENE_FIELD_QUANTITIES",
-                "SCENE_FIELD_TYPES",
-                "OMITTED_DEFAULTS",
-                "PART_SELECTING_FIELDS",
-                "SLOTS",
-                "SLOT_NAMES",
-                "UserPart",
-                "scene_field_defaults",
-                "scene_field_types",
-                "replace_names_by_user_parts",
-                "normalise_field_value",
-                "quantities_with_values",
-                "register_user_parts",
-                "scene_field_quantities",
-                "add_scene_fields_to_signature",
-            ),
-            "slider.sampled_loading": (
-                "STRESS_RATE_COLUMN",
-                "SampledHistory",
-                "build_sampled_history",
-                "build_sampled_history_from_table",
-            ),
+            "slider.part_registry": ("UserPart",),
+            "slider.sampled_loading": ("SampledHistory",),
             "slider.scene": ("SINGLE_ENDLESS_SEGMENT_TABLE", "Scene"),
+            "slider.scene_fields": ("SceneFields",),
             "slider.scene_view": ("SceneView",),
-            "slider.slider_parameters": ("ALTERNATIVE_STIFFNESS_FIELDS", "SliderParameters"),
-            "slider.stability": (
-                "critical_stiffness",
-                "all_critical_stiffnesses",
-                "linear_growth_rates",
-                "largest_linear_growth_rate",
-            ),
-            "slider.steady_state": (
-                "SteadySliding",
-                "min_steady_log_slip_rate",
-                "steady_friction_minus_reference",
-                "steady_sliding",
-                "frictional_stress_after_jump",
-                "frictional_stress_for_friction",
-            ),
+            "slider.slider_parameters": ("SliderParameters",),
+            "slider.steady_state": ("SteadySliding",),
         },
     )
 
 __all__ = [
+    "SceneFields",
     "BUILT_IN_PARTS",
     "CLOSED_FORMS",
     "SINGLE_ENDLESS_SEGMENT_TABLE",
     "Equations",
-    "SCENE_FIELD_NAMES",
-    "SCENE_FIELD_QUANTITIES",
-    "SCENE_FIELD_TYPES",
     "FrictionFunctions",
     "Function",
-    "LARGEST_LOG_SLIP_RATE",
     "MIN_SEGMENT_DURATION",
     "NEGLIGIBLE_SECOND_ORDER_WEIGHT",
     "Numbers",
-    "OMITTED_DEFAULTS",
     "LOG_SLIP_RATE_PER_PATH_LENGTH",
     "MotionPoint",
     "Protocol",
-    "RUPTURE_REGIME",
     "SEGMENT_MAPPING_KEYS",
-    "PART_SELECTING_FIELDS",
-    "SLOTS",
-    "SLOT_NAMES",
-    "ALTERNATIVE_STIFFNESS_FIELDS",
-    "STOPPED_LOG_SLIP_RATE",
-    "STRESS_RATE_COLUMN",
     "SampledHistory",
     "Scene",
     "SceneView",
@@ -255,44 +158,11 @@ __all__ = [
     "SteadySliding",
     "UserLoading",
     "UserPart",
-    "build_sampled_history",
     "cached_attribute",
     "cached_per_scene",
-    "compute_steady_states",
-    "critical_stiffness",
     "critical_stiffness_closed_form",
-    "all_critical_stiffnesses",
     "effective_friction",
-    "equations_between_ruptures",
-    "build_equations_against_displacement",
-    "build_equations_against_inertial_time",
-    "equations_in_rupture",
-    "equations_at_imposed_slip_rate",
-    "equations_without_mass",
-    "scene_field_defaults",
-    "field_names",
-    "scene_field_types",
-    "find_inapplicable_fields",
-    "build_friction_relation",
-    "linear_growth_rates",
-    "build_sampled_history_from_table",
-    "largest_linear_growth_rate",
-    "quasi_static_log_slip_rate",
-    "min_steady_log_slip_rate",
-    "replace_names_by_user_parts",
-    "effective_normal_stress_at",
-    "normalise_field_value",
     "displacement_per_path_length",
     "protocol",
-    "quantities_with_values",
-    "register_user_parts",
     "replace_field_values",
-    "scene_field_quantities",
-    "build_state_evolution_function",
-    "steady_friction_minus_reference",
-    "steady_sliding",
-    "frictional_stress_after_jump",
-    "frictional_stress_for_friction",
-    "hint_for_unknown_field",
-    "add_scene_fields_to_signature",
 ]

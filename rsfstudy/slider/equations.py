@@ -341,3 +341,25 @@ def quasi_static_log_slip_rate(scene: SceneView, spring_stress: float, state_sum
     balance = equations_without_mass(scene, with_time=False).force_balance_function
     assert balance is not None
     return float(balance(spring_stress, psis, scene.parameter_values)[0])
+
+
+def slow_manifold_point(scene: SceneView, spring_stress: float, states: Numbers) -> MotionPoint:
+    """Return the point on the slow manifold for a spring stress and states.
+
+    Parameters
+    ----------
+    scene : Scene
+        Scene of the motion.
+    spring_stress : float
+        Spring stress :math:`f`, in sigma_*.
+    states : tuple of float
+        States of the friction law, followed by the unknowns of the loading and the fluid.
+
+    Returns
+    -------
+    MotionPoint
+        Point with all fields.
+    """
+    return equations_between_ruptures(scene, with_time=False).evaluate_point(
+        (spring_stress, *states)
+    )

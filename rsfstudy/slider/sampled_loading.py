@@ -13,7 +13,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field, fields, replace
 from functools import cached_property
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -82,6 +82,9 @@ class SampledHistory(UserLoading):
         messages.
     """
 
+    #: Number of columns of ``sample_table``.
+    COLUMN_COUNT: ClassVar[int] = STRESS_RATE_COLUMN + 1
+
     samples: bytes = field(repr=False)
     digest: str
     of_stress: bool
@@ -90,6 +93,86 @@ class SampledHistory(UserLoading):
 
     auxiliary_rates = staticmethod(ramp.pending_normal_stress_rates)
     auxiliary_steady_states = staticmethod(ramp.zero_pending_normal_stress)
+
+    @classmethod
+    def from_samples(
+        cls,
+        time: np.ndarray,
+        velocity: np.ndarray,
+        normal_stress_fall: np.ndarray | None,
+        name: str,
+        *,
+        of_pressure: bool = False,
+        first_reversal: tuple[str, float, str] | None = None,
+    ) -> SampledHistory:
+        r"""Build a loading history from samples.
+
+        Parameters
+        ----------
+        time : ndarray
+            Sampling times in :math:`D_c/V_*`. The history starts at the first sample.
+        velocity : ndarray
+            Load point velocity between each sample and the next sample, in :math:`V_*`. The last
+            velocity also applies after the end of the record.
+        normal_stress_fall : ndarray or None
+            Decrease of normal stress from :math:`\sigma_*` at the samples, in :math:`\sigma_*`.
+            After the last sample, normal stress remains constant.
+        name : str
+            Name of the history in results.
+        of_pressure : bool, default: False
+            If True, pore pressure is the only cause of the decrease of effective normal stress.
+        first_reversal : tuple of (str, float, str), optional
+            Name, value and position of the first sample that moves the load point backwards.
+
+        Returns
+        -------
+        SampledHistory
+            Loading history.
+
+        Raises
+        ------
+        InvalidValue
+            If the name is not a Python identifier.
+        """
+        if not is_variable_name(name):
+            raise InvalidValue("name", name, "must be a Python identifier: it names the history")
+        columns = np.zeros((len(time), STRESS_RATE_COLUMN + 1))
+        columns[:, TIME_COLUMN], columns[:, VELOCITY_COLUMN] = time - time[0], velocity
+        if normal_stress_fall is not None:
+            columns[:, STRESS_FALL_COLUMN] = normal_stress_fall
+            columns[:-1, STRESS_RATE_COLUMN] = -np.diff(normal_stress_fall) / np.diff(time)
+        history = cls.from_table(
+            columns, normal_stress_fall is not None, name, of_pressure=of_pressure
+        )
+        return replace(history, first_reversal=first_reversal)
+
+    @classmethod
+    def from_table(
+        cls, sample_table: np.ndarray, of_stress: bool, name: str, *, of_pressure: bool = False
+    ) -> SampledHistory:
+        """Build a loading history from a table of samples.
+
+        Parameters
+        ----------
+        sample_table : ndarray of shape (samples, 4)
+            Samples with the columns of ``SampledHistory.sample_table``.
+        of_stress : bool
+            If True, the samples include normal stress or pore pressure.
+        name : str
+            Name of the history in results.
+        of_pressure : bool, default: False
+            If True, the samples include pore pressure but not normal stress.
+
+        Returns
+        -------
+        SampledHistory
+            Loading history.
+        """
+        samples = np.ascontiguousarray(sample_table, dtype=float).tobytes()
+        digest = hashlib.sha256(samples).hexdigest()[:16]
+        return cls(
+            name=name, samples=samples, digest=digest, of_stress=of_stress, of_pressure=of_pressure
+        )
 
     @property
     def unknowns(self) -> tuple[Quantity, ...]:  # type: ignore[override]
@@ -200,85 +283,6 @@ class SampledHistory(UserLoading):
         one = self.sample_table[segment_index].copy()
         one[TIME_COLUMN] = 0.0
         return replace(self, samples=one.tobytes())
-
-
-def build_sampled_history(
-    time: np.ndarray,
-    velocity: np.ndarray,
-    normal_stress_fall: np.ndarray | None,
-    name: str,
-    *,
-    of_pressure: bool = False,
-    first_reversal: tuple[str, float, str] | None = None,
-) -> SampledHistory:
-    r"""Build a loading history from samples.
-
-    Parameters
-    ----------
-    time : ndarray
-        Sampling times in :math:`D_c/V_*`. The history starts at the first sample.
-    velocity : ndarray
-        Load point velocity between each sample and the next sample, in :math:`V_*`. The last
-        velocity also applies after the end of the record.
-    normal_stress_fall : ndarray or None
-        Decrease of normal stress from :math:`\sigma_*` at the samples, in :math:`\sigma_*`. After
-        the last sample, normal stress remains constant.
-    name : str
-        Name of the history in results.
-    of_pressure : bool, default: False
-        If True, pore pressure is the only cause of the decrease of effective normal stress.
-    first_reversal : tuple of (str, float, str), optional
-        Name, value and position of the first sample that moves the load point backwards.
-
-    Returns
-    -------
-    SampledHistory
-        Loading history.
-
-    Raises
-    ------
-    InvalidValue
-        If the name is not a Python identifier.
-    """
-    if not is_variable_name(name):
-        raise InvalidValue("name", name, "must be a Python identifier: it names the history")
-    columns = np.zeros((len(time), STRESS_RATE_COLUMN + 1))
-    columns[:, TIME_COLUMN], columns[:, VELOCITY_COLUMN] = time - time[0], velocity
-    if normal_stress_fall is not None:
-        columns[:, STRESS_FALL_COLUMN] = normal_stress_fall
-        columns[:-1, STRESS_RATE_COLUMN] = -np.diff(normal_stress_fall) / np.diff(time)
-    history = build_sampled_history_from_table(
-        columns, normal_stress_fall is not None, name, of_pressure=of_pressure
-    )
-    return replace(history, first_reversal=first_reversal)
-
-
-def build_sampled_history_from_table(
-    sample_table: np.ndarray, of_stress: bool, name: str, *, of_pressure: bool = False
-) -> SampledHistory:
-    """Build a loading history from a table of samples.
-
-    Parameters
-    ----------
-    sample_table : ndarray of shape (samples, 4)
-        Samples with the columns of ``SampledHistory.sample_table``.
-    of_stress : bool
-        If True, the samples include normal stress or pore pressure.
-    name : str
-        Name of the history in results.
-    of_pressure : bool, default: False
-        If True, the samples include pore pressure but not normal stress.
-
-    Returns
-    -------
-    SampledHistory
-        Loading history.
-    """
-    samples = np.ascontiguousarray(sample_table, dtype=float).tobytes()
-    digest = hashlib.sha256(samples).hexdigest()[:16]
-    return SampledHistory(
-        name=name, samples=samples, digest=digest, of_stress=of_stress, of_pressure=of_pressure
-    )
 
 
 def _log_velocity(velocity: np.ndarray) -> np.ndarray:

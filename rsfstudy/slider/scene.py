@@ -31,6 +31,7 @@ from rsfstudy.slider.needed_quantities import check_needed_quantities
 from rsfstudy.slider.parts import Numbers
 from rsfstudy.slider.scene_assembly import SceneParts
 from rsfstudy.slider.scene_caching import cached_attribute
+from rsfstudy.slider.scene_functions import SceneFunctions
 from rsfstudy.slider.scene_quantities import SceneQuantities
 from rsfstudy.slider.slider_parameters import SliderParameters
 from rsfstudy.slider.state_functions import check_steady_states
@@ -44,7 +45,7 @@ SINGLE_ENDLESS_SEGMENT_TABLE = np.array([[0.0, math.inf, *[math.nan] * 4]])
 
 @wrap_methods_in_error_boundary
 @dataclass(frozen=True, init=False, repr=False)
-class Scene(SceneQuantities):
+class Scene(SceneFunctions, SceneQuantities):
     r"""Spring-slider with rate- and state-dependent friction.
 
     The slider slides steadily at the reference velocity :math:`V_*` until the loading starts. A

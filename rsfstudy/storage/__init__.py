@@ -13,7 +13,10 @@ from rsfstudy._lazy_exports import build_lazy_export_functions
 
 if TYPE_CHECKING:
     from rsfstudy.storage.cell_columns import CellColumns, OutputPacker, StoredCellRow
-    from rsfstudy.storage.cell_journal import CellJournal, CellTimings, read_timings
+    from rsfstudy.storage.cell_journal import (
+        CellJournal,
+        CellTimings,
+    )
     from rsfstudy.storage.cell_numbers import find_cell_number
     from rsfstudy.storage.comparison import Comparison, compare_results, compare_same_lattice
     from rsfstudy.storage.dataset_files import (
@@ -21,69 +24,40 @@ if TYPE_CHECKING:
         read_dataset,
         write_dataset,
     )
-    from rsfstudy.storage.dataset_scenes import scene_of_dataset
     from rsfstudy.storage.declarations import build_scene_from_stored
     from rsfstudy.storage.fingerprints import find_fingerprint_differences
     from rsfstudy.storage.lattice_coordinates import LatticeCoordinates
     from rsfstudy.storage.lattice_datasets import assemble_dataset
-    from rsfstudy.storage.rebuild_from_file import (
-        find_primary_output,
-        rebuild_study,
-        study_of_dataset,
-    )
-    from rsfstudy.storage.schema import (
-        check_contains_study_results,
-        is_of_single_scene,
-        read_declaration,
-        read_json_attribute,
-        read_provenance,
-        read_scene_fields,
-    )
-    from rsfstudy.storage.zarr_store import (
-        check_store_does_not_exist,
-        check_zarr_installed,
-        write_store,
-    )
+    from rsfstudy.storage.stored_dataset import StoredDataset
+    from rsfstudy.storage.zarr_store import ZarrStore
 else:
     __getattr__, __dir__ = build_lazy_export_functions(
         __name__,
         {
+            "storage.zarr_store": ("ZarrStore",),
+            "storage.stored_dataset": ("StoredDataset",),
             "storage.cell_numbers": ("find_cell_number",),
             "storage.comparison": ("Comparison", "compare_results", "compare_same_lattice"),
-            "storage.dataset_scenes": ("scene_of_dataset",),
             "storage.cell_columns": ("CellColumns", "StoredCellRow", "OutputPacker"),
-            "storage.cell_journal": ("CellTimings", "CellJournal", "read_timings"),
+            "storage.cell_journal": (
+                "CellTimings",
+                "CellJournal",
+            ),
             "storage.declarations": ("build_scene_from_stored",),
             "storage.fingerprints": ("find_fingerprint_differences",),
             "storage.lattice_coordinates": ("LatticeCoordinates",),
             "storage.lattice_datasets": ("assemble_dataset",),
-            "storage.rebuild_from_file": (
-                "find_primary_output",
-                "rebuild_study",
-                "study_of_dataset",
-            ),
-            "storage.schema": (
-                "check_contains_study_results",
-                "is_of_single_scene",
-                "read_declaration",
-                "read_json_attribute",
-                "read_provenance",
-                "read_scene_fields",
-            ),
             "storage.dataset_files": (
                 "convert_attributes_for_netcdf",
                 "read_dataset",
                 "write_dataset",
             ),
-            "storage.zarr_store": (
-                "check_store_does_not_exist",
-                "check_zarr_installed",
-                "write_store",
-            ),
         },
     )
 
 __all__ = [
+    "StoredDataset",
+    "ZarrStore",
     "CellColumns",
     "StoredCellRow",
     "CellTimings",
@@ -93,25 +67,11 @@ __all__ = [
     "OutputPacker",
     "assemble_dataset",
     "build_scene_from_stored",
-    "check_contains_study_results",
-    "check_store_does_not_exist",
-    "check_zarr_installed",
     "convert_attributes_for_netcdf",
     "compare_results",
     "compare_same_lattice",
     "find_cell_number",
     "find_fingerprint_differences",
-    "find_primary_output",
-    "is_of_single_scene",
     "read_dataset",
-    "read_declaration",
-    "read_json_attribute",
-    "read_provenance",
-    "read_scene_fields",
-    "read_timings",
-    "rebuild_study",
-    "scene_of_dataset",
-    "study_of_dataset",
     "write_dataset",
-    "write_store",
 ]

@@ -305,28 +305,30 @@ class CellTimings:
     fingerprint: Mapping[str, Any]
     seconds_by_cell_key: Mapping[bytes, float]
 
+    @classmethod
+    def read(cls, path: Path) -> CellTimings | None:
+        """Read the wall times of the cells in a journal.
 
-def read_timings(path: Path) -> CellTimings | None:
-    """Read the wall times of the cells in a journal.
+        Parameters
+        ----------
+        path : Path
+            Path of the journal.
 
-    Parameters
-    ----------
-    path : Path
-        Path of the journal.
-
-    Returns
-    -------
-    CellTimings or None
-        Wall times, or None if the journal does not exist, is damaged, or is locked by a run.
-    """
-    try:
-        uri = f"{path.resolve().as_uri()}?mode=ro"
-        with contextlib.closing(sqlite3.connect(uri, uri=True, timeout=0.0)) as db:
-            (known,) = db.execute("SELECT json FROM fingerprint").fetchone()
-            seconds = db.execute("SELECT key, seconds FROM cells WHERE typeof(seconds) = 'real'")
-            return CellTimings(dict(json.loads(known)), dict(seconds))
-    except (OSError, RecursionError, sqlite3.Error, TypeError, ValueError):
-        return None
+        Returns
+        -------
+        CellTimings or None
+            Wall times, or None if the journal does not exist, is damaged, or is locked by a run.
+        """
+        try:
+            uri = f"{path.resolve().as_uri()}?mode=ro"
+            with contextlib.closing(sqlite3.connect(uri, uri=True, timeout=0.0)) as db:
+                (known,) = db.execute("SELECT json FROM fingerprint").fetchone()
+                seconds = db.execute(
+                    "SELECT key, seconds FROM cells WHERE typeof(seconds) = 'real'"
+                )
+                return cls(dict(json.loads(known)), dict(seconds))
+        except (OSError, RecursionError, sqlite3.Error, TypeError, ValueError):
+            return None
 
 
 def _open_exclusively(path: Path | str) -> sqlite3.Connection:

@@ -19,7 +19,7 @@ import xarray as xr
 from rsfstudy._deprecation import add_former_member_names
 from rsfstudy.error_boundary import wrap_methods_in_error_boundary
 from rsfstudy.errors import InvalidValue
-from rsfstudy.status import STATUS_LABELS, Status
+from rsfstudy.status import Status
 from rsfstudy.storage.fingerprints import find_fingerprint_differences
 from rsfstudy.storage.rebuild_from_file import find_primary_output
 from rsfstudy.storage.schema import is_of_single_scene, read_provenance
@@ -337,7 +337,8 @@ def _compare_statuses_of_shared_cells(
     )
     frame = both.to_dataframe(dim_order=[*map(str, first.dims)]).reset_index()
     ended = frame[frame["known"] & (frame["first"] != frame["second"])].drop(columns="known")
-    return ended.replace({"first": STATUS_LABELS, "second": STATUS_LABELS}).reset_index(drop=True)
+    labels = Status.labels_by_code()
+    return ended.replace({"first": labels, "second": labels}).reset_index(drop=True)
 
 
 def _flatten_declaration(declaration_part: Any, path: str = "") -> Iterator[tuple[str, Any]]:

@@ -9,15 +9,7 @@ import numpy as np
 import xarray as xr
 
 from rsfstudy.errors import InvalidValue
-from rsfstudy.slider import (
-    SLOTS,
-    Scene,
-    UserLoading,
-    UserPart,
-    build_sampled_history_from_table,
-    normalise_field_value,
-    protocol,
-)
+from rsfstudy.slider import SampledHistory, Scene, SceneFields, UserLoading, UserPart, protocol
 from rsfstudy.storage.declarations import build_scene_from_stored
 from rsfstudy.storage.lattice_coordinates import build_dimension_coordinates
 from rsfstudy.storage.plain_data import invalid_part_error
@@ -110,22 +102,20 @@ def read_scene_from_attributes(dataset: xr.Dataset) -> Scene:
     segments, loading = plain.pop("segments", ()), str(plain.get("loading"))
     digest = plain.pop("samples", "")
     own: dict[str, UserPart] = {
-        name: part for slot in SLOTS for name, part in slot.user_parts.items()
+        name: part for slot in SceneFields.SLOTS for name, part in slot.user_parts.items()
     }
     # Protocols with the same name can differ, so the protocol is rebuilt from its segments.
     if segments and (loading not in own or isinstance(own[loading], UserLoading)):
         rebuilt = protocol(segments, loading)
-        own[normalise_field_value("loading", rebuilt)] = rebuilt
+        own[SceneFields.normalise_value("loading", rebuilt)] = rebuilt
     if digest:
         told = dataset["history_samples"]
         pressure, stress = (bool(told.attrs.get(n)) for n in ("of_pressure", "of_stress"))
-        sampled = build_sampled_history_from_table(
-            told.values, stress, loading, of_pressure=pressure
-        )
+        sampled = SampledHistory.from_table(told.values, stress, loading, of_pressure=pressure)
         if sampled.digest != digest:
             raise invalid_part_error("history_samples", f"are not those of the scene ({digest})")
-        own[normalise_field_value("loading", sampled)] = sampled
-    for slot in SLOTS:
+        own[SceneFields.normalise_value("loading", sampled)] = sampled
+    for slot in SceneFields.SLOTS:
         name = plain.get(slot.name)
         if isinstance(name, str) and name not in {*slot.built_in_parts, *own}:
             remedy = (

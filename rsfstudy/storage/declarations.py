@@ -21,17 +21,7 @@ from rsfstudy.measures import Measure
 from rsfstudy.motion import Accuracy
 from rsfstudy.reductions import Reduction
 from rsfstudy.rig import Rig
-from rsfstudy.slider import (
-    BUILT_IN_PARTS,
-    OMITTED_DEFAULTS,
-    SLOTS,
-    Scene,
-    UserLoading,
-    UserPart,
-    field_names,
-    replace_names_by_user_parts,
-    scene_field_types,
-)
+from rsfstudy.slider import BUILT_IN_PARTS, Scene, SceneFields, UserLoading, UserPart
 from rsfstudy.storage.plain_data import (
     build_from_plain_data,
     call_with_fields,
@@ -51,8 +41,8 @@ StoredScene = Mapping[str, float | str | bool | None]
 #: Default values of scene fields that are missing in older files. Fields that the parts of a scene
 #: lack must be None, so only the defaults of slots, which are names, are included.
 _DEFAULTS_OF_MISSING_FIELDS: Mapping[str, Any] = {
-    **{n: v if isinstance(v, str) else None for n, v in OMITTED_DEFAULTS.items()},
-    **{name: None for part in BUILT_IN_PARTS.values() for name in field_names(part)},
+    **{n: v if isinstance(v, str) else None for n, v in SceneFields.OMITTED_DEFAULTS.items()},
+    **{name: None for part in BUILT_IN_PARTS.values() for name in SceneFields.names_of_part(part)},
     "fluid": "drained",
 }
 
@@ -106,7 +96,7 @@ class StoredAxis(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
             raise invalid_part_error(path, f"is refused ({error})") from error
         if not user_parts:
             return named
-        rows = [replace_names_by_user_parts(row, user_parts) for row in named.rows]
+        rows = [SceneFields.replace_names_by_user_parts(row, user_parts) for row in named.rows]
         return named.with_rows(rows, named.units, named.sampling_info)
 
 
@@ -236,16 +226,16 @@ def build_scene_from_stored(
     """
     parts = [
         part
-        for part in replace_names_by_user_parts(stored_scene, user_parts).values()
+        for part in SceneFields.replace_names_by_user_parts(stored_scene, user_parts).values()
         if isinstance(part, type | UserLoading)
     ]
     values = convert_fields(
         {**_DEFAULTS_OF_MISSING_FIELDS, **stored_scene},
-        tuple(scene_field_types(parts).items()),
+        tuple(SceneFields.types_with_user_parts(parts).items()),
         path_in_file,
     )
     scene: Scene = call_with_fields(
-        Scene, replace_names_by_user_parts(values, user_parts), path_in_file
+        Scene, SceneFields.replace_names_by_user_parts(values, user_parts), path_in_file
     )
     return scene
 
@@ -270,7 +260,7 @@ def find_user_part_missing_from_file(
     rows: list[Mapping[str, Any]] = [declaration.base]
     for axis in declaration.axes:
         rows += axis.build().rows
-    for slot in SLOTS:
+    for slot in SceneFields.SLOTS:
         for name in {row.get(slot.name): None for row in rows}:
             if isinstance(name, str) and name not in (*slot.built_in_parts, *stored_loadings):
                 return slot.name, name

@@ -13,9 +13,9 @@ from typing import Any
 
 import numpy as np
 
-from rsfstudy.axes import Axis, AxisRow, classify_axis_rows_by_fields_and_texts
+from rsfstudy.axes import Axis, AxisRow
 from rsfstudy.quantities import Quantity
-from rsfstudy.rig import DIMENSIONLESS_PREFIX
+from rsfstudy.rig import DatasetUnits
 from rsfstudy.slider import Scene
 from rsfstudy.storage import stored_loadings
 from rsfstudy.study import Study
@@ -72,7 +72,7 @@ class LatticeCoordinates:
         #: For each axis, the cell number that represents each point of the axis.
         self._representative_cells: list[list[int]] = []
         for axis, stride in zip(study.axes, strides, strict=True):
-            groups = classify_axis_rows_by_fields_and_texts(axis.rows)
+            groups = axis.classify_rows()
             _, firsts, places = np.unique(groups, return_index=True, return_inverse=True)
             self._representative_cells.append((firsts[places] * stride).tolist())
         self.cell_numbers = frozenset(n for cells in self._representative_cells for n in cells)
@@ -99,7 +99,7 @@ class LatticeCoordinates:
             coords[name] = (*coords[name][:2], of_axis | {"units": units})
         scales = study.scene_builder.build_scale_coordinates() if study.scene_builder else {}
         for name, (dims, values) in scales.items():
-            about = variable_attributes(name.removeprefix(DIMENSIONLESS_PREFIX), own)
+            about = variable_attributes(name.removeprefix(DatasetUnits.DIMENSIONLESS_PREFIX), own)
             coords[name] = (dims, values, about)
         stored = [scene.stored_fields() for scene in scenes.values()]
         for name in study.scene_fields:

@@ -14,7 +14,7 @@ import msgspec
 import xarray as xr
 
 from rsfstudy.errors import DataError, InvalidValue, shorten_text
-from rsfstudy.slider import SLOTS, UserPart
+from rsfstudy.slider import SceneFields, UserPart
 from rsfstudy.storage import schema, stored_loadings
 from rsfstudy.storage.declarations import (
     MISSING_STUDY_FILE_REMEDY,
@@ -215,7 +215,7 @@ def study_from_declaration(
 
 def _collect_known_user_parts(study: Study | None) -> Mapping[str, UserPart]:
     """Return the user-defined parts of a study and of its files."""
-    others = {name: part for slot in SLOTS for name, part in slot.user_parts.items()}
+    others = {name: part for slot in SceneFields.SLOTS for name, part in slot.user_parts.items()}
     return {} if study is None else {**others, **study.user_parts}
 
 

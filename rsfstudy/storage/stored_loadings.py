@@ -13,15 +13,7 @@ import numpy as np
 import xarray as xr
 
 from rsfstudy.parts import Segment
-from rsfstudy.slider import (
-    STRESS_RATE_COLUMN,
-    Protocol,
-    SampledHistory,
-    UserLoading,
-    UserPart,
-    build_sampled_history_from_table,
-    protocol,
-)
+from rsfstudy.slider import Protocol, SampledHistory, UserLoading, UserPart, protocol
 from rsfstudy.storage.plain_data import invalid_part_error
 
 #: For each kind of loading table, the name of a row and the description of the columns.
@@ -98,14 +90,14 @@ def read_loadings(results: xr.Dataset) -> Mapping[str, UserLoading]:
         if (
             values.dtype.kind != "f"
             or values.ndim != 2
-            or values.shape[1] != STRESS_RATE_COLUMN + 1
+            or values.shape[1] != SampledHistory.COLUMN_COUNT
         ):
             raise invalid_part_error(
-                str(key), f"holds no loading of {STRESS_RATE_COLUMN + 1} columns"
+                str(key), f"holds no loading of {SampledHistory.COLUMN_COUNT} columns"
             )
         if "of_stress" in values.attrs:
             of = {key: bool(values.attrs.get(key, False)) for key in _FLAGS_OF_SAMPLED_HISTORIES}
-            found[name] = build_sampled_history_from_table(values.values, name=name, **of)
+            found[name] = SampledHistory.from_table(values.values, name=name, **of)
         else:
             found[name] = protocol([Segment(*row) for row in values.values.tolist()], name)
     return found

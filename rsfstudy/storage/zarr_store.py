@@ -1,9 +1,9 @@
 """Writing of Zarr stores, for lattices that do not fit in memory.
 
-Zarr stores need the optional dependency ``rsfstudy[zarr]``. ``write_store`` writes a lattice slab
-by slab under a temporary name, reads each slab back, and finally renames the store. An existing
-store is never replaced, because a program that has opened the store would read a mixture of old and
-new chunks.
+Zarr stores need the optional dependency ``rsfstudy[zarr]``. ``ZarrStore.write`` writes a lattice
+slab by slab under a temporary name, reads each slab back, and finally renames the store. An
+existing store is never replaced, because a program that has opened the store would read a mixture
+of old and new chunks.
 """
 
 from __future__ import annotations
@@ -13,6 +13,7 @@ import math
 import shutil
 import warnings
 from collections.abc import Callable, Mapping
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -39,94 +40,102 @@ ReadCellsFunction = Callable[[slice], CellColumns]
 ReduceLatticeFunction = Callable[[xr.Dataset], xr.Dataset]
 
 
-def check_zarr_installed() -> None:
-    """Check that the package zarr is installed.
-
-    Raises
-    ------
-    InvalidValue
-        If the package zarr is not installed.
-    """
-    if importlib.util.find_spec("zarr") is None:
-        remedy = "pip install 'rsfstudy[zarr]'."
-        raise InvalidValue("format", "zarr", "needs a package", remedy=remedy)
-
-
-def check_store_does_not_exist(path: Path) -> None:
-    """Check that a store does not exist.
+@dataclass(frozen=True)
+class ZarrStore:
+    """Zarr store with the results of a study.
 
     Parameters
     ----------
     path : Path
-        Directory of the store.
-
-    Raises
-    ------
-    DataError
-        If the path exists.
+        Directory of the store. A store that exists is never replaced.
     """
-    if path.exists():
-        raise DataError(
-            f"{path} is there already, and whoever has it open would read half of each. "
-            "Move it away, or choose another --output."
-        )
 
+    path: Path
 
-def write_store(
-    study: Study,
-    coordinates: Mapping[Any, Any],
-    read_cells: ReadCellsFunction,
-    provenance: Mapping[str, Any],
-    apply_reductions: ReduceLatticeFunction,
-    path: Path,
-) -> xr.Dataset:
-    """Write the lattice of a study and its reductions to a Zarr store.
+    @staticmethod
+    def check_installed() -> None:
+        """Check that the package zarr is installed.
 
-    Parameters
-    ----------
-    study : Study
-        Study whose results are written.
-    coordinates : mapping of str to tuple or xarray.Variable
-        Coordinates of the lattice.
-    read_cells : callable
-        Function that returns the ``CellColumns`` of a slice of cells, in row-major order.
-    provenance : mapping of str to object
-        Provenance of the run, as plain data.
-    apply_reductions : callable
-        Function that adds the reductions to the lattice dataset.
-    path : Path
-        Directory of the store, which must not exist.
+        Raises
+        ------
+        InvalidValue
+            If the package zarr is not installed.
+        """
+        if importlib.util.find_spec("zarr") is None:
+            remedy = "pip install 'rsfstudy[zarr]'."
+            raise InvalidValue("format", "zarr", "needs a package", remedy=remedy)
 
-    Returns
-    -------
-    xarray.Dataset
-        Contents of the store, opened lazily.
+    def check_does_not_exist(self) -> None:
+        """Check that the store does not exist.
 
-    Raises
-    ------
-    DataError
-        If the store cannot be written, or if the data that were read back differ from the lattice.
-    """
-    beside = path.with_name(f".{path.name}.new")
-    try:
-        shutil.rmtree(beside, ignore_errors=True)
-        finished = _write_lattice(study, coordinates, read_cells, beside)
-        lattice = open_zarr_store(beside)
-        results = apply_reductions(lattice)
-        reductions = _convert_strings_to_object_dtype(results.drop_vars(list(lattice.variables)))
-        about = {**root_attributes(study, finished, provenance), **results.attrs}
-        with warnings.catch_warnings():
-            # Version 3 of the Zarr format does not specify consolidated metadata yet, but xarray
-            # looks for them.
-            warnings.filterwarnings("ignore", "Consolidated metadata")
-            reductions.assign_attrs(about).to_zarr(beside, mode="a", zarr_format=3)
-        write_store_digest(beside)
-        beside.rename(path)
-    except OSError as error:
-        raise DataError(f"cannot write {path}: {error}.") from error
-    finally:
-        shutil.rmtree(beside, ignore_errors=True)
-    return open_zarr_store(path)
+        Raises
+        ------
+        DataError
+            If the path exists.
+        """
+        if self.path.exists():
+            raise DataError(
+                f"{self.path} is there already, and whoever has it open would read half of each. "
+                "Move it away, or choose another --output."
+            )
+
+    def write(
+        self,
+        study: Study,
+        coordinates: Mapping[Any, Any],
+        read_cells: ReadCellsFunction,
+        provenance: Mapping[str, Any],
+        apply_reductions: ReduceLatticeFunction,
+    ) -> xr.Dataset:
+        """Write the lattice of a study and its reductions to a Zarr store.
+
+        Parameters
+        ----------
+        study : Study
+            Study whose results are written.
+        coordinates : mapping of str to tuple or xarray.Variable
+            Coordinates of the lattice.
+        read_cells : callable
+            Function that returns the ``CellColumns`` of a slice of cells, in row-major order.
+        provenance : mapping of str to object
+            Provenance of the run, as plain data.
+        apply_reductions : callable
+            Function that adds the reductions to the lattice dataset.
+
+        Returns
+        -------
+        xarray.Dataset
+            Contents of the store, opened lazily.
+
+        Raises
+        ------
+        DataError
+            If the store cannot be written, or if the data that were read back differ from the
+            lattice.
+        """
+        path = self.path
+        beside = path.with_name(f".{path.name}.new")
+        try:
+            shutil.rmtree(beside, ignore_errors=True)
+            finished = _write_lattice(study, coordinates, read_cells, beside)
+            lattice = open_zarr_store(beside)
+            results = apply_reductions(lattice)
+            reductions = _convert_strings_to_object_dtype(
+                results.drop_vars(list(lattice.variables))
+            )
+            about = {**root_attributes(study, finished, provenance), **results.attrs}
+            with warnings.catch_warnings():
+                # Version 3 of the Zarr format does not specify consolidated metadata yet, but
+                # xarray looks for them.
+                warnings.filterwarnings("ignore", "Consolidated metadata")
+                reductions.assign_attrs(about).to_zarr(beside, mode="a", zarr_format=3)
+            write_store_digest(beside)
+            beside.rename(path)
+        except OSError as error:
+            raise DataError(f"cannot write {path}: {error}.") from error
+        finally:
+            shutil.rmtree(beside, ignore_errors=True)
+        return open_zarr_store(path)
 
 
 def _convert_strings_to_object_dtype(dataset: xr.Dataset) -> xr.Dataset:

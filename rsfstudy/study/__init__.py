@@ -13,8 +13,15 @@ from typing import TYPE_CHECKING
 from rsfstudy._lazy_exports import build_lazy_export_functions
 
 if TYPE_CHECKING:
-    from rsfstudy.study.claims import NOT_APPLICABLE_VERDICT, VERDICTS, Claim, build_verdict_table
-    from rsfstudy.study.figure_declarations import DrawFunction, Figure, Panel, name_of_figure
+    from rsfstudy.study.claims import (
+        Claim,
+        build_verdict_table,
+    )
+    from rsfstudy.study.figure_declarations import (
+        DrawFunction,
+        Figure,
+        Panel,
+    )
     from rsfstudy.study.lattice_cell import Cell, CellChanges
     from rsfstudy.study.reductions.base import failed_cell_mask, read_quantities_not_in_vocabulary
     from rsfstudy.study.studies_on_rig import convert_study_to_rig_units
@@ -29,8 +36,15 @@ else:
         {
             "study.study_loader": ("load_study",),
             "study.lattice_cell": ("Cell", "CellChanges"),
-            "study.claims": ("Claim", "NOT_APPLICABLE_VERDICT", "VERDICTS", "build_verdict_table"),
-            "study.figure_declarations": ("DrawFunction", "Figure", "Panel", "name_of_figure"),
+            "study.claims": (
+                "Claim",
+                "build_verdict_table",
+            ),
+            "study.figure_declarations": (
+                "DrawFunction",
+                "Figure",
+                "Panel",
+            ),
             "study.reductions.base": ("failed_cell_mask", "read_quantities_not_in_vocabulary"),
             "study.studies_on_rig": ("convert_study_to_rig_units",),
             "study.study": ("Study",),
@@ -46,13 +60,10 @@ __all__ = [
     "Claim",
     "DrawFunction",
     "Figure",
-    "NOT_APPLICABLE_VERDICT",
     "Panel",
     "STUDIES_PACKAGE",
     "Study",
-    "VERDICTS",
     "build_verdict_table",
-    "name_of_figure",
     "find_named_user_parts",
     "format_verdict_row",
     "failed_cell_mask",

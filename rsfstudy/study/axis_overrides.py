@@ -7,7 +7,7 @@ from collections.abc import Hashable, Sequence
 from functools import partial
 from typing import Any
 
-from rsfstudy.axes import Axis, AxisRow, to_plain_value
+from rsfstudy.axes import Axis, AxisRow
 from rsfstudy.errors import InvalidValue
 from rsfstudy.formatting import format_value, is_sequence_of_axis_values
 
@@ -93,7 +93,7 @@ def replace_field_values(axis: Axis, field_name: str, values: Sequence[Any]) -> 
         if field_name not in row:
             points[label] = row
             continue
-        for value in map(partial(to_plain_value, field_name), values):
+        for value in map(partial(Axis.to_plain_value, field_name), values):
             changed = {**row, field_name: value}
             if changed in points.values():
                 continue
@@ -159,7 +159,7 @@ def to_plain_values(field_name: str, value: Any) -> Any:
         Plain value or list of plain values.
     """
     return (
-        [to_plain_value(field_name, each) for each in value]
+        [Axis.to_plain_value(field_name, each) for each in value]
         if is_sequence_of_axis_values(value)
-        else to_plain_value(field_name, value)
+        else Axis.to_plain_value(field_name, value)
     )

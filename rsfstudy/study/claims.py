@@ -10,7 +10,7 @@ import math
 import sys
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 import pandas as pd
@@ -19,7 +19,7 @@ import xarray as xr
 from rsfstudy._deprecation import add_former_member_names
 from rsfstudy.error_boundary import wrap_methods_in_error_boundary
 from rsfstudy.errors import InvalidValue
-from rsfstudy.rig import NAME_OF_SCALES_ATTRIBUTE
+from rsfstudy.rig import DatasetUnits
 from rsfstudy.status import Status
 from rsfstudy.study.verdict_table import VerdictTable
 
@@ -104,6 +104,10 @@ class Claim:
     >>> claim.verdict(dataset)
     (0.67, 'reproduced')
     """
+
+    #: Possible verdicts, and the verdict on a claim that does not apply to the results.
+    VERDICTS: ClassVar = VERDICTS
+    NOT_APPLICABLE: ClassVar = NOT_APPLICABLE_VERDICT
 
     id: str
     statement: str
@@ -280,7 +284,7 @@ def build_verdict_table(
     along = {str(name) for name in dataset.coords if dataset[name].ndim > 0}
     moved_base = [
         name for name in study_overrides if name not in along
-    ] or NAME_OF_SCALES_ATTRIBUTE in dataset.attrs
+    ] or DatasetUnits.SCALES_ATTRIBUTE in dataset.attrs
     rows = []
     for claim in claims:
         ours, verdict = claim.verdict(dataset)

@@ -17,16 +17,8 @@ from rsfstudy.formatting import format_list, format_value
 from rsfstudy.measures import RESERVED_NAMES, Measure
 from rsfstudy.motion import Accuracy
 from rsfstudy.quantities import is_variable_name
-from rsfstudy.rig import RATIO_FIELD_BY_DIMENSIONAL_NAME, LatticeScenesOnRig, Rig
-from rsfstudy.slider import (
-    SCENE_FIELD_NAMES,
-    SLOT_NAMES,
-    Scene,
-    UserPart,
-    find_inapplicable_fields,
-    hint_for_unknown_field,
-    replace_names_by_user_parts,
-)
+from rsfstudy.rig import LatticeScenesOnRig, Rig, RigAxes
+from rsfstudy.slider import Scene, SceneFields, UserPart
 from rsfstudy.study.claims import Claim
 from rsfstudy.study.reductions.application import Reduction
 from rsfstudy.vocabulary import QUANTITY_BY_NAME
@@ -94,7 +86,7 @@ def check_name_clashes(
         if reduction.of not in known:
             raise InvalidValue("reduction of", reduction.of, "is not measured", choices=known)
         known.append(reduction.name)
-    taken = {*known, *measure.inner_coordinates, *(RESERVED_NAMES - set(SCENE_FIELD_NAMES))}
+    taken = {*known, *measure.inner_coordinates, *(RESERVED_NAMES - set(SceneFields.NAMES))}
     for axis in axes:
         check_fields_not_solved_by_measure(measure, axis.fields)
         for name in (axis.dimension, *axis.fields):
@@ -119,7 +111,7 @@ def check_fields_not_solved_by_measure(measure: Measure, field_names: Sequence[s
         fields.
     """
     for name in field_names:
-        if {name, RATIO_FIELD_BY_DIMENSIONAL_NAME.get(name)} & set(measure.solved_fields):
+        if {name, RigAxes.RATIO_FIELD_BY_DIMENSIONAL_NAME.get(name)} & set(measure.solved_fields):
             rule = f"{measure.name} solves for {name}; it cannot be an axis or be set"
             raise InvalidValue(name, "...", rule, remedy="Leave it out.")
 
@@ -145,8 +137,8 @@ def check_user_fields(
     """
     taken = {*measure.variables, *measure.inner_coordinates}
     taken |= {*RESERVED_NAMES, *QUANTITY_BY_NAME, *(reduction.name for reduction in reductions)}
-    for name in user_field_names[len(SCENE_FIELD_NAMES) :]:
-        if name in taken - SLOT_NAMES:
+    for name in user_field_names[len(SceneFields.NAMES) :]:
+        if name in taken - SceneFields.SLOT_NAMES:
             rule, remedy = "is the name of something else", "Rename the field of your part."
             raise InvalidValue("field", name, rule, remedy=remedy)
 
@@ -260,11 +252,11 @@ def check_override_of_partly_set_field(
     if axis.is_single_field or not 0 < len(stating) < len(axis):
         return
     for point, row in zip(axis.point_names, axis.rows, strict=True):
-        held = replace_names_by_user_parts({**base_scene.as_dict(), **row}, user_parts)
+        held = SceneFields.replace_names_by_user_parts({**base_scene.as_dict(), **row}, user_parts)
         if (
             field_name in row
             or not held.get(field_name)
-            or field_name in find_inapplicable_fields(held, user_parts.values())
+            or field_name in SceneFields.find_inapplicable(held, user_parts.values())
         ):
             continue
         some = format_list(stating, ", ")
@@ -291,7 +283,8 @@ def check_axes_are_distinct(axes: Sequence[Axis]) -> None:
     taken: dict[str, str] = {}
     for axis in axes:
         for name in {
-            RATIO_FIELD_BY_DIMENSIONAL_NAME.get(n, n) for n in (axis.dimension, *axis.fields)
+            RigAxes.RATIO_FIELD_BY_DIMENSIONAL_NAME.get(n, n)
+            for n in (axis.dimension, *axis.fields)
         }:
             if name in taken:
                 rule = f"varies {name!r}, as {taken[name]!r} does already"
@@ -321,7 +314,7 @@ def unknown_name_error(
     InvalidValue
         Error to raise.
     """
-    remedy = hint_for_unknown_field(unknown_name)
+    remedy = SceneFields.hint_for_unknown(unknown_name)
     return InvalidValue(
         argument_name, unknown_name, rule, remedy=remedy, choices=() if remedy else known_names
     )

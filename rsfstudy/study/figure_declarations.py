@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from rsfstudy._deprecation import accept_former_keyword_names, build_getattr_for_former_names
-from rsfstudy.axes import check_storable_text
+from rsfstudy.axes import Axis
 from rsfstudy.error_boundary import wrap_methods_in_error_boundary
 from rsfstudy.errors import InvalidValue
 from rsfstudy.quantities import is_variable_name
@@ -291,7 +291,7 @@ def check_figure(plot: Any) -> None:
         a figure of the package.
     """
     if isinstance(plot, str):
-        check_storable_text("plot", plot)
+        Axis.check_storable_text("plot", plot)
         return
     if isinstance(plot, Figure):
         return

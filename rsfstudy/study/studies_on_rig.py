@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import Any
 
-from rsfstudy.rig import Rig, convert_scene_and_axes_to_rig
+from rsfstudy.rig import Rig, RigAxes
 from rsfstudy.study.study import Study
 
 
@@ -27,7 +27,7 @@ def convert_study_to_rig_units(study: Study, rig: Rig) -> Study:
     Study
         Study with the rig.
     """
-    base, axes, every = convert_scene_and_axes_to_rig(rig, study.base, study.axes)
+    base, axes, every = RigAxes.convert_scene_and_axes(rig, study.base, study.axes)
     reductions = [
         _convert_reduction_range_to_rig_units(each, every.get(getattr(each, "on", "")))
         for each in study.reductions

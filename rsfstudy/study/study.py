@@ -18,33 +18,15 @@ from typing import Any
 import numpy as np
 
 from rsfstudy._deprecation import accept_former_keyword_names, add_former_member_names
-from rsfstudy.axes import Axis, AxisRow, check_storable_text
+from rsfstudy.axes import Axis, AxisRow
 from rsfstudy.error_boundary import error_boundary, wrap_methods_in_error_boundary
 from rsfstudy.errors import InvalidValue
 from rsfstudy.formatting import is_sequence_of_axis_values
 from rsfstudy.measures import Measure
-from rsfstudy.motion import Accuracy, find_user_stepper
+from rsfstudy.motion import Accuracy, Engine
 from rsfstudy.quantities import Quantity
-from rsfstudy.rig import (
-    RATIO_FIELD_BY_DIMENSIONAL_NAME,
-    LatticeScenesOnRig,
-    Rig,
-    axis_name_and_units,
-    convert_axis_to_stated_units,
-    convert_values_to_units,
-    replace_rig_quantity,
-)
-from rsfstudy.rig import make_axis_with_units as axis_in_units
-from rsfstudy.slider import (
-    ALTERNATIVE_STIFFNESS_FIELDS,
-    PART_SELECTING_FIELDS,
-    SLOT_NAMES,
-    Scene,
-    UserPart,
-    find_inapplicable_fields,
-    replace_names_by_user_parts,
-    scene_field_quantities,
-)
+from rsfstudy.rig import LatticeScenesOnRig, Rig, RigAxes
+from rsfstudy.slider import Scene, SceneFields, UserPart
 from rsfstudy.study import declaration_checks
 from rsfstudy.study.axis_overrides import replace_field_values, select_axis_points, to_plain_values
 from rsfstudy.study.claims import Claim
@@ -58,13 +40,17 @@ from rsfstudy.study.user_parts import find_named_user_parts, user_field_quantiti
 #: bytes, and the names of files have suffixes.
 _MAX_NAME_BYTES = 200
 #: Scene fields that select a part of the slider, such as the friction law.
-_SLOT_AND_PART_SELECTING_FIELDS = frozenset({*SLOT_NAMES, *PART_SELECTING_FIELDS})
+_SLOT_AND_PART_SELECTING_FIELDS = frozenset(
+    {*SceneFields.SLOT_NAMES, *SceneFields.SELECTING_A_PART}
+)
 #: Pairs of equivalent fields. A slip rate can be given as a velocity or as a ratio to the reference
 #: velocity. The spring can be given as a stiffness or as a ratio to the critical stiffness.
 _EQUIVALENT_FIELD_BY_FIELD_NAME = {
-    **RATIO_FIELD_BY_DIMENSIONAL_NAME,
-    **{ratio: name for name, ratio in RATIO_FIELD_BY_DIMENSIONAL_NAME.items()},
-    **dict(zip(ALTERNATIVE_STIFFNESS_FIELDS, ALTERNATIVE_STIFFNESS_FIELDS[::-1], strict=True)),
+    **RigAxes.RATIO_FIELD_BY_DIMENSIONAL_NAME,
+    **{ratio: name for name, ratio in RigAxes.RATIO_FIELD_BY_DIMENSIONAL_NAME.items()},
+    **dict(
+        zip(SceneFields.ALTERNATIVE_STIFFNESS, SceneFields.ALTERNATIVE_STIFFNESS[::-1], strict=True)
+    ),
 }
 
 
@@ -160,7 +146,7 @@ class Study:
             rule = f"must have at most {_MAX_NAME_BYTES} bytes, because it names files"
             raise InvalidValue("name", self.name, rule)
         for name in ("title", "summary", "source_file"):
-            check_storable_text(name, getattr(self, name))
+            Axis.check_storable_text(name, getattr(self, name))
         check_figure(self.plot)
         whole = isinstance(self.version, int) and not isinstance(self.version, bool)
         if not whole or self.version < 1:
@@ -170,7 +156,7 @@ class Study:
         declaration_checks.check_types(vars(self))
         if self.rig is not None:
             object.__setattr__(
-                self, "axes", [convert_axis_to_stated_units(axis) for axis in self.axes]
+                self, "axes", [RigAxes.convert_to_stated_units(axis) for axis in self.axes]
             )
         declaration_checks.check_name_clashes(self.measure, self.reductions, self.axes)
         declaration_checks.check_user_fields(self.measure, self.reductions, self.scene_fields)
@@ -237,13 +223,13 @@ class Study:
         return (
             *self.measure.code_classes,
             *self.user_parts.values(),
-            *find_user_stepper(self.accuracy.engine),
+            *Engine.find_user_stepper(self.accuracy.engine),
         )
 
     @cached_property
     def scene_fields(self) -> tuple[str, ...]:
         """Names of all scene fields, including fields of user-defined parts."""
-        return tuple(scene_field_quantities(self.user_parts.values()))
+        return tuple(SceneFields.quantities_with_user_parts(self.user_parts.values()))
 
     @cached_property
     def scene_field_names(self) -> frozenset[str]:
@@ -442,8 +428,8 @@ class Study:
         The set applies to cells in which no axis selects a part.
         """
         parts = self.user_parts
-        return find_inapplicable_fields(
-            replace_names_by_user_parts(self._base_fields, parts), parts.values()
+        return SceneFields.find_inapplicable(
+            SceneFields.replace_names_by_user_parts(self._base_fields, parts), parts.values()
         )
 
     def _compute_cell_changes(self, axis_rows: Sequence[AxisRow]) -> CellChanges:
@@ -466,8 +452,8 @@ class Study:
             for name in row
         }
         parts = self.user_parts
-        values = replace_names_by_user_parts({**self._base_fields, **of_scene}, parts)
-        meaningless = find_inapplicable_fields(values, parts.values()) - stated
+        values = SceneFields.replace_names_by_user_parts({**self._base_fields, **of_scene}, parts)
+        meaningless = SceneFields.find_inapplicable(values, parts.values()) - stated
         return CellChanges({n: values[n] for n in of_scene if n not in meaningless}, of_measure)
 
     def _build_cell(self, axis_rows: Sequence[AxisRow]) -> Cell:
@@ -539,7 +525,7 @@ class Study:
         values = list(value) if is_sequence_of_axis_values(value) else [value]
         of_rig = self.rig is not None and bool(values)
         field_name, units = (
-            axis_name_and_units(field_name, values[0]) if of_rig else (field_name, None)
+            RigAxes.name_and_units(field_name, values[0]) if of_rig else (field_name, None)
         )
         for index, axis in enumerate(self.axes):
             if changed := self._override_axis(axis, field_name, values):
@@ -559,10 +545,10 @@ class Study:
         if is_sequence_of_axis_values(value):
             return replace(self, axes=(self._make_axis(field_name, values), *self.axes))
         if self.rig is not None and of_rig:
-            rig, base = replace_rig_quantity(self.rig, self.base, field_name, value)
+            rig, base = RigAxes.replace_rig_quantity(self.rig, self.base, field_name, value)
             return replace(self, rig=rig, base=base)
-        if field_name in self.scene_field_names | SLOT_NAMES:
-            changes = replace_names_by_user_parts({field_name: value}, self.user_parts)
+        if field_name in self.scene_field_names | SceneFields.SLOT_NAMES:
+            changes = SceneFields.replace_names_by_user_parts({field_name: value}, self.user_parts)
             return replace(self, base=self.base.with_(**changes))
         return replace(self, measure=self.measure.with_(**{field_name: value}))
 
@@ -585,7 +571,7 @@ class Study:
             return replace_field_values(
                 axis,
                 field_name,
-                convert_values_to_units(field_name, values, units) if units else values,
+                RigAxes.convert_values(field_name, values, units) if units else values,
             )
         if _EQUIVALENT_FIELD_BY_FIELD_NAME.get(field_name) not in axis.fields:
             return None
@@ -609,7 +595,7 @@ class Study:
         """
         if self.rig is None:
             return Axis(field_name, values)
-        return axis_in_units(field_name, values, "" if isinstance(values[0], str) else units)
+        return RigAxes.create(field_name, values, "" if isinstance(values[0], str) else units)
 
     def describe(self) -> dict[str, Any]:
         """Convert the declaration to a dictionary of plain values.
@@ -630,11 +616,16 @@ class Study:
             "accuracy": asdict(self.accuracy),
             "reductions": [reduction.describe() for reduction in self.reductions],
             "claims": [claim.describe() for claim in self.claims],
-            "plot": name_of_figure(self.plot, self.name),
+            "plot": self.figure_name,
             "references": list(self.references),
             "overrides": dict(self.overrides),
             **({"laboratory": self.rig.as_dict()} if self.rig else {}),
         }
+
+    @property
+    def figure_name(self) -> str:
+        """Name of the figure in the declaration of the study."""
+        return name_of_figure(self.plot, self.name)
 
     def _repr_html_(self) -> str:
         heading = f"{self.name}: {self.title} ({self.size:,} cells)"

@@ -8,8 +8,8 @@ from dataclasses import replace
 from rsfstudy.axes import Axis
 from rsfstudy.formatting import format_list
 from rsfstudy.measures import Measure
-from rsfstudy.quantities import HtmlMarkup, Quantity, escape_html, html_quantities_table
-from rsfstudy.slider import Scene, quantities_with_values
+from rsfstudy.quantities import HtmlMarkup, Quantity, html_quantities_table
+from rsfstudy.slider import Scene, SceneFields
 from rsfstudy.vocabulary import find_quantity
 
 
@@ -42,7 +42,7 @@ def study_html(
     """
     varied = {name for axis in axes for name in axis.fields}
     fixed = {name: v for name, v in base_scene.as_dict().items() if name not in varied}
-    shared = quantities_with_values(fixed, base_scene.user_parts)
+    shared = SceneFields.quantities_with_values(fixed, base_scene.user_parts)
     along = [(_describe_axis_quantity(a, known_quantities), _format_axis_points(a)) for a in axes]
     measured = [(find_quantity(name, known_quantities), None) for name in measure.variables]
     return (
@@ -57,7 +57,9 @@ def study_html(
 
 def _html_details(caption: str, content: HtmlMarkup) -> HtmlMarkup:
     """Return HTML code that shows the content after a click on the caption."""
-    return HtmlMarkup(f"<details><summary>{escape_html(caption)}</summary>{content}</details>")
+    return HtmlMarkup(
+        f"<details><summary>{HtmlMarkup.escape(caption)}</summary>{content}</details>"
+    )
 
 
 def _describe_axis_quantity(axis: Axis, known_quantities: Mapping[str, Quantity]) -> Quantity:

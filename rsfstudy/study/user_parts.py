@@ -6,7 +6,7 @@ from collections.abc import Iterable, Iterator, Mapping
 from typing import Any
 
 from rsfstudy.quantities import Quantity
-from rsfstudy.slider import SCENE_FIELD_NAMES, SLOTS, UserPart, scene_field_quantities
+from rsfstudy.slider import SceneFields, UserPart
 
 
 def find_named_user_parts(
@@ -26,7 +26,7 @@ def find_named_user_parts(
     dict of str to type or UserLoading
         User-defined parts by name.
     """
-    slots = [slot for slot in SLOTS if slot.user_parts and slot.name in names]
+    slots = [slot for slot in SceneFields.SLOTS if slot.user_parts and slot.name in names]
     places = ((slot, row.get(slot.name)) for row in rows for slot in slots)
     return {
         n: slot.user_parts[n] for slot, n in places if isinstance(n, str) and n in slot.user_parts
@@ -48,6 +48,6 @@ def user_field_quantities(parts: Iterable[UserPart]) -> Iterator[Quantity]:
     """
     return (
         about
-        for name, about in scene_field_quantities(parts).items()
-        if name not in SCENE_FIELD_NAMES
+        for name, about in SceneFields.quantities_with_user_parts(parts).items()
+        if name not in SceneFields.NAMES
     )

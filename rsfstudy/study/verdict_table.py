@@ -8,7 +8,7 @@ from typing import Any
 import pandas as pd
 
 from rsfstudy.errors import escape_control_characters
-from rsfstudy.quantities import html_table
+from rsfstudy.quantities import HtmlMarkup
 
 _SIGN_BY_CLAIM_RELATION = {"equals": "", "below": "< ", "above": "> "}
 #: Width of a line on a terminal, and width of the column with the identifiers of the claims, in
@@ -92,7 +92,7 @@ class VerdictTable(pd.DataFrame):
     def _repr_html_(self) -> str:
         rows = [format_verdict_row(row) for row in self.to_dict("records")]
         return (
-            html_table(list(rows[0]), [list(row.values()) for row in rows])
+            HtmlMarkup.table(list(rows[0]), [list(row.values()) for row in rows])
             if rows
             else "<p>no claims</p>"
         )

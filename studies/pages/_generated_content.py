@@ -26,7 +26,7 @@ from rsfstudy.quantities import html_symbol as in_html
 from rsfstudy.quantities import html_unit as unit_in_html
 from rsfstudy.reductions import Reduction
 from rsfstudy.rig import rig_quantities
-from rsfstudy.slider import field_names, part_registry
+from rsfstudy.slider import SceneFields, part_registry
 from rsfstudy.study import study_index, study_loader
 from rsfstudy.study.verdict_table import format_published_value
 from rsfstudy.vocabulary import QUANTITY_BY_NAME, find_quantity
@@ -257,7 +257,7 @@ def _parts_with(name: str) -> str:
         f"`{part.name}`"
         for slot in part_registry.SLOTS
         for part in slot.built_in_parts.values()
-        if name in field_names(part)
+        if name in SceneFields.names_of_part(part)
     ]
     return ", ".join(owners)
 
@@ -278,7 +278,7 @@ def _slot(slot: part_registry.Slot) -> str:
     rows = (
         (f"`{name}`" + (" (default)" if name == slot.default_part_name else ""),
          first_paragraph(part), equation(part),
-         ", ".join(f"`{own}`" for own in field_names(part)), f"`{SCENES[name]}`")
+         ", ".join(f"`{own}`" for own in SceneFields.names_of_part(part)), f"`{SCENES[name]}`")
         for name, part in slot.built_in_parts.items()
     )  # fmt: skip
     made = markdown_table(("choice", "description", "equation", "fields", "example"), rows)

@@ -94,7 +94,7 @@ def _check_studies(given: options.CommandOptions) -> Check:
     from rsfstudy.cli.cost_estimates import describe_missing_engine_packages
     from rsfstudy.cli.study_options import selected_study_names
     from rsfstudy.cli.study_results import StudyResults, collect_verdicts
-    from rsfstudy.study import NOT_APPLICABLE_VERDICT, load_study
+    from rsfstudy.study import Claim, load_study
 
     studies, skipped, not_run = [], {}, []
     for name in selected_study_names(given):
@@ -108,7 +108,7 @@ def _check_studies(given: options.CommandOptions) -> Check:
     if not studies:
         return Check([], None, (), skipped, not_run)
     verdicts = _select_claims(collect_verdicts(studies), given.claims)
-    others = verdicts["id"][verdicts["verdict"] == NOT_APPLICABLE_VERDICT]
+    others = verdicts["id"][verdicts["verdict"] == Claim.NOT_APPLICABLE]
     unapplied = list(dict.fromkeys(others)) if given.claims or len(others) == len(verdicts) else []
     return Check(studies, verdicts, unapplied, skipped, not_run)
 

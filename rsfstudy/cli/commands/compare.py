@@ -111,12 +111,12 @@ def compare(given: options.CommandOptions) -> int:
     the files have no cell in common.
     """
     from rsfstudy.api import find_results
-    from rsfstudy.storage import read_provenance
+    from rsfstudy.storage import StoredDataset
 
     files = [find_results(name, given.output) for name in (given.first, given.second)]
     datasets = [rsfstudy.open(file) for file in files]
     result = FileComparison(
-        files, [read_provenance(one) for one in datasets], rsfstudy.compare(*datasets)
+        files, [StoredDataset(one).provenance for one in datasets], rsfstudy.compare(*datasets)
     )
     return output_result(result, _print_comparison, given.as_json)
 

@@ -20,9 +20,9 @@ from rsfstudy.cli.record_options import (
     reading_options,
 )
 from rsfstudy.cli.results import EXIT_STATUS_FAILED, EXIT_STATUS_OK, CommandResult, output_result
-from rsfstudy.defaults import FIT_EVALUATION_BUDGET
+from rsfstudy.defaults import Defaults
 from rsfstudy.errors import InvalidValue
-from rsfstudy.motion import ENGINES
+from rsfstudy.motion import Engine
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -186,11 +186,13 @@ def _make_comma_list_option(
     "Set a field of the scene that is not fitted, for example a=0.01."
 )
 @options.make_count_option(
-    "--budget", FIT_EVALUATION_BUDGET, "Maximum number of right-hand-side evaluations per fit."
+    "--budget",
+    Defaults.FIT_EVALUATION_BUDGET,
+    "Maximum number of right-hand-side evaluations per fit.",
 )
 @click.option(
     "--engine",
-    type=click.Choice(ENGINES),
+    type=click.Choice(Engine.NAMES),
     help="Integration engine.  [default: compiled if Numba is installed, otherwise scipy]",
 )
 @options.make_image_option(

@@ -10,7 +10,7 @@ from rsfstudy.cli import options
 from rsfstudy.cli.command_group import Command
 from rsfstudy.cli.printing import print_line
 from rsfstudy.cli.results import EXIT_STATUS_FAILED, EXIT_STATUS_OK
-from rsfstudy.defaults import FIGURE_FORMATS, OUTPUT_DIRECTORY
+from rsfstudy.defaults import Defaults
 from rsfstudy.error_boundary import check_regular_file
 from rsfstudy.errors import InvalidValue
 
@@ -38,7 +38,7 @@ def plot(given: options.CommandOptions) -> int:
 
     status, target = EXIT_STATUS_OK, _figure_path_from_output_option(given)
     for name in selected_study_names(given):
-        results = find_results(name, OUTPUT_DIRECTORY if target else given.output)
+        results = find_results(name, Defaults.OUTPUT_DIRECTORY if target else given.output)
         beside = results if given.output is None else given.output / results.name
         drawn = _draw_figure(results, target or default_figure_path(beside, given), given)
         status = status if drawn else EXIT_STATUS_FAILED
@@ -51,10 +51,10 @@ def _draw_figure(results: Path, figure_path: Path, given: options.CommandOptions
     """Draw the figure of a file, and return the paths of the figures that were written."""
     from rsfstudy.cli import figure_files
     from rsfstudy.cli.study_options import read_results_file
-    from rsfstudy.storage import is_of_single_scene
+    from rsfstudy.storage import StoredDataset
 
     dataset = read_results_file(results, given.study)
-    if is_of_single_scene(dataset):
+    if StoredDataset(dataset).is_of_single_scene:
         drawing = dataset.rsf.plot(against=given.against)
         figure_files.write_figure(drawing, figure_path, given.style)
         return [figure_path]
@@ -72,7 +72,7 @@ def _figure_path_from_output_option(given: options.CommandOptions) -> Path | Non
     ending = "" if output is None else output.suffix[1:].lower()
     if output is None or not ending:
         return None
-    if ending in FIGURE_FORMATS:
+    if ending in Defaults.FIGURE_FORMATS:
         if given.every or given.form not in (None, ending):
             rule = "is a single figure and cannot be combined with --all or another --figure format"
             raise click.UsageError(f"{output} {rule}")
@@ -81,5 +81,7 @@ def _figure_path_from_output_option(given: options.CommandOptions) -> Path | Non
     if not output.is_dir():
         rule = "has a suffix that is not a figure format"
         remedy = "To use it as a directory, create the directory first."
-        raise InvalidValue("--output", str(output), rule, choices=FIGURE_FORMATS, remedy=remedy)
+        raise InvalidValue(
+            "--output", str(output), rule, choices=Defaults.FIGURE_FORMATS, remedy=remedy
+        )
     return None

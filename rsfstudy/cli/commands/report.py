@@ -8,11 +8,11 @@ from rsfstudy.cli import options
 from rsfstudy.cli.command_group import Command
 from rsfstudy.cli.printing import print_line
 from rsfstudy.cli.results import EXIT_STATUS_FAILED, EXIT_STATUS_OK
-from rsfstudy.defaults import OUTPUT_DIRECTORY
+from rsfstudy.defaults import Defaults
 
 
 @click.command(cls=Command)
-@click.argument("directory", default=OUTPUT_DIRECTORY, type=options.FilePath())
+@click.argument("directory", default=Defaults.OUTPUT_DIRECTORY, type=options.FilePath())
 @click.option(
     "--output",
     type=options.FilePath(dir_okay=False),

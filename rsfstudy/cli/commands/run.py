@@ -14,7 +14,7 @@ from rsfstudy.cli import options
 from rsfstudy.cli.command_group import Command
 from rsfstudy.cli.printing import print_line, print_note, print_pieces
 from rsfstudy.cli.results import EXIT_STATUS_FAILED, EXIT_STATUS_OK, CommandResult, output_result
-from rsfstudy.defaults import RESULT_FORMATS
+from rsfstudy.defaults import Defaults
 from rsfstudy.errors import Interrupted, RsfStudyError
 
 if TYPE_CHECKING:
@@ -113,8 +113,8 @@ class Runs(CommandResult):
 @click.option("--despite-failures", is_flag=True, help="Compute reductions even if cells failed.")
 @click.option(
     "--format",
-    type=click.Choice(RESULT_FORMATS),
-    default=RESULT_FORMATS[0],
+    type=click.Choice(Defaults.RESULT_FORMATS),
+    default=Defaults.RESULT_FORMATS[0],
     help="Format of the results: a single NetCDF file, or a chunked Zarr store. An existing Zarr "
     "store is never overwritten.",
 )
@@ -171,12 +171,12 @@ def _print_expected_cost(study: Study, given: options.CommandOptions) -> None:
     """Print the expected cost of a run with another accuracy, and a hint at a faster engine."""
     from rsfstudy.cli import cost_estimates
     from rsfstudy.execution import CellPlan
-    from rsfstudy.motion import DEFAULT_RTOL
+    from rsfstudy.motion import Accuracy
 
     plan = CellPlan(study)
     if given.changes_accuracy and not given.as_json:
         ratio = study.measure.expected_work(study.accuracy) / study.measure.typical_work
-        words = f"{study.name}: {ratio:.2g} times the work of rtol {DEFAULT_RTOL:g}"
+        words = f"{study.name}: {ratio:.2g} times the work of rtol {Accuracy.DEFAULT_RTOL:g}"
         print_line(f"{words}, {cost_estimates.describe_study_cost(plan, given.output)}")
     if not (given.every or given.quiet) and (
         text := cost_estimates.compiled_engine_hint(plan, given.output)

@@ -13,7 +13,7 @@ from rsfstudy.cli.command_group import Command
 from rsfstudy.cli.printing import print_line, print_pieces
 from rsfstudy.cli.results import EXIT_STATUS_FAILED, EXIT_STATUS_OK
 from rsfstudy.errors import InvalidValue
-from rsfstudy.motion import DEFAULT_EVALUATION_BUDGET, DEFAULT_RTOL, ENGINES, SCIPY
+from rsfstudy.motion import Accuracy, Engine
 from rsfstudy.status import Status
 
 if TYPE_CHECKING:
@@ -45,11 +45,13 @@ _EXIT_STATUS_UNPHYSICAL_MOTION = 3
 )
 @options.abscissa_option
 @options.rig_options
-@click.option("--rtol", type=float, default=DEFAULT_RTOL, help="Relative tolerance.")
+@click.option("--rtol", type=float, default=Accuracy.DEFAULT_RTOL, help="Relative tolerance.")
 @options.make_count_option(
-    "--budget", DEFAULT_EVALUATION_BUDGET, "Maximum number of right-hand-side evaluations."
+    "--budget", Accuracy.DEFAULT_BUDGET, "Maximum number of right-hand-side evaluations."
 )
-@click.option("--engine", type=click.Choice(ENGINES), default=SCIPY, help="Integration engine.")
+@click.option(
+    "--engine", type=click.Choice(Engine.NAMES), default=Engine.SCIPY, help="Integration engine."
+)
 @options.make_image_option(
     "--output",
     Path("motion.png"),
@@ -123,7 +125,7 @@ def _write_motion_and_figure(
     """Write the figure and the data of a motion, and print a summary."""
     from rsfstudy.cli.figure_files import write_figure
     from rsfstudy.reporting import build_motion_tables_and_sentences
-    from rsfstudy.rig import DISPLAY_BASE_UNITS
+    from rsfstudy.rig import DatasetUnits
     from rsfstudy.storage import write_dataset
 
     status = f"{motion.attrs['status']} {motion.attrs['message']}".strip()
@@ -132,11 +134,11 @@ def _write_motion_and_figure(
         print_line(f"{status}\n{reason}")
         return
     data = given.output.with_suffix(".nc")
-    write_dataset(rig.in_units(motion, **DISPLAY_BASE_UNITS) if rig else motion, data)
+    write_dataset(rig.in_units(motion, **DatasetUnits.DISPLAY_UNITS) if rig else motion, data)
     write_figure(rsfstudy.plot_motion(motion, rig, against=given.against), given.output)
     if not given.quiet:
         found = [motion, motion.rsf.events()]
         if rig:
-            found = [rig.in_units(of, **DISPLAY_BASE_UNITS) for of in found]
+            found = [rig.in_units(of, **DatasetUnits.DISPLAY_UNITS) for of in found]
         print_pieces(build_motion_tables_and_sentences(found[0], motion.rsf.scene, found[1]))
     print_line(f"{status}\nwrote {given.output} and {data}")

@@ -26,15 +26,7 @@ from rsfstudy.motion.compiled.compile_cache import compile_cfunc_addresses, comp
 from rsfstudy.motion.in_place_functions import build_in_place_functions
 from rsfstudy.motion.motion_loop import advance_motion
 from rsfstudy.motion.regime_switching import SwitchThresholds
-from rsfstudy.slider import (
-    Equations,
-    Function,
-    Numbers,
-    Scene,
-    equations_between_ruptures,
-    equations_in_rupture,
-    equations_without_mass,
-)
+from rsfstudy.slider import Equations, Function, Numbers, Scene
 
 _ARRAY_TYPE, _TABLE_TYPE = types.float64[::1], types.float64[:, ::1]
 _SWITCH_THRESHOLDS_TYPE = types.UniTuple(types.float64, len(SwitchThresholds._fields))
@@ -217,11 +209,11 @@ def compile_equations_of_scene(scene: Scene, *, with_time: bool) -> None:
         If a part of the scene cannot be compiled.
     """
     get_compiled_loop()
-    compiled_function_addresses(equations_between_ruptures(scene, with_time=with_time))
+    compiled_function_addresses(scene.equations_between_ruptures(with_time=with_time))
     if scene.has_mass:
-        compiled_function_addresses(equations_in_rupture(scene, with_time=with_time))
+        compiled_function_addresses(scene.equations_in_rupture(with_time=with_time))
     if scene.has_mass and not with_time:
-        compiled_function_addresses(equations_without_mass(scene, with_time=False))
+        compiled_function_addresses(scene.equations_without_mass(with_time=False))
 
 
 @lru_cache(maxsize=256)

@@ -11,7 +11,7 @@ import xarray as xr
 from rsfstudy.error_boundary import wrap_methods_in_error_boundary
 from rsfstudy.errors import InvalidValue
 from rsfstudy.quantities import Quantity
-from rsfstudy.rig import compute_conversion_factor, find_scale_of_variable, read_si_scales
+from rsfstudy.rig import DatasetUnits, compute_conversion_factor
 from rsfstudy.study.reductions.base import DerivativesByVariable, Reduction
 
 
@@ -98,7 +98,7 @@ class InUnits(Reduction):
 
     def _scale_factor(self, dataset: xr.Dataset) -> xr.DataArray:
         """Compute the scale of each cell in the requested units."""
-        scale = find_scale_of_variable(dataset[self.of], read_si_scales(dataset))
+        scale = DatasetUnits(dataset).scale_of(self.of)
         if scale is None:
             raise InvalidValue("of", self.of, "is a pure number, in no units of a rig")
         return xr.DataArray(

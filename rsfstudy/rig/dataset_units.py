@@ -1,0 +1,114 @@
+"""Physical units of one dataset, in one object."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import ClassVar
+
+import xarray as xr
+
+from rsfstudy.rig import dataset_scales
+from rsfstudy.rig.dataset_scales import UnitScale
+
+
+class DatasetUnits:
+    """Units of a dataset: scales, conversions and names of variables.
+
+    Parameters
+    ----------
+    dataset : xarray.Dataset
+        Results of a study, or a simulated motion.
+    """
+
+    #: Name of the dataset attribute that lists the scales after a conversion.
+    SCALES_ATTRIBUTE: ClassVar[str] = dataset_scales.NAME_OF_SCALES_ATTRIBUTE
+    #: Units of stress, length and time in tables and figures of rigs.
+    DISPLAY_UNITS: ClassVar[Mapping[str, str]] = dataset_scales.DISPLAY_BASE_UNITS
+    #: Prefix of the names of dimensionless fields beside axes with units of the same name.
+    DIMENSIONLESS_PREFIX: ClassVar[str] = dataset_scales.DIMENSIONLESS_PREFIX
+
+    dimensional_name = staticmethod(dataset_scales.convert_to_dimensional_name)
+
+    def __init__(self, dataset: xr.Dataset) -> None:
+        """Refer to a dataset."""
+        self._dataset = dataset
+
+    def convert(self, stress: str, length: str, time: str, **si_scales: float) -> xr.Dataset:
+        """Convert the dataset to physical units of stress, length and time.
+
+        Parameters
+        ----------
+        stress, length, time : str
+            Requested units.
+        **si_scales : float
+            Scales that the dataset does not contain, as `read_si_scales` takes them.
+
+        Returns
+        -------
+        xarray.Dataset
+            Dataset in physical units.
+
+        Raises
+        ------
+        InvalidValue
+            If a scale is missing, or if an argument contradicts the dataset.
+        """
+        scales = dataset_scales.read_si_scales(self._dataset, **si_scales)
+        return dataset_scales.convert_dataset_units(self._dataset, scales, stress, length, time)
+
+    def convert_for_display(self) -> xr.Dataset:
+        """Convert the results of a rig to MPa, um and s for tables and figures.
+
+        Returns
+        -------
+        xarray.Dataset
+            Results in MPa, um and s. A dataset without a rig is returned unchanged.
+        """
+        return dataset_scales.convert_to_display_units(self._dataset)
+
+    def scale_of(self, variable_name: str) -> UnitScale | None:
+        """Find the SI value of the dimensionless unit of a variable.
+
+        Parameters
+        ----------
+        variable_name : str
+            Name of a variable of the dataset.
+
+        Returns
+        -------
+        UnitScale or None
+            Scale of the variable, or None if the variable has no scale or an unknown scale.
+
+        Raises
+        ------
+        InvalidValue
+            If the dataset does not contain the scales of its rig.
+        """
+        scales = dataset_scales.read_si_scales(self._dataset)
+        return dataset_scales.find_scale_of_variable(self._dataset[variable_name], scales)
+
+    def slip_rate_from_log(
+        self, variable_name: str, factor: float | xr.Variable, units: str
+    ) -> dict[str, xr.Variable]:
+        r"""Compute slip rates from their decimal logarithms.
+
+        Parameters
+        ----------
+        variable_name : str
+            Name of the logarithm.
+        factor : float or xarray.Variable
+            Value of :math:`V_*` in ``units``.
+        units : str
+            Units of the slip rate.
+
+        Returns
+        -------
+        dict of str to xarray.Variable
+            Slip rate and its error estimate by their names.
+        """
+        return dataset_scales.slip_rate_from_log(self._dataset, variable_name, factor, units)
+
+    @property
+    def are_unexpected_by_figures(self) -> bool:
+        """True if the results do not have the units of the figures of studies."""
+        return dataset_scales.has_units_unexpected_by_its_figures(self._dataset)

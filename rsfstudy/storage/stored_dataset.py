@@ -1,0 +1,116 @@
+"""What a dataset that rsfstudy has written contains besides numbers, in one object."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import xarray as xr
+
+from rsfstudy.slider import Scene
+from rsfstudy.storage import dataset_scenes, rebuild_from_file, schema
+from rsfstudy.storage.declarations import StoredDeclaration
+from rsfstudy.storage.schema import StoredProvenance
+from rsfstudy.study import Study
+
+
+@dataclass(frozen=True)
+class StoredDataset:
+    """Declaration, provenance and scenes of a dataset.
+
+    Each property reads and checks the attributes of the dataset, and raises ``DataError`` if they
+    are missing or damaged.
+
+    Parameters
+    ----------
+    dataset : xarray.Dataset
+        Results of a study, or dataset of a single scene.
+    """
+
+    dataset: xr.Dataset
+
+    @property
+    def is_of_single_scene(self) -> bool:
+        """True if the dataset belongs to a single scene, and not to a study."""
+        return schema.is_of_single_scene(self.dataset)
+
+    @property
+    def declaration(self) -> StoredDeclaration:
+        """Declaration of the study."""
+        return schema.read_declaration(self.dataset)
+
+    @property
+    def provenance(self) -> StoredProvenance:
+        """Provenance of the results."""
+        return schema.read_provenance(self.dataset)
+
+    @property
+    def scene_fields(self) -> dict[str, Any]:
+        """Fields of the scene of a dataset of a single scene."""
+        return schema.read_scene_fields(self.dataset)
+
+    @property
+    def study(self) -> Study:
+        """Study with all cells, even if only some cells of the dataset are selected."""
+        return rebuild_from_file.study_of_dataset(self.dataset)
+
+    @property
+    def primary_output(self) -> str | None:
+        """Name of the main numeric output, or None if there is none."""
+        return rebuild_from_file.find_primary_output(self.dataset)
+
+    def rebuild_study(self, study_file: str | Path | None = None) -> Study:
+        """Rebuild the study of the results from its declaration.
+
+        Parameters
+        ----------
+        study_file : str or Path, optional
+            File that declares user-defined classes of the study.
+
+        Returns
+        -------
+        Study
+            Study of the results.
+        """
+        return rebuild_from_file.rebuild_study(self.dataset, study_file)
+
+    def find_scene(self, study: Study | None) -> Scene:
+        """Return the scene of the dataset, or of the selected cell of a study.
+
+        Parameters
+        ----------
+        study : Study or None
+            Study of the results. None for a dataset of a single scene.
+
+        Returns
+        -------
+        Scene
+            Scene of the dataset.
+        """
+        return dataset_scenes.scene_of_dataset(self.dataset, study)
+
+    def read_json(self, attribute_name: str) -> Any:
+        """Decode an attribute that contains JSON.
+
+        Parameters
+        ----------
+        attribute_name : str
+            Name of the attribute.
+
+        Returns
+        -------
+        object
+            Decoded value.
+        """
+        return schema.read_json_attribute(self.dataset, attribute_name)
+
+    def check_contains_study_results(self, description: str) -> None:
+        """Raise ``DataError`` if the dataset does not contain the results of a study.
+
+        Parameters
+        ----------
+        description : str
+            Description of the file or dataset for the error message.
+        """
+        schema.check_contains_study_results(self.dataset, description)
