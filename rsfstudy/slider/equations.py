@@ -20,6 +20,7 @@ from rsfstudy.slider.scene_functions import (
     build_scene_functions,
 )
 from rsfstudy.slider.scene_view import SceneView
+from rsfstudy.slider.temperature_functions import steady_temperature_rise
 
 #: Names of two regimes of motion: ruptures with inertia, and the sliding of a rigid slider.
 RUPTURE_REGIME, RIGID_REGIME = "inertial", "rigid"
@@ -192,7 +193,8 @@ def _state_names(scene: SceneView) -> tuple[str, ...]:
     """Return the names of the states."""
     count = scene.parts.law.state_count
     of_law = ["psi"] if count == 1 else [f"psi_{i + 1}" for i in range(count)]
-    return (*of_law, *(unknown.name for unknown in scene.pressure_source.unknowns))
+    others = *scene.parts.temperature.unknowns, *scene.pressure_source.unknowns
+    return (*of_law, *(unknown.name for unknown in others))
 
 
 @cached_per_scene
@@ -429,5 +431,10 @@ def compute_steady_states(scene: SceneView, log_slip_rate: float, state_shift: f
     tuple of float
         States :math:`\Psi_i`.
     """
-    p = scene.friction_parameter_values
-    return scene.equation_functions.friction_functions.steady_states(log_slip_rate, state_shift, p)
+    p, functions = scene.friction_parameter_values, scene.equation_functions.friction_functions
+    states: Numbers = functions.steady_states(log_slip_rate, state_shift, p)
+    if not scene.parts.temperature.unknowns:
+        return states
+    place = scene.parts.law.state_count
+    rise = steady_temperature_rise(scene, log_slip_rate)
+    return (*states[:place], rise, *states[place + 1 :])

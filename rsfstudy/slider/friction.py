@@ -55,6 +55,14 @@ from rsfstudy.slider.state_functions import (
     build_states_from_strength_function,
     build_sum_function,
 )
+from rsfstudy.slider.temperature_functions import (
+    TemperatureTerms,
+    add_temperature_to_contribution,
+    add_temperature_to_strength,
+    append_temperature_evolution,
+    build_normal_stress_from_friction_function,
+    insert_temperature_steady_state,
+)
 
 #: Smallest magnitude of the friction coefficient in scenes in which slip may reverse. The limit
 #: keeps the logarithm of the slip rate finite at zero stress.
@@ -564,6 +572,8 @@ class FrictionTerms(NamedTuple):
         True if the last unknown is the shear stress :math:`K D` instead of a pressure.
     state_indices_excluded_from_distance : tuple of int, optional
         Indices of the states that are ignored when the distance from steady sliding is computed.
+    temperature : TemperatureTerms, optional
+        Contributions of the temperature, if the temperature is an unknown.
     """
 
     law_state_count: int
@@ -578,6 +588,7 @@ class FrictionTerms(NamedTuple):
     boundary_pressure_index: int
     has_load_point_unknown: bool = False
     state_indices_excluded_from_distance: tuple[int, ...] = ()
+    temperature: TemperatureTerms | None = None
 
 
 @cache
@@ -621,7 +632,24 @@ def build_friction_functions(friction_terms: FrictionTerms) -> FrictionFunctions
     if friction_terms.allows_reversed_slip:
         strength = extend_relation_to_reversed_slip(strength)
     evolutions, steady_states = friction_terms.evolutions, friction_terms.steady_states
-    if (
+    heat = friction_terms.temperature
+    if heat is not None:
+        if heat.affects_friction:
+            strength = add_temperature_to_strength(strength, heat)
+        by_friction = build_normal_stress_from_friction_function(
+            total, has_pressure=pressure, is_linear=heat.normal_stress_is_linear
+        )
+        evolutions = append_temperature_evolution(
+            evolutions,
+            friction_terms.auxiliary_rates,
+            by_friction,
+            friction_terms.law_state_count,
+            heat,
+        )
+        steady_states = insert_temperature_steady_state(
+            steady_states, friction_terms.auxiliary_steady_states
+        )
+    elif (
         friction_terms.auxiliary_rates is not None
         and friction_terms.auxiliary_steady_states is not None
     ):
@@ -633,9 +661,13 @@ def build_friction_functions(friction_terms: FrictionTerms) -> FrictionFunctions
         )
     by_last = build_pressure_derivatives_function(effective, effect) if pressure else None
     states = friction_terms.law_state_count + friction_terms.auxiliary_unknown_count
+    states += heat is not None
     if friction_terms.has_load_point_unknown:
         strength, effective, outer = map(wrap_with_load_point_stress, (strength, effective, outer))
         by_last = build_load_point_derivatives_function(strength)
+    contribution = build_state_contribution_function(friction_terms.law_state_count, by_last)
+    if heat is not None and heat.affects_friction:
+        contribution = add_temperature_to_contribution(contribution, heat)
     return FrictionFunctions(
         strength=strength,
         effective_normal_stress=effective,
@@ -644,9 +676,7 @@ def build_friction_functions(friction_terms: FrictionTerms) -> FrictionFunctions
         evolutions=evolutions,
         steady_states=steady_states,
         state_sum=build_sum_function(friction_terms.law_state_count),
-        state_contribution=build_state_contribution_function(
-            friction_terms.law_state_count, by_last
-        ),
+        state_contribution=contribution,
         pressure_derivatives=by_last or build_pressure_derivatives_function(effective, effect),
         states_from_strength=build_states_from_strength_function(friction_terms.law_state_count),
         load_point_stress=load_point_stress

@@ -26,6 +26,7 @@ from rsfstudy.slider import (
     part_registry,
     scene_functions,
     stability,
+    temperature,
 )
 from rsfstudy.slider.dynamics.quasi_static import QuasiStatic
 from rsfstudy.slider.fluid._boundary_pressure import FluidWithBoundaryPressure
@@ -383,9 +384,11 @@ class Scene(SceneBase):
     def state_count(self) -> int:
         """Total number of states of the scene.
 
-        The total includes the states of the law and the unknowns of the loading and of the fluid.
+        The total includes the states of the law, the temperature if it changes, and the unknowns of
+        the loading and of the fluid.
         """
-        return self.parts.law.state_count + len(self.pressure_source.unknowns)
+        of_law, heat = self.parts.law.state_count, len(self.parts.temperature.unknowns)
+        return of_law + heat + len(self.pressure_source.unknowns)
 
     @property
     def effects(self) -> tuple[str, ...]:
@@ -492,8 +495,8 @@ class Scene(SceneBase):
 
         See ``stability.critical_stiffness`` for the definition.
         """
-        slider, law, stress, pores, *_others = self.parts
-        return _critical_stiffness(slider.a, slider.mu_star, law, stress, pores)
+        slider, law, stress, pores, *_others, heat = self.parts
+        return _critical_stiffness(slider.a, slider.mu_star, law, stress, pores, heat)
 
 
 part_registry.RESERVED_NAMES.update(dir(Scene), Scene.__annotations__)
@@ -506,6 +509,7 @@ def _critical_stiffness(
     law: laws.LawBase,
     normal_stress_part: normal_stress.NormalStress,
     fluid_part: fluid.Fluid,
+    temperature_part: temperature.Temperature,
 ) -> float:
     """Compute the critical stiffness of all sliders with the same friction.
 
@@ -513,7 +517,6 @@ def _critical_stiffness(
     stiffness of the slider to the value of a.
     """
     slider = SliderParameters(a=a, mu_star=mu_star, stiffness=a)
-    scene = Scene(
-        SceneParts(slider, law, normal_stress_part, fluid_part, QuasiStatic(), StepLoading())
-    )
+    others = QuasiStatic(), StepLoading(), temperature_part
+    scene = Scene(SceneParts(slider, law, normal_stress_part, fluid_part, *others))
     return stability.critical_stiffness(scene, 0.0, quasi_static=True)

@@ -15,7 +15,7 @@ from rsfstudy._deprecation import translate_former_member_name
 from rsfstudy.error_boundary import wrap_methods_in_error_boundary
 from rsfstudy.errors import InvalidValue
 from rsfstudy.quantities import HtmlTableMixin, Quantity
-from rsfstudy.slider import dynamics, fluid, laws, loading, normal_stress
+from rsfstudy.slider import dynamics, fluid, laws, loading, normal_stress, temperature
 from rsfstudy.slider.field_name_hints import (
     hint_for_positional_argument,
     hint_for_unknown_choice,
@@ -24,6 +24,7 @@ from rsfstudy.slider.field_name_hints import (
 from rsfstudy.slider.part_registry import (
     FIELDS_OMITTED_IF_NONE,
     PART_CLASS_BY_FIELD_NAME,
+    PART_NAMES_OMITTED,
     PART_SELECTING_FIELDS,
     SLOT_NAMES,
     SLOTS,
@@ -44,6 +45,7 @@ from rsfstudy.slider.slider_parameters import (
     SliderParameters,
     with_stiffness_default,
 )
+from rsfstudy.slider.temperature.isothermal import Isothermal
 from rsfstudy.slider.user_loadings import UserLoading
 
 
@@ -64,6 +66,8 @@ class SceneParts(NamedTuple):
         Dynamics.
     loading : Loading
         Loading history.
+    temperature : Temperature
+        Temperature of the fault.
     """
 
     slider: SliderParameters
@@ -72,6 +76,7 @@ class SceneParts(NamedTuple):
     fluid: fluid.Fluid
     dynamics: dynamics.Dynamics
     loading: loading.Loading
+    temperature: temperature.Temperature = Isothermal()
 
 
 def build_parts(field_values: Mapping[str, Any]) -> SceneParts:
@@ -417,7 +422,9 @@ class SceneBase(HtmlTableMixin):
             for n in self.field_index.all_field_names
             if n not in FIELDS_OMITTED_IF_NONE or values[n] is not None
         )
-        return {name: values[name] for name in kept}
+        return {
+            name: values[name] for name in kept if values[name] != PART_NAMES_OMITTED.get(name, "")
+        }
 
     def describe(self) -> dict[str, Any]:
         """Return the fields and the history of a user-defined loading.

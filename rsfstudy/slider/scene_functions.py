@@ -54,6 +54,7 @@ from rsfstudy.slider.state_functions import (
     default_steady_state,
     wrap_single_state_evolution,
 )
+from rsfstudy.slider.temperature_functions import build_temperature_terms
 
 if TYPE_CHECKING:
     from rsfstudy.slider.dynamics import Dynamics
@@ -625,9 +626,10 @@ def state_indices_excluded_from_distance(scene: SceneView) -> tuple[int, ...]:
     tuple of int
         Indices of the states that are ignored when the distance from steady sliding is computed.
     """
-    law, source = scene.parts.law, scene.pressure_source
-    unknowns = enumerate(source.unknowns, start=law.state_count)
-    return tuple(n for n, about in unknowns if about.name in source.excluded_from_distance)
+    law, heat, source = scene.parts.law, scene.parts.temperature.unknowns, scene.pressure_source
+    excluded = *(about.name for about in heat), *source.excluded_from_distance
+    unknowns = enumerate((*heat, *source.unknowns), start=law.state_count)
+    return tuple(n for n, about in unknowns if about.name in excluded)
 
 
 def build_scene_functions(scene: SceneView, dynamics: Dynamics | None = None) -> SceneFunctions:
@@ -664,6 +666,7 @@ def build_scene_functions(scene: SceneView, dynamics: Dynamics | None = None) ->
         else 0,
         has_load_point_unknown=scene.parts.loading.has_load_point_unknown,
         state_indices_excluded_from_distance=state_indices_excluded_from_distance(scene),
+        temperature=build_temperature_terms(scene),
     )
     return assemble_scene_functions(
         parts, acting.build_slip_rate_functions, acting.build_rupture_rate_function

@@ -51,9 +51,11 @@ from rsfstudy.slider.evolution_derivatives import (
     StateEvolutionDerivatives,
     compute_state_evolution_derivatives,
 )
+from rsfstudy.slider.parameter_layout import temperature_parameter_values
 from rsfstudy.slider.scene_caching import cached_per_scene
 from rsfstudy.slider.scene_view import SceneView
 from rsfstudy.slider.steady_state import SteadySliding, steady_sliding
+from rsfstudy.slider.temperature_functions import temperature_derivatives
 
 #: Limits below which a result cannot be distinguished from zero because of rounding errors. The
 #: first limit applies to a critical stiffness divided by a. The second limit applies to a growth
@@ -284,7 +286,7 @@ def linear_friction_response(
     ----------
     Rice and Ruina (1983), J. Appl. Mech. 50, 343-349.
     """
-    _value, slope, _shift, shift_slope = build_friction_relation(scene)(
+    _value, slope, _shift, shift_slope = build_friction_relation(scene, steady_state.states)(
         steady_state.frictional_stress
     )
     by_rate, by_shift, by_state, _error = (
@@ -293,7 +295,8 @@ def linear_friction_response(
     by_state = [list(row) for row in by_state]
     weights, shifting = _log_slip_rate_change_by_each_state(scene, steady_state)
     for row, of_shift in zip(by_state, by_shift, strict=True):
-        row[-1] += of_shift * shifting
+        for place, shift in shifting.items():
+            row[place] += of_shift * shift
     denominator, adjugate = compute_resolvent_polynomials(by_state)
     above = [scene.a * x for x in denominator]
     below = [slope * x for x in denominator]
@@ -306,19 +309,26 @@ def linear_friction_response(
 
 def _log_slip_rate_change_by_each_state(
     scene: SceneView, steady_state: SteadySliding
-) -> tuple[list[float], float]:
+) -> tuple[list[float], dict[int, float]]:
     """Return the weight of each state in the friction relation.
 
-    The function also returns the derivative of the shift with respect to the last state.
+    The function also returns the derivatives of the shift with respect to the temperature and the
+    pore pressure, by the index of the state.
     """
     law, fluid = scene.parts.law.state_count, len(scene.parts.fluid.unknowns)
-    if not fluid:
-        return [1.0] * law, 0.0
-    by_pressure = scene.equation_functions.friction_functions.pressure_derivatives
-    gained, shifted = by_pressure(
-        steady_state.frictional_stress, steady_state.states, scene.friction_parameter_values
-    )
-    return [*[1.0] * law, *[0.0] * (fluid - 1), -gained], shifted
+    weights, shifts = [1.0] * law, dict[int, float]()
+    if scene.parts.temperature.unknowns:
+        gained, shifts[law] = temperature_derivatives(
+            steady_state.states[law], temperature_parameter_values(scene)
+        )
+        weights.append(-gained)
+    if fluid:
+        by_pressure = scene.equation_functions.friction_functions.pressure_derivatives
+        gained, shifts[-1] = by_pressure(
+            steady_state.frictional_stress, steady_state.states, scene.friction_parameter_values
+        )
+        weights += [*[0.0] * (fluid - 1), -gained]
+    return weights, shifts
 
 
 def _dot_product(first: Sequence[float], second: Sequence[float]) -> float:

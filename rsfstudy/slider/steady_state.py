@@ -21,6 +21,7 @@ from rsfstudy.slider.equations import build_friction_relation, compute_steady_st
 from rsfstudy.slider.parts import Numbers
 from rsfstudy.slider.scene_caching import cached_per_scene
 from rsfstudy.slider.scene_view import SceneView
+from rsfstudy.slider.temperature_functions import thermal_friction_change
 
 #: Largest deviation of frictional stress, in units of sigma_*, that the root search considers.
 _MAX_STEADY_FRICTIONAL_STRESS = 1e9
@@ -78,7 +79,10 @@ def steady_sliding(scene: SceneView, log_slip_rate: float) -> SteadySliding | No
     if friction is None:
         return None
     spring_stress = friction + scene.dynamics.radiated_stress(log_slip_rate)
-    shift = build_friction_relation(scene)(friction)[2]
+    heated = scene.parts.temperature.unknowns
+    # The steady temperature does not depend on the shift, but the shift depends on temperature.
+    states = compute_steady_states(scene, log_slip_rate, 0.0) if heated else ()
+    shift = build_friction_relation(scene, states)(friction)[2]
     return SteadySliding(
         log_slip_rate, friction, spring_stress, compute_steady_states(scene, log_slip_rate, shift)
     )
@@ -107,10 +111,9 @@ def steady_friction_minus_reference(scene: SceneView, log_slip_rate: float) -> f
     ----------
     Ruina (1983), J. Geophys. Res. 88, 10359-10370.
     """
-    psi = scene.equation_functions.friction_functions.state_sum(
-        compute_steady_states(scene, log_slip_rate, 0.0)
-    )
-    return float(scene.a * log_slip_rate + psi)
+    states = compute_steady_states(scene, log_slip_rate, 0.0)
+    psi = scene.equation_functions.friction_functions.state_sum(states)
+    return float(scene.a * log_slip_rate + psi + thermal_friction_change(scene, states))
 
 
 def frictional_stress_for_friction(
@@ -249,7 +252,7 @@ def min_steady_log_slip_rate(scene: SceneView) -> float:
     strongest = value - shift
     if strongest > 1e6:
         return -math.inf
-    if scene.parts.law.steady_states is None:
+    if scene.parts.law.steady_states is None and not any(scene.parts.temperature.activation):
         return strongest / (scene.a - scene.b) if scene.b > scene.a else -math.inf
     slower = -1.0
     while steady_friction_minus_reference(scene, slower) <= strongest:
