@@ -172,12 +172,14 @@ def _bound_pore_pressure_effect(scene: Scene, point: MotionPoint) -> tuple[float
     """Compute an upper bound of the increase of ln V by pore pressure.
 
     The function returns the upper bound, and the stress-induced change of the state at the upper
-    bound. The upper bound is infinite if no bound is found. An increase of ln V is an upper bound
-    if the highest pore pressure at the increased ln V reduces strength by less than a times the
-    increase.
+    bound. The upper bound is infinite if no bound is found, or if the temperature changes. An
+    increase of ln V is an upper bound if the highest pore pressure at the increased ln V reduces
+    strength by less than a times the increase.
     """
     fluid, psis = scene.parts.fluid, point.psis
     value, _slope, shift, _ = build_friction_relation(scene, psis)(point.frictional_stress)
+    if scene.parts.temperature.unknowns:
+        return math.inf, shift
     if not fluid.unknowns:
         return 0.0, shift
     own = psis[-len(fluid.unknowns) :]

@@ -1,17 +1,19 @@
 """Physics of one spring-slider: parts, parameters, equations and stability.
 
-A ``Scene`` describes a slider by five parts: a state evolution law, a normal stress condition, a
-pore fluid, the dynamics and the loading. The package checks scenes and provides their equations of
-motion, their steady states and the stability of steady sliding. The package never integrates the
-equations, never reads or writes files, and depends only on Python, NumPy and SciPy.
+A ``Scene`` describes a slider by six parts: a state evolution law, a normal stress condition, a
+pore fluid, the dynamics, the loading and the temperature. The package checks scenes and provides
+their equations of motion, their steady states and the stability of steady sliding. The package
+never integrates the equations, never reads or writes files, and depends only on Python, NumPy and
+SciPy.
 
-The parts are classes in the packages ``laws``, ``normal_stress``, ``fluid``, ``dynamics`` and
-``loading``. Each of these packages contains one module per part. We suggest reading the other
-modules in the following order:
+The parts are classes in the packages ``laws``, ``normal_stress``, ``fluid``, ``dynamics``,
+``loading`` and ``temperature``. Each of these packages contains one module per part. We suggest
+reading the other modules in the following order:
 
 - ``scene`` combines the parts of a slider.
 - ``friction`` combines the law, the normal stress and the pore pressure into a relation between
-  stress, slip rate and states. Helper functions for the state variables are in ``state_functions``.
+  stress, slip rate and states. Helper functions for the state variables are in ``state_functions``,
+  and functions for the effects of temperature are in ``temperature_functions``.
 - ``scene_functions`` combines friction with the dynamics, which determine the slip rate, into
   equations of motion for any combination of parts.
 - ``equations`` provides the unknowns, rates and parameters that an integrator needs. The layout of

@@ -68,10 +68,14 @@ class Scene(SceneBase):
         driving stress that is inclined at the angle ``phi``. A user-defined class is also accepted.
     fluid : str or type, default: "drained"
         Pore fluid. "drained" is constant pore pressure. With "dilatant", pore pressure falls when
-        the slip rate increases, because the pores open. A user-defined class is also accepted.
+        the slip rate increases, because the pores open. With "thermal", pore pressure rises when
+        the fault heats up. A user-defined class is also accepted.
         Stress is normalised by the effective normal stress of steady sliding at :math:`V_*`. Pore
         pressure is measured from the pressure of the surroundings, which is also its initial value.
         A history of pore pressure changes the pressure of the surroundings.
+    temperature : str or type, default: "isothermal"
+        Temperature of the fault. "isothermal" is constant temperature. With "shear_heating", the
+        work of the shear stress heats the fault. A user-defined class is also accepted.
     a : float, default: 0.0145
         Direct effect parameter.
     mu_star : float, default: 0.76
@@ -112,6 +116,12 @@ class Scene(SceneBase):
         effect.
     law_exponent : float, default: 0.5
         Exponent of the family of laws, from 0 (slip law) to 1 (slowness law).
+    weakening_velocity_ratio : float, default: 1e5
+        Weakening velocity :math:`V_w/V_*` of the law with flash heating.
+    weakened_friction : float, default: 0.2
+        Friction coefficient far above the weakening velocity.
+    weakening_exponent : float, default: 8.0
+        Sharpness of the transition at the weakening velocity.
     b1_over_a : float, default: 1.0
         Ratio :math:`b_1/a` of the first state, for laws with two states. Laws with two states do
         not have the field ``b_over_a``. Negative values are allowed.
@@ -129,9 +139,13 @@ class Scene(SceneBase):
         stress.
     dilatancy : float, default: 0.01
         Dilatancy :math:`\epsilon/(\beta \sigma_*)` of the dilatant fluid: the decrease of pore
-        pressure under undrained conditions if :math:`\ln V` increases by 1.
+        pressure under undrained conditions if :math:`\ln V` increases by 1. The default for the
+        thermal fluid is 0.
     drainage : float, default: 1.0
-        Drainage rate :math:`c^* D_c/V_*` of the dilatant fluid.
+        Drainage rate :math:`c^* D_c/V_*` of the dilatant or thermal fluid.
+    pressurisation : float, default: 1.0
+        Pressurisation factor :math:`\Lambda_p T_*/\sigma_*` of the thermal fluid: the increase of
+        pore pressure under undrained conditions if the temperature rises by :math:`T_*`.
     inertia : bool, default: False
         If True, the slider has mass.
     radiation_damping : float, default: 0.0
@@ -184,6 +198,15 @@ class Scene(SceneBase):
         Load point velocity in :math:`V_*` after the first velocity step.
     displacement_between_steps : float, default: 20.0
         Load point displacement between successive velocity steps in :math:`D_c`.
+    heating : float, default: 1e-3
+        Temperature rise over :math:`T_*`, the absolute temperature of steady sliding at
+        :math:`V_*`, by a slip of :math:`D_c` at unit shear stress.
+    cooling : float, default: 1.0
+        Cooling rate :math:`c_{th} D_c/V_*` of a fault with shear heating.
+    direct_activation : float, default: 0.0
+        Activation term :math:`Q_a/(R T_*)` of the direct effect.
+    evolution_activation : float, default: 0.0
+        Activation term :math:`Q_b/(R T_*)` of the evolution effect.
     dynamics : type, optional
         User-defined class of dynamics. By default the fields ``inertia`` and ``radiation_damping``
         select the dynamics, and motion is quasi-static if neither is set.
@@ -195,8 +218,8 @@ class Scene(SceneBase):
     Attributes
     ----------
     parts : SceneParts
-        Parts of the scene: ``slider``, ``law``, ``normal_stress``, ``fluid``, ``dynamics`` and
-        ``loading``. Each field of the scene belongs to one of the parts.
+        Parts of the scene: ``slider``, ``law``, ``normal_stress``, ``fluid``, ``dynamics``,
+        ``loading`` and ``temperature``. Each field of the scene belongs to one of the parts.
 
     Raises
     ------

@@ -139,9 +139,7 @@ def add_temperature_to_strength(strength_function: Function, terms: TemperatureT
     place, first = terms.state_index, terms.parameter_index
     second = first + 1
 
-    def thermal_strength(
-        g: float, psis: Numbers, p: Numbers
-    ) -> tuple[float, float, float, float]:
+    def thermal_strength(g: float, psis: Numbers, p: Numbers) -> tuple[float, float, float, float]:
         value, slope, shift, shift_slope = strength_function(g, psis, p)
         change = inverse_temperature_change(psis[place])
         return value - p[first] * change, slope, shift - p[second] * change, shift_slope

@@ -245,6 +245,7 @@ _ALLOWED_DTYPE_KINDS = ("iufbOUT", "numbers or texts")
 _SCENE_DEFAULTS_FOR_OLDER_FILES: Mapping[str, Any] = {
     **{name: None for part in BUILT_IN_PARTS.values() for name in field_names(part)},
     "fluid": "drained",
+    "temperature": "isothermal",
 }
 _REQUIRED_VARIABLES = {
     "status": ("i", "whole numbers"),

@@ -182,8 +182,6 @@ class FlashHeatingLaw(Law):
         """
         logarithm, exponent = math.log(self.weakening_velocity_ratio), self.weakening_exponent
         power = -exponent * logarithm
-        at_reference = (
-            power if power > LARGEST_EVOLUTION_EXPONENT else math.log1p(math.exp(power))
-        )
+        at_reference = power if power > LARGEST_EVOLUTION_EXPONENT else math.log1p(math.exp(power))
         own = self.weakened_friction, logarithm, exponent, at_reference
         return (*super().parameter_values(scene), *own)
