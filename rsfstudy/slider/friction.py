@@ -61,7 +61,9 @@ from rsfstudy.slider.temperature_functions import (
     add_temperature_to_strength,
     append_temperature_evolution,
     build_normal_stress_from_friction_function,
+    build_state_variable_function,
     insert_temperature_steady_state,
+    state_variable_at_constant_temperature,
 )
 
 #: Smallest magnitude of the friction coefficient in scenes in which slip may reverse. The limit
@@ -71,7 +73,7 @@ _MIN_NONZERO_FRICTION_COEFFICIENT = 1e-280
 
 @add_former_member_names
 class FrictionFunctions(NamedTuple):
-    """Functions that define the friction of a scene.
+    r"""Functions that define the friction of a scene.
 
     Parameters
     ----------
@@ -93,6 +95,9 @@ class FrictionFunctions(NamedTuple):
         Function ``(log_slip_rate, shift, p)`` that returns all states in steady sliding.
     state_sum : callable
         Function ``(psis) -> float`` that returns the sum of the states of the law.
+    state_variable : callable
+        Function ``(difference, psis, p)`` that returns the state variable :math:`\Theta` from the
+        sum of the states of the law minus the shift.
     state_contribution : callable
         Function ``(changes, g, psis, p)`` that returns the contribution of state changes to the
         friction relation, so that ``a d ln V = strength'(g) dg - state_contribution``.
@@ -121,6 +126,7 @@ class FrictionFunctions(NamedTuple):
     evolutions: Function
     steady_states: Function
     state_sum: Function
+    state_variable: Function
     state_contribution: Function
     pressure_derivatives: Function
     states_from_strength: Function
@@ -666,8 +672,10 @@ def build_friction_functions(friction_terms: FrictionTerms) -> FrictionFunctions
         strength, effective, outer = map(wrap_with_load_point_stress, (strength, effective, outer))
         by_last = build_load_point_derivatives_function(strength)
     contribution = build_state_contribution_function(friction_terms.law_state_count, by_last)
+    state_variable = state_variable_at_constant_temperature
     if heat is not None and heat.affects_friction:
         contribution = add_temperature_to_contribution(contribution, heat)
+        state_variable = build_state_variable_function(heat)
     return FrictionFunctions(
         strength=strength,
         effective_normal_stress=effective,
@@ -676,6 +684,7 @@ def build_friction_functions(friction_terms: FrictionTerms) -> FrictionFunctions
         evolutions=evolutions,
         steady_states=steady_states,
         state_sum=build_sum_function(friction_terms.law_state_count),
+        state_variable=state_variable,
         state_contribution=contribution,
         pressure_derivatives=by_last or build_pressure_derivatives_function(effective, effect),
         states_from_strength=build_states_from_strength_function(friction_terms.law_state_count),

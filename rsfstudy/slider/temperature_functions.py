@@ -147,6 +147,48 @@ def add_temperature_to_strength(strength_function: Function, terms: TemperatureT
     return thermal_strength
 
 
+def build_state_variable_function(terms: TemperatureTerms) -> Function:
+    r"""Return a function that removes the effect of temperature from the state.
+
+    Parameters
+    ----------
+    terms : TemperatureTerms
+        Contributions of the temperature.
+
+    Returns
+    -------
+    callable
+        Function ``(difference, psis, p)`` that returns :math:`\Theta`. The argument
+        ``difference`` is :math:`\Psi - \mathrm{shift} = \Theta + b q_b \Lambda`.
+    """
+    place, second = terms.state_index, terms.parameter_index + 1
+
+    def state_variable(difference: float, psis: Numbers, p: Numbers) -> float:
+        return difference - p[second] * inverse_temperature_change(psis[place])
+
+    return state_variable
+
+
+def state_variable_at_constant_temperature(difference: float, psis: Numbers, p: Numbers) -> float:
+    r"""Return the state variable at constant temperature.
+
+    Parameters
+    ----------
+    difference : float
+        Sum of the states of the law minus the shift.
+    psis : tuple of float
+        States of the scene. This argument is ignored.
+    p : tuple of float
+        Parameters of the scene. This argument is ignored.
+
+    Returns
+    -------
+    float
+        State variable :math:`\Theta`, which is equal to ``difference``.
+    """
+    return difference
+
+
 def temperature_derivatives(rise: float, parameters: Numbers) -> tuple[float, float]:
     r"""Compute the derivatives of strength and shift with respect to temperature.
 

@@ -45,12 +45,12 @@ def steady_state(log_slip_rate: float, p: Numbers) -> float:
     The function evaluates :math:`\Theta_{\mathrm{ss}} = -b \ln(V/V_*) + (\mu_{LV} - f_w)(D - 1)`,
     in which no digits cancel at slip rates far below :math:`V_w`.
     """
-    b, weakened, log_velocity, exponent, at_reference = p[LAW : LAW + 5]
-    power = exponent * (log_slip_rate - log_velocity)
+    b, exponent = p[LAW], p[LAW + 3]
+    power = exponent * (log_slip_rate - p[LAW + 2])
     # For large arguments, ln(1 + exp(x)) equals x.
     faster = power if power > LARGEST_EVOLUTION_EXPONENT else math.log1p(math.exp(power))
-    excess = p[MU_STAR] - weakened + (p[A] - b) * log_slip_rate
-    return -b * log_slip_rate + excess * math.expm1((at_reference - faster) / exponent)
+    excess = p[MU_STAR] - p[LAW + 1] + (p[A] - b) * log_slip_rate
+    return -b * log_slip_rate + excess * math.expm1((p[LAW + 4] - faster) / exponent)
 
 
 def state_evolution_per_slip(log_slip_rate: float, state: float, p: Numbers) -> float:
