@@ -215,7 +215,7 @@ NEW_NAME_BY_OWNER_AND_FORMER_NAME: Mapping[str, Mapping[str, str]] = {
         "IMPOSED": "IMPOSED_NORMAL_STRESS",
         "RECHARGE": "BOUNDARY_PRESSURE_RATE",
     },
-    "rsfstudy.slider.scene_assembly:SceneBase": {
+    "rsfstudy.slider.scene_base:SceneBase": {
         "under": "with_segment",
         "acting": "segment_scene",
         "chains": "continuous_segments",
@@ -230,7 +230,6 @@ NEW_NAME_BY_OWNER_AND_FORMER_NAME: Mapping[str, Mapping[str, str]] = {
         "begins_elsewhere": "starts_unsteady",
         "numbers_of_friction": "friction_parameter_values",
         "shown": "quantities_with_values",
-        "functions": "equation_functions",
         "numbers": "parameter_values",
     },
     "rsfstudy.slider.motion_point:MotionPoint": {

@@ -37,7 +37,8 @@ def test_it_begins_as_stated(stress, state, normal_stress, dependence, dynamics)
     )
     begin = start_point(scene)
     assert begin.spring_stress == stress
-    assert begin.state == pytest.approx(state, abs=1e-13)
+    # A root finder solves for the state to rounding, which inertia amplifies at high slip rates.
+    assert begin.state == pytest.approx(state, abs=1e-12)
     friction = scene.mu_star + scene.a * begin.log_slip_rate + state
     assert begin.friction_coefficient == pytest.approx(friction, abs=1e-12)
 

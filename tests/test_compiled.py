@@ -306,7 +306,7 @@ def test_a_cache_of_other_code_is_never_used(monkeypatch):
     rate = equations_between_ruptures(scene, with_time=False).rate_function
     before = compile_cache.compute_code_digest(None, rate)
     assert compile_cache.compute_code_digest(None, rate) == before
-    cells = scene.equation_functions.friction_functions.strength.__closure__
+    cells = scene.friction_functions.strength.__closure__
     effect = next(
         c.cell_contents for c in cells if c.cell_contents.__name__ == "linker_dieterich_effect"
     )

@@ -26,7 +26,7 @@ from rsfstudy.slider.equations import (
 )
 from rsfstudy.slider.motion_point import MotionPoint
 from rsfstudy.slider.parameter_layout import LAW
-from rsfstudy.slider.scene_functions import displacement_per_path_length
+from rsfstudy.slider.path_length import displacement_per_path_length
 from rsfstudy.status import Status
 
 

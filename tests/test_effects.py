@@ -13,12 +13,15 @@ from rsfstudy.named_studies import effects
 from rsfstudy import Scene
 from rsfstudy.motion.accuracy import Accuracy
 from rsfstudy.slider.equations import (
-    build_friction_relation,
+    build_equations_against_displacement,
+    build_equations_against_inertial_time,
     equations_at_imposed_slip_rate,
     equations_between_ruptures,
     equations_in_rupture,
+    equations_without_mass,
     quasi_static_log_slip_rate,
 )
+from rsfstudy.slider.friction import build_friction_relation
 
 shear = st.floats(-0.5, 0.5)
 
@@ -123,6 +126,35 @@ def test_the_same_functions_serve_all_scenes_of_the_same_parts():
     assert all(isinstance(number, float) for number in one.parameters)
     cells = (cell.cell_contents for cell in one.rate_function.__closure__ or ())
     assert all(isinstance(value, types.FunctionType | int) for value in cells)
+
+
+@pytest.mark.parametrize(
+    "parts",
+    [
+        {"law": "two_slowness_states", "inertia": True},
+        {"fluid": "dilatant", "radiation_damping": 1e-6},
+        {"normal_stress": "imposed", "oscillation_amplitude": 0.1, "law": "slowness"},
+        {"velocity_oscillation": 0.1, "regularised": True},
+        {"normal_stress": "constant", "stress_dependence": 0.5, "inertia": True},
+    ],
+)
+def test_scenes_of_the_same_parts_share_all_functions(parts):
+    """Equations of a new scene need no new functions, so nothing is compiled again."""
+    one, other = (Scene(**parts, a=a, stiffness=0.01) for a in (0.01, 0.012))
+    assert one.friction_functions == other.friction_functions
+    builders = [
+        lambda scene: equations_between_ruptures(scene, with_time=True),
+        lambda scene: equations_without_mass(scene, with_time=False),
+        lambda scene: build_equations_against_displacement(scene),
+        lambda scene: equations_at_imposed_slip_rate(scene, 0.5),
+    ]
+    if one.has_mass:
+        builders += [equations_in_rupture, build_equations_against_inertial_time]
+    for build in builders:
+        first, second = build(one), build(other)
+        assert first.rate_function is second.rate_function
+        assert first.point_function is second.point_function
+        assert first.force_balance_function is second.force_balance_function
 
 
 def test_trial_states_outside_of_the_physics_give_finite_rates():

@@ -22,9 +22,9 @@ from rsfstudy.motion.work_meter import WorkMeter
 from rsfstudy.responses.rigid_response import RigidResponse
 from rsfstudy.responses.step_response import StepResponse
 from rsfstudy.slider import laws, steady_state
-from rsfstudy.slider.equations import build_state_evolution_function, compute_steady_states
+from rsfstudy.slider.friction import build_state_evolution_function, compute_steady_states
 from rsfstudy.slider.laws.composite import lambert_w
-from rsfstudy.slider.scene_functions import build_scene_functions, velocity_ratios
+from rsfstudy.slider.path_length import velocity_ratios
 from rsfstudy.status import Status
 
 CONSTANT = {"normal_stress": "constant"}
@@ -74,7 +74,7 @@ def test_evolution_goes_over_to_that_of_stationary_contact(log_slip_rate, log_th
     def evolving(law: str) -> float:
         scene = Scene(law=law, a=0.5 * b, load_velocity_ratio=load)
         x, _slower, share = velocity_ratios(log_slip_rate, scene.parameter_values)
-        return build_scene_functions(scene).friction_functions.evolutions(
+        return scene.friction_functions.evolutions(
             x, (b * log_theta,), 0.0, share, scene.parameter_values
         )[0]
 

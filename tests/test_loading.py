@@ -163,7 +163,7 @@ def test_no_strength_is_the_scene_without_the_effect(idle, still, law):
     scene = plain.with_(**idle)
     assert scene == plain
     assert scene.parameter_values == plain.parameter_values
-    assert scene.equation_functions is plain.equation_functions
+    assert scene.friction_functions == plain.friction_functions
     assert scene.state_count == plain.state_count
 
 

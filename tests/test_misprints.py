@@ -16,7 +16,7 @@ from rsfstudy import Scene
 from rsfstudy.critical_steps.monotone_approach_to_load_rate import (
     build_single_state_evolution_function,
 )
-from rsfstudy.slider.equations import build_friction_relation
+from rsfstudy.slider.friction import build_friction_relation
 
 PAGE = (Path(__file__).parent.parent / "studies" / "MISPRINTS.md").read_text()
 

@@ -9,7 +9,8 @@ from hypothesis import strategies as st
 from rsfstudy import Scene
 from rsfstudy.critical_steps.critical_step import CriticalStep
 from rsfstudy.motion.accuracy import Accuracy
-from rsfstudy.slider.equations import build_friction_relation, equations_between_ruptures
+from rsfstudy.slider.equations import equations_between_ruptures
+from rsfstudy.slider.friction import build_friction_relation
 
 
 @given(

@@ -31,7 +31,7 @@ from rsfstudy.quantities import Output
 from rsfstudy.reductions import Reduction
 from rsfstudy.slider.laws import LawBase
 from rsfstudy.slider.parts import Part
-from rsfstudy.slider.scene_assembly import SceneBase
+from rsfstudy.slider.scene_base import SceneBase
 from rsfstudy.status import Status
 
 NAMES = [

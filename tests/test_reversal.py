@@ -16,7 +16,7 @@ from rsfstudy.motion.work_meter import WorkMeter
 from rsfstudy.responses._motion_readings import choose_friction_quantity_for_events
 from rsfstudy.responses.linear_stability import LinearStability
 from rsfstudy.slider import stability
-from rsfstudy.slider.equations import build_friction_relation
+from rsfstudy.slider.friction import build_friction_relation
 from rsfstudy.status import Status
 
 CONSTANT, VARIABLE = {"normal_stress": "constant"}, {"normal_stress": "variable"}

@@ -19,6 +19,7 @@ from rsfstudy.motion.work_meter import MotionStopped, WorkMeter
 from rsfstudy.quantities import Quantity
 from rsfstudy.responses._recorded_motion import compute_settled_friction_flag
 from rsfstudy.responses.step_response import StepResponse
+from rsfstudy.slider.equations import equations_between_ruptures
 from rsfstudy.slider.fluid import Fluid
 from rsfstudy.slider.parameter_layout import FLUID, LARGEST_LOG_SLOWNESS
 from rsfstudy.slider.parts import POSITIVE, Numbers, number
@@ -128,8 +129,7 @@ def test_an_excluded_unknown_is_left_out_of_the_distance():
     start, distance = (0.02, 0.01, 5.0, 0.0), []
     for fluid in (Dissipation, Excluded):
         scene = Scene(**CYCLES, fluid=fluid)
-        system, p = scene.equation_functions.functions_between_ruptures, scene.parameter_values
-        point = system.point_function(start, system.rates_along_path(start, p), p)
+        point = equations_between_ruptures(scene, with_time=False).evaluate_point(start)
         distance.append(point.distance_from_steady_state)
         steady = point.state + scene.b * point.log_slip_rate
     assert distance[0] > 5.0

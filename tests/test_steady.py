@@ -14,10 +14,8 @@ from hypothesis import strategies as st
 from rsfstudy import Scene
 from rsfstudy.responses.linear_stability import compute_jacobian, max_growth_rate
 from rsfstudy.slider import closed_forms, laws, stability, steady_state
-from rsfstudy.slider.equations import (
-    build_equations_against_displacement,
-    effective_normal_stress_at,
-)
+from rsfstudy.slider.equations import build_equations_against_displacement
+from rsfstudy.slider.friction import effective_normal_stress_at
 from rsfstudy.slider.laws.composite import lambert_w
 
 #: Laws with a single b, whose steady friction is mu_* + (a - b) ln(V/V_*).

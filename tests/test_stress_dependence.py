@@ -18,7 +18,7 @@ from rsfstudy.motion.accuracy import Accuracy
 from rsfstudy.responses.linear_stability import LinearStability
 from rsfstudy.responses.rigid_response import RigidResponse
 from rsfstudy.slider import stability
-from rsfstudy.slider.equations import build_friction_relation
+from rsfstudy.slider.friction import build_friction_relation
 from rsfstudy.status import Status
 
 CONSTANT = {"normal_stress": "constant"}

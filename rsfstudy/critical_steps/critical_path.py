@@ -123,7 +123,7 @@ class CriticalPath(NamedTuple):
         weakest = scene.parts.normal_stress.min_frictional_stress(scene)
         begin = (scene.spring_stress_step, *(0.0,) * scene.state_count)
         tangency, planar = (
-            _build_tangency_point_solver(scene.equation_functions.friction_functions),
+            _build_tangency_point_solver(scene.friction_functions),
             scene.state_count == 1,
         )
         return cls(

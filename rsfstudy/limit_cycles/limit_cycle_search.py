@@ -399,11 +399,7 @@ def _state_index_sets_to_compare(scene: Scene) -> tuple[tuple[int, ...], ...]:
     long after the states of the law.
     """
     of_law = tuple(range(scene.parts.law.state_count))
-    return tuple(
-        dict.fromkeys(
-            (scene.equation_functions.friction_functions.indices_of_states_in_distance, of_law)
-        )
-    )
+    return tuple(dict.fromkeys((scene.friction_functions.indices_of_states_in_distance, of_law)))
 
 
 def find_recurrence_period(
@@ -439,7 +435,7 @@ def find_recurrence_period(
     if len(cycles) < 4:
         return 1, math.inf
     places = list(
-        scene.equation_functions.friction_functions.indices_of_states_in_distance
+        scene.friction_functions.indices_of_states_in_distance
         if compared_state_indices is None
         else compared_state_indices
     )

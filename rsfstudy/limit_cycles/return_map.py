@@ -248,9 +248,7 @@ class ReturnMap:
         self.scene, self.accuracy, self._meter = scene, accuracy, work_meter
         self._with_recording = recorded
         places = (
-            scene.equation_functions.friction_functions.indices_of_states_in_distance
-            if counted is None
-            else counted
+            scene.friction_functions.indices_of_states_in_distance if counted is None else counted
         )
         #: Indices of the section components that contribute to the distance between sections.
         self._compared_unknowns = [0, *(1 + place for place in places)]

@@ -108,7 +108,7 @@ def point_without_derived_values(
         Point of the motion. All fields of the point that are not arguments of the function are NaN.
         The first event of the motion contains the computed values of all fields.
     """
-    psi = scene.equation_functions.friction_functions.state_sum(states)
+    psi = scene.friction_functions.state_sum(states)
     known = log_slip_rate, math.nan, spring_stress, frictional_stress, psi
     return MotionPoint._make((*known, *_NAN_FOR_UNEVALUATED_POINT_FIELDS, states))
 
@@ -135,9 +135,9 @@ def compute_restart_point(scene: Scene, spring_stress: float, states: Numbers) -
     MotionStopped
         If the spring stress is incompatible with forward slip.
     """
-    x, friction, _shift = scene.equation_functions.force_balance_function(
-        spring_stress, states, scene.parameter_values
-    )
+    balance = equations_between_ruptures(scene, with_time=False).force_balance_function
+    assert balance is not None
+    x, friction, _shift = balance(spring_stress, states, scene.parameter_values)
     point = point_without_derived_values(scene, spring_stress, states, x, friction)
     check_forward_slip_is_possible_at_start(scene, point)
     return point

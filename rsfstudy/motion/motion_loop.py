@@ -420,7 +420,7 @@ def integrate_one_regime(
             workspace.unknown_count,
         )
     evaluate_function_into_array(
-        workspace.fill_point,
+        workspace.functions.fill_point,
         workspace.y,
         workspace.rates,
         workspace.parameters,
@@ -433,7 +433,7 @@ def integrate_one_regime(
         if is_step_recorded(motion, workspace, requested_samples):
             halve_step_until_dense_output_is_accurate(motion, workspace)
         evaluate_function_into_array(
-            workspace.fill_point,
+            workspace.functions.fill_point,
             workspace.y_end,
             workspace.rates_at_end,
             workspace.parameters,
@@ -591,7 +591,7 @@ def end_step_at_end_time(motion, workspace, clock):
         late = time_at_step_end(motion, workspace) - motion.end_time
         clock -= late / time_since_regime_start(motion, workspace, workspace.rates_at_end)
     evaluate_function_into_array(
-        workspace.fill_point,
+        workspace.functions.fill_point,
         workspace.y_end,
         workspace.rates_at_end,
         workspace.parameters,
@@ -627,7 +627,11 @@ def has_rupture_regime_ended(motion, workspace):
     for i in range(motion.states):
         workspace.y_within[1 + i] = columns[FIRST_STATE + i]
     evaluate_function_into_array(
-        workspace.fill_balance, workspace.y_within, workspace.y_within, workspace.parameters, below
+        workspace.functions.fill_balance,
+        workspace.y_within,
+        workspace.y_within,
+        workspace.parameters,
+        below,
     )
     missing = columns[SPRING_STRESS] - below[1]
     return should_switch_back_to_slow_manifold(

@@ -244,14 +244,14 @@ def evaluate_point_at_clock(motion, workspace, clock):
     interpolate_unknowns(motion, workspace, clock)
     count_evaluations(motion, 1)
     evaluate_function_into_array(
-        workspace.fill_rates,
+        workspace.functions.fill_rates,
         workspace.y_within,
         workspace.y_within,
         workspace.parameters,
         workspace.rates_within,
     )
     evaluate_function_into_array(
-        workspace.fill_point,
+        workspace.functions.fill_point,
         workspace.y_within,
         workspace.rates_within,
         workspace.parameters,

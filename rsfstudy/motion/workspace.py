@@ -32,12 +32,13 @@ from __future__ import annotations
 from typing import Any, NamedTuple
 
 from rsfstudy._deprecation import add_former_member_names
-from rsfstudy.motion.array_layout import FIRST_STATE, FUNCTION_COUNT_PER_REGIME, SLOW_REGIME
+from rsfstudy.motion.array_layout import FIRST_STATE, SLOW_REGIME
 from rsfstudy.motion.array_operations import (
     advance_pointer_by_items,
     copy_values,
     evaluate_function_into_array,
 )
+from rsfstudy.motion.in_place_functions import InPlaceFunctions
 from rsfstudy.motion.regime_switching import SwitchThresholds
 from rsfstudy.motion.steppers.unrolled_step import (
     DENSE_ROW_COUNT,
@@ -85,8 +86,9 @@ class Workspace(NamedTuple):
     event_clocks : array of shape (event_spec_count,)
         Values of the independent variable at the events of the step, or NaN for events that do not
         occur.
-    fill_rates, fill_point, attempt_step, fill_balance : function
-        Functions of the equations. See ``in_place_functions.InPlaceFunctions``.
+    functions : InPlaceFunctions
+        Functions of the equations, the row of the regime in the function table. In compiled code,
+        functions are represented by addresses.
     event_specs : array
         Flattened table of event specifications.
     event_spec_count : int
@@ -116,10 +118,7 @@ class Workspace(NamedTuple):
     point_at_end: Array
     point_within: Array
     event_clocks: Array
-    fill_rates: Any
-    fill_point: Any
-    attempt_step: Any
-    fill_balance: Any
+    functions: InPlaceFunctions
     event_specs: Array
     event_spec_count: int
     parameters: Array
@@ -213,9 +212,9 @@ def create_workspace(
         advance_pointer_by_items(before, 2 * columns),
         advance_pointer_by_items(before, 3 * columns),
     )
-    equations = functions[0], functions[1], functions[2], functions[FUNCTION_COUNT_PER_REGIME - 1]
+    row = InPlaceFunctions(functions[0], functions[1], functions[2], functions[3])
     return Workspace(
-        unknown_count, y, new, *step, *inside, *points, *equations, *members_shared_by_regimes
+        unknown_count, y, new, *step, *inside, *points, row, *members_shared_by_regimes
     )
 
 
@@ -234,7 +233,7 @@ def evaluate_rates_by_step_clock(motion, workspace, y, result):
         Output array of the derivatives. If ``motion.time_per_step`` is positive, the independent
         variable of the step is proportional to time.
     """
-    evaluate_function_into_array(workspace.fill_rates, y, y, workspace.parameters, result)
+    evaluate_function_into_array(workspace.functions.fill_rates, y, y, workspace.parameters, result)
     if motion.time_per_step > 0.0:
         slower = motion.time_per_step / max(
             result[workspace.unknown_count - 1], REPLACEMENT_OF_ZERO_TIME_DERIVATIVE

@@ -11,49 +11,43 @@ The parts are classes in the packages ``laws``, ``normal_stress``, ``fluid``, ``
 reading the other modules in the following order:
 
 - ``scene`` combines the parts of a slider.
-- ``friction`` combines the law, the normal stress and the pore pressure into a relation between
-  stress, slip rate and states. Helper functions for the state variables are in ``state_functions``,
-  and functions for the effects of temperature are in ``temperature_functions``.
-- ``scene_functions`` combines friction with the dynamics, which determine the slip rate, into
-  equations of motion for any combination of parts.
-- ``equations`` provides the unknowns, rates and parameters that an integrator needs. The layout of
-  the parameters is defined in ``parameter_layout``.
+- ``friction_relation`` defines the relation between stress, slip rate and states, and
+  ``state_functions`` defines functions of the state variables. ``temperature_functions`` adds the
+  effects of a temperature that changes.
+- ``rate_functions`` and ``point_functions`` build the equations of motion from friction and from
+  the dynamics. ``path_length`` defines the independent variable.
 - ``steady_state`` and ``stability`` compute steady sliding and its linear stability from the
   friction relation.
 - ``closed_forms`` contains published closed-form solutions.
 
-The following functions convert the state evolution of a law to the rates that an integrator needs:
+Five containers lead from a scene to the right-hand side that an integrator evaluates:
 
-1. The method ``evolution`` of a law computes the change of the state per unit slip.
-2. `state_functions.wrap_single_state_evolution` converts the method ``evolution`` to a function
-   ``evolutions``, which receives and returns tuples. A law with several states defines
-   ``evolutions`` itself. The function `scene_functions.build_scene_functions` converts the method
-   only if the law does not define ``evolutions``.
-3. `friction.build_friction_functions` appends the rates of the unknowns of a fluid or a loading and
-   stores the combined function as ``FrictionFunctions.evolutions``.
-4. The function `scene_functions.build_displacement_rate_function` computes the rates between
-   ruptures, and `scene_functions.build_rate_function_of_rigid_slider` computes the rates of a rigid
-   slider. For scenes with inertia, ``dynamics.inertia.build_rupture_rate_function`` computes the
-   rates in ruptures, and ``dynamics.inertia.build_slip_rate_functions`` computes the slip rate
-   between ruptures.
-5. `equations` combines the rates, the unknowns and the parameters of a scene.
-6. The ``motion`` package converts the rate functions to functions that write to arrays, and passes
-   these functions to an integrator. The SciPy integrators call ``Equations.rate_function``
-   directly.
+1. Parts: ``scene_assembly.SceneParts`` holds one part per slot, and each part defines plain
+   functions of floats, for example the ``evolution`` of a law.
+2. Friction: ``friction.FrictionFunctions`` combines the functions of the law, the normal stress,
+   the fluid and the loading into the friction relation and the evolution of all states
+   (``scene.friction_functions``).
+3. Equations: ``equations.Equations`` holds the rates, unknowns and parameters of a scene in one
+   regime. The rates and the points are built from friction and from the functions of the dynamics,
+   and the SciPy integrators call ``Equations.rate_function`` directly.
+4. In-place functions: ``motion.in_place_functions.InPlaceFunctions`` converts the functions of
+   equations, which take and return tuples, to functions that fill arrays.
+5. Table: ``MotionDriver`` passes a table to the event loop, with one row of in-place functions, or
+   of their compiled addresses, per regime.
 
 The equations of doi:10.1007/s11589-014-0098-4 are implemented in the following modules:
 
-    1a, 4a    friction                                  friction
+    1a, 4a    friction                                  friction_relation
     1b        slip law                                  laws.slip
     4b        slowness law                              laws.slowness
     1b to 3   effect of normal stress on the state      normal_stress.variable
     5         normal stress follows shear stress        normal_stress.variable
     6         motion with inertia                       dynamics.inertia
-    15        quasi-static motion                       dynamics.quasi_static, scene_functions
+    15        quasi-static motion                       dynamics.quasi_static, rate_functions
     7, 9      critical stiffness, steady sliding        stability, steady_state
     8, 10, 11, 14   closed-form boundaries              closed_forms
     12, 13    stress and slip rate after a jump         friction, steady_state
-    16, 17    rigid slider                              scene_functions, laws.slip, laws.slowness
+    16, 17    rigid slider                              rate_functions, laws.slip, laws.slowness
 """
 
 from __future__ import annotations
@@ -76,10 +70,6 @@ if TYPE_CHECKING:
         Equations,
         build_equations_against_displacement,
         build_equations_against_inertial_time,
-        build_friction_relation,
-        build_state_evolution_function,
-        compute_steady_states,
-        effective_normal_stress_at,
         equations_at_imposed_slip_rate,
         equations_between_ruptures,
         equations_in_rupture,
@@ -88,7 +78,13 @@ if TYPE_CHECKING:
     )
     from rsfstudy.slider.field_name_hints import hint_for_unknown_field
     from rsfstudy.slider.fluid import BUILT_IN_PARTS
-    from rsfstudy.slider.friction import FrictionFunctions
+    from rsfstudy.slider.friction import (
+        FrictionFunctions,
+        build_friction_relation,
+        build_state_evolution_function,
+        compute_steady_states,
+        effective_normal_stress_at,
+    )
     from rsfstudy.slider.loading import MIN_SEGMENT_DURATION
     from rsfstudy.slider.motion_point import MotionPoint
     from rsfstudy.slider.parameter_layout import LARGEST_LOG_SLIP_RATE
@@ -111,6 +107,11 @@ if TYPE_CHECKING:
         scene_field_types,
     )
     from rsfstudy.slider.parts import Function, Numbers, field_names
+    from rsfstudy.slider.path_length import (
+        LOG_SLIP_RATE_PER_PATH_LENGTH,
+        STOPPED_LOG_SLIP_RATE,
+        displacement_per_path_length,
+    )
     from rsfstudy.slider.sampled_loading import (
         STRESS_RATE_COLUMN,
         SampledHistory,
@@ -120,11 +121,6 @@ if TYPE_CHECKING:
     from rsfstudy.slider.scene import SINGLE_ENDLESS_SEGMENT_TABLE, Scene
     from rsfstudy.slider.scene_assembly import find_inapplicable_fields, replace_field_values
     from rsfstudy.slider.scene_caching import cached_attribute, cached_per_scene
-    from rsfstudy.slider.scene_functions import (
-        LOG_SLIP_RATE_PER_PATH_LENGTH,
-        STOPPED_LOG_SLIP_RATE,
-        displacement_per_path_length,
-    )
     from rsfstudy.slider.scene_view import SceneView
     from rsfstudy.slider.slider_parameters import ALTERNATIVE_STIFFNESS_FIELDS, SliderParameters
     from rsfstudy.slider.stability import (
@@ -157,24 +153,31 @@ else:
             "slider.equations": (
                 "Equations",
                 "RUPTURE_REGIME",
-                "compute_steady_states",
                 "equations_between_ruptures",
                 "build_equations_against_displacement",
                 "build_equations_against_inertial_time",
                 "equations_in_rupture",
                 "equations_at_imposed_slip_rate",
                 "equations_without_mass",
-                "build_friction_relation",
                 "quasi_static_log_slip_rate",
-                "effective_normal_stress_at",
-                "build_state_evolution_function",
             ),
             "slider.fluid": ("BUILT_IN_PARTS",),
-            "slider.friction": ("FrictionFunctions",),
+            "slider.friction": (
+                "FrictionFunctions",
+                "build_friction_relation",
+                "build_state_evolution_function",
+                "compute_steady_states",
+                "effective_normal_stress_at",
+            ),
             "slider.field_name_hints": ("hint_for_unknown_field",),
             "slider.loading": ("MIN_SEGMENT_DURATION",),
             "slider.parameter_layout": ("LARGEST_LOG_SLIP_RATE",),
             "slider.parts": ("Function", "Numbers", "field_names"),
+            "slider.path_length": (
+                "LOG_SLIP_RATE_PER_PATH_LENGTH",
+                "STOPPED_LOG_SLIP_RATE",
+                "displacement_per_path_length",
+            ),
             "slider.motion_point": ("MotionPoint",),
             "slider.user_loadings": ("Protocol", "SEGMENT_MAPPING_KEYS", "UserLoading", "protocol"),
             "slider.part_registry": (
@@ -202,11 +205,6 @@ else:
                 "build_sampled_history_from_table",
             ),
             "slider.scene": ("SINGLE_ENDLESS_SEGMENT_TABLE", "Scene"),
-            "slider.scene_functions": (
-                "LOG_SLIP_RATE_PER_PATH_LENGTH",
-                "STOPPED_LOG_SLIP_RATE",
-                "displacement_per_path_length",
-            ),
             "slider.scene_view": ("SceneView",),
             "slider.slider_parameters": ("ALTERNATIVE_STIFFNESS_FIELDS", "SliderParameters"),
             "slider.stability": (

@@ -7,20 +7,29 @@ return `Equations` with the names and scales of the unknowns, the rates and the 
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import NamedTuple
+from functools import cache
+from typing import TYPE_CHECKING, NamedTuple
 
 from rsfstudy._deprecation import add_former_member_names
 from rsfstudy.slider.dynamics.quasi_static import QuasiStatic
+from rsfstudy.slider.friction import FrictionFunctions
 from rsfstudy.slider.motion_point import MotionPoint
 from rsfstudy.slider.parts import Function, Numbers
-from rsfstudy.slider.scene_caching import cached_per_scene
-from rsfstudy.slider.scene_functions import (
-    MotionRegimeFunctions,
-    SceneFunctions,
-    build_scene_functions,
+from rsfstudy.slider.point_functions import (
+    build_point_function_between_ruptures,
+    build_point_function_in_rupture,
+    build_point_function_of_rigid_slider,
 )
+from rsfstudy.slider.rate_functions import (
+    build_rate_function_of_rigid_slider,
+    build_rate_functions_between_ruptures,
+    build_rate_functions_in_rupture,
+)
+from rsfstudy.slider.scene_caching import cached_per_scene
 from rsfstudy.slider.scene_view import SceneView
-from rsfstudy.slider.temperature_functions import steady_temperature_rise
+
+if TYPE_CHECKING:
+    from rsfstudy.slider.dynamics import Dynamics
 
 #: Names of two regimes of motion: ruptures with inertia, and the sliding of a rigid slider.
 RUPTURE_REGIME, RIGID_REGIME = "inertial", "rigid"
@@ -121,9 +130,7 @@ def equations_between_ruptures(scene: SceneView, *, with_time: bool) -> Equation
     Equations
         Equations with path length as the independent variable.
     """
-    return _build_slow_equations(
-        scene, scene.equation_functions, scene.dynamics.regime, with_time=with_time
-    )
+    return _build_slow_equations(scene, scene.dynamics, with_time=with_time)
 
 
 @cached_per_scene
@@ -144,57 +151,49 @@ def equations_without_mass(scene: SceneView, *, with_time: bool) -> Equations:
     """
     if scene.dynamics.build_rupture_rate_function is None:
         return equations_between_ruptures(scene, with_time=with_time)
-    return _build_slow_equations(
-        scene, build_scene_functions(scene, QuasiStatic()), QuasiStatic.regime, with_time=with_time
-    )
+    return _build_slow_equations(scene, QuasiStatic(), with_time=with_time)
 
 
 def _build_slow_equations(
-    scene: SceneView, scene_functions: SceneFunctions, regime_name: str, *, with_time: bool
+    scene: SceneView, dynamics: Dynamics, *, with_time: bool, along_path: bool = True
 ) -> Equations:
-    unknowns, form = (
-        ("spring_stress", *_state_names(scene)),
-        scene_functions.functions_between_ruptures,
+    """Build the equations between ruptures from the friction of a scene and from dynamics."""
+    friction = scene.friction_functions
+    balance, growth = _build_slip_rate_functions(friction, dynamics.build_slip_rate_functions)
+    by_displacement, by_path, by_path_with_time = build_rate_functions_between_ruptures(
+        friction, balance, allows_reversed_slip=scene.parts.law.regularised
     )
-    unknowns, scales, rate = _append_time_if_requested(
-        form, unknowns, (scene.a,) * len(unknowns), with_time=with_time
-    )
-    p, states = scene.parameter_values, scene.state_count
+    unknowns = ("spring_stress", *_state_names(scene))
+    scales = (scene.a,) * len(unknowns)
+    if with_time:
+        unknowns, scales = (*unknowns, "time"), (*scales, 1.0)
     return Equations(
-        regime_name,
+        dynamics.regime,
         unknowns,
         scales,
-        rate,
-        form.point_function,
-        p,
-        states,
-        scene_functions.force_balance_function,
+        by_path_with_time if with_time else by_path if along_path else by_displacement,
+        build_point_function_between_ruptures(friction, balance, growth),
+        scene.parameter_values,
+        friction.state_count,
+        balance,
     )
 
 
-def _append_time_if_requested(
-    regime_functions: MotionRegimeFunctions,
-    unknown_names: tuple[str, ...],
-    unknown_scales: Numbers,
-    *,
-    with_time: bool,
-) -> tuple[tuple[str, ...], Numbers, Function]:
-    """Return the unknowns, scales and rates. Append time if it is requested."""
-    if not with_time:
-        return unknown_names, unknown_scales, regime_functions.rates_along_path
-    return (
-        (*unknown_names, "time"),
-        (*unknown_scales, 1.0),
-        regime_functions.rates_along_path_with_time,
-    )
+@cache
+def _build_slip_rate_functions(
+    friction_functions: FrictionFunctions,
+    build_slip_rate_functions: Callable[[FrictionFunctions], tuple[Function, Function]],
+) -> tuple[Function, Function]:
+    """Build the force balance and the derivative of ln V once for equal friction functions."""
+    return build_slip_rate_functions(friction_functions)
 
 
 def _state_names(scene: SceneView) -> tuple[str, ...]:
     """Return the names of the states."""
     count = scene.parts.law.state_count
     of_law = ["psi"] if count == 1 else [f"psi_{i + 1}" for i in range(count)]
-    others = *scene.parts.temperature.unknowns, *scene.pressure_source.unknowns
-    return (*of_law, *(unknown.name for unknown in others))
+    heat = scene.parts.temperature.unknowns
+    return (*of_law, *(unknown.name for unknown in (*heat, *scene.pressure_source.unknowns)))
 
 
 @cached_per_scene
@@ -221,20 +220,32 @@ def equations_in_rupture(scene: SceneView, *, with_time: bool = False) -> Equati
     TypeError
         If the scene has no inertia.
     """
-    a, form, others = scene.a, _get_required_rupture_functions(scene), _state_names(scene)[1:]
-    unknowns = ("spring_stress", "log_slip_rate", "friction", *others)
-    scales, p = (a, 1.0, a, *[a] * len(others)), scene.parameter_values
-    unknowns, scales, rate = _append_time_if_requested(form, unknowns, scales, with_time=with_time)
-    return Equations(
-        RUPTURE_REGIME, unknowns, scales, rate, form.point_function, p, scene.state_count
-    )
+    return _build_rupture_equations(scene, with_time=with_time)
 
 
-def _get_required_rupture_functions(scene: SceneView) -> MotionRegimeFunctions:
-    full = scene.equation_functions.functions_in_rupture
-    if full is None:
+def _build_rupture_equations(
+    scene: SceneView, *, with_time: bool = False, along_path: bool = True
+) -> Equations:
+    """Build the equations in ruptures, or raise ``TypeError`` if there is no inertia."""
+    a, friction, others = scene.a, scene.friction_functions, _state_names(scene)[1:]
+    if scene.dynamics.build_rupture_rate_function is None:
         raise TypeError(f"{scene.dynamics.name} has no equations of ruptures")
-    return full
+    by_time, by_path, by_path_with_time = build_rate_functions_in_rupture(
+        friction, scene.dynamics.build_rupture_rate_function
+    )
+    unknowns = ("spring_stress", "log_slip_rate", "friction", *others)
+    scales = (a, 1.0, a, *[a] * len(others))
+    if with_time:
+        unknowns, scales = (*unknowns, "time"), (*scales, 1.0)
+    return Equations(
+        RUPTURE_REGIME,
+        unknowns,
+        scales,
+        by_path_with_time if with_time else by_path if along_path else by_time,
+        build_point_function_in_rupture(friction),
+        scene.parameter_values,
+        friction.state_count,
+    )
 
 
 def build_equations_against_displacement(scene: SceneView) -> Equations:
@@ -254,10 +265,7 @@ def build_equations_against_displacement(scene: SceneView) -> Equations:
     Equations
         Equations with displacement as the independent variable.
     """
-    along = equations_between_ruptures(scene, with_time=False)
-    return along._replace(
-        rate_function=scene.equation_functions.functions_between_ruptures.rates_against_clock
-    )
+    return _build_slow_equations(scene, scene.dynamics, with_time=False, along_path=False)
 
 
 def build_equations_against_inertial_time(scene: SceneView) -> Equations:
@@ -278,9 +286,7 @@ def build_equations_against_inertial_time(scene: SceneView) -> Equations:
     TypeError
         If the scene has no inertia.
     """
-    return equations_in_rupture(scene)._replace(
-        rate_function=_get_required_rupture_functions(scene).rates_against_clock
-    )
+    return _build_rupture_equations(scene, along_path=False)
 
 
 def equations_at_imposed_slip_rate(scene: SceneView, log_slip_rate: float) -> Equations:
@@ -301,70 +307,16 @@ def equations_at_imposed_slip_rate(scene: SceneView, log_slip_rate: float) -> Eq
     Equations
         Equations whose last parameter is :math:`\ln(V/V_*)`.
     """
-    forms, unknowns = scene.equation_functions, ("friction", *_state_names(scene)[1:])
-    scales, p = (scene.a,) * len(unknowns), (*scene.parameter_values, log_slip_rate)
+    friction, unknowns = scene.friction_functions, ("friction", *_state_names(scene)[1:])
     return Equations(
         RIGID_REGIME,
         unknowns,
-        scales,
-        forms.rigid_rate_function,
-        forms.rigid_point_function,
-        p,
-        scene.state_count,
+        (scene.a,) * len(unknowns),
+        build_rate_function_of_rigid_slider(friction),
+        build_point_function_of_rigid_slider(friction),
+        (*scene.parameter_values, log_slip_rate),
+        friction.state_count,
     )
-
-
-def build_friction_relation(
-    scene: SceneView, states: Numbers = ()
-) -> Callable[[float], tuple[float, float, float, float]]:
-    """Return the friction relation of a scene as a function of stress.
-
-    Parameters
-    ----------
-    scene : Scene
-        Scene with friction parameters.
-    states : tuple of float, optional
-        States of the scene, from which the pore pressure is read. By default, the function uses the
-        pore pressure of steady sliding.
-
-    Returns
-    -------
-    callable
-        Function ``g -> (strength, slope, shift, shift_slope)``.
-    """
-    strength, p = (
-        scene.equation_functions.friction_functions.strength,
-        scene.friction_parameter_values,
-    )
-    known = states or (0.0,) * scene.state_count
-    return lambda friction: strength(friction, known, p)
-
-
-def effective_normal_stress_at(
-    scene: SceneView, frictional_stress: float, states: Numbers = ()
-) -> float:
-    r"""Compute the effective normal stress from the frictional stress.
-
-    Parameters
-    ----------
-    scene : Scene
-        Scene with friction parameters.
-    frictional_stress : float
-        Deviation of the frictional stress from :math:`\tau_*`, in units of :math:`\sigma_*`.
-    states : tuple of float, optional
-        States of the scene, from which the pore pressure is read. By default, the function uses the
-        pore pressure of steady sliding.
-
-    Returns
-    -------
-    float
-        Effective normal stress in :math:`\sigma_*`.
-    """
-    at = states or (0.0,) * scene.state_count
-    stress = scene.equation_functions.friction_functions.effective_normal_stress(
-        frictional_stress, at, scene.friction_parameter_values
-    )
-    return 1.0 + float(stress[0])
 
 
 def quasi_static_log_slip_rate(scene: SceneView, spring_stress: float, state_sum: float) -> float:
@@ -386,55 +338,7 @@ def quasi_static_log_slip_rate(scene: SceneView, spring_stress: float, state_sum
     float
         Natural logarithm of the slip rate, :math:`\ln(V/V_*)`.
     """
-    forms = (
-        build_scene_functions(scene, QuasiStatic()) if scene.has_mass else scene.equation_functions
-    )
     psis = (state_sum, *(0.0,) * (scene.state_count - 1))
-    return float(forms.force_balance_function(spring_stress, psis, scene.parameter_values)[0])
-
-
-def build_state_evolution_function(scene: SceneView) -> Callable[[float, Numbers, float], Numbers]:
-    """Return the state evolution of a scene as a function.
-
-    Parameters
-    ----------
-    scene : Scene
-        Scene with friction parameters.
-
-    Returns
-    -------
-    callable
-        Function ``(log_slip_rate, psis, shift)`` that returns the change of each state per slip
-        distance of :math:`D_c`.
-    """
-    evolutions, p = (
-        scene.equation_functions.friction_functions.evolutions,
-        scene.friction_parameter_values,
-    )
-    return lambda log_slip_rate, psis, shift: evolutions(log_slip_rate, psis, shift, 1.0, p)
-
-
-def compute_steady_states(scene: SceneView, log_slip_rate: float, state_shift: float) -> Numbers:
-    r"""Compute the states of steady sliding at a slip rate.
-
-    Parameters
-    ----------
-    scene : Scene
-        Scene with friction parameters.
-    log_slip_rate : float
-        Natural logarithm of the slip rate, :math:`\ln(V/V_*)`.
-    state_shift : float
-        Decrease of the state variable due to stress.
-
-    Returns
-    -------
-    tuple of float
-        States :math:`\Psi_i`.
-    """
-    p, functions = scene.friction_parameter_values, scene.equation_functions.friction_functions
-    states: Numbers = functions.steady_states(log_slip_rate, state_shift, p)
-    if not scene.parts.temperature.unknowns:
-        return states
-    place = scene.parts.law.state_count
-    rise = steady_temperature_rise(scene, log_slip_rate)
-    return (*states[:place], rise, *states[place + 1 :])
+    balance = equations_without_mass(scene, with_time=False).force_balance_function
+    assert balance is not None
+    return float(balance(spring_stress, psis, scene.parameter_values)[0])

@@ -6,7 +6,7 @@ import math
 from collections.abc import Callable
 from typing import NamedTuple, cast
 
-from rsfstudy.slider.equations import build_friction_relation, compute_steady_states
+from rsfstudy.slider.friction import build_friction_relation, compute_steady_states
 from rsfstudy.slider.parts import Numbers
 from rsfstudy.slider.scene_view import SceneView
 from rsfstudy.slider.steady_state import SteadySliding
@@ -95,7 +95,7 @@ def compute_state_evolution_derivatives(
         Derivatives with an error estimate.
     """
     evolutions, p = (
-        scene.equation_functions.friction_functions.evolutions,
+        scene.friction_functions.evolutions,
         scene.friction_parameter_values,
     )
     relation = build_friction_relation(scene, steady_state.states)

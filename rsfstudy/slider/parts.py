@@ -7,7 +7,7 @@ dynamics, the loading and the temperature. Each choice for a slot is a frozen da
 
 The functions of a part are plain functions of floats. The functions receive the parameters of a
 scene as a flat tuple ``p``. The parameters of a part start at the index of its slot, for example
-``p[LAW]`` (see ``parameter_layout``). The modules ``friction`` and ``scene_functions`` combine the
+``p[LAW]`` (see ``parameter_layout``). The modules ``friction`` and ``equations`` combine the
 functions of all parts.
 
 To add an effect, derive a class from the base class of a slot:

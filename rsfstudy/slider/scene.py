@@ -15,26 +15,24 @@ from typing import TYPE_CHECKING, Any, ClassVar
 import numpy as np
 
 from rsfstudy.error_boundary import wrap_methods_in_error_boundary
-from rsfstudy.errors import InvalidValue
 from rsfstudy.slider import (
-    dynamics,
     fluid,
+    friction,
     laws,
     loading,
     normal_stress,
     parameter_layout,
     part_registry,
-    scene_functions,
     stability,
     temperature,
 )
 from rsfstudy.slider.dynamics.quasi_static import QuasiStatic
-from rsfstudy.slider.fluid._boundary_pressure import FluidWithBoundaryPressure
 from rsfstudy.slider.loading.step import StepLoading
 from rsfstudy.slider.needed_quantities import check_needed_quantities
 from rsfstudy.slider.parts import Numbers
-from rsfstudy.slider.scene_assembly import SceneBase, SceneParts
+from rsfstudy.slider.scene_assembly import SceneParts
 from rsfstudy.slider.scene_caching import cached_attribute
+from rsfstudy.slider.scene_quantities import SceneQuantities
 from rsfstudy.slider.slider_parameters import SliderParameters
 from rsfstudy.slider.state_functions import check_steady_states
 
@@ -47,7 +45,7 @@ SINGLE_ENDLESS_SEGMENT_TABLE = np.array([[0.0, math.inf, *[math.nan] * 4]])
 
 @wrap_methods_in_error_boundary
 @dataclass(frozen=True, init=False, repr=False)
-class Scene(SceneBase):
+class Scene(SceneQuantities):
     r"""Spring-slider with rate- and state-dependent friction.
 
     The slider slides steadily at the reference velocity :math:`V_*` until the loading starts. A
@@ -348,11 +346,6 @@ class Scene(SceneBase):
         acting = map(self.segment_scene, (0, *first.tolist()))
         return tuple(zip(acting, np.split(table, first), strict=True))
 
-    @cached_attribute
-    def _segments(self) -> tuple[loading.Segment, ...]:
-        """Segments of the loading."""
-        return self.parts.loading.segments
-
     # ---- equations ------------------------------------------------------------------------------
 
     @cached_attribute
@@ -374,143 +367,9 @@ class Scene(SceneBase):
         return parameter_layout.pack_friction_parameter_values(self)
 
     @cached_attribute
-    def equation_functions(self) -> scene_functions.SceneFunctions:
-        """Functions that define the equations of motion (see ``scene_functions``)."""
-        return scene_functions.build_scene_functions(self)
-
-    # ---- derived values -------------------------------------------------------------------------
-
-    @property
-    def dynamics(self) -> dynamics.Dynamics:
-        """Part that defines the dynamics."""
-        return self.parts.dynamics
-
-    @cached_attribute
-    def pressure_source(self) -> fluid.Fluid | loading.Loading | FluidWithBoundaryPressure:
-        """Part that changes the effective normal stress by its last unknown.
-
-        The pressure source is the loading, if the loading has unknowns, and otherwise the fluid. If
-        both the loading and the fluid have unknowns, the pressure source is a combination in which
-        the loading imposes the pressure around the fault.
-        """
-        imposed, pores = self.parts.loading, self.parts.fluid
-        if not imposed.unknowns:
-            return pores
-        return FluidWithBoundaryPressure(imposed, pores) if pores.unknowns else imposed
-
-    @property
-    def has_mass(self) -> bool:
-        """True if inertia acts during ruptures."""
-        return self.parts.dynamics.build_rupture_rate_function is not None
-
-    @cached_attribute
-    def state_count(self) -> int:
-        """Total number of states of the scene.
-
-        The total includes the states of the law, the temperature if it changes, and the unknowns of
-        the loading and of the fluid.
-        """
-        of_law, heat = self.parts.law.state_count, len(self.parts.temperature.unknowns)
-        return of_law + heat + len(self.pressure_source.unknowns)
-
-    @property
-    def effects(self) -> tuple[str, ...]:
-        """Names of the physical effects that are active in the scene."""
-        return tuple(effect for part in self.parts for effect in part.effects)
-
-    @cached_attribute
-    def a(self) -> float:
-        """Direct effect parameter."""
-        return self.parts.slider.a
-
-    @cached_attribute
-    def b(self) -> float:
-        """Evolution effect parameter of all states together."""
-        return float(self.parts.slider.a * self.parts.law.b_over_a)
-
-    @property
-    def stiffness(self) -> float:
-        """Dimensionless stiffness K, in units of sigma_*/D_c."""
-        given = self.parts.slider.stiffness
-        return float(given) if given is not None else self._stiffness_from_ratio
-
-    @cached_attribute
-    def _stiffness_from_ratio(self) -> float:
-        """Stiffness computed from the stiffness ratio."""
-        ratio = self.parts.slider.stiffness_ratio
-        assert ratio is not None  # The slider has either a stiffness or a stiffness ratio.
-        if not 0.0 < self.critical_stiffness < math.inf:
-            rule = f"is of a critical stiffness at V_* that is {self.critical_stiffness:g}"
-            raise InvalidValue("stiffness_ratio", ratio, rule, remedy="Give stiffness itself.")
-        stiffness = float(ratio * self.critical_stiffness)
-        if not stiffness > 0.0:
-            rule = "is so small that the stiffness is rounded to 0"
-            raise InvalidValue("stiffness_ratio", ratio, rule, remedy="Choose a larger ratio.")
-        return stiffness
-
-    @property
-    def stiffness_ratio(self) -> float:
-        """Ratio of the stiffness to the critical stiffness at V_*.
-
-        Without rate weakening, steady sliding is stable at every stiffness, so the ratio is
-        infinite. With several states, steady sliding may be unstable only in a range of stiffness,
-        so a ratio below 1 does not imply instability.
-        """
-        given = self.parts.slider.stiffness_ratio
-        if given is not None:
-            return float(given)
-        return self.stiffness / self.critical_stiffness if self.critical_stiffness else math.inf
-
-    @cached_attribute
-    def load_velocity(self) -> float:
-        """Load point velocity after the last step, in V_*."""
-        return self._segments[-1].load_velocity
-
-    @cached_attribute
-    def log_load_velocity(self) -> float:
-        """Natural logarithm of the magnitude of the load point velocity.
-
-        The logarithm is negative infinity for a stationary load point.
-        """
-        return math.log(abs(self.load_velocity)) if self.load_velocity else -math.inf
-
-    @cached_attribute
-    def imposed_normal_stress(self) -> float:
-        """Change of imposed normal stress after the last step, in sigma_*."""
-        return self._segments[-1].normal_stress
-
-    @property
-    def spring_stress_step(self) -> float:
-        r"""Change of spring stress due to the first displacement step.
-
-        The change of spring stress is in units of :math:`\sigma_*`.
-        """
-        return self.stiffness * self._segments[0].displacement
-
-    @property
-    def is_perturbed(self) -> bool:
-        """True if the motion deviates from steady sliding at V_*."""
-        return self.starts_unsteady or self.parts.loading.perturbs_steady_sliding
-
-    @property
-    def starts_unsteady(self) -> bool:
-        """True if the initial stress or state differs from steady sliding."""
-        return bool(self.parts.slider.initial_stress or self.parts.slider.initial_state)
-
-    @cached_attribute
-    def inertial_time(self) -> float:
-        """Time scale of inertia, T/(2 pi), in units of D_c/V_*.
-
-        A motion is unstable if the product of this time scale and the slip rate in units of
-        :math:`V_*` reaches the instability norm.
-        """
-        slider = self.parts.slider
-        return slider.period * slider.reference_rate / (2.0 * math.pi)
-
-    @cached_attribute
-    def log_instability_rate(self) -> float:
-        """Natural logarithm of the slip rate V/V_* at which a motion is unstable."""
-        return math.log(self.parts.slider.instability_norm / self.inertial_time)
+    def friction_functions(self) -> friction.FrictionFunctions:
+        """Functions that define the friction of the scene."""
+        return friction.build_friction_functions(self)
 
     @cached_attribute
     def critical_stiffness(self) -> float:

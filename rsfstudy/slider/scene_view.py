@@ -41,8 +41,8 @@ class SceneView(Protocol):
         """Parameter tuple ``p`` with NaN for the spring and the load point."""
 
     @property
-    def equation_functions(self) -> Any:
-        """Functions that define the equations of motion."""
+    def friction_functions(self) -> Any:
+        """Functions that define the friction of the scene."""
 
     @property
     def dynamics(self) -> Any:

@@ -10,6 +10,7 @@ of states so that Numba can compile them.
 from __future__ import annotations
 
 from functools import cache
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -17,6 +18,9 @@ from rsfstudy.errors import InvalidValue
 from rsfstudy.slider.parameter_layout import A, B
 from rsfstudy.slider.parts import Function, Numbers
 from rsfstudy.slider.scene_view import SceneView
+
+if TYPE_CHECKING:
+    from rsfstudy.slider.laws import LawBase
 
 #: Values of ln(V/V_*) at which steady states are checked. The second constant is the largest
 #: accepted change of a steady state per slip distance of D_c, divided by a. This tolerance is far
@@ -68,6 +72,46 @@ def default_steady_state(log_slip_rate: float, state_shift: float, p: Numbers) -
     return (state_shift - p[B] * log_slip_rate,)
 
 
+def find_law_functions(law: LawBase) -> tuple[Function, Function]:
+    """Return the functions ``evolutions`` and ``steady_states`` of a law.
+
+    Parameters
+    ----------
+    law : LawBase
+        Law, which may define only ``evolution``.
+
+    Returns
+    -------
+    evolutions, steady_states : callable
+        Functions of the tuple of states, as described in ``LawBase``.
+    """
+    return (
+        law.evolutions or wrap_single_state_evolution(law.evolution),
+        law.steady_states or default_steady_state,
+    )
+
+
+def state_variable_at_constant_temperature(difference: float, psis: Numbers, p: Numbers) -> float:
+    r"""Return the state variable at constant temperature.
+
+    Parameters
+    ----------
+    difference : float
+        Sum of the states of the law minus the shift, :math:`\sum_i \Psi_i - \mathrm{shift}`.
+    psis : tuple of float
+        States of the scene. This argument is ignored.
+    p : tuple of float
+        Parameters of the scene. This argument is ignored.
+
+    Returns
+    -------
+    float
+        State variable :math:`\Theta`, which is equal to ``difference``.
+    """
+    return difference
+
+
+@cache
 def append_auxiliary_evolutions(
     law_evolutions: Function, auxiliary_rates: Function, law_state_count: int
 ) -> Function:
@@ -99,6 +143,7 @@ def append_auxiliary_evolutions(
     return all_evolutions
 
 
+@cache
 def append_auxiliary_steady_states(
     law_steady_states: Function, auxiliary_steady_states: Function
 ) -> Function:
@@ -194,6 +239,7 @@ def _build_function_from_expression(argument_names: str, expression: str) -> Fun
     return function
 
 
+@cache
 def build_state_contribution_function(
     law_state_count: int, pressure_derivatives: Function | None
 ) -> Function:
@@ -225,6 +271,7 @@ def build_state_contribution_function(
     return contribution_with_pressure
 
 
+@cache
 def build_states_from_strength_function(law_state_count: int) -> Function:
     """Return a function that computes the first state from the strength.
 
@@ -276,9 +323,9 @@ def check_steady_states(scene: SceneView) -> None:
         If the law violates one of the conditions.
     """
     law, p, still = scene.parts.law, scene.parameter_values, _REST_TOLERANCE * scene.a
-    evolutions = law.evolutions or wrap_single_state_evolution(law.evolution)
+    evolutions, steady_states = find_law_functions(law)
     for rate in _CHECKED_LOG_SLIP_RATES:
-        psis = (law.steady_states or default_steady_state)(rate, 0.0, p)
+        psis = steady_states(rate, 0.0, p)
         change = max(map(abs, evolutions(rate, psis, 0.0, 1.0, p)))
         if not change <= still:
             rule = f"changes by {change:.3g} per D_c in steady sliding at ln(V/V_*) = {rate:g}"

@@ -17,7 +17,7 @@ from dataclasses import dataclass
 
 from scipy.optimize import brentq
 
-from rsfstudy.slider.equations import build_friction_relation, compute_steady_states
+from rsfstudy.slider.friction import build_friction_relation, compute_steady_states
 from rsfstudy.slider.parts import Numbers
 from rsfstudy.slider.scene_caching import cached_per_scene
 from rsfstudy.slider.scene_view import SceneView
@@ -112,7 +112,7 @@ def steady_friction_minus_reference(scene: SceneView, log_slip_rate: float) -> f
     Ruina (1983), J. Geophys. Res. 88, 10359-10370.
     """
     states = compute_steady_states(scene, log_slip_rate, 0.0)
-    psi = scene.equation_functions.friction_functions.state_sum(states)
+    psi = scene.friction_functions.state_sum(states)
     return float(scene.a * log_slip_rate + psi + thermal_friction_change(scene, states))
 
 

@@ -14,25 +14,28 @@ so the two activation terms only change the strength and the shift that the law 
 parameters of the temperature follow the parameters of the law in the parameter tuple ``p``:
 :math:`a q_a`, :math:`b q_b`, the pressurisation factor of the fluid, and the parameters that the
 temperature part declares.
+
+The function `build_replacements` is the main function. The functions that it returns have the
+arguments that ``friction.FrictionFunctions`` describes.
 """
 
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
+from functools import cache
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from scipy.optimize import newton
 
-from rsfstudy.slider.parameter_layout import (
-    LAW,
-    MU_STAR,
-    A,
-    temperature_parameter_values,
-)
+from rsfstudy.slider.friction_relation import zero_normal_stress_excess
+from rsfstudy.slider.parameter_layout import LAW, MU_STAR, A, temperature_parameter_values
 from rsfstudy.slider.parts import Function, Numbers, collect_parameter_values
 from rsfstudy.slider.scene_caching import cached_per_scene
 from rsfstudy.slider.scene_view import SceneView
-from rsfstudy.slider.state_functions import build_sum_function
+from rsfstudy.slider.state_functions import build_sum_function, find_law_functions
+
+if TYPE_CHECKING:
+    from rsfstudy.slider.friction import FrictionFunctions
 
 #: Number of parameters that precede the parameters that the temperature part declares.
 _COMMON_PARAMETER_COUNT = 3
@@ -48,61 +51,69 @@ _NORMAL_STRESS_ITERATION_COUNT = 30
 _MAX_LOG_SLIP_RATE_CHANGE = 0.25
 
 
-class TemperatureTerms(NamedTuple):
-    """Contributions of the temperature to the equations of a scene.
+class _Places(NamedTuple):
+    """Places of the temperature in the tuples of states and parameters.
 
-    Parameters
-    ----------
-    temperature_rate : callable
-        Function ``temperature_rate`` of the temperature part.
-    state_index : int
-        Negative index of the temperature rise in the tuple of states.
-    parameter_index : int
-        Index of the first parameter of the temperature in ``p``.
-    parameter_count : int
-        Number of parameters.
-    affects_friction : bool
-        True if an activation term is not zero.
-    changes_pressure : bool
-        True if heating raises the pore pressure.
-    normal_stress_is_linear : bool
-        True if normal stress is a linear function of shear stress.
+    The index of the state is negative. The last parameter precedes the index ``end``.
     """
 
-    temperature_rate: Function
-    state_index: int
-    parameter_index: int
-    parameter_count: int
-    affects_friction: bool
-    changes_pressure: bool
-    normal_stress_is_linear: bool
+    state: int
+    first_parameter: int
+    end: int
 
 
-def build_temperature_terms(scene: SceneView) -> TemperatureTerms | None:
-    """Return the contributions of the temperature, or None if it is constant.
+def build_replacements(scene: SceneView, isothermal: FrictionFunctions) -> dict[str, Any]:
+    """Build the friction functions that the temperature of a scene changes.
 
     Parameters
     ----------
     scene : Scene
-        Scene with a temperature.
+        Scene whose temperature is an unknown.
+    isothermal : FrictionFunctions
+        Friction functions of the scene without the temperature.
 
     Returns
     -------
-    TemperatureTerms or None
-        Contributions to the equations.
+    dict of str to object
+        Attributes of ``FrictionFunctions`` with their new values.
     """
-    temperature, stress = scene.parts.temperature, scene.parts.normal_stress
-    if not temperature.unknowns:
-        return None
-    return TemperatureTerms(
-        temperature_rate=temperature.temperature_rate,
-        state_index=-1 - len(scene.pressure_source.unknowns),
-        parameter_index=LAW + len(collect_parameter_values(scene.parts.law, scene)),
-        parameter_count=len(temperature_parameter_values(scene)),
-        affects_friction=any(temperature.activation),
-        changes_pressure=scene.parts.fluid.pressurisation_factor != 0.0,
-        normal_stress_is_linear=stress.normal_stress is None or stress.coupling is not None,
+    parts, source, law_states = scene.parts, scene.pressure_source, scene.parts.law.state_count
+    first = LAW + len(collect_parameter_values(parts.law, scene))
+    end = first + len(temperature_parameter_values(scene))
+    places = _Places(-1 - len(source.unknowns), first, end)
+    stress, oscillates = parts.normal_stress, parts.loading.has_load_point_unknown
+    normal_stress = _build_normal_stress_function(
+        stress.normal_stress or zero_normal_stress_excess,
+        has_pressure=bool(source.unknowns) and not oscillates,
+        is_linear=stress.normal_stress is None or stress.coupling is not None,
     )
+    evolutions, steady_states = find_law_functions(parts.law)
+    replacements: dict[str, Any] = {
+        "evolutions": _append_temperature_evolution(
+            evolutions,
+            source.auxiliary_rates,
+            _build_warming_function(
+                parts.temperature.temperature_rate, normal_stress, law_states, places
+            ),
+            law_states,
+            first + 2 if parts.fluid.pressurisation_factor else 0,
+        ),
+        "steady_states": _insert_steady_temperature(steady_states, source.auxiliary_steady_states),
+        "indices_of_states_in_distance": tuple(
+            i + (i >= law_states) for i in isothermal.indices_of_states_in_distance
+        ),
+    }
+    if any(parts.temperature.activation):
+        contribution = isothermal.state_contribution
+        replacements |= {
+            "strength": _add_temperature_to_strength(isothermal.strength, places),
+            "state_contribution": _add_temperature_to_contribution(contribution, places),
+            "state_variable": _build_state_variable_function(places),
+        }
+    return replacements
+
+
+# ---- effects on friction -------------------------------------------------------------------------
 
 
 def inverse_temperature_change(rise: float) -> float:
@@ -119,74 +130,6 @@ def inverse_temperature_change(rise: float) -> float:
         Value of :math:`\Lambda = T_*/T - 1`.
     """
     return -rise / max(1.0 + rise, _MIN_TEMPERATURE)
-
-
-def add_temperature_to_strength(strength_function: Function, terms: TemperatureTerms) -> Function:
-    """Return a friction relation that depends on temperature.
-
-    Parameters
-    ----------
-    strength_function : callable
-        Function ``(g, psis, p) -> (strength, slope, shift, shift_slope)``.
-    terms : TemperatureTerms
-        Contributions of the temperature.
-
-    Returns
-    -------
-    callable
-        Function with the same arguments and values.
-    """
-    place, first = terms.state_index, terms.parameter_index
-    second = first + 1
-
-    def thermal_strength(g: float, psis: Numbers, p: Numbers) -> tuple[float, float, float, float]:
-        value, slope, shift, shift_slope = strength_function(g, psis, p)
-        change = inverse_temperature_change(psis[place])
-        return value - p[first] * change, slope, shift - p[second] * change, shift_slope
-
-    return thermal_strength
-
-
-def build_state_variable_function(terms: TemperatureTerms) -> Function:
-    r"""Return a function that removes the effect of temperature from the state.
-
-    Parameters
-    ----------
-    terms : TemperatureTerms
-        Contributions of the temperature.
-
-    Returns
-    -------
-    callable
-        Function ``(difference, psis, p)`` that returns :math:`\Theta`. The argument
-        ``difference`` is :math:`\Psi - \mathrm{shift} = \Theta + b q_b \Lambda`.
-    """
-    place, second = terms.state_index, terms.parameter_index + 1
-
-    def state_variable(difference: float, psis: Numbers, p: Numbers) -> float:
-        return difference - p[second] * inverse_temperature_change(psis[place])
-
-    return state_variable
-
-
-def state_variable_at_constant_temperature(difference: float, psis: Numbers, p: Numbers) -> float:
-    r"""Return the state variable at constant temperature.
-
-    Parameters
-    ----------
-    difference : float
-        Sum of the states of the law minus the shift.
-    psis : tuple of float
-        States of the scene. This argument is ignored.
-    p : tuple of float
-        Parameters of the scene. This argument is ignored.
-
-    Returns
-    -------
-    float
-        State variable :math:`\Theta`, which is equal to ``difference``.
-    """
-    return difference
 
 
 def temperature_derivatives(rise: float, parameters: Numbers) -> tuple[float, float]:
@@ -209,26 +152,23 @@ def temperature_derivatives(rise: float, parameters: Numbers) -> tuple[float, fl
     return parameters[0] * falling, parameters[1] * falling
 
 
-def add_temperature_to_contribution(
-    contribution_function: Function, terms: TemperatureTerms
-) -> Function:
-    r"""Return the contribution of all states and temperature to the slip rate.
+@cache
+def _add_temperature_to_strength(strength_function: Function, places: _Places) -> Function:
+    """Return the friction relation with both activation terms."""
+    place, first, second = places.state, places.first_parameter, places.first_parameter + 1
 
-    Parameters
-    ----------
-    contribution_function : callable
-        Function ``(changes, g, psis, p) -> float`` of the other states.
-    terms : TemperatureTerms
-        Contributions of the temperature.
+    def thermal_strength(g: float, psis: Numbers, p: Numbers) -> tuple[float, float, float, float]:
+        value, slope, shift, shift_slope = strength_function(g, psis, p)
+        change = inverse_temperature_change(psis[place])
+        return value - p[first] * change, slope, shift - p[second] * change, shift_slope
 
-    Returns
-    -------
-    callable
-        Function with the same arguments. The function returns the decrease of
-        :math:`a \ln(V/V_*)` due to changes of the states.
-    """
-    place, first = terms.state_index, terms.parameter_index
-    end = first + 2
+    return thermal_strength
+
+
+@cache
+def _add_temperature_to_contribution(contribution_function: Function, places: _Places) -> Function:
+    """Return the contribution of state changes to friction, with temperature."""
+    place, first, end = places.state, places.first_parameter, places.end
 
     def thermal_contribution(changes: Numbers, g: float, psis: Numbers, p: Numbers) -> float:
         gained = temperature_derivatives(psis[place], p[first:end])[0]
@@ -237,30 +177,32 @@ def add_temperature_to_contribution(
     return thermal_contribution
 
 
-def build_normal_stress_from_friction_function(
-    total_normal_stress_function: Function, *, has_pressure: bool, is_linear: bool
+@cache
+def _build_state_variable_function(places: _Places) -> Function:
+    r"""Return a function that computes the state variable.
+
+    The sum of the states minus the shift is :math:`\Theta + b q_b \Lambda`.
+    """
+    place, second = places.state, places.first_parameter + 1
+
+    def state_variable(difference: float, psis: Numbers, p: Numbers) -> float:
+        return difference - p[second] * inverse_temperature_change(psis[place])
+
+    return state_variable
+
+
+# ---- evolution of the temperature ----------------------------------------------------------------
+
+
+@cache
+def _build_normal_stress_function(
+    total_normal_stress: Function, *, has_pressure: bool, is_linear: bool
 ) -> Function:
-    r"""Return a function for the normal stress at a friction coefficient.
+    r"""Return a function ``(friction, psis, p)`` for the effective normal stress.
 
-    Parameters
-    ----------
-    total_normal_stress_function : callable
-        Function ``(g, p) -> (sigma/sigma_* - 1, slope)``.
-    has_pressure : bool
-        Whether the last state is a pore pressure or a decrease of normal stress.
-    is_linear : bool
-        Whether normal stress is a linear function of shear stress.
-
-    Returns
-    -------
-    callable
-        Function ``(friction, psis, p)`` that returns the effective normal stress :math:`s` in
-        :math:`\sigma_*`.
-
-    Notes
-    -----
     The frictional stress :math:`g` solves :math:`\mu_* + g = \mu s(g)`. Newton's method needs a
-    single iteration if :math:`s` is a linear function of :math:`g`.
+    single iteration if the normal stress :math:`s` is a linear function of :math:`g`. If
+    ``has_pressure`` is True, the last state reduces the normal stress.
     """
     iterations = 1 if is_linear else _NORMAL_STRESS_ITERATION_COUNT
 
@@ -268,7 +210,7 @@ def build_normal_stress_from_friction_function(
         g, pressure = friction - p[MU_STAR], psis[-1] if has_pressure else 0.0
         ratio = 1.0
         for _ in range(iterations):
-            excess, change = total_normal_stress_function(g, p)
+            excess, change = total_normal_stress(g, p)
             ratio = 1.0 + excess - pressure
             resisting = max(1.0 - friction * change, _MIN_NORMAL_STRESS)
             step = (friction * ratio - p[MU_STAR] - g) / resisting
@@ -279,46 +221,41 @@ def build_normal_stress_from_friction_function(
     return normal_stress
 
 
-def append_temperature_evolution(
-    law_evolutions: Function,
-    auxiliary_rates: Function | None,
-    normal_stress_function: Function,
-    law_state_count: int,
-    terms: TemperatureTerms,
+@cache
+def _build_warming_function(
+    temperature_rate: Function, normal_stress: Function, law_state_count: int, places: _Places
 ) -> Function:
-    r"""Return an evolution function for law states, temperature and pressure.
+    r"""Return a function ``(x, psis, shift, fraction, p)`` for the rate of temperature.
 
-    Parameters
-    ----------
-    law_evolutions : callable
-        Function ``evolutions`` of the law.
-    auxiliary_rates : callable or None
-        Function ``auxiliary_rates`` of the loading and the fluid.
-    normal_stress_function : callable
-        Output of `build_normal_stress_from_friction_function`.
-    law_state_count : int
-        Number of states of the law.
-    terms : TemperatureTerms
-        Contributions of the temperature.
-
-    Returns
-    -------
-    callable
-        Function ``(log_slip_rate, psis, shift, fraction, p)`` that returns the changes of all
-        states. The friction coefficient is
-        :math:`\mu = \mu_* + a \ln V + \Psi - \mathrm{shift} - (b q_b - a q_a) \Lambda`.
+    The friction coefficient is
+    :math:`\mu = \mu_* + a \ln V + \Psi - \mathrm{shift} - (b q_b - a q_a) \Lambda`.
     """
-    place, first = law_state_count, terms.parameter_index
-    own, end = first + _COMMON_PARAMETER_COUNT, first + terms.parameter_count
-    after, rate, state_sum = place + 1, terms.temperature_rate, build_sum_function(law_state_count)
-    changes_pressure = terms.changes_pressure
+    place, first, end = law_state_count, places.first_parameter, places.end
+    own, state_sum = first + _COMMON_PARAMETER_COUNT, build_sum_function(law_state_count)
 
     def warming(x: float, psis: Numbers, shift: float, fraction: float, p: Numbers) -> float:
         rise, activated = psis[place], p[first + 1] - p[first]
         friction = p[MU_STAR] + p[A] * x + state_sum(psis) - shift
         friction -= activated * inverse_temperature_change(rise)
-        stress = normal_stress_function(friction, psis, p)
-        return rate(x, rise, friction, stress, fraction, p[own:end])
+        stress = normal_stress(friction, psis, p)
+        return temperature_rate(x, rise, friction, stress, fraction, p[own:end])
+
+    return warming
+
+
+@cache
+def _append_temperature_evolution(
+    law_evolutions: Function,
+    auxiliary_rates: Function | None,
+    warming: Function,
+    law_state_count: int,
+    pressurisation_index: int,
+) -> Function:
+    """Return the evolution of law states, temperature and other unknowns.
+
+    The pressurisation index is 0 if heat does not change the pore pressure.
+    """
+    place, after = law_state_count, law_state_count + 1
 
     def evolutions(x: float, psis: Numbers, shift: float, fraction: float, p: Numbers) -> Numbers:
         changes = law_evolutions(x, psis[:place], shift, fraction, p)
@@ -327,38 +264,29 @@ def append_temperature_evolution(
     if auxiliary_rates is None:
         return evolutions
 
-    def evolutions_with_pressure(
+    def evolutions_with_others(
         x: float, psis: Numbers, shift: float, fraction: float, p: Numbers
     ) -> Numbers:
-        others = auxiliary_rates(x, psis[after:], fraction, p)
-        heated = warming(x, psis, shift, fraction, p)
-        pressed = others[-1]
-        if changes_pressure:
-            pressed += p[first + 2] * heated
         changes = law_evolutions(x, psis[:place], shift, fraction, p)
-        return (*changes, heated, *others[:-1], pressed)
+        heated = warming(x, psis, shift, fraction, p)
+        others = auxiliary_rates(x, psis[after:], fraction, p)
+        pressed = p[pressurisation_index] * heated if pressurisation_index else 0.0
+        return (*changes, heated, *others[:-1], others[-1] + pressed)
 
-    return evolutions_with_pressure
+    return evolutions_with_others
 
 
-def insert_temperature_steady_state(
+# ---- steady sliding ------------------------------------------------------------------------------
+
+
+@cache
+def _insert_steady_temperature(
     law_steady_states: Function, auxiliary_steady_states: Function | None
 ) -> Function:
-    """Return the steady states of a scene with a temperature.
+    """Return the steady states with NaN for the temperature rise.
 
-    Parameters
-    ----------
-    law_steady_states : callable
-        Function ``steady_states`` of the law.
-    auxiliary_steady_states : callable or None
-        Function ``auxiliary_steady_states`` of the loading and the fluid.
-
-    Returns
-    -------
-    callable
-        Function ``(log_slip_rate, shift, p)``. The temperature rise is NaN, because
-        `steady_temperature_rise` must solve an equation for it. The distance from steady sliding
-        does not contain the temperature rise.
+    The function `steady_temperature_rise` must solve an equation for the temperature rise, and the
+    distance from steady sliding does not contain it.
     """
 
     def steady_states(log_slip_rate: float, shift: float, p: Numbers) -> Numbers:
@@ -392,14 +320,13 @@ def steady_temperature_rise(scene: SceneView, log_slip_rate: float) -> float:
     -------
     float
         Temperature rise :math:`\vartheta`. The result is NaN if the steady temperature cannot be
-        followed to the slip rate, for example because heat accumulates without limit.
+        followed to the slip rate.
     """
-    functions, p = scene.equation_functions.friction_functions, scene.friction_parameter_values
-    place = scene.parts.law.state_count
-    evolution_term = temperature_parameter_values(scene)[1]
+    functions, p = scene.friction_functions, scene.friction_parameter_values
+    place, activated = scene.parts.law.state_count, temperature_parameter_values(scene)[1]
 
     def warming(rise: float, x: float) -> float:
-        shift = -evolution_term * inverse_temperature_change(rise)
+        shift = -activated * inverse_temperature_change(rise)
         steady = functions.steady_states(x, shift, p)
         psis = (*steady[:place], rise, *steady[place + 1 :])
         return float(functions.evolutions(x, psis, shift, math.exp(min(x, 0.0)), p)[place])

@@ -53,7 +53,11 @@ def begin_regime(motion, workspace):
     """
     motion.clock = 0.0
     evaluate_function_into_array(
-        workspace.fill_rates, workspace.y, workspace.y, workspace.parameters, workspace.rates
+        workspace.functions.fill_rates,
+        workspace.y,
+        workspace.y,
+        workspace.parameters,
+        workspace.rates,
     )
     count_evaluations(motion, 1)
     if motion.next_step_length == 0.0:
@@ -116,7 +120,7 @@ def take_step_without_error_test(motion, workspace):
     """
     workspace.order_eight_step_block[LENGTH_INDEX] = motion.step_length
     evaluate_function_into_array(
-        workspace.attempt_step,
+        workspace.functions.attempt_step,
         workspace.y,
         workspace.stage_rates,
         workspace.parameters,
@@ -329,7 +333,7 @@ def select_initial_step_length(workspace, clock_direction, tolerance):
     for i in range(count):
         workspace.y_end[i] = y[i] + trial * clock_direction * first[i]
     evaluate_function_into_array(
-        workspace.fill_rates, workspace.y_end, y, workspace.parameters, workspace.y_within
+        workspace.functions.fill_rates, workspace.y_end, y, workspace.parameters, workspace.y_within
     )
     d2 = 0.0
     for i in range(count):

@@ -22,7 +22,7 @@ from rsfstudy.slider.parameter_layout import (
     A,
 )
 from rsfstudy.slider.parts import Function, Numbers, flag
-from rsfstudy.slider.scene_functions import velocity_ratios
+from rsfstudy.slider.path_length import velocity_ratios
 from rsfstudy.slider.scene_view import SceneView
 from rsfstudy.slider.state_functions import build_state_step_function
 
@@ -44,19 +44,7 @@ MIN_VELOCITY_RATIO, MAX_VELOCITY_RATIO = 1e-60, 1e40
 def build_slip_rate_functions(friction_functions: FrictionFunctions) -> tuple[Function, Function]:
     r"""Return the functions that compute the slip rate on the slow manifold.
 
-    Parameters
-    ----------
-    friction_functions : FrictionFunctions
-        Friction of the scene.
-
-    Returns
-    -------
-    balance : callable
-        Function ``balance(spring_stress, psis, p)`` that returns :math:`\ln(V/V_*)`, the frictional
-        stress and the decrease of the state due to stress.
-    growth : callable
-        Function ``growth(state, rates, x, g, p)`` that returns the derivative of :math:`\ln(V/V_*)`
-        along the motion.
+    See ``Dynamics`` for the argument and for the returned functions.
 
     Notes
     -----
@@ -261,15 +249,7 @@ def build_rupture_rate_function(friction_functions: FrictionFunctions) -> Functi
     The independent variable is inertial time in units of :math:`T/(2 \pi)`. Because :math:`g` is an
     unknown, the function does not need the inverse of ``strength``.
 
-    Parameters
-    ----------
-    friction_functions : FrictionFunctions
-        Friction of the scene.
-
-    Returns
-    -------
-    callable
-        Function ``rates(state, p)`` that returns the derivatives of the unknowns.
+    See ``Dynamics`` for the argument.
 
     Notes
     -----

@@ -51,19 +51,7 @@ def compute_radiated_stress(log_slip_rate: float, damping: float) -> float:
 def build_slip_rate_functions(friction_functions: FrictionFunctions) -> tuple[Function, Function]:
     r"""Return the functions that compute the slip rate with radiation damping.
 
-    Parameters
-    ----------
-    friction_functions : FrictionFunctions
-        Friction of the scene.
-
-    Returns
-    -------
-    balance : callable
-        Function ``balance(spring_stress, psis, p)`` that returns :math:`\ln(V/V_*)`, the frictional
-        stress and the decrease of the state due to stress.
-    growth : callable
-        Function ``growth(state, rates, x, g, p)`` that returns the derivative of :math:`\ln(V/V_*)`
-        along the motion.
+    See ``Dynamics`` for the argument and for the returned functions.
 
     Notes
     -----

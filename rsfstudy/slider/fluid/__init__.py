@@ -27,7 +27,7 @@ from rsfstudy.slider.parts import (
 
 @dataclass(frozen=True, kw_only=True)
 class Fluid(Part):
-    """Base class of all pore fluids.
+    r"""Base class of all pore fluids.
 
     A fluid with unknowns declares them in ``unknowns``. The last unknown of a fluid must be the
     pore pressure P. A fluid with unknowns also defines two functions as static methods:
@@ -37,6 +37,11 @@ class Fluid(Part):
       independent variable.
     - ``auxiliary_steady_states(log_slip_rate, p)`` returns the unknowns in steady sliding, where
       the pore pressure P is zero.
+
+    The argument ``log_slip_rate`` is :math:`\ln(V/V_*)`, ``states`` is the tuple of the unknowns,
+    and ``p`` is the tuple of parameters, in which the parameters of the fluid start at
+    ``p[FLUID]``. When slip stops, the changes per unit slip are infinite, but their product with
+    ``fraction`` remains finite.
 
     The distance between the unknowns and their values in steady sliding determines whether a motion
     has settled and whether a cycle repeats. The attribute ``excluded_from_distance`` lists the

@@ -27,25 +27,10 @@ def porosity_and_pressure_rates(
 ) -> Numbers:
     r"""Compute the rates of porosity and pore pressure.
 
-    Parameters
-    ----------
-    log_slip_rate : float
-        Natural logarithm of the slip rate, :math:`\ln(V/V_*)`.
-    states : tuple of float
-        Porosity :math:`(\varphi - \varphi_0)/(\beta \sigma_*)` and pore pressure :math:`P`.
-    slip_per_independent_variable : float
-        Slip per unit of the independent variable, by which the result is multiplied. When slip
-        stops, the changes per unit slip are infinite, but their product with
-        ``slip_per_independent_variable`` remains finite.
-    p : tuple of float
-        Parameters of the scene. The function reads the dilatancy :math:`\epsilon/(\beta \sigma_*)`
-        from ``p[FLUID]`` and the drainage :math:`c^* D_c/V_*` from ``p[FLUID + 1]``.
-
-    Returns
-    -------
-    tuple of float
-        Changes of porosity and pore pressure per unit slip in :math:`D_c`, multiplied by
-        ``slip_per_independent_variable``.
+    See ``Fluid`` for the arguments. The states are the porosity :math:`(\varphi - \varphi_0)/(\beta
+    \sigma_*)` and the pore pressure :math:`P`. The function reads the dilatancy
+    :math:`\epsilon/(\beta \sigma_*)` from ``p[FLUID]`` and the drainage :math:`c^* D_c/V_*` from
+    ``p[FLUID + 1]``.
 
     Notes
     -----
@@ -70,17 +55,7 @@ def porosity_and_pressure_rates(
 def steady_porosity_and_pressure(log_slip_rate: float, p: Numbers) -> Numbers:
     r"""Compute porosity and pore pressure in steady sliding.
 
-    Parameters
-    ----------
-    log_slip_rate : float
-        Natural logarithm of the slip rate, :math:`\ln(V/V_*)`.
-    p : tuple of float
-        Parameters of the scene.
-
-    Returns
-    -------
-    tuple of float
-        Porosity :math:`(\varphi - \varphi_0)/(\beta \sigma_*)`, and a pore pressure of zero.
+    See ``Fluid`` for the arguments.
 
     Notes
     -----

@@ -92,6 +92,11 @@ class LawBase(Part):
     stress varies. If effective normal stress is constant, shear stress divided by :math:`\sigma_*`
     equals the friction coefficient.
 
+    The arguments of the functions have the same meaning for all laws: ``log_slip_rate`` is
+    :math:`\ln(V/V_*)`, ``state`` is the state variable :math:`\Theta`, ``psis`` is the tuple of
+    states :math:`\Psi_i`, which exclude the effect of stress, and ``p`` is the tuple of parameters,
+    in which the parameters of the law start at ``p[LAW]``.
+
     A law with one state defines ``evolution(log_slip_rate, state, p)``. The function returns the
     change of the state variable per unit slip in :math:`D_c` at constant normal stress. The default
     steady state is :math:`\Theta = -b \ln(V/V_*)`. If the steady state of a law differs from the
@@ -279,11 +284,10 @@ class Law(LawBase):
         evolution(log_slip_rate, state, p) -> float
 
     The function returns the change of :math:`\Theta` per unit slip in :math:`D_c` at constant
-    normal stress. The argument ``log_slip_rate`` is :math:`\ln(V/V_*)`, and ``state`` is
-    :math:`\Theta`. The element ``p[LAW]`` is b, where the constant ``LAW`` can be imported from
-    ``rsfstudy.parts``. Declare the parameters of the law as fields, with ``rsfstudy.parts.number``.
-    The parameters follow b in the order of their declaration, as ``p[LAW + 1]``, ``p[LAW + 2]`` and
-    so on. Two methods are optional::
+    normal stress. The arguments are described for ``LawBase``. The element ``p[LAW]`` is b, where
+    the constant ``LAW`` can be imported from ``rsfstudy.parts``. Declare the parameters of the law
+    as fields, with ``rsfstudy.parts.number``. The parameters follow b in the order of their
+    declaration, as ``p[LAW + 1]``, ``p[LAW + 2]`` and so on. Two methods are optional::
 
         parameter_values(self, scene) -> tuple[float, ...]
         check(self, scene) -> None

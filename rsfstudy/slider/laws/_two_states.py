@@ -22,19 +22,7 @@ FIRST_B, SECOND_B, FIRST_SHARE, SECOND_SHARE, LENGTH_QUOTIENT = range(LAW, LAW +
 def steady_states(log_slip_rate: float, state_shift: float, p: Numbers) -> Numbers:
     r"""Compute both state variables in steady sliding.
 
-    Parameters
-    ----------
-    log_slip_rate : float
-        Natural logarithm of the slip rate, :math:`\ln(V/V_*)`.
-    state_shift : float
-        Decrease of the sum of the states due to stress.
-    p : tuple of float
-        Parameters of the scene.
-
-    Returns
-    -------
-    tuple of float
-        States :math:`\Psi_1` and :math:`\Psi_2`.
+    See ``LawBase`` for the arguments.
 
     Notes
     -----

@@ -21,20 +21,8 @@ HALLEY_ITERATION_COUNT = 4
 def state_evolution_per_slip(log_slip_rate: float, state: float, p: Numbers) -> float:
     r"""Compute the state evolution per unit slip at constant normal stress.
 
-    Parameters
-    ----------
-    log_slip_rate : float
-        Natural logarithm of the slip rate, :math:`\ln(V/V_*)`.
-    state : float
-        State variable :math:`\Theta`.
-    p : tuple of float
-        Parameters of the scene. The function reads :math:`b` from ``p[LAW]``, followed by
-        :math:`\ln(V_c/V_*)` and :math:`u_*`.
-
-    Returns
-    -------
-    float
-        Rate :math:`D_c \, d\Theta/d\delta`.
+    See ``LawBase`` for the arguments. The function reads :math:`b` from ``p[LAW]``, followed by
+    :math:`\ln(V_c/V_*)` and :math:`u_*`.
 
     Notes
     -----
@@ -71,19 +59,7 @@ def state_evolution_per_slip(log_slip_rate: float, state: float, p: Numbers) -> 
 def steady_states(log_slip_rate: float, state_shift: float, p: Numbers) -> Numbers:
     r"""Compute the state variable in steady sliding.
 
-    Parameters
-    ----------
-    log_slip_rate : float
-        Natural logarithm of the slip rate, :math:`\ln(V/V_*)`.
-    state_shift : float
-        Decrease of the state variable due to stress.
-    p : tuple of float
-        Parameters of the scene.
-
-    Returns
-    -------
-    tuple of float
-        State :math:`\Psi`.
+    See ``LawBase`` for the arguments.
 
     Notes
     -----

@@ -23,20 +23,8 @@ from rsfstudy.slider.scene_view import SceneView
 def state_evolution_per_slip(log_slip_rate: float, state: float, p: Numbers) -> float:
     r"""Compute the state evolution per unit slip at constant normal stress.
 
-    Parameters
-    ----------
-    log_slip_rate : float
-        Natural logarithm of the slip rate, :math:`\ln(V/V_*)`.
-    state : float
-        State variable :math:`\Theta`.
-    p : tuple of float
-        Parameters of the scene. The function reads :math:`b` from ``p[LAW]``, followed by the
-        fractions :math:`V_c/(V_c + V_*)` and :math:`V_*/(V_c + V_*)`.
-
-    Returns
-    -------
-    float
-        Rate :math:`D_c \, d\Theta/d\delta`.
+    See ``LawBase`` for the arguments. The function reads :math:`b` from ``p[LAW]``, followed by the
+    fractions :math:`V_c/(V_c + V_*)` and :math:`V_*/(V_c + V_*)`.
 
     Notes
     -----
@@ -67,19 +55,7 @@ def state_evolution_per_slip(log_slip_rate: float, state: float, p: Numbers) -> 
 def steady_states(log_slip_rate: float, state_shift: float, p: Numbers) -> Numbers:
     r"""Compute the state variable in steady sliding.
 
-    Parameters
-    ----------
-    log_slip_rate : float
-        Natural logarithm of the slip rate, :math:`\ln(V/V_*)`.
-    state_shift : float
-        Decrease of the state variable due to stress.
-    p : tuple of float
-        Parameters of the scene.
-
-    Returns
-    -------
-    tuple of float
-        State :math:`\Psi`.
+    See ``LawBase`` for the arguments.
 
     Notes
     -----

@@ -14,20 +14,8 @@ from rsfstudy.slider.scene_view import SceneView
 def state_evolution_per_slip(log_slip_rate: float, state: float, p: Numbers) -> float:
     r"""Compute the state evolution per unit slip at constant normal stress.
 
-    Parameters
-    ----------
-    log_slip_rate : float
-        Natural logarithm of the slip rate, :math:`\ln(V/V_*)`.
-    state : float
-        State variable :math:`\Theta`.
-    p : tuple of float
-        Parameters of the scene. The function reads :math:`b` from ``p[LAW]`` and :math:`\epsilon`
-        from ``p[LAW + 1]``.
-
-    Returns
-    -------
-    float
-        Rate :math:`D_c \, d\Theta/d\delta`.
+    See ``LawBase`` for the arguments. The function reads :math:`b` from ``p[LAW]`` and
+    :math:`\epsilon` from ``p[LAW + 1]``.
 
     Notes
     -----
@@ -82,17 +70,7 @@ class SlipToSlownessLaw(Law):
     def relaxation(self, log_slip_rate: float, slip: float) -> float:
         r"""Compute the relaxation of stress at constant slip rate.
 
-        Parameters
-        ----------
-        log_slip_rate : float
-            Natural logarithm of the slip rate, :math:`\ln(V/V_*)`.
-        slip : float
-            Slip since the velocity step from :math:`V_*`, in :math:`D_c`.
-
-        Returns
-        -------
-        float
-            Difference between the friction coefficient and its steady value, divided by b.
+        See ``LawBase.relaxation``.
 
         Notes
         -----

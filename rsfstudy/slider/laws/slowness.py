@@ -16,19 +16,7 @@ from rsfstudy.slider.parts import Numbers
 def state_evolution_per_slip(log_slip_rate: float, state: float, p: Numbers) -> float:
     r"""Compute the state evolution per unit slip at constant normal stress.
 
-    Parameters
-    ----------
-    log_slip_rate : float
-        Natural logarithm of the slip rate, :math:`\ln(V/V_*)`.
-    state : float
-        State variable :math:`\Theta = b \ln(\theta/\theta_*)`.
-    p : tuple of float
-        Parameters of the scene. The function reads :math:`b` from ``p[LAW]``.
-
-    Returns
-    -------
-    float
-        Rate :math:`D_c \, d\Theta/d\delta`.
+    See ``LawBase`` for the arguments. The function reads :math:`b` from ``p[LAW]``.
 
     Notes
     -----
@@ -62,17 +50,7 @@ def state_evolution_per_slip(log_slip_rate: float, state: float, p: Numbers) -> 
 def stress_relaxation_after_velocity_step(log_slip_rate: float, slip: float) -> float:
     r"""Compute the relaxation of stress at constant slip rate.
 
-    Parameters
-    ----------
-    log_slip_rate : float
-        Natural logarithm of the slip rate, :math:`\ln(V/V_*)`.
-    slip : float
-        Slip since the velocity step from :math:`V_*`, in :math:`D_c`.
-
-    Returns
-    -------
-    float
-        Difference between the friction coefficient and its steady value, divided by b.
+    See ``LawBase.relaxation`` for the arguments.
 
     Notes
     -----

@@ -27,23 +27,7 @@ def evolutions(
 ) -> Numbers:
     r"""Compute the evolution of both states at constant normal stress.
 
-    Parameters
-    ----------
-    log_slip_rate : float
-        Natural logarithm of the slip rate, :math:`\ln(V/V_*)`.
-    states : tuple of float
-        States :math:`\Psi_1` and :math:`\Psi_2`, which exclude the effect of stress.
-    state_shift : float
-        Decrease of the sum of the states due to stress.
-    slip_per_independent_variable : float
-        Slip per unit of the independent variable, by which the result is multiplied.
-    p : tuple of float
-        Parameters of the scene. The parameters of the law start at ``p[LAW]``.
-
-    Returns
-    -------
-    tuple of float
-        Rates :math:`D_c \, d\Theta_i/d\delta`, multiplied by ``slip_per_independent_variable``.
+    See ``LawBase`` for the arguments.
 
     Notes
     -----

@@ -25,23 +25,9 @@ def harmonic_oscillation_rates(
 ) -> Numbers:
     r"""Compute the rates of the two unknowns of a harmonic oscillation.
 
-    Parameters
-    ----------
-    log_slip_rate : float
-        Natural logarithm of the slip rate, :math:`\ln(V/V_*)`.
-    states : tuple of float
-        Unknowns :math:`y` and :math:`P`.
-    slip_per_independent_variable : float
-        Slip per unit of the independent variable, by which the result is multiplied.
-    p : tuple of float
-        Parameters of the scene. The function reads :math:`\omega D_c/V_*` from ``p[LOADING]`` and
-        the amplitude :math:`A` from ``p[LOADING + 1]``.
-
-    Returns
-    -------
-    tuple of float
-        Changes of :math:`y` and :math:`P` per unit slip in :math:`D_c`, multiplied by
-        ``slip_per_independent_variable``.
+    See ``Fluid`` for the arguments. The states are the unknowns :math:`y` and :math:`P`. The
+    function reads :math:`\omega D_c/V_*` from ``p[LOADING]`` and the amplitude :math:`A` from
+    ``p[LOADING + 1]``.
 
     Notes
     -----
@@ -71,17 +57,7 @@ def harmonic_oscillation_rates(
 def zero_oscillation_in_steady_sliding(log_slip_rate: float, p: Numbers) -> Numbers:
     r"""Return the unknowns of the oscillation in steady sliding.
 
-    Parameters
-    ----------
-    log_slip_rate : float
-        Natural logarithm of the slip rate, :math:`\ln(V/V_*)`.
-    p : tuple of float
-        Parameters of the scene.
-
-    Returns
-    -------
-    tuple of float
-        Two zeros, because steady sliding has no oscillation.
+    Steady sliding has no oscillation, so both unknowns are zero.
     """
     return 0.0, 0.0
 

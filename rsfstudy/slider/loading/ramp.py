@@ -24,23 +24,9 @@ def pending_normal_stress_rates(
 ) -> Numbers:
     r"""Compute the rate of the remaining normal stress change of a ramp.
 
-    Parameters
-    ----------
-    log_slip_rate : float
-        Natural logarithm of the slip rate, :math:`\ln(V/V_*)`.
-    states : tuple of float
-        Unknown :math:`P`, the remaining change of normal stress.
-    slip_per_independent_variable : float
-        Slip per unit of the independent variable, by which the result is multiplied.
-    p : tuple of float
-        Parameters of the scene. The function reads the rate of imposed normal stress, in
-        :math:`\sigma_* V_*/D_c`, from ``p[LOADING]``.
-
-    Returns
-    -------
-    tuple of float
-        Change of :math:`P` per unit slip in :math:`D_c`, multiplied by
-        ``slip_per_independent_variable``.
+    See ``Fluid`` for the arguments. The only state is :math:`P`, the remaining change of normal
+    stress. The function reads the rate of imposed normal stress, in :math:`\sigma_* V_*/D_c`, from
+    ``p[LOADING]``.
 
     Notes
     -----
@@ -60,17 +46,7 @@ def pending_normal_stress_rates(
 def zero_pending_normal_stress(log_slip_rate: float, p: Numbers) -> Numbers:
     r"""Return the remaining normal stress change in steady sliding.
 
-    Parameters
-    ----------
-    log_slip_rate : float
-        Natural logarithm of the slip rate, :math:`\ln(V/V_*)`.
-    p : tuple of float
-        Parameters of the scene.
-
-    Returns
-    -------
-    tuple of float
-        Zero, because normal stress is constant in steady sliding.
+    The remaining change is zero, because normal stress is constant in steady sliding.
     """
     return (0.0,)
 

@@ -21,23 +21,8 @@ def linker_dieterich_effect(
 ) -> tuple[float, float]:
     r"""Compute the decrease of the state variable due to normal stress.
 
-    Parameters
-    ----------
-    frictional_stress : float
-        Deviation of frictional stress from its reference value, in :math:`\sigma_*`.
-    normal_stress_ratio : float
-        Normal stress ratio :math:`s = \sigma/\sigma_*`.
-    normal_stress_derivative : float
-        Derivative :math:`s'` of the normal stress ratio with respect to frictional stress.
-    p : tuple of float
-        Parameters of the scene. The function reads :math:`\alpha` from ``p[NORMAL_STRESS]``.
-
-    Returns
-    -------
-    shift : float
-        Decrease of the state variable, :math:`\Psi - \Theta`.
-    slope : float
-        Derivative of the shift with respect to frictional stress.
+    See ``NormalStress.state_effect`` for the arguments. The function reads :math:`\alpha` from
+    ``p[NORMAL_STRESS]``.
 
     Notes
     -----

@@ -16,20 +16,8 @@ from rsfstudy.slider.scene_view import SceneView
 def imposed_normal_stress_excess(frictional_stress: float, p: Numbers) -> tuple[float, float]:
     r"""Compute the imposed normal stress.
 
-    Parameters
-    ----------
-    frictional_stress : float
-        Deviation of frictional stress. The function ignores this argument.
-    p : tuple of float
-        Parameters of the scene. The function reads the imposed change of normal stress from
-        ``p[IMPOSED_NORMAL_STRESS]``.
-
-    Returns
-    -------
-    excess : float
-        Normal stress ratio minus one, :math:`\sigma/\sigma_* - 1`.
-    change : float
-        Derivative of the normal stress ratio with respect to frictional stress, which is zero.
+    See ``NormalStress`` for the arguments. The function reads the imposed change of normal stress
+    from ``p[IMPOSED_NORMAL_STRESS]``.
     """
     return p[IMPOSED_NORMAL_STRESS], 0.0
 

@@ -23,19 +23,8 @@ from rsfstudy.slider.scene_view import SceneView
 def shear_coupled_normal_stress_excess(frictional_stress: float, p: Numbers) -> tuple[float, float]:
     r"""Compute the normal stress under an inclined driving stress.
 
-    Parameters
-    ----------
-    frictional_stress : float
-        Deviation of frictional stress, :math:`(\tau - \tau_*)/\sigma_*`.
-    p : tuple of float
-        Parameters of the scene. The function reads :math:`\cot\phi` from ``p[NORMAL_STRESS + 1]``.
-
-    Returns
-    -------
-    excess : float
-        Normal stress ratio minus one, :math:`\sigma/\sigma_* - 1`.
-    change : float
-        Derivative of the normal stress ratio with respect to frictional stress.
+    See ``NormalStress`` for the arguments. The function reads :math:`\cot\phi` from
+    ``p[NORMAL_STRESS + 1]``.
 
     Notes
     -----

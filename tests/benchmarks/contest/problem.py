@@ -27,7 +27,7 @@ from rsfstudy.motion.work_meter import WorkMeter
 from rsfstudy.slider.dynamics.inertia import DIFFERENCE_STEP, NEGLIGIBLE_SECOND_ORDER_WEIGHT
 from rsfstudy.slider.equations import RUPTURE_REGIME, equations_between_ruptures
 from rsfstudy.slider.motion_point import MotionPoint
-from rsfstudy.slider.scene_functions import LOG_SLIP_RATE_PER_PATH_LENGTH
+from rsfstudy.slider.path_length import LOG_SLIP_RATE_PER_PATH_LENGTH
 
 BUDGET = 10**9
 #: Indices of the parameters of a scene.

@@ -1,0 +1,165 @@
+r"""Stress, slip rate and states of a motion at a point in time.
+
+The module builds functions ``(state, rates, p) -> MotionPoint`` from the friction functions of a
+scene. The arguments are the unknowns of the equations of motion in one regime, the derivatives of
+the unknowns, and the parameters of the scene.
+"""
+
+from __future__ import annotations
+
+from functools import cache
+
+from rsfstudy.slider.friction import FrictionFunctions
+from rsfstudy.slider.motion_point import MotionPoint
+from rsfstudy.slider.parameter_layout import MU_STAR, A
+from rsfstudy.slider.parts import Function, Numbers
+
+
+@cache
+def build_motion_point_assembling_function(friction_functions: FrictionFunctions) -> Function:
+    r"""Return a function that creates a ``MotionPoint`` from stresses and states.
+
+    Parameters
+    ----------
+    friction_functions : FrictionFunctions
+        Friction functions of the scene.
+
+    Returns
+    -------
+    callable
+        Function ``(x, growth, forces, states, changes, shift, p) ->
+        MotionPoint``. The arguments ``x`` and ``growth`` are :math:`x = \ln(V/V_*)` and its
+        derivative. The tuple ``forces`` contains f, the derivative of f, g, and the derivative of
+        g. The other arguments are the states, the derivatives of the states, the decrease of the
+        state variable due to stress, and the parameters.
+
+    Notes
+    -----
+    The friction coefficient that a laboratory rig measures is :math:`(\mu_* + f)/s`, with the
+    normal stress ratio :math:`s` outside the fault.
+    """
+    steady_states, state_sum, counted = (
+        friction_functions.steady_states,
+        friction_functions.state_sum,
+        friction_functions.indices_of_states_in_distance,
+    )
+    effective_stress, stress = (
+        friction_functions.effective_normal_stress,
+        friction_functions.rig_normal_stress,
+    )
+    state_variable = friction_functions.state_variable
+    pressure, imposed, imposed_change = (
+        friction_functions.boundary_pressure,
+        friction_functions.load_point_stress,
+        friction_functions.load_point_stress_change,
+    )
+
+    def point_at(
+        x: float,
+        growth: float,
+        forces: Numbers,
+        psis: Numbers,
+        changes: Numbers,
+        shift: float,
+        p: Numbers,
+    ) -> MotionPoint:
+        f, f_change, g, g_change = forces
+        steady = steady_states(x, shift, p)
+        psi, distance = state_sum(psis), 0.0
+        for i in counted:
+            distance = max(distance, abs(psis[i] - steady[i]))
+        ratio = 1.0 + effective_stress(g, psis, p)[0]
+        excess, slope = stress(g, psis, p)
+        pushed, pushed_change = imposed(psis, p), imposed_change(changes)
+        outside = 1.0 + excess
+        outside_change = slope * (g_change + pushed_change) - pressure(changes)
+        reading = (p[MU_STAR] + f + pushed) / outside
+        return MotionPoint(
+            x,
+            growth,
+            f,
+            g,
+            psi,
+            state_variable(psi - shift, psis, p),
+            psi - state_sum(steady),
+            distance,
+            (p[MU_STAR] + g + pushed) / ratio,
+            ratio,
+            reading,
+            (f_change + pushed_change - reading * outside_change) / outside,
+            psis,
+        )
+
+    return point_at
+
+
+@cache
+def build_point_function_between_ruptures(
+    friction_functions: FrictionFunctions,
+    force_balance_function: Function,
+    log_slip_rate_growth_function: Function,
+) -> Function:
+    """Return a function for stress, slip rate and states between ruptures.
+
+    The functions ``(spring, psis, p)`` and ``(unknowns, rates, x, g, p)`` of the dynamics are
+    described in ``Dynamics``.
+
+    Notes
+    -----
+    The derivative of g follows from the friction relation,
+    ``a dx = strength'(g) dg - contribution``.
+    """
+    assemble_point = build_motion_point_assembling_function(friction_functions)
+    strength, contribution, end = (
+        friction_functions.strength,
+        friction_functions.state_contribution,
+        1 + friction_functions.state_count,
+    )
+
+    def point(state: Numbers, rates: Numbers, p: Numbers) -> MotionPoint:
+        unknowns, changes = state[:end], rates[1:end]
+        f, psis = unknowns[0], unknowns[1:]
+        x, g, _shift = force_balance_function(f, psis, p)
+        x_change = log_slip_rate_growth_function(unknowns, rates[:end], x, g, p)
+        _value, slope, shift, _shift_slope = strength(g, psis, p)
+        g_change = (p[A] * x_change + contribution(changes, g, psis, p)) / slope
+        return assemble_point(x, x_change, (f, rates[0], g, g_change), psis, changes, shift, p)
+
+    return point
+
+
+@cache
+def build_point_function_in_rupture(friction_functions: FrictionFunctions) -> Function:
+    """Return a function for stress, slip rate and states in ruptures."""
+    assemble_point = build_motion_point_assembling_function(friction_functions)
+    strength, states_at, end = (
+        friction_functions.strength,
+        friction_functions.states_from_strength,
+        2 + friction_functions.state_count,
+    )
+
+    def point(state: Numbers, rates: Numbers, p: Numbers) -> MotionPoint:
+        f, x, g, others = state[0], state[1], state[2], state[3:end]
+        value, _slope, shift, _shift_slope = strength(g, others, p)
+        psis = states_at(value, x, others, p)
+        return assemble_point(x, rates[1], (f, rates[0], g, rates[2]), psis, rates[:end], shift, p)
+
+    return point
+
+
+@cache
+def build_point_function_of_rigid_slider(friction_functions: FrictionFunctions) -> Function:
+    """Return a function for stress, slip rate and states of a rigid slider.
+
+    The spring stress f of a rigid slider is equal to the frictional stress g.
+    """
+    assemble_point = build_motion_point_assembling_function(friction_functions)
+    strength, states_at = friction_functions.strength, friction_functions.states_from_strength
+
+    def point(state: Numbers, rates: Numbers, p: Numbers) -> MotionPoint:
+        g, others, x = state[0], state[1:], p[-1]
+        value, _slope, shift, _shift_slope = strength(g, others, p)
+        psis = states_at(value, x, others, p)
+        return assemble_point(x, 0.0, (g, rates[0], g, rates[0]), psis, rates, shift, p)
+
+    return point

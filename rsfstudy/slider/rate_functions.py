@@ -1,0 +1,194 @@
+r"""Rates of the unknowns of a scene.
+
+Between ruptures, the unknowns are the spring stress :math:`f` and the states :math:`\Psi`. The
+independent variable :math:`\delta` is slip plus load point displacement,
+:math:`d\delta = (V + V_0) \, dt`:
+
+.. math::
+
+    \frac{df}{d\delta} = \frac{K (V_0 - V)}{V + V_0}, \qquad
+    \frac{d\Psi}{d\delta} = \frac{V}{V + V_0} \frac{d\Psi}{d(\mathrm{slip})}, \qquad
+    \frac{dt}{d\delta} = \frac{1}{V + V_0}.
+
+The dynamics of the scene determine the slip rate from :math:`f` and :math:`\Psi`. In ruptures, the
+independent variable of the equations of motion with inertia is inertial time, which is time in
+units of :math:`T/(2 \pi)`. Both regimes are integrated along the path length that the module
+``path_length`` defines.
+
+The slip rate of a rigid slider is prescribed, and slip is the independent variable.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from functools import cache
+
+from rsfstudy.slider.friction import FrictionFunctions
+from rsfstudy.slider.parameter_layout import LOAD_VELOCITY, MU_STAR, STIFFNESS, A
+from rsfstudy.slider.parts import Function, Numbers
+from rsfstudy.slider.path_length import (
+    LOG_SLIP_RATE_PER_PATH_LENGTH,
+    VelocityRatios,
+    displacement_per_path_length,
+    time_per_displacement,
+    velocity_ratios,
+)
+from rsfstudy.slider.state_functions import build_tuple_scaling_function
+
+
+def build_displacement_rate_function(
+    friction_functions: FrictionFunctions,
+    force_balance_function: Function,
+    *,
+    allows_reversed_slip: bool,
+) -> Function:
+    r"""Return a function for the rates with respect to displacement.
+
+    The returned function ``(state, p)`` computes the rate of the spring stress, the rates of the
+    states and the output of `velocity_ratios`.
+
+    Notes
+    -----
+    If slip may reverse, the displacement is the sum of the magnitudes of slip and load point
+    displacement, and :math:`df/d\delta = K (V_0 - V)/(|V| + |V_0|)`. The slip rate :math:`V` has
+    the sign of the shear stress.
+    """
+    evolutions, imposed, end = (
+        friction_functions.evolutions,
+        friction_functions.load_point_stress,
+        1 + friction_functions.state_count,
+    )
+
+    def forward_rates(state: Numbers, p: Numbers) -> tuple[float, Numbers, VelocityRatios]:
+        psis = state[1:end]
+        log_slip_rate, _g, shift = force_balance_function(state[0], psis, p)
+        ratios = velocity_ratios(log_slip_rate, p)
+        x, slower, fraction = ratios
+        loading = p[STIFFNESS] * (slower - 1.0) * fraction
+        return loading, evolutions(x, psis, shift, fraction, p), ratios
+
+    def reversible_rates(state: Numbers, p: Numbers) -> tuple[float, Numbers, VelocityRatios]:
+        _loading, changes, ratios = forward_rates(state, p)
+        _x, slower, fraction = ratios
+        slip = math.copysign(1.0, p[MU_STAR] + state[0] + imposed(state[1:end], p))
+        load = math.copysign(slower, p[LOAD_VELOCITY])
+        return p[STIFFNESS] * (load - slip) * fraction, changes, ratios
+
+    return reversible_rates if allows_reversed_slip else forward_rates
+
+
+@cache
+def build_rate_functions_between_ruptures(
+    friction_functions: FrictionFunctions,
+    force_balance_function: Function,
+    *,
+    allows_reversed_slip: bool,
+) -> tuple[Function, Function, Function]:
+    """Return the rate functions of a scene between ruptures.
+
+    Parameters
+    ----------
+    friction_functions : FrictionFunctions
+        Friction functions of the scene.
+    force_balance_function : callable
+        Function ``(spring, psis, p)`` of the dynamics (see ``Dynamics``).
+    allows_reversed_slip : bool
+        Whether slip and the load point may reverse.
+
+    Returns
+    -------
+    rates_by_displacement, rates_along_path, rates_along_path_with_time : callable
+        Functions ``(state, p) -> tuple`` that return the derivatives of the spring stress and the
+        states. The third function appends the derivative of time.
+    """
+    state_sum, times = (
+        friction_functions.state_sum,
+        build_tuple_scaling_function(friction_functions.state_count),
+    )
+    displacement_rate_function = build_displacement_rate_function(
+        friction_functions, force_balance_function, allows_reversed_slip=allows_reversed_slip
+    )
+
+    def rates_by_displacement(state: Numbers, p: Numbers) -> Numbers:
+        loading, changes, _ratios = displacement_rate_function(state, p)
+        return (loading, *changes)
+
+    def rates_along_path(state: Numbers, p: Numbers) -> Numbers:
+        loading, changes, _ratios = displacement_rate_function(state, p)
+        along = displacement_per_path_length(
+            (loading - state_sum(changes)) / (LOG_SLIP_RATE_PER_PATH_LENGTH * p[A])
+        )
+        return (along * loading, *times(changes, along))
+
+    def rates_along_path_with_time(state: Numbers, p: Numbers) -> Numbers:
+        loading, changes, ratios = displacement_rate_function(state, p)
+        along = displacement_per_path_length(
+            (loading - state_sum(changes)) / (LOG_SLIP_RATE_PER_PATH_LENGTH * p[A])
+        )
+        return (along * loading, *times(changes, along), along * time_per_displacement(ratios, p))
+
+    return rates_by_displacement, rates_along_path, rates_along_path_with_time
+
+
+@cache
+def build_rate_functions_in_rupture(
+    friction_functions: FrictionFunctions,
+    build_rupture_rate_function: Callable[[FrictionFunctions], Function],
+) -> tuple[Function, Function, Function]:
+    r"""Return the rate functions of a scene in ruptures.
+
+    Parameters
+    ----------
+    friction_functions : FrictionFunctions
+        Friction functions of the scene.
+    build_rupture_rate_function : callable
+        Function of the dynamics that builds the rates with respect to inertial time (see
+        ``Dynamics``).
+
+    Returns
+    -------
+    rates_by_time, rates_along_path, rates_along_path_with_time : callable
+        Functions ``(state, p) -> tuple`` that return the derivatives of the spring stress f, of
+        :math:`x = \ln(V/V_*)`, of the frictional stress g and of all states except the first. The
+        third function appends the derivative of inertial time.
+    """
+    rupture_rate_function = build_rupture_rate_function(friction_functions)
+    end = 2 + friction_functions.state_count
+    times = build_tuple_scaling_function(end)
+
+    def rates_along_path(state: Numbers, p: Numbers) -> Numbers:
+        by = rupture_rate_function(state, p)
+        return times(by, displacement_per_path_length(by[1] / LOG_SLIP_RATE_PER_PATH_LENGTH))
+
+    def rates_along_path_with_time(state: Numbers, p: Numbers) -> Numbers:
+        by = rupture_rate_function(state[:end], p)
+        along = displacement_per_path_length(by[1] / LOG_SLIP_RATE_PER_PATH_LENGTH)
+        return (*times(by, along), along)
+
+    return rupture_rate_function, rates_along_path, rates_along_path_with_time
+
+
+@cache
+def build_rate_function_of_rigid_slider(friction_functions: FrictionFunctions) -> Function:
+    r"""Return the rate function of a rigid slider.
+
+    The returned function ``(state, p) -> tuple`` computes the derivatives of g and all states
+    except the first with respect to slip. The log rate :math:`\ln(V/V_*)` is the last element of
+    ``p``.
+
+    Notes
+    -----
+    At a constant slip rate, the friction relation gives
+    :math:`\mathrm{strength}'(g) \, dg = d\Psi`.
+    """
+    strength, states_at = friction_functions.strength, friction_functions.states_from_strength
+    evolutions, contribution = friction_functions.evolutions, friction_functions.state_contribution
+
+    def rigid_rate(state: Numbers, p: Numbers) -> Numbers:
+        others = state[1:]
+        value, slope, shift, _shift_slope = strength(state[0], others, p)
+        changes = evolutions(p[-1], states_at(value, p[-1], others, p), shift, 1.0, p)
+        return (contribution(changes, state[0], others, p) / slope, *changes[1:])
+
+    return rigid_rate

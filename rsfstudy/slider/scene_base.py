@@ -1,0 +1,215 @@
+"""Base class of scenes, which presents the fields of the parts as attributes."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Any, Self
+
+from rsfstudy._deprecation import translate_former_member_name
+from rsfstudy.error_boundary import wrap_methods_in_error_boundary
+from rsfstudy.errors import InvalidValue
+from rsfstudy.quantities import HtmlTableMixin, Quantity
+from rsfstudy.slider.field_name_hints import hint_for_positional_argument
+from rsfstudy.slider.part_registry import (
+    FIELDS_OMITTED_IF_NONE,
+    PART_NAMES_OMITTED,
+    SLOTS_WITH_PART_CHOSEN_BY_NAME,
+    UserPart,
+    add_scene_fields_to_signature,
+    quantities_with_values,
+)
+from rsfstudy.slider.scene_assembly import (
+    FieldIndex,
+    SceneParts,
+    build_field_index,
+    build_parts,
+    find_inapplicable_fields,
+    find_user_parts,
+    replace_field_values,
+)
+from rsfstudy.slider.scene_caching import cached_attribute
+from rsfstudy.slider.slider_parameters import ALTERNATIVE_STIFFNESS_FIELDS
+
+#: Attributes of a scene that are used only inside the package and are hidden from ``dir``.
+_ATTRIBUTES_HIDDEN_FROM_DIR = frozenset(
+    {
+        "field_index",
+        "cache",
+        "friction_functions",
+        "parameter_values",
+        "friction_parameter_values",
+        "with_segment",
+        "quantities_with_values",
+    }
+)
+
+
+@wrap_methods_in_error_boundary
+class SceneBase(HtmlTableMixin):
+    """Base class of scenes, which provides the fields of the parts.
+
+    The fields of all parts are attributes of the scene.
+
+    Parameters
+    ----------
+    parts : SceneParts, optional
+        Parts of the scene. By default the parts are built from the fields.
+    **given : object
+        Values of the fields.
+    """
+
+    parts: SceneParts
+
+    def __init__(self, parts: SceneParts | None = None, /, **given: Any) -> None:
+        """Build and check the parts of the scene."""
+        if parts is None:
+            parts = build_parts(given)
+        elif not isinstance(parts, SceneParts):
+            raise value_without_field_name_error(parts)
+        object.__setattr__(self, "parts", parts)
+        self._check()
+
+    def _check(self) -> None:
+        """Raise ``InvalidValue`` if the parts are incompatible."""
+
+    def __getattr__(self, name: str) -> Any:
+        """Return the value of a field of one of the parts."""
+        if name.startswith("_"):
+            raise AttributeError(name)
+        layout = self.field_index
+        if name in layout.part_index_by_field:
+            return getattr(self.parts[layout.part_index_by_field[name]], name)
+        if name in layout.names_of_slots_chosen_by_name:
+            return getattr(self.parts, name).name
+        if name in layout.values_of_inactive_fields:
+            return layout.values_of_inactive_fields[name]
+        if (new := translate_former_member_name(SceneBase, name)) == name:
+            raise AttributeError(f"a {SceneBase.__name__} has no field or attribute {name!r}")
+        return getattr(self, new)
+
+    def __repr__(self) -> str:
+        """Return the call that creates the scene."""
+        return f"Scene({', '.join(f'{k}={v!r}' for k, v in self.as_dict().items())})"
+
+    def __dir__(self) -> list[str]:
+        """Return the names of the public attributes, without inapplicable fields."""
+        # Fields without a value may be properties that are computed from other fields.
+        stated = {name for name, value in self.as_dict().items() if value is not None}
+        names = {*super().__dir__(), *stated} - _ATTRIBUTES_HIDDEN_FROM_DIR
+        return [name for name in names if not name.startswith("_")]
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Return the arguments for unpickling."""
+        return type(self), (self.parts,)
+
+    @cached_attribute
+    def field_index(self) -> FieldIndex:
+        """Index that assigns the fields to the parts."""
+        return build_field_index(tuple(map(type, self.parts[1:])))
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return the fields as plain Python values.
+
+        Returns
+        -------
+        dict of str to object
+            Values by field name.
+        """
+        values = dict(self.field_index.values_of_inactive_fields)
+        for name in self.field_index.names_of_slots_chosen_by_name:
+            values[name] = getattr(self.parts, name).name
+        for part in self.parts:
+            values |= vars(part)
+        kept = (
+            n
+            for n in self.field_index.all_field_names
+            if n not in FIELDS_OMITTED_IF_NONE or values[n] is not None
+        )
+        return {
+            name: values[name] for name in kept if values[name] != PART_NAMES_OMITTED.get(name, "")
+        }
+
+    def describe(self) -> dict[str, Any]:
+        """Return the fields and the history of a user-defined loading.
+
+        Returns
+        -------
+        dict of str to object
+            Values by field name. A protocol adds its segments in the format that ``protocol``
+            accepts, and a sampled history adds the digest of its samples.
+        """
+        history = (
+            self.parts.loading.describe()
+            if "loading" in self.field_index.names_of_slots_chosen_by_name
+            else {}
+        )
+        return self.as_dict() | history
+
+    @property
+    def user_parts(self) -> tuple[UserPart, ...]:
+        """User-defined parts of the scene."""
+        return tuple(find_user_parts(self.parts).values())
+
+    def quantities_with_values(self) -> Iterator[tuple[Quantity, object]]:
+        """Iterate over the fields that have a value.
+
+        Returns
+        -------
+        iterator of (Quantity, object)
+            Pairs of a quantity and the value of the field.
+        """
+        return quantities_with_values(self.as_dict(), self.user_parts)
+
+    @add_scene_fields_to_signature()
+    def with_(self, **changes: Any) -> Self:
+        """Return a copy of the scene with new values of some fields.
+
+        The values of the copy are checked. If a change replaces a part, the fields that do not
+        apply to the new part are dropped. Setting ``stiffness`` replaces ``stiffness_ratio``, and
+        vice versa.
+
+        Parameters
+        ----------
+        **changes : object
+            New values by field name.
+
+        Returns
+        -------
+        Scene
+            New scene.
+
+        Raises
+        ------
+        InvalidValue
+            If a value is invalid in the new scene.
+        """
+        if all(
+            n in self.field_index.fields_not_selecting_a_part and value is not None
+            for n, value in changes.items()
+        ):
+            return type(self)(replace_field_values(self.parts, changes))
+        theirs = find_user_parts(self.parts)
+        kept = {**self.as_dict(), **theirs}
+        dropped = find_inapplicable_fields({**kept, **changes}, theirs.values())
+        if any(changes.get(name) is not None for name in ALTERNATIVE_STIFFNESS_FIELDS):
+            dropped |= {*ALTERNATIVE_STIFFNESS_FIELDS}
+        return type(self)(**{name: kept[name] for name in kept if name not in dropped} | changes)
+
+
+def value_without_field_name_error(value: Any) -> InvalidValue:
+    """Return the error for a positional argument of ``Scene``.
+
+    Parameters
+    ----------
+    value : object
+        Value of the argument.
+
+    Returns
+    -------
+    InvalidValue
+        Error whose message suggests the name of the field.
+    """
+    remedy = hint_for_positional_argument(
+        value, {slot.name: slot.built_in_parts for slot in SLOTS_WITH_PART_CHOSEN_BY_NAME}
+    )
+    return InvalidValue("Scene", value, "is given without a name", remedy=remedy)
