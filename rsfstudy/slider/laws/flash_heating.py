@@ -141,7 +141,7 @@ class FlashHeatingLaw(Law):
         0.2,
         "$f_w$",
         "1",
-        "friction coefficient of contacts that flash heating has weakened",
+        "friction coefficient of weakened contacts",
         rule=NON_NEGATIVE,
         omit_if_none=True,
     )

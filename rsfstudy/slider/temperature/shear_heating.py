@@ -103,7 +103,7 @@ class ShearHeating(Temperature):
         1.0,
         "$c_{th}D_c/V_*$",
         "1",
-        "rate at which the fault cools",
+        "cooling rate of the fault",
         "V_*/D_c",
         rule=POSITIVE,
         remedy="Nearly adiabatic is a small number, and without cooling there is no steady state.",
