@@ -14,27 +14,28 @@ import xarray as xr
 
 from rsfstudy import Axis, Claim, Figure, Panel, Study
 from rsfstudy.measures import RigidResponse
+from rsfstudy.study.figure_declarations import Axes
 
 from ._heat import PRESSURE_REFERENCES, PRESSURISED_FAULT, RICE
 
 _MU_STAR = 0.6
 
 
-def closed_form(row: xr.Dataset) -> tuple[np.ndarray, np.ndarray]:
-    """Compute the undrained pore pressure.
+def plot_closed_forms(dataset: xr.Dataset, axes: Axes) -> None:
+    """Draw the undrained pore pressure in closed form.
 
     Parameters
     ----------
-    row : xarray.Dataset
-        Results for one heating and one drainage rate.
-
-    Returns
-    -------
-    tuple of ndarray
-        Slip in D_c and pore pressure in sigma_*.
+    dataset : xarray.Dataset
+        Results of the study.
+    axes : matplotlib.axes.Axes
+        Axes to draw on.
     """
-    slip = np.linspace(0.0, float(row["slip"].max()), 200)
-    return slip, -np.expm1(-_MU_STAR * float(row["heating"]) * slip)
+    slip = np.linspace(0.0, float(dataset["slip"].max()), 21)
+    for number, heating in enumerate(dataset["heating"].values.tolist()):
+        label = r"$1 - \exp(-F E \delta)$" if number == 0 else None
+        pressure = -np.expm1(-_MU_STAR * heating * slip)
+        axes.plot(slip, pressure, "o", color="0.4", fillstyle="none", markersize=4, label=label)
 
 
 def pressure_claim(heating: float, slip: float) -> Claim:
@@ -72,11 +73,10 @@ figure = Figure(
             x="slip",
             y=lambda row: 1.0 - row["normal_stress_ratio"],
             hue=["heating", "drainage"],
-            fit_line=closed_form,
-            style={"markersize": 2, "markevery": 10},
+            overlays=[plot_closed_forms],
             x_label=r"Slip, $\delta/D_c$",
             y_label=r"Pore pressure, $P = (p-p_\infty)/\sigma_*$",
-            title="Points: computed; lines: undrained closed form",
+            title="Points: undrained closed form",
         )
     ],
     height=80.0,
