@@ -31,6 +31,7 @@ if TYPE_CHECKING:
     from rsfstudy.api.study_runs import studies as studies
     from rsfstudy.axes.axis import Axis as Axis
     from rsfstudy.motion.accuracy import Accuracy as Accuracy
+    from rsfstudy.motion.integrator import Integrator as Integrator
     from rsfstudy.plots._motion import plot_motion as plot_motion
     from rsfstudy.rig.protocol_files import history as history
     from rsfstudy.rig.protocol_files import read_protocol as read_protocol
@@ -62,6 +63,7 @@ _LAZY_EXPORTS = {
     "study.claims": ("Claim",),
     "study.figure_declarations": ("Figure", "Panel"),
     "motion.accuracy": ("Accuracy",),
+    "motion.integrator": ("Integrator",),
     "api.study_runs": (
         "run",
         "rerun",

@@ -162,11 +162,13 @@ def _wrap_in_error_boundary(
 
     If ``is_constructor`` is True, NumPy numbers are converted to Python numbers, which can be
     stored in files, and the arguments are also checked against their annotations. The arguments are
-    checked after the call, because the errors that the function itself raises are more specific.
+    checked after the call, because the errors that the function itself raises are more specific. If
+    the function has an attribute ``convert_arguments``, this callable converts former arguments.
     """
     signature = inspect.signature(inspect.unwrap(function))
     name = function.__qualname__.removesuffix(".__init__").removesuffix(".__new__")
     remedy = f"See the documentation of {name}."
+    convert_arguments = getattr(function, "convert_arguments", None)
 
     def bind(args: tuple[Any, ...], options: dict[str, Any]) -> dict[str, Any]:
         try:
@@ -183,6 +185,8 @@ def _wrap_in_error_boundary(
     def wrapper(
         *args: FunctionParameters.args, **options: FunctionParameters.kwargs
     ) -> FunctionResult:
+        if convert_arguments:
+            args, options = convert_arguments(args, options)
         if is_constructor:
             args = tuple(map(convert_numpy_number, args))  # type: ignore[assignment]
             options = {key: convert_numpy_number(value) for key, value in options.items()}  # type: ignore[assignment]

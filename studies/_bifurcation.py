@@ -12,7 +12,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from rsfstudy import Accuracy, Scene, Segment
+from rsfstudy import Scene, Segment
 from rsfstudy.errors import InvalidValue
 from rsfstudy.limit_cycles.limit_cycle import (
     EVENTS_PER_PERIOD_OUTPUT,
@@ -33,7 +33,7 @@ from rsfstudy.limit_cycles.return_map import (
 from rsfstudy.limit_cycles.stick_slip_cycles import LN10, Cycle, suggest_raising_event_limit
 from rsfstudy.measure_base import check_loading_changes_stress_only_in_steps
 from rsfstudy.measures import Measure, Outcome, Output, Quantity, Status
-from rsfstudy.motion import WorkMeter, estimate_error
+from rsfstudy.motion import Integrator
 
 #: Lower bound of error estimates, relative to the requested accuracy. Without this bound, the error
 #: estimate would be too small if two runs agree by chance.
@@ -158,7 +158,7 @@ class Bifurcation(Measure):
         """Coordinate values of the dimension ``event``."""
         return {"event": np.arange(1, self.events + 1)}
 
-    def compute(self, scene: Scene, accuracy: Accuracy, meter: WorkMeter) -> Outcome:
+    def compute(self, scene: Scene, integrator: Integrator) -> Outcome:
         """Integrate the motion event by event, and find the period-one cycle.
 
         The period-one cycle is computed at two accuracies to estimate its errors.
@@ -167,10 +167,8 @@ class Bifurcation(Measure):
         ----------
         scene : Scene
             Parameters of the slider.
-        accuracy : Accuracy
-            Requested accuracy.
-        meter : WorkMeter
-            Counter of right-hand-side evaluations.
+        integrator : Integrator
+            Integrator with the requested accuracy.
 
         Returns
         -------
@@ -183,15 +181,15 @@ class Bifurcation(Measure):
         if not scene.is_perturbed:
             scene = scene.with_segment(Segment(1.0, INITIAL_PERTURBATION_DISPLACEMENT))
         motion = follow_to_periodic_orbit(
-            scene, accuracy, meter, self.transient + self.events, follow_all_cycles=True
+            scene, integrator, self.transient + self.events, follow_all_cycles=True
         )
         if motion is None:
             return STEADY_SLIDING_OUTCOME
         values = self._event_outputs(scene, motion.cycles[-self.events :])
-        status, why, of_one = _one_event_cycle_outputs(scene, accuracy, motion, meter)
+        status, why, of_one = _one_event_cycle_outputs(scene, integrator, motion)
         values |= of_one
         if motion.orbit is None:
-            growth = _mean_growth(ReturnMap(scene, accuracy, meter), motion.cycles, self.events)
+            growth = _mean_growth(ReturnMap(scene, integrator), motion.cycles, self.events)
             values |= zip(("lyapunov_exponent", "lyapunov_exponent_stderr"), growth, strict=True)
             remedy = suggest_raising_event_limit(max(self.transient, self.events), "transient")
             ended = outcome_of_aperiodic_motion(scene, motion, remedy)
@@ -216,7 +214,7 @@ class Bifurcation(Measure):
 
 
 def _one_event_cycle_outputs(
-    scene: Scene, accuracy: Accuracy, motion: StickSlipSequence, meter: WorkMeter
+    scene: Scene, integrator: Integrator, motion: StickSlipSequence
 ) -> tuple[Status, str, dict[str, float | np.ndarray]]:
     """Compute the results of the period-one cycle.
 
@@ -224,12 +222,10 @@ def _one_event_cycle_outputs(
     ----------
     scene : Scene
         Parameters of the slider.
-    accuracy : Accuracy
-        Requested accuracy.
+    integrator : Integrator
+        Integrator with the requested accuracy.
     motion : EventSequence
         Cycles of the motion.
-    meter : WorkMeter
-        Counter of right-hand-side evaluations.
 
     Returns
     -------
@@ -240,20 +236,21 @@ def _one_event_cycle_outputs(
     values : dict of str to float
         Results of the cycle. The dictionary is empty if no period-one cycle is found.
     """
-    one = _find_one_event_cycle(ReturnMap(scene, accuracy, meter), motion.cycles)
+    one = _find_one_event_cycle(ReturnMap(scene, integrator), motion.cycles)
     if one is None:
         return Status.OK, "", {}
-    again = ReturnMap(scene, accuracy.refined(), meter).find_periodic_orbit(
+    again = ReturnMap(scene, integrator.refined()).find_periodic_orbit(
         one.start_section_coordinates, 1, one.cycles[0].log_slip_rate_range
     )
     if again is None:
         return Status.OK, "", {}
     (first, *_), (same, *_) = one.floquet_multipliers, again.floquet_multipliers
-    chance = _COINCIDENCE_FLOOR * accuracy.rtol
-    errors = estimate_primary_output_errors(accuracy, one, again)
+    errors = estimate_primary_output_errors(integrator, one, again)
     values: dict[str, float | np.ndarray] = {
         "floquet_multiplier": float(first.real),
-        "floquet_multiplier_error": estimate_error(first.real, same.real, chance),
+        "floquet_multiplier_error": integrator.estimate_error(
+            first.real, same.real, _COINCIDENCE_FLOOR
+        ),
         "floquet_multiplier_imaginary": float(abs(first.imag)),
         "floquet_multiplier_size": float(abs(first)),
         "one_event_log10_peak": float(
@@ -262,7 +259,7 @@ def _one_event_cycle_outputs(
         "one_event_log10_peak_error": float(errors[INDEX_OF_PEAK_SLIP_RATE_OUTPUT]),
     }
     return *status_from_output_errors(
-        accuracy,
+        integrator,
         one,
         errors,
         slice(INDEX_OF_PEAK_SLIP_RATE_OUTPUT, INDEX_OF_PEAK_SLIP_RATE_OUTPUT + 1),

@@ -15,7 +15,7 @@ import numpy as np
 from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 
-from rsfstudy import Accuracy, Scene, Segment
+from rsfstudy import Scene, Segment
 from rsfstudy.errors import InvalidValue
 from rsfstudy.limit_cycles.limit_cycle_search import LimitCycleSearch
 from rsfstudy.limit_cycles.return_map import ReturnMap
@@ -23,9 +23,7 @@ from rsfstudy.measures import Measure, Outcome, Output, Status
 from rsfstudy.motion import (
     Event,
     EventSpecification,
-    WorkMeter,
-    estimate_error,
-    integrate_events,
+    Integrator,
     rise,
 )
 from rsfstudy.slider import MotionPoint
@@ -102,7 +100,7 @@ class ClockAdvance(Measure):
         if not 0.0 < self.cycle_phase < 1.0:
             raise InvalidValue("cycle_phase", self.cycle_phase, "must lie between 0 and 1")
 
-    def compute(self, scene: Scene, accuracy: Accuracy, meter: WorkMeter) -> Outcome:
+    def compute(self, scene: Scene, integrator: Integrator) -> Outcome:
         """Compute the clock advance and its error estimate.
 
         The error estimate is based on a second run with smaller tolerances.
@@ -111,10 +109,8 @@ class ClockAdvance(Measure):
         ----------
         scene : Scene
             Parameters of the slider.
-        accuracy : Accuracy
-            Requested accuracy.
-        meter : WorkMeter
-            Counter of right-hand-side evaluations.
+        integrator : Integrator
+            Integrator with the requested accuracy.
 
         Returns
         -------
@@ -124,20 +120,21 @@ class ClockAdvance(Measure):
         """
         if not isinstance(scene.parts.loading, NormalStressOscillation):
             return Outcome(Status.NO_STEP, message="normal stress does not oscillate")
-        runs = [self._find_next_event(scene, how, meter) for how in (accuracy, accuracy.refined())]
+        runs = [self._find_next_event(scene, each) for each in (integrator, integrator.refined())]
         one, again = runs
         if one is None or again is None:
             why = "the motion settles to steady sliding"
             return Outcome(Status.NO_LIMIT_CYCLE, message=why)
-        chance = _COINCIDENCE_FLOOR * accuracy.rtol
         errors = {
-            f"{name}_error": estimate_error(getattr(one, name), getattr(again, name), chance, scale)
+            f"{name}_error": integrator.estimate_error(
+                getattr(one, name), getattr(again, name), _COINCIDENCE_FLOOR, scale
+            )
             for name, scale in (("clock_advance", one.recurrence_interval), (INTERVAL, None))
         }
         values = {
             "clock_advance": one.clock_advance,
             INTERVAL: one.recurrence_interval,
-            "linear_clock_advance": _linear_clock_advance(scene, one, meter),
+            "linear_clock_advance": _linear_clock_advance(scene, one, integrator),
             "coulomb_clock_advance": _coulomb_clock_advance(scene, one),
         }
         ratios = {
@@ -166,19 +163,15 @@ class ClockAdvance(Measure):
         """
         return dict.fromkeys(("clock_advance", INTERVAL), 2.0 * values[INTERVAL])
 
-    def _find_next_event(
-        self, scene: Scene, accuracy: Accuracy, meter: WorkMeter
-    ) -> "_NextEvent | None":
+    def _find_next_event(self, scene: Scene, integrator: Integrator) -> "_NextEvent | None":
         """Find the next event after the train has begun.
 
         Parameters
         ----------
         scene : Scene
             Parameters of the slider.
-        accuracy : Accuracy
-            Requested accuracy.
-        meter : WorkMeter
-            Counter of right-hand-side evaluations.
+        integrator : Integrator
+            Integrator with the requested accuracy.
 
         Returns
         -------
@@ -186,16 +179,14 @@ class ClockAdvance(Measure):
             Next event. The value is None if there is no stick-slip motion.
         """
         free = scene.with_segment(Segment(scene.load_velocity))
-        cycle = _find_free_cycle(free, accuracy, meter)
+        cycle = _find_free_cycle(free, integrator)
         if cycle is None:
             return None
         start, (first, second) = cycle
         begins = first + self.cycle_phase * (second - first)
-        *_earlier, begin = integrate_events(free, accuracy, meter, start=start, until=begins)
+        *_earlier, begin = integrator.follow(free, start=start, until=begins)
         forced, watches = scene.with_(oscillation_begin=begins), _event_specifications(scene)
-        (comes,) = _event_times(
-            integrate_events(forced, accuracy, meter, watches, resume_from=begin), 1
-        )
+        (comes,) = _event_times(integrator.follow(forced, watches, resume_from=begin), 1)
         onset = start.friction_coefficient
         return _NextEvent(second - first, second - comes, second - begins, begin.point, onset)
 
@@ -226,7 +217,7 @@ class _NextEvent(NamedTuple):
 
 
 def _find_free_cycle(
-    free: Scene, accuracy: Accuracy, meter: WorkMeter
+    free: Scene, integrator: Integrator
 ) -> tuple[MotionPoint, tuple[float, float]] | None:
     """Find the limit cycle without waves.
 
@@ -234,10 +225,8 @@ def _find_free_cycle(
     ----------
     free : Scene
         Scene without waves.
-    accuracy : Accuracy
-        Requested accuracy.
-    meter : WorkMeter
-        Counter of right-hand-side evaluations.
+    integrator : Integrator
+        Integrator with the requested accuracy.
 
     Returns
     -------
@@ -246,15 +235,13 @@ def _find_free_cycle(
         the motion settles to steady sliding.
     """
     nudged = free.with_segment(Segment(free.load_velocity, START_DISPLACEMENT_STEP))
-    approach = LimitCycleSearch(nudged, accuracy, meter)
+    approach = LimitCycleSearch(nudged, integrator)
     if not approach.follow_until_converged(MAX_EVENTS):
         return None
-    start = ReturnMap(free, accuracy, meter).section_coordinates_to_point(
+    start = ReturnMap(free, integrator).section_coordinates_to_point(
         approach.orbit.start_section_coordinates
     )
-    motion = integrate_events(
-        free, accuracy, meter, _event_specifications(free), start=start, with_time=True
-    )
+    motion = integrator.follow(free, _event_specifications(free), start=start, with_time=True)
     begin = next(motion).point  # The first event holds the fully evaluated point.
     first, second = _event_times(motion, 2)
     return begin, (first, second)
@@ -304,7 +291,7 @@ def _normal_stress_change(scene: Scene) -> Callable[[float], float]:
     return train
 
 
-def _linear_clock_advance(scene: Scene, found: _NextEvent, meter: WorkMeter) -> float:
+def _linear_clock_advance(scene: Scene, found: _NextEvent, integrator: Integrator) -> float:
     r"""Compute the clock advance to first order in the amplitude of the waves.
 
     The perturbations of the spring stress :math:`f` and of the state :math:`\Psi` are integrated
@@ -329,8 +316,8 @@ def _linear_clock_advance(scene: Scene, found: _NextEvent, meter: WorkMeter) -> 
         Parameters of the slider.
     found : _NextEvent
         Event after the beginning of the train.
-    meter : WorkMeter
-        Counter of right-hand-side evaluations.
+    integrator : Integrator
+        Integrator that counts right-hand-side evaluations.
 
     Returns
     -------
@@ -398,7 +385,7 @@ def _linear_clock_advance(scene: Scene, found: _NextEvent, meter: WorkMeter) -> 
     ):
         steps = {"rtol": 1e-7, "atol": 1e-10, "max_step": longest}
         run = solve_ivp(rate, (begin, end), y, "DOP853", events=fast, **steps)
-        meter.charge("linear", run.nfev)
+        integrator.work_meter.charge("linear", run.nfev)
         y = run.y[:, -1]
         if run.status == 1:
             break

@@ -9,10 +9,10 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import ClassVar
 
-from rsfstudy import Accuracy, Scene
+from rsfstudy import Scene
 from rsfstudy.critical_steps.motion_after_step import is_linearly_stable
 from rsfstudy.measures import CriticalStep, Measure, Outcome, Output, Status
-from rsfstudy.motion import WorkMeter
+from rsfstudy.motion import Integrator
 from rsfstudy.slider import effective_friction
 
 #: Triggers in the order of computation. The decrease of normal stress comes first, because a scene
@@ -118,17 +118,15 @@ class Triggers(Measure):
         """Relative number of right-hand-side evaluations for each requested accuracy."""
         return _NORMAL_STRESS_FALL.work_by_digits
 
-    def compute(self, scene: Scene, accuracy: Accuracy, meter: WorkMeter) -> Outcome:
+    def compute(self, scene: Scene, integrator: Integrator) -> Outcome:
         """Compute the critical steps and the corresponding stress changes.
 
         Parameters
         ----------
         scene : Scene
             Parameters of the slider.
-        accuracy : Accuracy
-            Requested accuracy.
-        meter : WorkMeter
-            Counter of right-hand-side evaluations.
+        integrator : Integrator
+            Integrator with the requested accuracy.
 
         Returns
         -------
@@ -139,9 +137,7 @@ class Triggers(Measure):
         coupling = scene.parts.normal_stress.coupling
         if why or coupling is None:
             return Outcome(Status.NOT_APPLICABLE, message=f"{why} has no one effective friction")
-        found = {
-            trigger: _find_critical_step(trigger, scene, accuracy, meter) for trigger in TRIGGERS
-        }
+        found = {trigger: _find_critical_step(trigger, scene, integrator) for trigger in TRIGGERS}
         values: dict[str, float] = {}
         for trigger, outcome in found.items():
             numbers = {n: float(v) for n, v in outcome.values.items() if n in self.variables}
@@ -182,9 +178,7 @@ def _reason_without_effective_friction(scene: Scene) -> str:
     return f"a fault that is {fluid.name}" if fluid.unknowns else ""
 
 
-def _find_critical_step(
-    trigger: CriticalStep, scene: Scene, accuracy: Accuracy, meter: WorkMeter
-) -> Outcome:
+def _find_critical_step(trigger: CriticalStep, scene: Scene, integrator: Integrator) -> Outcome:
     """Find a critical step.
 
     If steady sliding at V_* is unstable, every velocity step triggers an instability, and the
@@ -196,10 +190,8 @@ def _find_critical_step(
         Critical step to search for.
     scene : Scene
         Parameters of the slider.
-    accuracy : Accuracy
-        Requested accuracy.
-    meter : WorkMeter
-        Counter of right-hand-side evaluations.
+    integrator : Integrator
+        Integrator with the requested accuracy.
 
     Returns
     -------
@@ -209,7 +201,7 @@ def _find_critical_step(
     if trigger is _VELOCITY_STEP and not is_linearly_stable(_without_steps(scene)):
         text = "steady sliding at V_* is unstable already"
         return Outcome(Status.UNSTABLE_AT_ANY_STEP, message=text)
-    return trigger.run_nested(scene, accuracy, meter)
+    return trigger.run_nested(scene, integrator)
 
 
 def _without_steps(scene: Scene) -> Scene:

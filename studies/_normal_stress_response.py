@@ -14,12 +14,12 @@ from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 
-from rsfstudy import Accuracy, Scene
+from rsfstudy import Scene
 from rsfstudy.errors import InvalidValue
 from rsfstudy.measure_base import RecordingMeasure, create_outputs_along_phase
 from rsfstudy.measure_base._recorded_motion import VARIABLES_RECORDED_ALONG_PHASE
 from rsfstudy.measures import Outcome, Output, Status
-from rsfstudy.motion import Event, WorkMeter, integrate_events
+from rsfstudy.motion import Event, Integrator
 from rsfstudy.responses import estimate_errors_at_instants
 from rsfstudy.slider import MotionPoint, linear_growth_rates, steady_sliding
 from rsfstudy.slider.loading.oscillation import NormalStressOscillation
@@ -292,7 +292,7 @@ class NormalStressResponse(RecordingMeasure):
             "departure_from_linear": size / values["linear_gain"],
         }
 
-    def compute(self, scene: Scene, accuracy: Accuracy, meter: WorkMeter) -> Outcome:
+    def compute(self, scene: Scene, integrator: Integrator) -> Outcome:
         """Compute the response, and estimate its errors from a second motion.
 
         The second motion is integrated with smaller tolerances.
@@ -301,10 +301,8 @@ class NormalStressResponse(RecordingMeasure):
         ----------
         scene : Scene
             Parameters of the slider.
-        accuracy : Accuracy
-            Requested accuracy.
-        meter : WorkMeter
-            Counter of right-hand-side evaluations.
+        integrator : Integrator
+            Integrator with the requested accuracy.
 
         Returns
         -------
@@ -340,22 +338,22 @@ class NormalStressResponse(RecordingMeasure):
         # periods begins, and must have decayed when the comparison ends.
         faint, over = (
             -math.log(_REMAINING_TRANSIENT * part) * fold
-            for part in (_REPETITION_RTOL, accuracy.rtol)
+            for part in (_REPETITION_RTOL, integrator.rtol)
         )
         waits = math.ceil(max(faint, over - _COMPARED_PERIODS))
-        start, repeats = self._find_repetition(scene, waits, accuracy, meter)
+        start, repeats = self._find_repetition(scene, waits, integrator)
         if not repeats:
             why = f"it repeats itself after none of 1 to {_MAX_RESPONSE_PERIODS} periods of forcing"
             return Outcome(Status.NOT_PERIODIC, {**by_theory, "settled": 0.0}, why)
         way = _ResponsePeriod(period * repeats, repeats, fold / repeats)
-        first, last = self._resolve(scene, start, way, accuracy, meter)
-        finer, instants = accuracy.refined(), len(last.spring_stress)
-        start, same = self._find_repetition(scene, waits, finer, meter)
-        _first, again = self._record_twice(scene, start, way, instants, finer, meter)
+        first, last = self._resolve(scene, start, way, integrator)
+        finer, instants = integrator.refined(), len(last.spring_stress)
+        start, same = self._find_repetition(scene, waits, finer)
+        _first, again = self._record_twice(scene, start, way, instants, finer)
         moved = abs(last.response / first.response - 1.0)
         values = _read_outputs(last, linear)
         values |= (
-            _estimate_errors(values, linear, last, again, moved, (scene, accuracy)) | by_theory
+            _estimate_errors(values, linear, last, again, moved, (scene, integrator)) | by_theory
         )
         values["response_period"] = float(repeats)
         values["settled"] = float(same == repeats and last.equals_in_median(first))
@@ -363,7 +361,7 @@ class NormalStressResponse(RecordingMeasure):
         return Outcome(Status.OK, {**values, **_record_outputs(scene, shown)})
 
     def _find_repetition(
-        self, scene: Scene, waits: int, accuracy: Accuracy, meter: WorkMeter
+        self, scene: Scene, waits: int, integrator: Integrator
     ) -> tuple[MotionPoint, int]:
         """Find the number of forcing periods after which the response repeats.
 
@@ -377,10 +375,8 @@ class NormalStressResponse(RecordingMeasure):
             Parameters of the slider.
         waits : int
             Number of forcing periods before the comparison.
-        accuracy : Accuracy
-            Requested accuracy.
-        meter : WorkMeter
-            Counter of right-hand-side evaluations.
+        integrator : Integrator
+            Integrator with the requested accuracy.
 
         Returns
         -------
@@ -390,11 +386,11 @@ class NormalStressResponse(RecordingMeasure):
             Response period in forcing periods. The number is zero if the response does not repeat.
         """
         period = scene.oscillation_period
-        *_earlier, begin = integrate_events(scene, accuracy, meter, until=waits * period)
+        *_earlier, begin = integrator.follow(scene, until=waits * period)
         point, way = begin.point, _ResponsePeriod(_COMPARED_PERIODS * period, _COMPARED_PERIODS)
         for _ in range(_MAX_REPETITION_CHECKS):
             seen = self._record_period(
-                scene, point, way, _COMPARED_PERIODS * _INSTANTS_PER_PERIOD, accuracy, meter
+                scene, point, way, _COMPARED_PERIODS * _INSTANTS_PER_PERIOD, integrator
             )
             point = seen.events[-1].point
             # The trend is not removed, because it is part of a response that repeats after three
@@ -415,8 +411,7 @@ class NormalStressResponse(RecordingMeasure):
         scene: Scene,
         start: MotionPoint,
         way: _ResponsePeriod,
-        accuracy: Accuracy,
-        meter: WorkMeter,
+        integrator: Integrator,
     ) -> tuple[_ResponseRecord, _ResponseRecord]:
         """Record the response with sufficient samples for the requested accuracy.
 
@@ -428,10 +423,8 @@ class NormalStressResponse(RecordingMeasure):
             State of the slider at the beginning of the first record.
         way : _ResponsePeriod
             Period of the response.
-        accuracy : Accuracy
-            Requested accuracy.
-        meter : WorkMeter
-            Counter of right-hand-side evaluations.
+        integrator : Integrator
+            Integrator with the requested accuracy.
 
         Returns
         -------
@@ -442,9 +435,9 @@ class NormalStressResponse(RecordingMeasure):
         instants = way.forcing_periods * self.samples
         most = _MAX_SAMPLE_REFINEMENT * instants
         while True:
-            first, last = self._record_twice(scene, start, way, instants, accuracy, meter)
+            first, last = self._record_twice(scene, start, way, instants, integrator)
             stressed = abs(last.response) * scene.oscillation_amplitude
-            allowed = accuracy.rtol * (1.0 + scene.a / stressed)
+            allowed = integrator.rtol * (1.0 + scene.a / stressed)
             if instants >= most or last.resolution_error <= allowed:
                 return first, last
             instants *= 2
@@ -455,8 +448,7 @@ class NormalStressResponse(RecordingMeasure):
         start: MotionPoint,
         way: _ResponsePeriod,
         instants: int,
-        accuracy: Accuracy,
-        meter: WorkMeter,
+        integrator: Integrator,
     ) -> tuple[_ResponseRecord, _ResponseRecord]:
         """Record the response at two times.
 
@@ -475,25 +467,23 @@ class NormalStressResponse(RecordingMeasure):
             Period of the response.
         instants : int
             Number of samples.
-        accuracy : Accuracy
-            Requested accuracy.
-        meter : WorkMeter
-            Counter of right-hand-side evaluations.
+        integrator : Integrator
+            Integrator with the requested accuracy.
 
         Returns
         -------
         tuple of _ResponseRecord
             First and second record.
         """
-        first = self._record_period(scene, start, way, instants, accuracy, meter)
+        first = self._record_period(scene, start, way, instants, integrator)
         point, between = first.events[-1].point, math.ceil(way.decay_time)
         while math.gcd(between, 6) > 1:
             between += 1
         if between > 1:
             wait = (between - 1) * way.duration
-            *_earlier, begin = integrate_events(scene, accuracy, meter, start=point, until=wait)
+            *_earlier, begin = integrator.follow(scene, start=point, until=wait)
             point = begin.point
-        return first, self._record_period(scene, point, way, instants, accuracy, meter)
+        return first, self._record_period(scene, point, way, instants, integrator)
 
     def _record_period(
         self,
@@ -501,8 +491,7 @@ class NormalStressResponse(RecordingMeasure):
         start: MotionPoint,
         way: _ResponsePeriod,
         instants: int,
-        accuracy: Accuracy,
-        meter: WorkMeter,
+        integrator: Integrator,
     ) -> _ResponseRecord:
         """Record the motion at regular intervals over one response period.
 
@@ -519,10 +508,8 @@ class NormalStressResponse(RecordingMeasure):
             Period of the response.
         instants : int
             Number of samples.
-        accuracy : Accuracy
-            Requested accuracy.
-        meter : WorkMeter
-            Counter of right-hand-side evaluations.
+        integrator : Integrator
+            Integrator with the requested accuracy.
 
         Returns
         -------
@@ -533,9 +520,7 @@ class NormalStressResponse(RecordingMeasure):
         time = slip = 0.0
         stride = way.duration / instants
         for _ in range(instants):
-            begin, *_others, end = integrate_events(
-                scene, accuracy, meter, start=start, until=stride
-            )
+            begin, *_others, end = integrator.follow(scene, start=start, until=stride)
             events = events or [begin]
             time, slip = time + end.time, slip + end.slip
             events.append(end._replace(time=time, slip=slip))
@@ -571,7 +556,7 @@ def _estimate_errors(
     record: _ResponseRecord,
     again: _ResponseRecord,
     moved: float,
-    asked: tuple[Scene, Accuracy],
+    asked: tuple[Scene, Integrator],
 ) -> dict[str, float]:
     """Estimate the errors of the results.
 
@@ -591,8 +576,8 @@ def _estimate_errors(
         Record of the second run.
     moved : float
         Relative difference of the response between the two records of the first run.
-    asked : tuple[Scene, Accuracy]
-        Scene and requested accuracy.
+    asked : tuple[Scene, Integrator]
+        Scene, and integrator with the requested accuracy.
 
     Returns
     -------

@@ -12,7 +12,7 @@ from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 
-from rsfstudy import Accuracy, Scene
+from rsfstudy import Scene
 from rsfstudy.errors import InvalidValue
 from rsfstudy.measure_base import (
     RecordingMeasure,
@@ -26,9 +26,8 @@ from rsfstudy.motion import (
     RECORDED_VARIABLES,
     RELATIVE_ROUNDING_ERROR,
     Event,
+    Integrator,
     Recording,
-    WorkMeter,
-    integrate_events,
     recorded_friction_coefficient,
     resample_motion_along_path,
 )
@@ -213,7 +212,7 @@ class NormalStressTransient(RecordingMeasure):
         names = ("apparent_alpha", "apparent_slip_distance", "evolution_left")
         return {name: part * abs(values[name]) for name in names}
 
-    def compute(self, scene: Scene, accuracy: Accuracy, meter: WorkMeter) -> Outcome:
+    def compute(self, scene: Scene, integrator: Integrator) -> Outcome:
         """Compute the transient, and estimate its errors from a second motion.
 
         The second motion is integrated with smaller tolerances.
@@ -222,10 +221,8 @@ class NormalStressTransient(RecordingMeasure):
         ----------
         scene : Scene
             Parameters of the slider.
-        accuracy : Accuracy
-            Requested accuracy.
-        meter : WorkMeter
-            Counter of right-hand-side evaluations.
+        integrator : Integrator
+            Integrator with the requested accuracy.
 
         Returns
         -------
@@ -239,8 +236,8 @@ class NormalStressTransient(RecordingMeasure):
         why = self._reason_not_readable(scene)
         if why:
             return Outcome(Status.NOT_APPLICABLE, message=why)
-        record = self._record_motion(scene, accuracy, meter)
-        again = self._record_motion(scene, accuracy.refined(), meter)
+        record = self._record_motion(scene, integrator)
+        again = self._record_motion(scene, integrator.refined())
         if record is None or again is None:
             why = f"slip does not come to {max(self.fit_to, 1.0):g} D_c, where friction is read"
             return Outcome(Status.NOT_APPLICABLE, message=f"{why}, within record = {self.record:g}")
@@ -251,7 +248,11 @@ class NormalStressTransient(RecordingMeasure):
             why = f"from {span} friction does not decay, or is still that of loading or unloading"
             return Outcome(Status.NOT_APPLICABLE, shown, why)
         errors = estimate_errors_at_instants(
-            values, refined, self._sensitivities_to_friction(scene, record, values), scene, accuracy
+            values,
+            refined,
+            self._sensitivities_to_friction(scene, record, values),
+            scene,
+            integrator,
         )
         direct = _direct_change(scene, record)
         if abs(direct) <= _NEGLIGIBLE_DIRECT_CHANGE * scene.mu_star:
@@ -273,19 +274,15 @@ class NormalStressTransient(RecordingMeasure):
             return "normal stress does not stay so for all of the record"
         return ""
 
-    def _record_motion(
-        self, scene: Scene, accuracy: Accuracy, meter: WorkMeter
-    ) -> _TransientRecord | None:
+    def _record_motion(self, scene: Scene, integrator: Integrator) -> _TransientRecord | None:
         """Record the motion.
 
         Parameters
         ----------
         scene : Scene
             Parameters of the slider.
-        accuracy : Accuracy
-            Requested accuracy.
-        meter : WorkMeter
-            Counter of right-hand-side evaluations.
+        integrator : Integrator
+            Integrator with the requested accuracy.
 
         Returns
         -------
@@ -294,8 +291,8 @@ class NormalStressTransient(RecordingMeasure):
             friction is read.
         """
         recording = Recording()
-        begin, *_others = integrate_events(
-            scene, accuracy, meter, with_time=True, recording=recording, until=self.record
+        begin, *_others = integrator.follow(
+            scene, with_time=True, recording=recording, until=self.record
         )
         rows = recording.as_table(scene)
         slip = rows[:, MOTION_VARIABLES.index("slip")]
@@ -306,11 +303,11 @@ class NormalStressTransient(RecordingMeasure):
             abs(np.interp(self.fit_from, slip, rate)) * math.log(10.0) <= _SPRING_RESPONSE_LOG_RATE
         )
         return _TransientRecord(
-            begin, rows, self._friction_at_slips(scene, rows, accuracy, meter) if taken_up else {}
+            begin, rows, self._friction_at_slips(scene, rows, integrator) if taken_up else {}
         )
 
     def _friction_at_slips(
-        self, scene: Scene, rows: np.ndarray, accuracy: Accuracy, meter: WorkMeter
+        self, scene: Scene, rows: np.ndarray, integrator: Integrator
     ) -> dict[float, float]:
         """Return friction at the slips that the measure evaluates.
 
@@ -328,9 +325,7 @@ class NormalStressTransient(RecordingMeasure):
             )
             for _ in range(_MAX_EXTENSIONS):
                 if 0.0 < wait <= self.record - elapsed:
-                    *_earlier, end = integrate_events(
-                        stepped, accuracy, meter, start=start, until=wait
-                    )
+                    *_earlier, end = integrator.follow(stepped, start=start, until=wait)
                     elapsed, slipped, start = elapsed + end.time, slipped + end.slip, end.point
                 log_slip_rate = max(end.point.log_slip_rate, _MIN_LOG_SLIP_RATE)
                 wait = (slip - slipped) / math.exp(log_slip_rate)

@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import lru_cache
 from typing import ClassVar, NamedTuple
 
@@ -32,7 +32,7 @@ from rsfstudy.fitting.joint_model import JointModel, add_window_numbers
 from rsfstudy.fitting.noise import check_noise_name
 from rsfstudy.fitting.window_model import ParameterValues, WindowModel, check_fields_positive
 from rsfstudy.measures import Measure, Outcome, Output, OutputValue, Quantity, Status
-from rsfstudy.motion import WorkMeter
+from rsfstudy.motion import Integrator
 
 from ._noise_kinds import NOISE_KINDS, ExactResponse
 
@@ -201,17 +201,15 @@ class SyntheticFit(Measure):
         """Names of the free parameters, with a number for each window."""
         return add_window_numbers(self.free, len(self._window_segments()))
 
-    def compute(self, scene: Scene, accuracy: Accuracy, meter: WorkMeter) -> Outcome:
+    def compute(self, scene: Scene, integrator: Integrator) -> Outcome:
         """Draw a synthetic record, and fit the record.
 
         Parameters
         ----------
         scene : Scene
             Parameters of the slider.
-        accuracy : Accuracy
-            Requested accuracy.
-        meter : WorkMeter
-            Counter of right-hand-side evaluations.
+        integrator : Integrator
+            Integrator with the requested accuracy.
 
         Returns
         -------
@@ -219,9 +217,9 @@ class SyntheticFit(Measure):
             Outcome of the measure.
         """
         if self.process in NOISE_KINDS:
-            return self._fit_noisy_record(scene, accuracy, meter)
+            return self._fit_noisy_record(scene, integrator)
         true = self._exact_parameters(scene)
-        truth = self._joint_model(scene, accuracy, meter)
+        truth = self._joint_model(scene, integrator)
         clean = truth.model_friction(true)
         if not np.isfinite(clean).all():
             return Outcome(Status.NOT_APPLICABLE, message="the true motion cannot be followed")
@@ -229,7 +227,7 @@ class SyntheticFit(Measure):
         root = _noise_factor(self.process, self.rows)
         noise = np.concatenate([root @ rng.standard_normal(self.rows) for _ in truth.models])
         fitted = scene.with_(law=self.fitted_law) if self.fitted_law else scene
-        model = self._joint_model(fitted, accuracy, meter, clean + size * noise)
+        model = self._joint_model(fitted, integrator, clean + size * noise)
         search = FitProblem(
             model, self._initial_parameters(fitted, true), self._free_parameters, self.noise
         )
@@ -238,7 +236,7 @@ class SyntheticFit(Measure):
         reasons = find_validity_problems(found, model.friction)
         return Outcome(Status.OK, self._compare_with_exact(search, found, true, promised, reasons))
 
-    def _fit_noisy_record(self, scene: Scene, accuracy: Accuracy, meter: WorkMeter) -> Outcome:
+    def _fit_noisy_record(self, scene: Scene, integrator: Integrator) -> Outcome:
         """Draw a laboratory record, and fit it in the same way as the function ``fit``."""
         from rsfstudy.measures import Fit  # The import is slow.
 
@@ -250,7 +248,7 @@ class SyntheticFit(Measure):
             rule = "is drawn for a protocol with one step"
             raise InvalidValue("process", self.process, rule, choices=_PROCESSES)
         before, after = windows[0]
-        smooth = replace(accuracy, rtol=min(accuracy.rtol, 1e-9))
+        smooth = integrator.tightened_to(1e-9)
 
         def friction(time: np.ndarray) -> np.ndarray:
             """Return exact friction at given times."""
@@ -260,9 +258,9 @@ class SyntheticFit(Measure):
                 (before.duration, after.velocity, 1.0, 0.0),
             ]
             zeros = np.zeros(len(time))
-            return WindowModel(
-                scene, time, zeros, zeros, np.array(pieces), smooth, meter
-            ).model_friction(true)
+            return WindowModel(scene, time, zeros, zeros, np.array(pieces), smooth).model_friction(
+                true
+            )
 
         ends = before.duration + after.duration
         step = before.duration, ends, before.velocity, after.velocity
@@ -273,7 +271,7 @@ class SyntheticFit(Measure):
         fit = Fit((record,), self.free, guess, noise=self.noise, filter=stated)
         fitted = scene.with_(law=self.fitted_law) if self.fitted_law else scene
         fitted = fitted.with_(stiffness=fitted.stiffness * guess / self.slip_distance)
-        search, found = fit.solve(fitted, accuracy, meter)
+        search, found = fit.solve(fitted, integrator)
         unknown = np.full(len(self.free), math.nan)
         reasons = fit.find_validity_problems(search, found)
         return Outcome(Status.OK, self._compare_with_exact(search, found, true, unknown, reasons))
@@ -361,16 +359,16 @@ class SyntheticFit(Measure):
         return first
 
     def _joint_model(
-        self, scene: Scene, accuracy: Accuracy, meter: WorkMeter, friction: np.ndarray | None = None
+        self, scene: Scene, integrator: Integrator, friction: np.ndarray | None = None
     ) -> JointModel:
         """Return the joint model of all windows."""
-        smooth = replace(accuracy, rtol=min(accuracy.rtol, 1e-9))
+        smooth = integrator.tightened_to(1e-9)
         parts = []
         for number, pieces in enumerate(self._window_segments()):
             time, moved, loading = _build_rows(pieces)
             rows = slice(number * self.rows, (number + 1) * self.rows)
             seen = np.zeros(self.rows) if friction is None else friction[rows]
-            parts.append(WindowModel(scene, time, moved, seen, loading, smooth, meter))
+            parts.append(WindowModel(scene, time, moved, seen, loading, smooth))
         return JointModel(tuple(parts))
 
     def _expected_stderrs(self, truth: JointModel, true: ParameterValues) -> np.ndarray:

@@ -29,7 +29,15 @@ from rsfstudy.measures import (
     Status,
     StepResponse,
 )
-from rsfstudy.motion import COMPILED, MAX_RTOL, MIN_RTOL, SCIPY, WorkMeter, is_engine_installed
+from rsfstudy.motion import (
+    COMPILED,
+    MAX_RTOL,
+    MIN_RTOL,
+    SCIPY,
+    Integrator,
+    WorkMeter,
+    is_engine_installed,
+)
 from rsfstudy.motion.steppers.scipy import SCIPY_SOLVER_BY_METHOD_NAME
 from rsfstudy.reductions import LinearFit
 from rsfstudy.study.figure_declarations import Axes, horizontal_line, reference_line
@@ -196,17 +204,15 @@ class WorkPrecision(ProblemMeasure):
         """
         return {3.0: 1.0, 10.0: 1.0}
 
-    def compute(self, scene: Scene, accuracy: Accuracy, meter: WorkMeter) -> Outcome:
+    def compute(self, scene: Scene, integrator: Integrator) -> Outcome:
         """Solve the problem, and repeat the run to measure the processor time.
 
         Parameters
         ----------
         scene : Scene
             Parameters of the slider.
-        accuracy : Accuracy
-            Requested accuracy.
-        meter : WorkMeter
-            Counter of right-hand-side evaluations.
+        integrator : Integrator
+            Integrator with the requested accuracy.
 
         Returns
         -------
@@ -220,10 +226,8 @@ class WorkPrecision(ProblemMeasure):
             problem.measure(scene, self._requested_accuracy)  # compiles the equations
         before = _time_run(problem, scene, _YARDSTICK_ACCURACY)[0]
         seconds, outcome, spent = _time_run(problem, scene, self._requested_accuracy)
-        meter.evaluations_by_regime, meter.evaluations = (
-            spent.evaluations_by_regime,
-            spent.evaluations,
-        )
+        for regime, evaluations in spent.evaluations_by_regime.items():
+            integrator.work_meter.add_evaluations(regime, evaluations)
         work = {
             "run_evaluations": float(spent.evaluations),
             "run_steps": float(spent.steps),

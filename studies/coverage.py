@@ -18,10 +18,10 @@ from typing import Any, ClassVar
 import numpy as np
 import xarray as xr
 
-from rsfstudy import Accuracy, Axis, Claim, Figure, Panel, Scene, Study
+from rsfstudy import Axis, Claim, Figure, Panel, Scene, Study
 from rsfstudy.errors import InvalidValue
 from rsfstudy.measures import Measure, Outcome, Output, Quantity, Status
-from rsfstudy.motion import MIN_RTOL, WorkMeter
+from rsfstudy.motion import MIN_RTOL, Integrator
 from rsfstudy.reductions import Reduction
 from rsfstudy.study.figure_declarations import Axes
 
@@ -100,17 +100,15 @@ class Coverage(Measure):
         """Names of the results along the dimension ``number``."""
         return {"number": np.array(_ESTIMATED_OUTPUTS, dtype=object)}
 
-    def compute(self, scene: Scene, accuracy: Accuracy, meter: WorkMeter) -> Outcome:
+    def compute(self, scene: Scene, integrator: Integrator) -> Outcome:
         """Compute the measure at two accuracies, and compare the results.
 
         Parameters
         ----------
         scene : Scene
             Parameters of the slider.
-        accuracy : Accuracy
-            Requested accuracy.
-        meter : WorkMeter
-            Counter of right-hand-side evaluations.
+        integrator : Integrator
+            Integrator with the requested accuracy.
 
         Returns
         -------
@@ -122,15 +120,12 @@ class Coverage(Measure):
             drawn = random_scene(scene, self.question, self.sample)
         except InvalidValue as error:  # e.g. normal stress is constant
             return Outcome(Status.NOT_APPLICABLE, message=str(error))
-        asked = replace(accuracy, rtol=10.0**-self.requested_digits)
+        asked = replace(integrator.accuracy, rtol=10.0**-self.requested_digits)
         rtol = max(_TIGHTER_RTOL_FACTOR * asked.rtol, MIN_RTOL)
         tighter = replace(asked, rtol=rtol, budget=_MAX_TIGHTER_WORK * asked.budget)
         (outcome, spent), (truth, more) = (measure.run_metered(drawn, a) for a in (asked, tighter))
-        meter.evaluations_by_regime["asked"], meter.evaluations_by_regime["tighter"] = (
-            spent.evaluations,
-            more.evaluations,
-        )
-        meter.evaluations = spent.evaluations + more.evaluations
+        integrator.work_meter.add_evaluations("asked", spent.evaluations)
+        integrator.work_meter.add_evaluations("tighter", more.evaluations)
         values: dict[str, Any] = {
             "ended_as": float(outcome.status),
             "status_kept_error": 0.0,

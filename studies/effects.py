@@ -19,9 +19,9 @@ from typing import ClassVar
 import numpy as np
 import xarray as xr
 
-from rsfstudy import Accuracy, Axis, Claim, Figure, Panel, Scene, Study
+from rsfstudy import Axis, Claim, Figure, Panel, Scene, Study
 from rsfstudy.measures import LimitCycle, Measure, Outcome, Output
-from rsfstudy.motion import MotionStopped, WorkMeter
+from rsfstudy.motion import Integrator, MotionStopped
 from rsfstudy.reductions import RelativeDifference
 from rsfstudy.slider import Equations, equations_between_ruptures, equations_in_rupture
 from rsfstudy.study import DrawFunction
@@ -101,17 +101,15 @@ class EffectCost(Measure):
     outputs = _OUTPUTS
     needs_time: ClassVar[tuple[bool, ...]] = (False, True)
 
-    def compute(self, scene: Scene, accuracy: Accuracy, meter: WorkMeter) -> Outcome:
+    def compute(self, scene: Scene, integrator: Integrator) -> Outcome:
         """Compute the limit cycle and the cost of the equations.
 
         Parameters
         ----------
         scene : Scene
             Parameters of the slider.
-        accuracy : Accuracy
-            Requested accuracy.
-        meter : WorkMeter
-            Counter of right-hand-side evaluations.
+        integrator : Integrator
+            Integrator with the requested accuracy.
 
         Returns
         -------
@@ -120,11 +118,13 @@ class EffectCost(Measure):
         """
         costs = _measure_costs(scene)
         try:
-            cycle = _CYCLE_MEASURE.compute(scene, accuracy, meter)
+            cycle = _CYCLE_MEASURE.compute(scene, integrator)
         except MotionStopped as halt:
             return Outcome(halt.status, costs, str(halt))
-        spent = meter.evaluations_by_regime.get("inertial", 0)
-        costs["share_in_rupture"] = spent / meter.evaluations if meter.evaluations else math.nan
+        spent = integrator.work_meter.evaluations_by_regime.get("inertial", 0)
+        costs["share_in_rupture"] = (
+            spent / integrator.evaluations if integrator.evaluations else math.nan
+        )
         names = [name for about in _CYCLE_OUTPUTS for name in about.variable_names]
         kept = {name: cycle.values[name] for name in names if name in cycle.values}
         return Outcome(cycle.status, {**kept, **costs}, cycle.message)

@@ -18,14 +18,14 @@ import xarray as xr
 from scipy.integrate import solve_ivp
 from scipy.special import lambertw
 
-from rsfstudy import Accuracy, Axis, Claim, Figure, Panel, Scene, Study
+from rsfstudy import Axis, Claim, Figure, Panel, Scene, Study
 from rsfstudy.errors import InvalidValue
 from rsfstudy.fitting import LOGARITHMIC_PARAMETERS, PARAMETERS, scene_to_parameters
 from rsfstudy.fitting.fit_problem import FitProblem
 from rsfstudy.fitting.joint_model import JointModel
 from rsfstudy.fitting.window_model import ParameterValues, WindowModel
 from rsfstudy.measures import Measure, Outcome, Output, OutputValue, Quantity, Status
-from rsfstudy.motion import WorkMeter
+from rsfstudy.motion import Integrator
 from rsfstudy.study.figure_declarations import Axes
 
 from ._synthetic_fit import FIT_ACCURACY
@@ -139,17 +139,15 @@ class RecoveryError(Measure):
         """
         return {"largest_deviation": 1.0}
 
-    def compute(self, scene: Scene, accuracy: Accuracy, meter: WorkMeter) -> Outcome:
+    def compute(self, scene: Scene, integrator: Integrator) -> Outcome:
         """Compute a record, and fit the record.
 
         Parameters
         ----------
         scene : Scene
             Parameters of the slider.
-        accuracy : Accuracy
-            Requested accuracy.
-        meter : WorkMeter
-            Counter of right-hand-side evaluations.
+        integrator : Integrator
+            Integrator with the requested accuracy.
 
         Returns
         -------
@@ -158,8 +156,8 @@ class RecoveryError(Measure):
         """
         free, true = self.looked_for.split(), scene_to_parameters(scene, SLIP_DISTANCE, math.nan)
         true |= {name: 0.0 for name in free if name not in true}
-        smooth = replace(accuracy, rtol=min(accuracy.rtol, MOTION_RTOL))
-        model = self._record_model(scene, smooth, meter)
+        smooth = integrator.tightened_to(MOTION_RTOL)
+        model = self._record_model(scene, smooth)
         made = (
             model.model_friction(true)
             if self.record_by == "the model"
@@ -182,7 +180,7 @@ class RecoveryError(Measure):
         }
         return Outcome(Status.OK, values)
 
-    def _record_model(self, scene: Scene, accuracy: Accuracy, meter: WorkMeter) -> WindowModel:
+    def _record_model(self, scene: Scene, integrator: Integrator) -> WindowModel:
         """Return the model of the record.
 
         Rows are evenly spaced in load point displacement.
@@ -195,7 +193,7 @@ class RecoveryError(Measure):
         time = np.interp(at, moved, knots)
         step = moved[np.argmax(begins > 0.0)]
         loading[0, 0] -= STEADY_TIME_BEFORE_RECORD
-        return WindowModel(scene, time, at - step, np.zeros(ROWS), loading, accuracy, meter)
+        return WindowModel(scene, time, at - step, np.zeros(ROWS), loading, integrator)
 
 
 def _friction_by_scipy(model: WindowModel, true: ParameterValues) -> np.ndarray:

@@ -14,7 +14,7 @@ from typing import Any, ClassVar
 import numpy as np
 import xarray as xr
 
-from rsfstudy import Accuracy, Axis, Claim, Figure, Panel, Scene, Study
+from rsfstudy import Axis, Claim, Figure, Panel, Scene, Study
 from rsfstudy.measures import (
     CriticalStep,
     LimitCycle,
@@ -27,7 +27,7 @@ from rsfstudy.measures import (
     StepResponse,
     Triggered,
 )
-from rsfstudy.motion import WorkMeter
+from rsfstudy.motion import Integrator
 from rsfstudy.study.figure_declarations import Axes
 
 from . import _reference_values as known
@@ -54,17 +54,15 @@ class HardCase(ProblemMeasure):
     outputs = (*ERROR_OUTPUTS, Output("answer", "", "1", "the known answer"), Output("ended_as"))
     needs_time: ClassVar[tuple[bool, ...]] = (False, True)
 
-    def compute(self, scene: Scene, accuracy: Accuracy, meter: WorkMeter) -> Outcome:
+    def compute(self, scene: Scene, integrator: Integrator) -> Outcome:
         """Compute the result, and compare it with the known answer.
 
         Parameters
         ----------
         scene : Scene
             Parameters of the slider.
-        accuracy : Accuracy
-            Requested accuracy.
-        meter : WorkMeter
-            Counter of right-hand-side evaluations.
+        integrator : Integrator
+            Integrator with the requested accuracy.
 
         Returns
         -------
@@ -72,11 +70,9 @@ class HardCase(ProblemMeasure):
             Outcome of the comparison.
         """
         problem = self.problem_of_scene(scene)
-        outcome, spent = problem.measure.run_metered(scene, accuracy)
-        meter.evaluations_by_regime, meter.evaluations = (
-            spent.evaluations_by_regime,
-            spent.evaluations,
-        )
+        outcome, spent = problem.measure.run_metered(scene, integrator.accuracy)
+        for regime, evaluations in spent.evaluations_by_regime.items():
+            integrator.work_meter.add_evaluations(regime, evaluations)
         numbers = {"ended_as": float(outcome.status)}
         if outcome.status is not problem.status:
             why = f"ended as {outcome.status.label}, not {problem.status.label}: {outcome.message}"

@@ -21,7 +21,7 @@ from scipy.optimize import brentq
 
 from rsfstudy import Accuracy, Axis, Claim, Figure, Panel, Scene, Study, history
 from rsfstudy.measures import Measure, Outcome, Output, Status
-from rsfstudy.motion import MOTION_VARIABLES, Recording, WorkMeter, estimate_error, integrate_events
+from rsfstudy.motion import MOTION_VARIABLES, Integrator, Recording
 from rsfstudy.slider import SampledHistory
 from rsfstudy.slider.sampled_loading import TIME_COLUMN
 from rsfstudy.study.figure_declarations import Axes, horizontal_line
@@ -125,7 +125,7 @@ class StabilisationPressure(Measure):
     typical_work = 300_000
     outputs = _OUTPUTS
 
-    def compute(self, scene: Scene, accuracy: Accuracy, meter: WorkMeter) -> Outcome:
+    def compute(self, scene: Scene, integrator: Integrator) -> Outcome:
         """Compute the pressures from a motion and a perturbed motion.
 
         A second run with smaller tolerances provides the error estimates.
@@ -134,10 +134,8 @@ class StabilisationPressure(Measure):
         ----------
         scene : Scene
             Parameters of the slider.
-        accuracy : Accuracy
-            Requested accuracy.
-        meter : WorkMeter
-            Counter of right-hand-side evaluations.
+        integrator : Integrator
+            Integrator with the requested accuracy.
 
         Returns
         -------
@@ -151,12 +149,12 @@ class StabilisationPressure(Measure):
             why = "critical stiffness is that of one state and imposed normal stress, alpha = 0"
             return Outcome(Status.NOT_APPLICABLE, message=why)
         seen, refined = (
-            _Departures.follow(scene, a, meter) for a in (accuracy, accuracy.refined())
+            _Departures.follow(scene, each) for each in (integrator, integrator.refined())
         )
         values, again = seen.find_extrema(scene), refined.find_extrema(scene)
         other = seen.find_extrema(scene, degree=5)
         errors = {
-            f"{name}_error": estimate_error(value, again[name], accuracy.rtol)
+            f"{name}_error": integrator.estimate_error(value, again[name], 1.0)
             + abs(value - other[name])
             for name, value in values.items()
         }
@@ -188,17 +186,15 @@ class _Departures(NamedTuple):
     log_size: np.ndarray
 
     @classmethod
-    def follow(cls, scene: Scene, accuracy: Accuracy, meter: WorkMeter) -> "_Departures":
+    def follow(cls, scene: Scene, integrator: Integrator) -> "_Departures":
         """Integrate the unperturbed and the perturbed motion over the record.
 
         Parameters
         ----------
         scene : Scene
             Parameters of the slider.
-        accuracy : Accuracy
-            Requested accuracy.
-        meter : WorkMeter
-            Counter of right-hand-side evaluations.
+        integrator : Integrator
+            Integrator with the requested accuracy.
 
         Returns
         -------
@@ -214,9 +210,7 @@ class _Departures(NamedTuple):
         for departure in (0.0, INITIAL_DEPARTURE * scene.a):
             beside = scene.with_(initial_stress=scene.initial_stress + departure)
             recording = Recording(sample_times=time)
-            for _event in integrate_events(
-                beside, accuracy, meter, recording=recording, until=float(time[-1])
-            ):
+            for _event in integrator.follow(beside, recording=recording, until=float(time[-1])):
                 pass
             tables.append(recording.as_table(beside))
         motion, other = (math.log(10.0) * table[:, LOG_SLIP_RATE_COLUMN] for table in tables)

@@ -26,7 +26,7 @@ from rsfstudy.measures import (
     OutputValue,
     Status,
 )
-from rsfstudy.motion import WorkMeter
+from rsfstudy.motion import Integrator
 from rsfstudy.reductions import Logarithm, SobolIndices
 from rsfstudy.study.figure_declarations import Axes
 
@@ -59,17 +59,15 @@ class Headlines(Measure):
     outputs = tuple(Output(name, error=True) for name in INDEXED_OUTPUTS.values())
     needs_time: ClassVar[tuple[bool, ...]] = (False, True)
 
-    def compute(self, scene: Scene, accuracy: Accuracy, meter: WorkMeter) -> Outcome:
+    def compute(self, scene: Scene, integrator: Integrator) -> Outcome:
         """Compute the critical displacement and the limit cycle.
 
         Parameters
         ----------
         scene : Scene
             Parameters of the slider.
-        accuracy : Accuracy
-            Requested accuracy.
-        meter : WorkMeter
-            Counter of right-hand-side evaluations.
+        integrator : Integrator
+            Integrator with the requested accuracy.
 
         Returns
         -------
@@ -80,7 +78,7 @@ class Headlines(Measure):
         at_critical = scene.without_mass().with_(stiffness_ratio=1.0)
         values: dict[str, OutputValue] = {}
         for measure, asked in ((_STEP_MEASURE, at_critical), (_CYCLE_MEASURE, scene)):
-            outcome = measure.run_nested(asked, accuracy, meter)
+            outcome = measure.run_nested(asked, integrator)
             if outcome.status is not Status.OK:
                 return Outcome(outcome.status, values, outcome.message)
             values |= {n: v for n, v in outcome.values.items() if n in self.variables}

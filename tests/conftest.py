@@ -17,7 +17,6 @@ from matplotlib.mathtext import MathTextParser
 
 from rsfstudy import Scene
 from rsfstudy.execution import clusters, provenance, worker_pool
-from rsfstudy.motion import event_integration
 from rsfstudy.motion.accuracy import Accuracy
 from rsfstudy.motion.engines import COMPILED
 from rsfstudy.motion.events import (
@@ -29,7 +28,8 @@ from rsfstudy.motion.events import (
     maximum,
     rise,
 )
-from rsfstudy.motion.work_meter import MotionStopped, WorkMeter
+from rsfstudy.motion.integrator import Integrator
+from rsfstudy.motion.work_meter import MotionStopped
 
 settings.register_profile(
     "default", deadline=None, suppress_health_check=[HealthCheck.too_slow], derandomize=True
@@ -84,19 +84,17 @@ def follow_until(
     until: Callable[[Event], bool],
     budget: int = 2_000_000,
     watches: Sequence[EventSpecification] = (),
-) -> WorkMeter:
+) -> Integrator:
     """Integrate a scene until the callback ``until`` returns True.
 
     The callback receives the start of the motion, the beginning of each regime, the end of
-    each step, and the events requested with ``watches``. The function returns the work
-    meter.
+    each step, and the events requested with ``watches``. The function returns the
+    integrator.
     """
-    meter, watches = WorkMeter(budget), (*watches, STEP_END_EVENT)
-    for event in event_integration.integrate_events(
-        scene, Accuracy(rtol, budget), meter, watches, with_time=True
-    ):
+    integrator = Integrator(Accuracy(rtol, budget))
+    for event in integrator.follow(scene, (*watches, STEP_END_EVENT), with_time=True):
         if until(event):
-            return meter
+            return integrator
     raise AssertionError("a motion never ends by itself")
 
 
@@ -112,9 +110,9 @@ def reaches_instability_norm(scene: Scene, rtol: float = 1e-8, peaks: float = ma
         rise("log_slip_rate", norm, terminal=True),
         fall("spring_stress", -scene.mu_star, terminal=True),
     )
-    accuracy, meter = Accuracy(rtol, engine=COMPILED), WorkMeter(200_000, engine=COMPILED)
+    integrator = Integrator(Accuracy(rtol, 200_000, engine=COMPILED))
     with contextlib.suppress(MotionStopped):  # Slip may die out, or decay for ever.
-        for event in event_integration.integrate_events(scene, accuracy, meter, watches):
+        for event in integrator.follow(scene, watches):
             # The slip rate may exceed the norm and fall below it again within one step.
             if event.kind is EventKind.RISE or event.point.log_slip_rate >= norm:
                 return True

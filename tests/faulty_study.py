@@ -91,13 +91,13 @@ class Faulty(Measure):
     variables: ClassVar = {"total": ()}
     typical_work: ClassVar[int] = 1
 
-    def compute(self, scene, accuracy, meter):
+    def compute(self, scene, integrator):
         _busy_wait(float(os.environ.get("FAULT_TAKES", "0")))
         if "FAULT_GATE" in os.environ:
             _wait_for_file(Path(os.environ["FAULT_GATE"]))
         if scene.b_over_a in self.at or (self.fault and not self.at):
-            return FAULTS[self.fault](meter)
-        meter.charge("any", 7)
+            return FAULTS[self.fault](integrator.work_meter)
+        integrator.work_meter.charge("any", 7)
         return Outcome(Status.OK, {"total": scene.b_over_a})
 
 

@@ -9,15 +9,15 @@ tests/frozen_motion_comparison.py sensitivity`` to measure the changes.
 
 from __future__ import annotations
 
+import functools
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from rsfstudy import Scene, protocol
 from rsfstudy.motion.accuracy import Accuracy
-from rsfstudy.motion.event_integration import integrate_events, iterate_events_of_equations
 from rsfstudy.motion.events import (
     EventKind,
     EventSpecification,
@@ -27,8 +27,8 @@ from rsfstudy.motion.events import (
     minimum,
     rise,
 )
+from rsfstudy.motion.integrator import Integrator
 from rsfstudy.motion.recording import MOTION_VARIABLES, Recording
-from rsfstudy.motion.work_meter import WorkMeter
 from rsfstudy.slider.equations import equations_at_imposed_slip_rate, equations_between_ruptures
 
 #: Maximum number of rows per motion, and work budget of a motion.
@@ -86,10 +86,8 @@ class Motion(NamedTuple):
 
     def events(self, scene: Scene, engine: str) -> Iterator[Any]:
         """Yield the events of the motion."""
-        accuracy, meter = Accuracy(self.rtol, engine=engine), WorkMeter(self.budget, engine=engine)
-        return integrate_events(
-            scene, accuracy, meter, self.watches, with_time=True, until=self.until
-        )
+        integrator = Integrator(Accuracy(self.rtol, self.budget, engine=engine))
+        return integrator.follow(scene, self.watches, with_time=True, until=self.until)
 
 
 def frozen_motion(law: str, *parts: Mapping[str, Any], **stated: Any) -> Motion:
@@ -128,19 +126,26 @@ class Track(NamedTuple):
             equations = equations_between_ruptures(scene, with_time=False)
         else:
             equations = equations_at_imposed_slip_rate(scene, self.log_slip_rate)
-        meter, how = WorkMeter(self.budget, engine=engine), {"backward": self.backward}
-        asked = (equations, self.state, 0.07 * self.rtol, meter, self.watches)
-        if not self.samples:
-            return iterate_events_of_equations(*asked, **how)
-        return self._recorded_events(scene, *asked, **how)
+        integrator = Integrator(Accuracy(budget=self.budget, engine=engine))
+        follow = functools.partial(
+            integrator.follow_equations,
+            equations,
+            self.state,
+            self.watches,
+            local_tolerance=0.07 * self.rtol,
+            backward=self.backward,
+        )
+        return self._recorded_events(scene, equations, follow) if self.samples else follow()
 
-    def _recorded_events(self, scene: Scene, *asked: Any, **how: Any) -> Iterator[Any]:
+    def _recorded_events(
+        self, scene: Scene, equations: Any, follow: Callable[..., Iterator[Any]]
+    ) -> Iterator[Any]:
         """Yield the events and the recorded samples, ordered by slip.
 
         Only a rigid slider with one state variable is supported.
         """
         recording, events = Recording(sample_times=np.array(self.samples)), []
-        for event in iterate_events_of_equations(*asked, **how, recording=recording):
+        for event in follow(recording=recording):
             if event.kind is EventKind.SAMPLED:
                 break
             events.append(event)
@@ -149,7 +154,7 @@ class Track(NamedTuple):
             - scene.mu_star
         )
         events += [
-            event._replace(slip=slip, point=asked[0].evaluate_point((stress,)))
+            event._replace(slip=slip, point=equations.evaluate_point((stress,)))
             for slip, stress in zip(self.samples, friction.tolist(), strict=True)
         ]
         return iter(sorted(events, key=lambda event: event.slip))

@@ -34,8 +34,7 @@ from rsfstudy.errors import DataError, IncompleteWarning
 from rsfstudy.execution import cell_computation, cell_plan
 from rsfstudy.motion.accuracy import Accuracy
 from rsfstudy.motion.engines import COMPILED
-from rsfstudy.motion.event_integration import integrate_events
-from rsfstudy.motion.work_meter import WorkMeter
+from rsfstudy.motion.integrator import Integrator
 from rsfstudy.slider.motion_point import MotionPoint
 from rsfstudy.study import study_loader
 from rsfstudy.study.claims import Claim
@@ -70,7 +69,7 @@ class Power(Measure):
     variables = {"total": ()}
     typical_work = 1
 
-    def compute(self, scene, accuracy, meter):
+    def compute(self, scene, integrator):
         if self.power == 4:
             raise ZeroDivisionError
         return Outcome(Status.OK, {"total": scene.b_over_a**self.power + self.offset})
@@ -157,7 +156,10 @@ REDUCED_AXES = {
     "dilatant_cycles": {"drainage": [1.0], "dilatancy": [0.0, 0.004, 0.008]},
     "dilatant_steps": {"drainage": [0.1, 1.0, 10.0]},
     "displacement_boundary": {"b_over_a": 1.0 + 1.0 / np.array([0.25, 0.5, 0.75, 1.0, 2.0])},
-    "fit_coverage": {"process": ["white", "ar1", "ma3", "encoder", "coarsely_rounded"]},
+    "fit_coverage": {
+        "process": ["white", "ar1", "encoder", "coarsely_rounded"],
+        "seed": list(range(12)),
+    },
     "fit_coverage_joint": {"process": ["white"]},
     "injection": {"record": ["1000", "2000"]},
     "instability_norm": {
@@ -311,7 +313,7 @@ def run_command(words: Sequence[str]) -> tuple[int, str]:
 
 def start_point(scene: Scene) -> MotionPoint:
     """Return the initial point of the motion of a scene."""
-    return next(integrate_events(scene, Accuracy(), WorkMeter(1_000_000))).point
+    return next(Integrator(Accuracy(budget=1_000_000)).follow(scene)).point
 
 
 def count_journal_cells(journal: Path) -> int:

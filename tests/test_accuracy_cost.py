@@ -20,10 +20,9 @@ from rsfstudy import Scene
 from rsfstudy.limit_cycles.limit_cycle import LimitCycle
 from rsfstudy.measures import Outcome
 from rsfstudy.motion.accuracy import Accuracy
-from rsfstudy.motion.event_integration import iterate_events_of_equations
+from rsfstudy.motion.integrator import Integrator
 from rsfstudy.motion.recording import Recording
 from rsfstudy.motion.steppers.scipy import SCIPY_SOLVER_BY_METHOD_NAME
-from rsfstudy.motion.work_meter import WorkMeter
 from rsfstudy.reductions import apply_reductions
 from rsfstudy.responses.step_response import StepResponse
 from rsfstudy.slider.equations import equations_between_ruptures
@@ -44,7 +43,7 @@ CYCLE = Scene(normal_stress="constant", stiffness_ratio=0.8, load_velocity_ratio
 
 @pytest.mark.parametrize("method", sorted(SCIPY_SOLVER_BY_METHOD_NAME))
 def test_every_right_hand_side_is_counted(method, monkeypatch):
-    """The meter and the equations count the same number of evaluations.
+    """The integrator and the equations count the same number of evaluations.
 
     The count includes evaluations for Jacobians and interpolants.
     """
@@ -52,15 +51,15 @@ def test_every_right_hand_side_is_counted(method, monkeypatch):
     counted = system._replace(
         rate_function=lambda state, p: (calls.append(state), system.rate_function(state, p))[1]
     )
-    meter = WorkMeter(10**6, {"quasi_static": method})
+    integrator = Integrator(Accuracy(budget=10**6, methods=(("quasi_static", method),)))
     # The recording needs interpolants within each step.
-    path = iterate_events_of_equations(
-        counted, (0.0, 0.0), 1e-6, meter, [STEP_END_EVENT], recording=Recording()
+    path = integrator.follow_equations(
+        counted, (0.0, 0.0), [STEP_END_EVENT], local_tolerance=1e-6, recording=Recording()
     )
     told = list(itertools.islice(path, 22))
-    assert meter.evaluations == told[-1].evaluation_count == len(calls)
-    assert meter.steps == 21
-    assert (meter.jacobians > 0) == (method in ("Radau", "BDF"))
+    assert integrator.evaluations == told[-1].evaluation_count == len(calls)
+    assert integrator.work_meter.steps == 21
+    assert (integrator.work_meter.jacobians > 0) == (method in ("Radau", "BDF"))
 
 
 @pytest.mark.parametrize("method", sorted(SCIPY_SOLVER_BY_METHOD_NAME))

@@ -85,7 +85,7 @@ class Own(Measure):
     typical_work = 1
     least: float = 0.0
 
-    def compute(self, scene, accuracy, meter):
+    def compute(self, scene, integrator):
         total = inner(helper.twice(scene.b_over_a)) + kept(Tool.shifted(TOOL.more))
         if total in {4.0, 5.0, 6.0}:
             total += 1.0
@@ -98,7 +98,7 @@ study = Study(
 """
 
 
-FOUND = 'compute(self, scene, accuracy, meter):\n        """A remark."""'
+FOUND = 'compute(self, scene, integrator):\n        """A remark."""'
 
 
 def study_in(place, *, helper=HELPER, measure=MEASURE):
@@ -150,7 +150,7 @@ def test_whatever_a_measure_draws_on_changes_its_digest(part, old, new, tmp_path
         ("helper", "    return 1\n", "    return 2\n"),
         ("measure", "[2.0, 3.0]", "[2.0, 2.5, 3.0]"),
         ("measure", "SCALE = 1.0", "# a remark\n\nSCALE = 1.0"),
-        ("measure", "compute(self, scene, accuracy, meter):", FOUND),
+        ("measure", "compute(self, scene, integrator):", FOUND),
         ("measure", "class Own(Measure):", 'class Own(Measure):\n    """A remark."""\n'),
     ],
 )

@@ -199,14 +199,14 @@ def test_other_processes_find_equations_again(tmp_path):
     The equations are closures, which Numba's own cache would compile again.
     """
     asks = (
-        "from rsfstudy import Scene\n"
+        "from rsfstudy import Accuracy, Integrator, Scene\n"
         "from rsfstudy.critical_steps.critical_path import CriticalPath\n"
         "from rsfstudy.motion.compiled.numba_backend import compiled_function_addresses\n"
         "from rsfstudy.motion.engines import compilation_log\n"
         "from rsfstudy.slider.equations import equations_between_ruptures\n"
         "scene = Scene(normal_stress='constant')\n"
         "compiled_function_addresses(equations_between_ruptures(scene, with_time=False))\n"
-        "CriticalPath.from_scene(scene, 'compiled')\n"
+        "CriticalPath.from_scene(scene, Integrator(Accuracy(engine='compiled')))\n"
         "print(compilation_log.compiled_program_count)\n"
     )
     environment = {**os.environ, "XDG_CACHE_HOME": str(tmp_path)}

@@ -17,8 +17,8 @@ from rsfstudy import Scene
 from rsfstudy.limit_cycles.limit_cycle import LimitCycle
 from rsfstudy.motion.accuracy import Accuracy
 from rsfstudy.motion.engines import PYTHON, SCIPY
-from rsfstudy.motion.event_integration import iterate_events_of_equations
-from rsfstudy.motion.work_meter import MotionStopped, WorkMeter
+from rsfstudy.motion.integrator import Integrator
+from rsfstudy.motion.work_meter import MotionStopped
 from rsfstudy.slider.equations import (
     Equations,
     build_equations_against_displacement,
@@ -206,8 +206,8 @@ def test_inertia_is_integrated_only_where_it_acts():
     A motion that stays slow never needs the full equations.
     """
     slow = Scene(load_velocity_ratio=1.2, stiffness_ratio=1.2, inertia=True)
-    meter = follow_until(slow, 1e-7, lambda event: event.clock > 100.0)
-    assert set(meter.evaluations_by_regime) == {"slow_manifold"}
+    integrator = follow_until(slow, 1e-7, lambda event: event.clock > 100.0)
+    assert set(integrator.work_meter.evaluations_by_regime) == {"slow_manifold"}
     fast = slow.with_(stiffness_ratio=0.8)
     regimes = []
 
@@ -254,7 +254,7 @@ def test_equations_that_fail_end_in_a_status_and_not_in_nan(engine):
         return MotionPoint(*[float(state[0])] * len(MotionPoint._fields))._replace(psis=state)
 
     system = Equations("broken", ("y",), (1.0,), rate, point, (1.0,) * LAW)
-    meter = WorkMeter(10**5, engine=engine)
+    integrator = Integrator(Accuracy(budget=10**5, engine=engine))
     with np.errstate(invalid="ignore"), pytest.raises(MotionStopped) as halted:
-        list(iterate_events_of_equations(system, (0.0,), 1e-8, meter))
+        list(integrator.follow_equations(system, (0.0,), local_tolerance=1e-8))
     assert halted.value.status in (Status.INTEGRATION_FAILED, Status.WORK_BUDGET_SPENT)

@@ -15,8 +15,8 @@ from rsfstudy.named_studies.coverage import Coverage, CoverageStatistics
 
 from rsfstudy import Scene
 from rsfstudy.errors import InvalidValue
-from rsfstudy.limit_cycles import limit_cycle
 from rsfstudy.motion.accuracy import Accuracy
+from rsfstudy.motion.integrator import Integrator
 from rsfstudy.reductions import apply_reductions
 from rsfstudy.status import Status
 
@@ -61,8 +61,8 @@ def test_an_estimate_that_is_too_small_shows(monkeypatch):
     """Errors exceed their estimates if the estimates are reduced to 1 %."""
     cell, like = Coverage(sample=3, requested_digits=5), RANDOM_SCENE_TEMPLATES[1]
     ratios = cell(like, Accuracy()).values["error_over_estimate"]
-    usual = limit_cycle.estimate_error
-    monkeypatch.setattr(limit_cycle, "estimate_error", lambda *given: 0.01 * usual(*given))
+    usual = Integrator.estimate_error
+    monkeypatch.setattr(Integrator, "estimate_error", lambda *given: 0.01 * usual(*given))
     smaller = cell(like, Accuracy()).values["error_over_estimate"]
     known = np.isfinite(ratios)
     assert known.sum() == 5

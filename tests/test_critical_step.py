@@ -23,8 +23,8 @@ from rsfstudy.critical_steps.critical_step import CriticalStep
 from rsfstudy.critical_steps.slow_manifold_accuracy import slow_manifold_relative_error
 from rsfstudy.motion.accuracy import Accuracy
 from rsfstudy.motion.engines import COMPILED, SCIPY
+from rsfstudy.motion.integrator import Integrator
 from rsfstudy.motion.root_finding import build_root_finder
-from rsfstudy.motion.work_meter import WorkMeter
 from rsfstudy.slider.equations import equations_between_ruptures, quasi_static_log_slip_rate
 from rsfstudy.slider.motion_point import MotionPoint
 from rsfstudy.status import Status
@@ -355,7 +355,7 @@ def test_an_orbit_that_grows_slowly_is_known_to_reach_the_norm_in_a_few_leaps():
     """
     slowly = {"law": "slowness", "b_over_a": 2.46, "phi": 82.8, "alpha": 0.129}
     scene = Scene(**slowly, stiffness_ratio=0.998, load_velocity_ratio=0.16, instability_norm=3e-4)
-    assert motion_after_step.motion_reaches_norm(scene, Accuracy(1e-6), WorkMeter(15_000))
+    assert motion_after_step.motion_reaches_norm(scene, Integrator(Accuracy(1e-6, 15_000)))
 
 
 def test_mass_holds_an_orbit_that_would_close_beyond_the_norm():
@@ -366,7 +366,7 @@ def test_mass_holds_an_orbit_that_would_close_beyond_the_norm():
     scene = Scene(law="slowness", load_velocity_ratio=200.0, instability_norm=10.0, **CONSTANT)
     for inertia in (False, True):
         reached = motion_after_step.motion_reaches_norm(
-            scene.with_(inertia=inertia), Accuracy(1e-6), WorkMeter(500_000)
+            scene.with_(inertia=inertia), Integrator(Accuracy(1e-6, 500_000))
         )
         assert reached is not inertia
 
@@ -380,9 +380,9 @@ def test_a_limit_cycle_below_the_norm_is_not_leapt_over():
     for load, peak in ((0.25, 9.57), (0.3, 8.49)):
         scene = Scene(law="slowness", b_over_a=1.6, load_velocity_ratio=load)
         assert peak < scene.log_instability_rate
-        assert not motion_after_step.motion_reaches_norm(scene, Accuracy(1e-6), WorkMeter(500_000))
+        assert not motion_after_step.motion_reaches_norm(scene, Integrator(Accuracy(1e-6, 500_000)))
     low = Scene(law="slowness", b_over_a=1.6, load_velocity_ratio=0.15)
-    assert motion_after_step.motion_reaches_norm(low, Accuracy(1e-6), WorkMeter(500_000))
+    assert motion_after_step.motion_reaches_norm(low, Integrator(Accuracy(1e-6, 500_000)))
 
 
 def test_a_spent_budget_is_a_failure_with_a_name():
@@ -414,7 +414,9 @@ def test_public_call_returns_a_small_dataset():
 def test_the_critical_path_touches_the_norm_at_rest(law, load):
     """At the tangency point, ln V equals the norm and is stationary."""
     scene = Scene(law=law, load_velocity_ratio=load)
-    start = CriticalPath.from_scene(scene).tangency_point_at_instability_norm
+    start = CriticalPath.from_scene(
+        scene, Integrator(Accuracy())
+    ).tangency_point_at_instability_norm
     assert start is not None
     system = equations_between_ruptures(scene, with_time=False)
     point = system.evaluate_point(start)
@@ -432,14 +434,17 @@ def test_where_a_path_begins_and_ends_is_the_same_by_all_engines(law, normal_str
     """
     for load in (1e-3, 1.5, 40.0):
         scene = Scene(law=law, normal_stress=normal_stress, load_velocity_ratio=load)
-        paths = [CriticalPath.from_scene(scene, engine) for engine in (SCIPY, COMPILED)]
+        paths = [
+            CriticalPath.from_scene(scene, Integrator(Accuracy(engine=engine)))
+            for engine in (SCIPY, COMPILED)
+        ]
         plain, compiled = (path.tangency_point_at_instability_norm for path in paths)
         assert compiled == pytest.approx(plain, rel=1e-12, abs=1e-14)
         begin = (0.01, -0.02), paths[0].parameters
         at = [
-            prepare_scalar_function_for_engine(path.motion_point_evaluator, path.engine, *begin)(
-                *begin
-            )
+            prepare_scalar_function_for_engine(
+                path.motion_point_evaluator, path.integrator.engine, *begin
+            )(*begin)
             for path in paths
         ]
         assert all(isinstance(point, MotionPoint) for point in at)

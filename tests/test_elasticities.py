@@ -161,7 +161,7 @@ class Known(Measure):
     outputs = (Output("y", "", "1", "known", error=True),)
     asked: ClassVar[list[Scene]] = []
 
-    def compute(self, scene, accuracy, meter):
+    def compute(self, scene, integrator):
         self.asked.append(scene)
         if scene.mu_star > 0.9:
             return Outcome(Status.WORK_BUDGET_SPENT, message="too far")
@@ -199,7 +199,7 @@ class Ending(Known):
     The measure has no result for k >= k_cr.
     """
 
-    def compute(self, scene, accuracy, meter):
+    def compute(self, scene, integrator):
         if scene.stiffness_ratio >= 1.0:
             return Outcome(Status.NO_LIMIT_CYCLE)
         y = (1.0 - scene.stiffness_ratio) ** 0.05

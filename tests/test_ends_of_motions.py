@@ -14,14 +14,14 @@ from rsfstudy.critical_steps.motion_after_step import motion_reaches_norm
 from rsfstudy.errors import IncompleteWarning, NoResultWarning
 from rsfstudy.motion.accuracy import Accuracy
 from rsfstudy.motion.engines import COMPILED, SCIPY
-from rsfstudy.motion.event_integration import integrate_events
 from rsfstudy.motion.events import EventKind, rise
+from rsfstudy.motion.integrator import Integrator
 from rsfstudy.motion.regime_switching import (
     CONTINUES,
     compute_margin_to_termination,
     find_termination_status,
 )
-from rsfstudy.motion.work_meter import MotionStopped, WorkMeter
+from rsfstudy.motion.work_meter import MotionStopped
 from rsfstudy.status import Status
 
 ENGINES = (SCIPY, COMPILED)
@@ -48,10 +48,10 @@ def test_a_runaway_is_followed_to_its_end(engine):
     """
     scene = Scene(stiffness_ratio=0.5, displacement_step=3.0)
     levels = [rise("log_slip_rate", to) for to in (50.0, 150.0, 250.0)]
-    met, meter = [], WorkMeter(100_000, engine=engine)
+    met, integrator = [], Integrator(Accuracy(1e-6, 100_000, engine=engine))
 
     def follow_on() -> None:
-        for event in integrate_events(scene, Accuracy(1e-6, engine=engine), meter, levels):
+        for event in integrator.follow(scene, levels):
             met.extend([event.specification.level] if event.kind is EventKind.RISE else [])
 
     with pytest.raises(MotionStopped, match=r"beyond 10\^120"):
@@ -76,9 +76,9 @@ def test_slip_that_nothing_loads_is_followed_to_its_end(engine):
         law="slowness", normal_stress="constant", b_over_a=5.0, stiffness_ratio=0.5,
         inertia=True, displacement_step=3.0,
     )  # fmt: skip
-    meter = WorkMeter(5_000, engine=engine)
+    integrator = Integrator(Accuracy(1e-4, 5_000, engine=engine))
     with pytest.raises(MotionStopped) as halt:
-        list(integrate_events(scene, Accuracy(1e-4, engine=engine), meter))
+        list(integrator.follow(scene))
     assert halt.value.status is Status.SLIP_STOPPED
 
 
@@ -95,8 +95,8 @@ def test_the_norm_is_met_before_normal_stress_is_lost(engine):
     for step, reached in ((-0.0271, False), (-0.028, True), (-0.035, True), (-0.05, True)):
         stepped = scene.with_(normal_stress_step=step)
         for rtol in (1e-6, 1e-8):
-            asked = Accuracy(rtol, engine=engine), WorkMeter(100_000, engine=engine)
-            assert motion_reaches_norm(stepped, *asked) is reached, (step, rtol)
+            asked = Integrator(Accuracy(rtol, 100_000, engine=engine))
+            assert motion_reaches_norm(stepped, asked) is reached, (step, rtol)
 
 
 @pytest.mark.parametrize("rise_by", [0.5, 5.0, 11.0, 30.0, 60.0])

@@ -465,7 +465,7 @@ class Held(Measure):
     variables = {"held": ()}  # noqa: RUF012
     typical_work = 1
 
-    def compute(self, scene, accuracy, meter):
+    def compute(self, scene, integrator):
         grip = getattr(scene.parts.dynamics, "grip", 0.0)
         return Outcome(Status.OK, {"held": grip + 10.0 * scene.as_dict().get("is_odd", False)})
 

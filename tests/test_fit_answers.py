@@ -26,7 +26,7 @@ from rsfstudy.fitting.load_point_noise import shift_steps_by_their_errors
 from rsfstudy.fitting.record import loading_history
 from rsfstudy.fitting.window_model import LOADING_STEP_SHIFT_OVER_STANDARD_ERROR, WindowModel
 from rsfstudy.motion.accuracy import Accuracy
-from rsfstudy.motion.work_meter import WorkMeter
+from rsfstudy.motion.integrator import Integrator
 
 WHITE = {**FIT_OPTIONS, "noise": "white", "laws": ["slowness"]}
 #: True values of the parameters that are not free.
@@ -63,15 +63,16 @@ def test_a_spring_softer_than_critical_is_not_followed(law: str) -> None:
     """
     fields = {"normal_stress": "constant", "stiffness": 0.03, "mu_star": 0.6}
     scene = Scene(law=law, a=0.01, b_over_a=1.3, **fields)
-    meter, loading = WorkMeter(10**9), np.array([(t, v, 1.0, 0.0) for t, v in STEP_UP])
+    integrator = Integrator(Accuracy(budget=10**9, engine="compiled"))
+    loading = np.array([(t, v, 1.0, 0.0) for t, v in STEP_UP])
     times = synthetic.sample_times(STEP_UP, 50.0, 50)
-    model = WindowModel(scene, times, times, times, loading, Accuracy(engine="compiled"), meter)
+    model = WindowModel(scene, times, times, times, loading, integrator)
     critical = (EXACT_PARAMETERS["b"] - EXACT_PARAMETERS["a"]) / EXACT_PARAMETERS["slip_distance"]
     soft, stiff = (EXACT_PARAMETERS | {"stiffness": part * critical} for part in (0.999, 3.0))
     assert np.isnan(model.model_friction(soft, require_stable=True)).all()
-    assert meter.evaluations == 0
+    assert integrator.evaluations == 0
     assert np.isfinite(model.model_friction(stiff, require_stable=True)).all()
-    assert meter.evaluations > 0
+    assert integrator.evaluations > 0
 
 
 #: A ramp of 0.4 s, during which the load point moves by 2.2 um. A constant velocity during the

@@ -25,7 +25,7 @@ from rsfstudy.fitting.window_model import (
     WindowModel,
 )
 from rsfstudy.motion.accuracy import Accuracy
-from rsfstudy.motion.work_meter import WorkMeter
+from rsfstudy.motion.integrator import Integrator
 
 ENOUGH = 10**9
 
@@ -43,7 +43,14 @@ def model_of(
     pieces = np.array([(begins, speed, 1.0, 0.0) for begins, speed in loading])
     accuracy = Accuracy(1e-9, ENOUGH, engine="compiled")
     moved = synthetic.load_point_displacement(loading, times)
-    return WindowModel(scene_of(law), times, moved, friction, pieces, accuracy, WorkMeter(ENOUGH))
+    return WindowModel(
+        scene_of(law),
+        times,
+        moved,
+        friction,
+        pieces,
+        Integrator(accuracy),
+    )
 
 
 @pytest.mark.parametrize(

@@ -32,7 +32,7 @@ from rsfstudy.fitting.joint_model import JointModel
 from rsfstudy.fitting.window_model import WindowModel
 from rsfstudy.motion.accuracy import Accuracy
 from rsfstudy.motion.engines import COMPILED
-from rsfstudy.motion.work_meter import WorkMeter
+from rsfstudy.motion.integrator import Integrator
 
 ENOUGH = 10**9
 SHARED = ("a", "b", "slip_distance")
@@ -69,13 +69,13 @@ def test_derivatives_of_windows_are_differences() -> None:
     scene = Scene(
         law="slip", a=0.01, b_over_a=1.3, normal_stress="constant", stiffness=0.03, mu_star=0.6
     )
-    accuracy, meter = Accuracy(1e-9, ENOUGH, engine=COMPILED), WorkMeter(ENOUGH, engine=COMPILED)
+    integrator = Integrator(Accuracy(1e-9, ENOUGH, engine=COMPILED))
     parts = []
     for loading in (STEP_UP, synthetic.STEP_DOWN):
         times = synthetic.sample_times(loading, synthetic.loading_end_time(loading), 60)
         pieces = np.array([(begins, speed, 1.0, 0.0) for begins, speed in loading])
         moved = synthetic.load_point_displacement(loading, times)
-        parts.append(WindowModel(scene, times, moved, 0.0 * times, pieces, accuracy, meter))
+        parts.append(WindowModel(scene, times, moved, 0.0 * times, pieces, integrator))
     joint = JointModel(tuple(parts))
     plainly = {n: EXACT_PARAMETERS[n] for n in ("a", "b", "slip_distance", "stiffness")}
     values = plainly | {"mu_star_1": 0.6, "mu_star_2": 0.5, "trend1_1": 1e-5, "trend1_2": -2e-5}

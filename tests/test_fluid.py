@@ -17,10 +17,9 @@ from test_steady import PLAIN
 from rsfstudy import Scene, simulate
 from rsfstudy.motion.accuracy import Accuracy
 from rsfstudy.motion.engines import ENGINES
-from rsfstudy.motion.event_integration import integrate_events, iterate_events_of_equations
 from rsfstudy.motion.events import EventKind, maximum
+from rsfstudy.motion.integrator import Integrator
 from rsfstudy.motion.recording import FIRST_STATE_COLUMN, RECORDED_VARIABLES, Recording
-from rsfstudy.motion.work_meter import WorkMeter
 from rsfstudy.responses.step_response import StepResponse
 from rsfstudy.slider import stability
 from rsfstudy.slider.equations import (
@@ -97,10 +96,10 @@ def test_a_rigid_slider_after_a_step_of_its_slip_rate(rate, drainage):
     """
     scene = dilatant(0.01, drainage, load_velocity_ratio=rate, **CONSTANT)
     x, c, start = math.log(rate), drainage / rate, scene.a * math.log(rate)
-    recording, meter = Recording(sample_times=np.array([0.1, 0.7, 2.0, 5.0])), WorkMeter(100_000)
+    recording = Recording(sample_times=np.array([0.1, 0.7, 2.0, 5.0]))
     equations = equations_at_imposed_slip_rate(scene, x)
-    path = iterate_events_of_equations(
-        equations, (start, 0.0, 0.0), 1e-11, meter, recording=recording
+    path = Integrator(Accuracy()).follow_equations(
+        equations, (start, 0.0, 0.0), local_tolerance=1e-11, recording=recording
     )
     next(event for event in path if event.kind is EventKind.SAMPLED)
     for row, asked in zip(recording.as_table(scene), recording.sample_times, strict=True):
@@ -135,8 +134,8 @@ def test_a_rigid_slider_after_a_step_of_its_slip_rate(rate, drainage):
 def test_without_drainage_pressure_is_lost_to_porosity(fields):
     """Without drainage, P = -(phi - phi_0)/beta in every regime."""
     scene, far = dilatant(0.01, 1e-30, load_velocity_ratio=10.0, **fields), 0.0
-    for event in integrate_events(
-        scene, Accuracy(1e-9), WorkMeter(20_000), [maximum("log_slip_rate")], until=40.0
+    for event in Integrator(Accuracy(1e-9, 20_000)).follow(
+        scene, [maximum("log_slip_rate")], until=40.0
     ):
         porosity, pressure = event.point.psis[1:]
         far = max(far, porosity)

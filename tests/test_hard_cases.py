@@ -22,7 +22,7 @@ from rsfstudy.limit_cycles.limit_cycle import LimitCycle
 from rsfstudy.limit_cycles.stick_slip_cycles import iterate_cycles
 from rsfstudy.motion.accuracy import Accuracy
 from rsfstudy.motion.engines import COMPILED
-from rsfstudy.motion.work_meter import WorkMeter
+from rsfstudy.motion.integrator import Integrator
 from rsfstudy.responses.rigid_response import RigidResponse
 from rsfstudy.responses.step_response import StepResponse
 from rsfstudy.status import Status
@@ -78,7 +78,7 @@ def test_two_hundred_cycles_do_not_drift():
     )
     intervals = []
     accuracy = Accuracy(1e-5, budget=10**7, engine=COMPILED)
-    for cycle in iterate_cycles(scene, accuracy, WorkMeter(10**7, engine=COMPILED), None):
+    for cycle in iterate_cycles(scene, Integrator(accuracy), None):
         intervals.append(cycle.recurrence_interval)
         if len(intervals) == 203:
             break

@@ -14,9 +14,8 @@ from rsfstudy.critical_steps.critical_step import CriticalStep
 from rsfstudy.critical_steps.triggered import Triggered
 from rsfstudy.motion.accuracy import Accuracy
 from rsfstudy.motion.engines import COMPILED
-from rsfstudy.motion.event_integration import integrate_events
 from rsfstudy.motion.events import fall, maximum
-from rsfstudy.motion.work_meter import WorkMeter
+from rsfstudy.motion.integrator import Integrator
 from rsfstudy.status import Status
 
 DISPLACEMENT, FALL = "displacement_step", "normal_stress_step"
@@ -119,10 +118,8 @@ def test_pore_pressure_stays_below_its_bound(law, drainage):
                   stiffness_ratio=2.0, displacement_step=0.5, load_velocity_ratio=0.0)  # fmt: skip
     points = [
         event.point
-        for event in integrate_events(
+        for event in Integrator(Accuracy(1e-6, 20_000, engine=COMPILED)).follow(
             scene,
-            Accuracy(1e-6, engine=COMPILED),
-            WorkMeter(20_000, engine=COMPILED),
             (
                 maximum("log_slip_rate"),
                 *(fall("log_slip_rate", -float(x), terminal=x == 4) for x in range(5)),

@@ -29,8 +29,7 @@ from rsfstudy.errors import DataError, InvalidValue
 from rsfstudy.motion import engines
 from rsfstudy.motion.accuracy import Accuracy
 from rsfstudy.motion.engines import COMPILED, ENGINES
-from rsfstudy.motion.event_integration import integrate_events
-from rsfstudy.motion.work_meter import WorkMeter
+from rsfstudy.motion.integrator import Integrator
 from rsfstudy.responses.step_response import StepResponse
 
 PLAIN = {"normal_stress": "constant", "stiffness": 0.02, "a": 0.01, "b_over_a": 1.4}
@@ -242,8 +241,6 @@ def test_other_steppers_follow_it_too(method):
     scene = Scene(**PLAIN, law="slowness", loading=history(wave(12)))
     known = told(history(wave(12)), "", law="slowness")[0, -1]
     own = isinstance(method, type)
-    accuracy = Accuracy(1e-6, 10**6, **({"engine": method} if own else {}))
-    methods = {} if own else {"quasi_static": method}
-    meter = WorkMeter(10**6, engine=accuracy.engine, methods=methods)
-    *_earlier, end = integrate_events(scene, accuracy, meter, until=20.0)
+    options = {"engine": method} if own else {"methods": (("quasi_static", method),)}
+    *_earlier, end = Integrator(Accuracy(1e-6, 10**6, **options)).follow(scene, until=20.0)
     assert scene.mu_star + end.point.spring_stress == pytest.approx(known, abs=1e-7)

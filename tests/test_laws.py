@@ -16,9 +16,8 @@ from rsfstudy.critical_steps.monotone_approach_to_load_rate import (
 from rsfstudy.errors import InvalidValue
 from rsfstudy.limit_cycles.limit_cycle import LimitCycle
 from rsfstudy.motion.accuracy import Accuracy
-from rsfstudy.motion.event_integration import integrate_events
 from rsfstudy.motion.events import EventKind, approach_to_steady_state
-from rsfstudy.motion.work_meter import WorkMeter
+from rsfstudy.motion.integrator import Integrator
 from rsfstudy.responses.rigid_response import RigidResponse
 from rsfstudy.responses.step_response import StepResponse
 from rsfstudy.slider import laws, steady_state
@@ -222,9 +221,7 @@ def test_with_any_b_below_a_every_spring_slides_steadily_in_the_end(law, b):
         assert end.frictional_stress == pytest.approx(
             scene.a * (1.0 - b) * math.log(3.0), rel=1e-12
         )
-    motion = integrate_events(
-        scene, accuracy, WorkMeter(10**6, engine="compiled"), [approach_to_steady_state(1e-6)]
-    )
+    motion = Integrator(accuracy).follow(scene, [approach_to_steady_state(1e-6)])
     settled = next(event for event in motion if event.kind is EventKind.SETTLED)
     assert settled.point.spring_stress == pytest.approx(end.frictional_stress, abs=1e-5 * scene.a)
 

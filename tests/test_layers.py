@@ -6,6 +6,7 @@ Packages import from lower layers only, and heavy libraries are imported by few 
 import ast
 import importlib.util
 import itertools
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -206,3 +207,19 @@ def test_help_and_the_list_of_studies_load_next_to_nothing():
     *answers, after = ran.stdout.split("loaded:\n")
     assert (len(answers), after) == (4, "")
     assert all(len(answer.splitlines()) > 9 for answer in answers)
+
+
+def test_no_function_takes_an_accuracy_and_a_meter():
+    """An integrator contains both, so no function takes the two arguments."""
+    found = []
+    for file in FILES:
+        for node in ast.walk(ast.parse(file.read_text())):
+            if isinstance(node, ast.FunctionDef):
+                arguments = [*node.args.posonlyargs, *node.args.args, *node.args.kwonlyargs]
+                texts = {ast.unparse(argument) for argument in arguments}
+                accuracies = [t for t in texts if re.search(r"\baccuracy\b|\bAccuracy\b", t)]
+                meters = [t for t in texts if re.search(r"meter\b|\bWorkMeter\b", t)]
+                meters = [t for t in meters if "parameter" not in t.lower()]
+                if accuracies and meters:
+                    found.append(f"{file.name}:{node.name}")
+    assert found == []

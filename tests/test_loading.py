@@ -12,9 +12,9 @@ from rsfstudy import Scene, simulate
 from rsfstudy.errors import IncompleteWarning
 from rsfstudy.limit_cycles.limit_cycle import LimitCycle
 from rsfstudy.motion.accuracy import Accuracy
-from rsfstudy.motion.event_integration import integrate_events
 from rsfstudy.motion.events import EventKind, approach_to_steady_state, fall, maximum, minimum, rise
-from rsfstudy.motion.work_meter import MotionStopped, WorkMeter
+from rsfstudy.motion.integrator import Integrator
+from rsfstudy.motion.work_meter import MotionStopped
 from rsfstudy.responses.linear_stability import LinearStability
 from rsfstudy.responses.step_response import StepResponse
 from rsfstudy.slider.loading import Loading, Segment
@@ -50,7 +50,7 @@ def scene(first=(1.0, 0.0, 1.0), then=(1.0, 0.0), **fields) -> Scene:
 
 
 def told(of: Scene, *watches, until: float, rtol: float = 1e-7) -> list:
-    return list(integrate_events(of, Accuracy(rtol), WorkMeter(10**6), watches, until=until))
+    return list(Integrator(Accuracy(rtol, 10**6)).follow(of, watches, until=until))
 
 
 @pytest.mark.parametrize(

@@ -58,7 +58,7 @@ class Scaled(Measure):
         if self.factor == 13.0:
             raise RuntimeError("no luck")
 
-    def compute(self, scene, accuracy, meter):
+    def compute(self, scene, integrator):
         total = sum(self.factor * scene.b_over_a for _ in range(self.times))
         return Outcome(Status.OK, {"total": -total if self.negative else total})
 

@@ -7,11 +7,10 @@ import pytest
 
 from rsfstudy import Scene
 from rsfstudy.motion.accuracy import Accuracy
-from rsfstudy.motion.event_integration import integrate_events
 from rsfstudy.motion.events import maximum
+from rsfstudy.motion.integrator import Integrator
 from rsfstudy.motion.neglected_inertia_error import estimate_neglected_inertia_error
 from rsfstudy.motion.recording import REGIME_COLUMN, Recording
-from rsfstudy.motion.work_meter import WorkMeter
 from rsfstudy.responses._motion_readings import growth_rate_along_path
 from rsfstudy.responses.healing import Healing
 from rsfstudy.responses.velocity_step import VelocityStep
@@ -70,8 +69,8 @@ def test_errors_cover_what_both_runs_neglect(measure, rtol, scene):
 
 
 def recorded(scene, rtol):
-    recording, accuracy = Recording(), Accuracy(rtol, engine="compiled")
-    list(integrate_events(scene, accuracy, WorkMeter(10_000_000, engine="compiled"), with_time=True,
+    recording, accuracy = Recording(), Accuracy(rtol, 10_000_000, engine="compiled")
+    list(Integrator(accuracy).follow(scene, with_time=True,
                 recording=recording, until=12.0))  # fmt: skip
     return recording, recording.as_table(scene)
 
@@ -108,11 +107,9 @@ def test_growth_at_a_peak_has_one_unit_in_both_regimes():
     """
     scene, growths = CASES[0][2], {}
     for rtol in (1e-5, 1e-8):
-        meter, wanted = (
-            WorkMeter(10_000_000, engine="compiled"),
-            maximum("spring_stress", terminal=True),
-        )
-        events = list(integrate_events(scene, Accuracy(rtol, engine="compiled"), meter, [wanted]))
+        wanted = maximum("spring_stress", terminal=True)
+        integrator = Integrator(Accuracy(rtol, 10_000_000, engine="compiled"))
+        events = list(integrator.follow(scene, [wanted]))
         peak = next(event for event in events if event.specification == wanted)
         growths[peak.regime] = growth_rate_along_path(scene, peak, 8.22991)
     assert set(growths) == {RUPTURE_REGIME, scene.dynamics.regime}

@@ -23,7 +23,7 @@ from rsfstudy.critical_steps.motion_after_step import (
     motion_reaches_norm,
 )
 from rsfstudy.motion.accuracy import Accuracy
-from rsfstudy.motion.work_meter import WorkMeter
+from rsfstudy.motion.integrator import Integrator
 from rsfstudy.slider import closed_forms, stability
 from rsfstudy.status import Status
 
@@ -132,7 +132,7 @@ def test_either_side_of_a_fall(law, stress, dynamics, ratio, b_over_a, moves):
         return
     for side, reached in ((1.0 - 1e-4, False), (1.0 + 1e-4, True)):
         stepped = scene.with_(normal_stress_step=math.expm1(side * math.log1p(value)))
-        assert motion_reaches_norm(stepped, Accuracy(1e-6), WorkMeter(200_000)) is reached
+        assert motion_reaches_norm(stepped, Integrator(Accuracy(1e-6, 200_000))) is reached
 
 
 @pytest.mark.parametrize("dynamics", DYNAMICS, ids=str)

@@ -14,7 +14,7 @@ from rsfstudy import Scene
 from rsfstudy.critical_steps.motion_after_step import motion_reaches_norm
 from rsfstudy.motion.accuracy import Accuracy
 from rsfstudy.motion.initial_points import initial_point
-from rsfstudy.motion.work_meter import WorkMeter
+from rsfstudy.motion.integrator import Integrator
 
 
 @given(
@@ -79,4 +79,4 @@ def test_a_fall_of_normal_stress_triggers_beyond_its_closed_form(law, alpha):
     step = 1.0 / q - 1.0
     for share, reached in ((1.0 - 1e-6, False), (1.0 + 1e-6, True)):
         stepped = scene.with_(normal_stress_step=share * step)
-        assert motion_reaches_norm(stepped, Accuracy(1e-9), WorkMeter(100_000)) is reached
+        assert motion_reaches_norm(stepped, Integrator(Accuracy(1e-9, 100_000))) is reached

@@ -31,8 +31,8 @@ class Own(Measure):
     variables = {"total": ()}  # noqa: RUF012
     typical_work = 1
 
-    def compute(self, scene, accuracy, meter):
-        meter.charge("any", 7)
+    def compute(self, scene, integrator):
+        integrator.work_meter.charge("any", 7)
         return Outcome(Status.OK, {"total": scene.b_over_a})
 
 
@@ -72,7 +72,7 @@ class Outputs(Measure):
     inner_coordinates = {"x": [1.0, 2.0]}  # noqa: RUF012
     typical_work = 1
 
-    def compute(self, scene, accuracy, meter):
+    def compute(self, scene, integrator):
         ratio = scene.b_over_a
         values = {"total": ratio, "total_error": 0.0, "curve": np.ones(2), "slip_per_event": 1.0}
         if ratio > 2.0:
@@ -141,7 +141,7 @@ def test_inner_coordinates_that_a_file_gives_back(values, tmp_path):
         variables = {"total": (), "curve": ("x",)}  # noqa: RUF012
         inner_coordinates = {"x": values}  # noqa: RUF012
 
-        def compute(self, scene, accuracy, meter):
+        def compute(self, scene, integrator):
             return Outcome(Status.OK, {"total": 1.0, "curve": [3, 4]})
 
     run(study(Curve()), output=tmp_path)
@@ -157,8 +157,8 @@ def test_inner_coordinates_that_a_file_gives_back(values, tmp_path):
 def test_work_that_is_no_count(count, tmp_path):
     """Cells with an invalid work count fail with a message in the file."""
 
-    def compute(self, scene, accuracy, meter):
-        meter.evaluations = count
+    def compute(self, scene, integrator):
+        integrator.work_meter.evaluations = count
         return Outcome(Status.OK, {"total": 1.0})
 
     run_with_failures(study(own(compute=compute)), output=tmp_path)

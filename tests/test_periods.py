@@ -18,7 +18,7 @@ from rsfstudy.limit_cycles.return_map import (
 from rsfstudy.limit_cycles.stick_slip_cycles import Cycle
 from rsfstudy.motion.accuracy import Accuracy
 from rsfstudy.motion.engines import COMPILED, ENGINES
-from rsfstudy.motion.work_meter import WorkMeter
+from rsfstudy.motion.integrator import Integrator
 from rsfstudy.slider.stability import linear_growth_rates
 from rsfstudy.status import Status
 
@@ -42,19 +42,17 @@ def quick(rtol: float) -> Accuracy:
 
 
 def came_to(scene: Scene, events: int = 64, rtol: float = 1e-7, **how):
-    return follow_to_periodic_orbit(
-        scene, quick(rtol), WorkMeter(2_000_000, engine=COMPILED), events, **how
-    )
+    return follow_to_periodic_orbit(scene, Integrator(quick(rtol)), events, **how)
 
 
 @pytest.mark.parametrize("law", ["slip", "slowness"])
 def test_the_multiplier_of_one_state_is_the_slope_of_its_return_map(law):
     """The multiplier equals the slope from two successive cycles."""
     scene = Scene(law=law, stiffness_ratio=0.8, load_velocity_ratio=2.0, inertia=True)
-    accuracy, meter = Accuracy(1e-8), WorkMeter(2_000_000)
-    approach = LimitCycleSearch(scene, accuracy, meter)
+    integrator = Integrator(Accuracy(1e-8, 2_000_000))
+    approach = LimitCycleSearch(scene, integrator)
     assert approach.follow_until_converged(300)
-    orbit = follow_to_periodic_orbit(scene, accuracy, meter, 64).orbit
+    orbit = follow_to_periodic_orbit(scene, integrator, 64).orbit
     assert orbit.period == 1
     multiplier, forgotten = orbit.floquet_multipliers
     assert multiplier.imag == 0.0
@@ -185,7 +183,7 @@ def test_the_growth_of_departures_is_that_of_the_motion_alone(monkeypatch):
     scene, transient, events = slow(0.853), 24, 16
     found = Bifurcation(transient=transient, events=events)(scene, quick(1e-7)).values
     seen = came_to(scene, transient + events, 1e-7, follow_all_cycles=True).cycles
-    by = ReturnMap(scene, quick(1e-7), WorkMeter(2_000_000, engine=COMPILED))
+    by = ReturnMap(scene, Integrator(quick(1e-7)))
     monkeypatch.setattr(return_map, "DIFFERENCE_STEP_OVER_LOG_RATE_RANGE", 3e-5)
     direction, grown = np.array([0.2, 1.0, -0.3]), []
     for cycle in seen:

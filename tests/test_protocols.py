@@ -16,9 +16,8 @@ from rsfstudy.errors import InvalidValue
 from rsfstudy.limit_cycles.limit_cycle import LimitCycle
 from rsfstudy.motion.accuracy import Accuracy
 from rsfstudy.motion.engines import ENGINES
-from rsfstudy.motion.event_integration import integrate_events
 from rsfstudy.motion.events import EventKind, maximum
-from rsfstudy.motion.work_meter import WorkMeter
+from rsfstudy.motion.integrator import Integrator
 from rsfstudy.responses.step_response import StepResponse
 from rsfstudy.responses.velocity_step import VelocityStep
 from rsfstudy.slider import loading
@@ -96,10 +95,8 @@ def test_a_very_long_hold_ends_when_it_should(engine):
     loading determines the end.
     """
     scene = Scene(**STIFF, hold_time=1e10)
-    asked = integrate_events(
+    asked = Integrator(Accuracy(engine=engine, budget=10**5)).follow(
         scene,
-        Accuracy(engine=engine),
-        WorkMeter(10**5, engine=engine),
         [maximum("spring_stress")],
         until=1e10 + 40.0,
     )

@@ -14,9 +14,8 @@ from rsfstudy.errors import InvalidValue
 from rsfstudy.limit_cycles.limit_cycle import LimitCycle
 from rsfstudy.motion.accuracy import Accuracy
 from rsfstudy.motion.engines import COMPILED, ENGINES
-from rsfstudy.motion.event_integration import integrate_events
 from rsfstudy.motion.events import EventKind, approach_to_steady_state
-from rsfstudy.motion.work_meter import WorkMeter
+from rsfstudy.motion.integrator import Integrator
 
 IMPOSED = {"law": "slowness", "normal_stress": "imposed", "alpha": 0.3, "stiffness_ratio": 3.0}
 SLIDERS = {
@@ -40,9 +39,8 @@ def test_where_stability_limits_steps_a_motion_ends_as_accurately_as_steps_do(ov
                   ramp_duration=30.5)  # fmt: skip
 
     def at_end(rtol: float, engine: str) -> tuple[float, float]:
-        meter = WorkMeter(200_000, engine=engine)
-        accuracy = Accuracy(rtol, engine=engine)
-        *_, end = integrate_events(scene, accuracy, meter, with_time=True, until=over * 30.5)
+        integrator = Integrator(Accuracy(rtol, 200_000, engine=engine))
+        *_, end = integrator.follow(scene, with_time=True, until=over * 30.5)
         assert end.time == over * 30.5
         return end.point.log_slip_rate, end.point.spring_stress / scene.a
 
@@ -66,9 +64,9 @@ def test_once_over_it_leaves_no_unknown():
 @pytest.mark.parametrize("slider", SLIDERS)
 def test_it_settles_once_over(slider):
     scene = Scene(**SLIDERS[slider], **RAMP)
-    accuracy, meter = Accuracy(1e-8, engine=COMPILED), WorkMeter(10**5, engine=COMPILED)
-    *_earlier, end = integrate_events(
-        scene, accuracy, meter, [approach_to_steady_state(1e-3, terminal=True)], with_time=True
+    integrator = Integrator(Accuracy(1e-8, 10**5, engine=COMPILED))
+    *_earlier, end = integrator.follow(
+        scene, [approach_to_steady_state(1e-3, terminal=True)], with_time=True
     )
     assert end.kind is EventKind.SETTLED
     assert end.time > 4.0
@@ -100,7 +98,7 @@ def test_stairs_tend_to_a_ramp_of_velocity_as_the_square_of_their_number(change)
     )
     for stairs in (64, 128):
         which = scene.with_(velocity_ramp_stairs=stairs)
-        *_earlier, end = integrate_events(which, Accuracy(1e-9), WorkMeter(10**6), until=5.0)
+        *_earlier, end = Integrator(Accuracy(1e-9, 10**6)).follow(which, until=5.0)
         off.append(end.point.spring_stress - known)
     assert off[0] / off[1] == pytest.approx(4.0, rel=0.1)
     assert abs(off[1]) < 1e-4 * scene.a

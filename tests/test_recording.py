@@ -15,11 +15,10 @@ from rsfstudy import Scene, protocol, simulate
 from rsfstudy.limit_cycles.limit_cycle import LimitCycle
 from rsfstudy.motion.accuracy import Accuracy
 from rsfstudy.motion.engines import COMPILED, ENGINES
-from rsfstudy.motion.event_integration import integrate_events
 from rsfstudy.motion.events import Event, EventKind
+from rsfstudy.motion.integrator import Integrator
 from rsfstudy.motion.recorded_motion_readings import resample_motion_along_path
 from rsfstudy.motion.recording import FIRST_STATE_COLUMN, RECORDED_VARIABLES, Recording
-from rsfstudy.motion.work_meter import WorkMeter
 from rsfstudy.responses.step_response import StepResponse
 from rsfstudy.status import Status
 
@@ -52,10 +51,8 @@ TIMES = np.array([0.0, 1e-9, 0.7, 0.7000001, 3.0, 3.5, 8.0, 8.0 + 1e-9, 10.0, 12
 def recorded(scene: Scene, engine: str, times: np.ndarray, until: float = math.inf):
     """Return the recorded table and the events of a motion."""
     recording, events = Recording(sample_times=times), list[Event]()
-    meter, accuracy = WorkMeter(10**6, engine=engine), Accuracy(RTOL, engine=engine)
-    motion = integrate_events(
-        scene, accuracy, meter, with_time=True, until=until, recording=recording
-    )
+    integrator = Integrator(Accuracy(RTOL, 10**6, engine=engine))
+    motion = integrator.follow(scene, with_time=True, until=until, recording=recording)
     for event in motion:
         events.append(event)
         if event.kind is EventKind.SAMPLED and math.isinf(until):
@@ -89,8 +86,8 @@ def test_values_are_those_of_motions_that_end_there(name, engine):
     assert [event.kind for event in events].count(EventKind.SAMPLED) == 1
     assert [event.kind for event in events[-2:]] == [EventKind.SAMPLED, EventKind.END]
     for time, row in zip(TIMES[1:], table[1:], strict=True):
-        meter, accuracy = WorkMeter(10**6, engine=engine), Accuracy(RTOL, engine=engine)
-        *_, end = integrate_events(scene, accuracy, meter, with_time=True, until=time)
+        integrator = Integrator(Accuracy(RTOL, 10**6, engine=engine))
+        *_, end = integrator.follow(scene, with_time=True, until=time)
         assert (end.kind, end.time) == (EventKind.END, time)
         states = list(end.point.psis[: len(row) - FIRST_STATE_COLUMN])
         expected = [*row_of(scene, end), *states]
@@ -148,9 +145,9 @@ def weights(scene: Scene) -> dict[str, float]:
 
 def exactly(scene: Scene, times: np.ndarray) -> dict[str, np.ndarray]:
     """Return the motion at given times with a much smaller tolerance."""
-    recording, accuracy = Recording(sample_times=times), Accuracy(1e-11, 10**7, engine=COMPILED)
-    meter = WorkMeter(10**7, engine=COMPILED)
-    list(integrate_events(scene, accuracy, meter, until=float(times[-1]), recording=recording))
+    recording = Recording(sample_times=times)
+    integrator = Integrator(Accuracy(1e-11, 10**7, engine=COMPILED))
+    list(integrator.follow(scene, until=float(times[-1]), recording=recording))
     return dict(zip(RECORDED_VARIABLES, recording.as_table(scene).T, strict=False))
 
 
@@ -215,8 +212,8 @@ def test_points_along_a_path_are_those_of_the_compiled_loop():
     """
     scene = Scene(law="slip", stiffness_ratio=0.8, load_velocity_ratio=2.0, inertia=True)
     recording, changes = Recording(), 0
-    for event in integrate_events(
-        scene, Accuracy(1e-6), WorkMeter(20_000), with_time=True, recording=recording
+    for event in Integrator(Accuracy(1e-6, 20_000)).follow(
+        scene, with_time=True, recording=recording
     ):
         changes += event.kind is EventKind.REGIME
         if changes == 2:

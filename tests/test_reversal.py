@@ -10,9 +10,8 @@ from rsfstudy.critical_steps.critical_step import CriticalStep
 from rsfstudy.errors import IncompleteWarning
 from rsfstudy.motion.accuracy import Accuracy
 from rsfstudy.motion.engines import COMPILED, ENGINES
-from rsfstudy.motion.event_integration import integrate_events
 from rsfstudy.motion.events import EventKind, maximum, minimum
-from rsfstudy.motion.work_meter import WorkMeter
+from rsfstudy.motion.integrator import Integrator
 from rsfstudy.responses._motion_readings import choose_friction_quantity_for_events
 from rsfstudy.responses.linear_stability import LinearStability
 from rsfstudy.slider import stability
@@ -145,7 +144,7 @@ def test_stress_turns_first_where_slip_back_is_as_fast_as_the_load_point():
     scene = Scene(**fields, regularised=True, loading=protocol([{"velocity": -1.0}]))
     of = choose_friction_quantity_for_events(scene)[0]
     watches = [minimum(of, terminal=True), maximum(of, terminal=True)]
-    *_before, turn = integrate_events(scene, Accuracy(1e-6), WorkMeter(10**5), watches, until=100.0)
+    *_before, turn = Integrator(Accuracy(1e-6, 10**5)).follow(scene, watches, until=100.0)
     assert turn.kind is EventKind.MINIMUM
     assert turn.point.log_slip_rate == pytest.approx(0.0, abs=1e-6)
     assert turn.point.spring_stress < -2.0 * scene.mu_star

@@ -60,7 +60,7 @@ class Profile(Measure):
     def inner_coordinates(self):
         return {"phase": np.linspace(0.0, 1.0, 4)}
 
-    def compute(self, scene, accuracy, meter):
+    def compute(self, scene, integrator):
         return Outcome(Status.OK, {"total": scene.b_over_a, "curve": scene.b_over_a * np.arange(4)})
 
 

@@ -13,9 +13,9 @@ from rsfstudy.limit_cycles.limit_cycle import LimitCycle
 from rsfstudy.measure_base.settling_checks import steady_sliding_is_linearly_stable
 from rsfstudy.motion.accuracy import Accuracy
 from rsfstudy.motion.engines import COMPILED, PYTHON, SCIPY
-from rsfstudy.motion.event_integration import integrate_events
 from rsfstudy.motion.events import EventKind, approach_to_steady_state, rise
-from rsfstudy.motion.work_meter import MotionStopped, WorkMeter
+from rsfstudy.motion.integrator import Integrator
+from rsfstudy.motion.work_meter import MotionStopped
 from rsfstudy.quantities import Quantity
 from rsfstudy.responses._recorded_motion import compute_settled_friction_flag
 from rsfstudy.responses.step_response import StepResponse
@@ -118,7 +118,7 @@ def test_no_motion_settles_where_small_changes_grow():
         (approach_to_steady_state(0.5), rise("log_slip_rate", scene.log_load_velocity)),
         [],
     )
-    for event in integrate_events(scene, accuracy, WorkMeter(accuracy.budget), asked):
+    for event in Integrator(accuracy).follow(scene, asked):
         kinds.append(event.kind)
         if kinds.count(EventKind.RISE) == 3:
             break

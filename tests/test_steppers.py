@@ -19,11 +19,11 @@ from rsfstudy import Scene
 from rsfstudy.motion import array_layout
 from rsfstudy.motion.accuracy import Accuracy
 from rsfstudy.motion.engines import PYTHON, SCIPY
-from rsfstudy.motion.event_integration import integrate_events, iterate_events_of_equations
 from rsfstudy.motion.in_place_functions import (
     build_array_unpacking_function,
     build_in_place_functions,
 )
+from rsfstudy.motion.integrator import Integrator
 from rsfstudy.motion.motion_loop import advance_to_step_end
 from rsfstudy.motion.steppers import Stepper, unrolled_step
 from rsfstudy.motion.steppers.order_eight import OrderEightStepper
@@ -32,7 +32,7 @@ from rsfstudy.motion.steppers.scipy import (
     SciPyStepper,
     _build_interpolant_of_unknowns,
 )
-from rsfstudy.motion.work_meter import MotionStopped, WorkMeter
+from rsfstudy.motion.work_meter import MotionStopped
 from rsfstudy.motion.workspace import Workspace, create_workspace, workspace_size
 from rsfstudy.slider.equations import (
     Equations,
@@ -135,11 +135,13 @@ def test_a_step_is_scipys(equations, y):
 def ends_of_steps(equations: Equations, y, by: str, steps: int, **options):
     """Return the independent variable at the end of each step.
 
-    The second return value is the work meter.
+    The second return value is the integrator.
     """
-    meter = WorkMeter(10**5, engine=by)
-    path = iterate_events_of_equations(equations, y, 1e-3, meter, [STEP_END_EVENT], **options)
-    return [event.clock for event in itertools.islice(path, steps + 1)], meter
+    integrator = Integrator(Accuracy(budget=10**5, engine=by))
+    path = integrator.follow_equations(
+        equations, y, [STEP_END_EVENT], local_tolerance=1e-3, **options
+    )
+    return [event.clock for event in itertools.islice(path, steps + 1)], integrator
 
 
 @pytest.mark.parametrize("backward", [False, True])
@@ -159,7 +161,7 @@ def test_plain_python_takes_the_steps_of_scipy(equations, y, steps, backward):
     assert ours[0] == pytest.approx(theirs[0], rel=1e-9)
     assert math.copysign(1.0, ours[0][-1]) == (-1.0 if backward else 1.0)
     assert abs(ours[1].evaluations - theirs[1].evaluations) <= 2
-    assert ours[1].steps == theirs[1].steps == steps
+    assert ours[1].work_meter.steps == theirs[1].work_meter.steps == steps
 
 
 # ---- what a stepper owes the loop ----------------------------------------------------------------
@@ -245,15 +247,15 @@ def test_a_budget_ends_within_a_step(method):
     """
     regime = SYSTEMS[1][0].regime
     for budget in range(21, 30):
-        meter = WorkMeter(budget, {regime: method})
+        integrator = Integrator(Accuracy(1e-6, budget, methods=((regime, method),)))
         with pytest.raises(MotionStopped) as halt:
-            list(integrate_events(SLOW, Accuracy(1e-6, budget), meter))
+            list(integrator.follow(SLOW))
         assert halt.value.status is Status.WORK_BUDGET_SPENT
         # The rates at the end of a step belong to the step.
-        assert budget < meter.evaluations <= budget + 2
+        assert budget < integrator.evaluations <= budget + 2
     ends = []
     for by in (method, "DOP853"):
-        *_, end = integrate_events(SLOW, Accuracy(1e-6), WorkMeter(10**5, {regime: by}), until=8.0)
+        *_, end = Integrator(Accuracy(1e-6, 10**5, methods=((regime, by),))).follow(SLOW, until=8.0)
         ends.append(end.point.log_slip_rate)
     # Multistep methods lose more of the requested accuracy.
     assert ends[0] == pytest.approx(ends[1], abs=1e-4)

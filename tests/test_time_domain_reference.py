@@ -15,9 +15,8 @@ from time_domain_reference import TimeDomainMotion, rows_to_columns
 from rsfstudy import Scene, simulate
 from rsfstudy.motion.accuracy import Accuracy
 from rsfstudy.motion.engines import ENGINES, PYTHON, SCIPY
-from rsfstudy.motion.event_integration import integrate_events
 from rsfstudy.motion.events import fall, maximum, minimum, rise
-from rsfstudy.motion.work_meter import WorkMeter
+from rsfstudy.motion.integrator import Integrator
 
 CONSTANT, IMPOSED = {"normal_stress": "constant"}, {"normal_stress": "imposed", "alpha": 0.3}
 INCLINED = {"normal_stress": "variable", "phi": 65.0, "alpha": 0.3}
@@ -220,9 +219,9 @@ def test_events_are_those_of_time(name, engine):
     """
     which, until = EVENTFUL[name]
     rtol, watches = (1e-8 if which.has_mass else 1e-9), [row[0] for row in events_of(which)]
-    accuracy, meter = Accuracy(rtol, engine=engine), WorkMeter(10**6, engine=engine)
+    integrator = Integrator(Accuracy(rtol, 10**6, engine=engine))
     told = {watch: [] for watch in watches}
-    for event in integrate_events(which, accuracy, meter, watches, with_time=True, until=until):
+    for event in integrator.follow(which, watches, with_time=True, until=until):
         if event.specification is not None:
             told[event.specification].append(event)
     known = dict(zip(watches, events_in_time(name), strict=True))

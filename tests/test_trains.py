@@ -14,9 +14,8 @@ from rsfstudy import Scene, history, simulate
 from rsfstudy.limit_cycles.limit_cycle import LimitCycle
 from rsfstudy.motion.accuracy import Accuracy
 from rsfstudy.motion.engines import COMPILED, ENGINES
-from rsfstudy.motion.event_integration import integrate_events
 from rsfstudy.motion.events import EventKind, approach_to_steady_state
-from rsfstudy.motion.work_meter import WorkMeter
+from rsfstudy.motion.integrator import Integrator
 from rsfstudy.slider.laws import BUILT_IN_PARTS as LAWS
 
 IMPOSED = {"normal_stress": "imposed", "alpha": 0.3}
@@ -193,9 +192,8 @@ def test_the_amplitude_does_not_drift(rtol):
     """
     scene, off = Scene(**SLIDERS["imposed"], **OSCILLATES), []
     for periods in (30, 300):
-        meter = WorkMeter(10**6, engine=COMPILED)
-        accuracy = Accuracy(rtol, 10**6, engine=COMPILED)
-        *_earlier, end = integrate_events(scene, accuracy, meter, until=8.0 * periods)
+        integrator = Integrator(Accuracy(rtol, 10**6, engine=COMPILED))
+        *_earlier, end = integrator.follow(scene, until=8.0 * periods)
         _psi, ahead, relief = end.point.psis
         off.append(abs(math.hypot(ahead, relief) / 0.02 - 1.0))
         # Time has an error of at most rtol per period.
@@ -210,8 +208,8 @@ def test_it_never_settles(slider):
         Scene(**SLIDERS[slider], **OSCILLATES),
         [approach_to_steady_state(0.9, terminal=True)],
     )
-    accuracy, meter = Accuracy(1e-6, engine=COMPILED), WorkMeter(10**5, engine=COMPILED)
-    *_earlier, end = integrate_events(scene, accuracy, meter, watches, until=40.0)
+    integrator = Integrator(Accuracy(1e-6, 10**5, engine=COMPILED))
+    *_earlier, end = integrator.follow(scene, watches, until=40.0)
     assert (end.kind, end.time) == (EventKind.END, 40.0)
 
 

@@ -14,9 +14,8 @@ from rsfstudy.critical_steps.monotone_approach_to_load_rate import (
 from rsfstudy.critical_steps.triggered import Triggered
 from rsfstudy.motion.accuracy import Accuracy
 from rsfstudy.motion.engines import COMPILED, ENGINES
-from rsfstudy.motion.event_integration import integrate_events
 from rsfstudy.motion.events import EventKind, approach_to_steady_state, maximum
-from rsfstudy.motion.work_meter import WorkMeter
+from rsfstudy.motion.integrator import Integrator
 from rsfstudy.status import Status
 
 #: A slider whose radiation damping balances the spring. An integration until V reaches V_0 would
@@ -52,11 +51,11 @@ def test_what_is_said_to_rise_to_the_load_point_does(law, normal_stress, ratio):
     slope = {"phi": 70.0} if normal_stress == "variable" else {}
     damped = {"radiation_damping": 1e-3, "load_velocity_ratio": 2e3, "stiffness_ratio": ratio}
     scene = Scene(law=law, b_over_a=1.7, normal_stress=normal_stress, **effect, **slope, **damped)
-    accuracy, meter = Accuracy(1e-7, 10**6, engine=COMPILED), WorkMeter(10**6, engine=COMPILED)
+    integrator = Integrator(Accuracy(1e-7, 10**6, engine=COMPILED))
     levels = build_events_testing_monotone_rise(scene)
     told = [False]
-    for event in integrate_events(
-        scene, accuracy, meter, [maximum("log_slip_rate"), approach_to_steady_state(1e-3), *levels]
+    for event in integrator.follow(
+        scene, [maximum("log_slip_rate"), approach_to_steady_state(1e-3), *levels]
     ):
         if event.specification in levels and not told[-1]:
             told.append(rises_monotonically_to_load_rate(scene, event.point))
@@ -77,7 +76,7 @@ def test_a_slider_that_waves_do_not_hold_back_is_not_asked():
 def test_oscillations_do_not_rise_to_the_load_point():
     """Near the critical stiffness, the slip rate exceeds the load velocity."""
     scene = Scene(stiffness_ratio=1.1, load_velocity_ratio=1.1, radiation_damping=1e-12)
-    start = next(integrate_events(scene, Accuracy(1e-6), WorkMeter(10**5)))
+    start = next(Integrator(Accuracy(1e-6, 10**5)).follow(scene))
     assert start.point.log_slip_rate < scene.log_load_velocity
     assert not rises_monotonically_to_load_rate(scene, start.point)
 

@@ -16,7 +16,7 @@ from rsfstudy.critical_steps.triggered import Triggered
 from rsfstudy.limit_cycles.limit_cycle import LimitCycle
 from rsfstudy.motion.accuracy import Accuracy
 from rsfstudy.motion.engines import COMPILED, SCIPY
-from rsfstudy.motion.work_meter import WorkMeter
+from rsfstudy.motion.integrator import Integrator
 from rsfstudy.responses.linear_stability import LinearStability
 from rsfstudy.responses.rigid_response import RigidResponse
 from rsfstudy.responses.step_response import StepResponse
@@ -153,7 +153,7 @@ def test_below_a_window_of_instability_motions_settle(ratio, margin):
     assert motion_after_step.is_linearly_stable(scene) is (margin > 0.0)
     if ratio == 0.2:
         assert LimitCycle(phases=2)(scene, Accuracy(1e-4)).status is Status.NO_LIMIT_CYCLE
-        small = motion_after_step.motion_reaches_norm(scene, Accuracy(1e-4), WorkMeter(2_000_000))
+        small = motion_after_step.motion_reaches_norm(scene, Integrator(Accuracy(1e-4, 2_000_000)))
         assert not small
 
 

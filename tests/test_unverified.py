@@ -66,7 +66,7 @@ class Known(Measure):
     def error_scales(self, scene, values):
         return {"known": self.relative_to} if self.relative_to else {}
 
-    def compute(self, scene, accuracy, meter):
+    def compute(self, scene, integrator):
         values = {"known": 2.0, "known_error": 0.01, "mean": 1.0, "mean_error": 1.0}
         return Outcome(Status.OK, values, "as it is")
 

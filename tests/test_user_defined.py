@@ -18,7 +18,7 @@ from rsfstudy import Accuracy, Axis, Claim, Figure, Panel, Rig, Scene, Study
 from rsfstudy.critical_steps.critical_step import CriticalStep
 from rsfstudy.errors import InvalidValue
 from rsfstudy.measures import Measure, Outcome
-from rsfstudy.motion.work_meter import WorkMeter
+from rsfstudy.motion.integrator import Integrator
 from rsfstudy.quantities import Output
 from rsfstudy.reductions import LinearFit, ProportionalFit, Reduction
 from rsfstudy.responses.linear_stability import LinearStability
@@ -184,8 +184,8 @@ class PeakFriction(Measure):
     primary_output, typical_work = "peak_friction", 500
     outputs = (Output("peak_friction", r"$\mu_p$", "1", "largest friction after the step"),)
 
-    def compute(self, scene, accuracy, meter):
-        motion = rsfstudy.simulate(scene, duration=5.0, accuracy=accuracy, meter=meter)
+    def compute(self, scene, integrator):
+        motion = rsfstudy.simulate(scene, duration=5.0, integrator=integrator)
         peak = float(motion.friction_coefficient.max())
         return Outcome(Status.OK, {"peak_friction": peak})
 
@@ -209,15 +209,14 @@ def test_a_motion_within_a_measure_keeps_to_the_budget_of_its_cell():
     assert found.peak_friction.isnull().all()
 
 
-def test_several_motions_of_one_meter_report_their_own_work():
-    accuracy, meter = Accuracy(1e-3), WorkMeter(100_000)
+def test_several_motions_of_one_integrator_report_their_own_work():
+    integrator = Integrator(Accuracy(1e-3, 100_000))
     scene = STEPPED.with_(load_velocity_ratio=2.0)
-    motions = [rsfstudy.simulate(scene, accuracy=accuracy, meter=meter) for _ in range(2)]
+    motions = [rsfstudy.simulate(scene, integrator=integrator) for _ in range(2)]
     first, second = (motion.attrs["rhs_evaluations"] for motion in motions)
-    assert first == second == meter.evaluations / 2
-    for given in ({"meter": meter}, {"accuracy": accuracy}, {"accuracy": 1e-3, "meter": meter}):
-        with pytest.raises(InvalidValue, match="must be an Accuracy and a WorkMeter.*meter=meter"):
-            rsfstudy.simulate(scene, **given)
+    assert first == second == integrator.evaluations / 2
+    with pytest.raises(InvalidValue, match="must be an Integrator. Pass integrator=integrator"):
+        rsfstudy.simulate(scene, integrator=Accuracy())
 
 
 def test_a_motion_with_radiation_damping_says_what_its_stress_leaves_out():

@@ -29,11 +29,11 @@ from rsfstudy.motion import (
     Accuracy,
     Event,
     EventKind,
+    Integrator,
     MotionStopped,
     Recording,
-    WorkMeter,
+    accept_accuracy_and_meter,
     check_engine_is_usable,
-    integrate_events,
     recorded_friction_coefficient,
     recorded_load_point_displacement,
     rise,
@@ -77,6 +77,7 @@ _BUILT_IN_REGIME_NAMES = ("quasi_static", "slow_manifold", RUPTURE_REGIME, "quas
 
 
 @error_boundary
+@accept_accuracy_and_meter
 def simulate(
     scene: Scene,
     *extra_positional_arguments: Never,
@@ -86,8 +87,7 @@ def simulate(
     rtol: float = DEFAULT_RTOL,
     budget: int = DEFAULT_EVALUATION_BUDGET,
     engine: Any = SCIPY,
-    accuracy: Accuracy | None = None,
-    meter: WorkMeter | None = None,
+    integrator: Integrator | None = None,
 ) -> xr.Dataset:
     """Integrate the motion of a scene.
 
@@ -120,11 +120,11 @@ def simulate(
     engine : {"scipy", "python", "compiled"} or type, default: "scipy"
         Engine that integrates the motion. "compiled" is much faster, and requires Numba. A
         user-defined stepper is passed as a class.
-    accuracy, meter : Accuracy and WorkMeter, optional
-        Arguments of ``Measure.compute``. A user-defined measure passes these arguments to
-        ``simulate``. The two arguments replace ``rtol``, ``budget`` and ``engine``. If ``meter`` is
-        passed, the right-hand side evaluations are added to the count of the cell. If the motion
-        cannot continue, the cell ends with the status of the motion.
+    integrator : Integrator, optional
+        Argument of ``Measure.compute``, which a user-defined measure passes to ``simulate``. The
+        integrator replaces ``rtol``, ``budget`` and ``engine``. The right-hand side evaluations are
+        added to the count of the cell. If the motion cannot continue, the cell ends with the status
+        of the motion. The former arguments ``accuracy`` and ``meter`` are deprecated.
 
     Returns
     -------
@@ -216,18 +216,13 @@ def simulate(
     if not (known and 0.0 < duration < math.inf):
         remedy = "It is in D_c/V_*; rig.dimensionless converts units of a rig."
         raise InvalidValue("duration", duration, "must be positive and finite", remedy=remedy)
-    is_alone = accuracy is None and meter is None
-    if is_alone:
-        accuracy = Accuracy(rtol, budget, engine=engine)
-        meter = WorkMeter(budget, engine=accuracy.engine)
-    if not (isinstance(accuracy, Accuracy) and isinstance(meter, WorkMeter)):
-        rule = "must be an Accuracy and a WorkMeter"
-        remedy = "Pass accuracy=accuracy, meter=meter, as Measure.compute receives them."
-        raise InvalidValue("accuracy, meter", (accuracy, meter), rule, remedy=remedy)
-    check_engine_is_usable(accuracy.engine)
+    is_alone = integrator is None
+    if integrator is None:
+        integrator = Integrator(Accuracy(rtol, budget, engine=engine))
+    check_integrator(integrator)
     if is_alone and not scene.is_perturbed:
         warnings.warn(_UNPERTURBED_SCENE_MESSAGE, NoResultWarning, stacklevel=3)
-    spent, by_regime = meter.evaluations, dict(meter.evaluations_by_regime)
+    spent, by_regime = integrator.evaluations, dict(integrator.work_meter.evaluations_by_regime)
     recording = Recording(list(_BUILT_IN_REGIME_NAMES), at)
     status, message, limit, passed = (
         Status.OK,
@@ -237,9 +232,7 @@ def simulate(
     )
     watches = [rise("log_slip_rate", limit)] if limit < math.inf else []
     until = began + duration if at is None else float(at[-1])
-    moving = integrate_events(
-        scene, accuracy, meter, watches, recording=recording, until=until, resume_from=since
-    )
+    moving = integrator.follow(scene, watches, recording=recording, until=until, resume_from=since)
     try:
         for last in moving:
             if math.isnan(passed) and (last.specification or last.point.log_slip_rate >= limit):
@@ -263,14 +256,14 @@ def simulate(
             "message": message,
             "duration": duration,
             "told": "as it moves" if at is None else "at times that were asked for",
-            "rtol": accuracy.rtol,
-            "budget": accuracy.budget,
-            "engine": accuracy.engine,
-            "rhs_evaluations": meter.evaluations - spent,
+            "rtol": integrator.rtol,
+            "budget": integrator.accuracy.budget,
+            "engine": integrator.engine,
+            "rhs_evaluations": integrator.evaluations - spent,
             "rhs_evaluations_by_regime": json.dumps(
                 {
                     regime: n - by_regime.get(regime, 0)
-                    for regime, n in meter.evaluations_by_regime.items()
+                    for regime, n in integrator.work_meter.evaluations_by_regime.items()
                 }
             ),
             **provenance_attributes("rsfstudy.simulate"),
@@ -296,6 +289,25 @@ def simulate(
         text = f"the motion ends after {max([0.0, *seen[-1:, 0]]):.6g} of {duration:g} D_c/V_*"
         warnings.warn(f"{text}: {status.label} ({message})", IncompleteWarning, stacklevel=3)
     return copy_with_cf_encoding(dataset)
+
+
+def check_integrator(integrator: Any) -> None:
+    """Check the integrator of a public function.
+
+    Parameters
+    ----------
+    integrator : Integrator
+        Argument of the function.
+
+    Raises
+    ------
+    InvalidValue
+        If the argument is not an integrator, or if its engine is not installed.
+    """
+    if not isinstance(integrator, Integrator):
+        remedy = "Pass integrator=integrator, as Measure.compute receives it."
+        raise InvalidValue("integrator", integrator, "must be an Integrator", remedy=remedy)
+    check_engine_is_usable(integrator.engine)
 
 
 def _recording_to_dataset(

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from rsfstudy.api.simulation import check_scene, motion_variable_attributes
+from rsfstudy.api.simulation import check_integrator, check_scene, motion_variable_attributes
 from rsfstudy.error_boundary import error_boundary
 from rsfstudy.errors import NoResultWarning, RsfStudyWarning
 from rsfstudy.execution import provenance_attributes
@@ -20,7 +20,7 @@ from rsfstudy.motion import (
     DEFAULT_RTOL,
     SCIPY,
     Accuracy,
-    check_engine_is_usable,
+    Integrator,
 )
 from rsfstudy.netcdf_encoding import copy_with_cf_encoding
 from rsfstudy.rig import convert_dataset_units, convert_to_si, read_si_scales
@@ -38,6 +38,7 @@ def critical_step(
     rtol: float = DEFAULT_RTOL,
     engine: Any = SCIPY,
     budget: int = DEFAULT_EVALUATION_BUDGET,
+    integrator: Integrator | None = None,
 ) -> xr.Dataset:
     r"""Compute the smallest step that causes an instability.
 
@@ -63,6 +64,10 @@ def critical_step(
     budget : int, default: 500,000
         Largest number of right-hand side evaluations. If the budget is exceeded, the status is
         ``work_budget_spent``.
+    integrator : Integrator, optional
+        Argument of ``Measure.compute``, which a user-defined measure passes on. The integrator
+        replaces ``rtol``, ``engine`` and ``budget``. The right-hand side evaluations are added to
+        the count of the cell, and no warning is emitted.
 
     Returns
     -------
@@ -106,7 +111,10 @@ def critical_step(
     1.0
     """
     return _measure_scene_to_dataset(
-        CriticalStep(of=of, direction=direction), scene, Accuracy(rtol, budget, engine=engine)
+        CriticalStep(of=of, direction=direction),
+        scene,
+        integrator or Integrator(Accuracy(rtol, budget, engine=engine)),
+        is_nested=integrator is not None,
     )
 
 
@@ -118,6 +126,7 @@ def limit_cycle(
     rtol: float = DEFAULT_RTOL,
     engine: Any = SCIPY,
     budget: int = DEFAULT_EVALUATION_BUDGET,
+    integrator: Integrator | None = None,
 ) -> xr.Dataset:
     r"""Compute the stick-slip limit cycle of a scene.
 
@@ -137,6 +146,10 @@ def limit_cycle(
     budget : int, default: 500,000
         Largest number of right-hand side evaluations. If the budget is exceeded, the status is
         ``work_budget_spent``.
+    integrator : Integrator, optional
+        Argument of ``Measure.compute``, which a user-defined measure passes on. The integrator
+        replaces ``rtol``, ``engine`` and ``budget``. The right-hand side evaluations are added to
+        the count of the cell, and no warning is emitted.
 
     Returns
     -------
@@ -174,7 +187,10 @@ def limit_cycle(
     9.061
     """
     return _measure_scene_to_dataset(
-        LimitCycle(events=events), scene, Accuracy(rtol, budget, engine=engine)
+        LimitCycle(events=events),
+        scene,
+        integrator or Integrator(Accuracy(rtol, budget, engine=engine)),
+        is_nested=integrator is not None,
     )
 
 
@@ -244,15 +260,23 @@ def to_si(
     return convert_dataset_units(dataset, read_si_scales(dataset, **stated), "Pa", "m", "s")
 
 
-def _measure_scene_to_dataset(measure: Measure, scene: Scene, accuracy: Accuracy) -> xr.Dataset:
+def _measure_scene_to_dataset(
+    measure: Measure, scene: Scene, integrator: Integrator, *, is_nested: bool
+) -> xr.Dataset:
     """Compute a measure of a scene, and return the outputs as a dataset.
 
     The variables have the same names as in the results of studies. Outputs without a value are NaN.
+    If ``is_nested`` is True, another measure uses the results, so the function does not emit
+    warnings, and adds its evaluations to the count of the integrator.
     """
     check_scene(scene)
-    check_engine_is_usable(accuracy.engine)
-    outcome = measure(scene, accuracy)
-    if outcome.status is not Status.OK:
+    check_integrator(integrator)
+    outcome = (
+        measure.run_nested(scene, integrator) if is_nested else measure(scene, integrator.accuracy)
+    )
+    if is_nested:
+        pass
+    elif outcome.status is not Status.OK:
         why = outcome.message or outcome.status.meaning
         text = f"{measure.name} has no number: {outcome.status.label} ({why})"
         warnings.warn(text, NoResultWarning, stacklevel=4)
@@ -278,8 +302,8 @@ def _measure_scene_to_dataset(measure: Measure, scene: Scene, accuracy: Accuracy
         "title": f"{what} of a spring-slider, {scene.law} law",
         "Conventions": "CF-1.11",
         "scene": json.dumps(scene.describe()),
-        "rtol": accuracy.rtol,
-        "engine": accuracy.engine,
+        "rtol": integrator.rtol,
+        "engine": integrator.engine,
         "status": outcome.status.label,
         "message": outcome.message,
         **provenance_attributes(f"rsfstudy.{measure.name}"),

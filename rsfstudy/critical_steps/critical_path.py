@@ -30,13 +30,12 @@ from typing import Any, NamedTuple
 
 from rsfstudy.motion import (
     COMPILED,
-    SCIPY,
     Event,
     EventKind,
     EventSpecification,
+    Integrator,
     MotionDriver,
     MotionStopped,
-    WorkMeter,
     build_root_finder,
     fall,
     import_compiled_engine,
@@ -86,8 +85,8 @@ class CriticalPath(NamedTuple):
         Function ``(state, p) -> MotionPoint``.
     motion_driver : MotionDriver
         Driver that integrates the path.
-    engine : str
-        Name of the engine that integrates the path.
+    integrator : Integrator
+        Integrator of the path.
     has_single_state_variable : bool
         True if the scene has one state. Scenes with several states have no critical path.
     """
@@ -100,19 +99,19 @@ class CriticalPath(NamedTuple):
     tangency_point_solver: Function
     motion_point_evaluator: Function
     motion_driver: MotionDriver
-    engine: str
+    integrator: Integrator
     has_single_state_variable: bool
 
     @classmethod
-    def from_scene(cls, scene: Scene, engine: str = SCIPY) -> CriticalPath:
+    def from_scene(cls, scene: Scene, integrator: Integrator) -> CriticalPath:
         """Create the critical path of a scene.
 
         Parameters
         ----------
         scene : Scene
             Scene with the step.
-        engine : str, default: "scipy"
-            Name of the engine that integrates the path.
+        integrator : Integrator
+            Integrator of the path.
 
         Returns
         -------
@@ -132,12 +131,12 @@ class CriticalPath(NamedTuple):
             scene.dynamics.radiated_stress(x),
             begin,
             slow.parameters,
-            prepare_scalar_function_for_engine(tangency, engine, x, x, slow.parameters)
+            prepare_scalar_function_for_engine(tangency, integrator.engine, x, x, slow.parameters)
             if planar
             else tangency,
             build_motion_point_evaluator(slow.rate_function, slow.point_function),
-            MotionDriver(slow, engine=engine),
-            engine,
+            MotionDriver(slow, engine=integrator.engine, methods=integrator.accuracy.methods),
+            integrator,
             planar,
         )
 
@@ -179,7 +178,6 @@ class CriticalPath(NamedTuple):
     def find_start_point(
         self,
         tolerance: float,
-        work_meter: WorkMeter,
         crossing_quantity_and_level: tuple[str, float],
         is_start_of_step: Callable[[MotionPoint], bool],
     ) -> MotionPoint | None:
@@ -189,8 +187,6 @@ class CriticalPath(NamedTuple):
         ----------
         tolerance : float
             Local error tolerance of the integration.
-        work_meter : WorkMeter
-            Counter of right-hand-side evaluations.
         crossing_quantity_and_level : tuple of str and float
             Quantity and level whose crossing defines the start of the path.
         is_start_of_step : callable
@@ -216,7 +212,7 @@ class CriticalPath(NamedTuple):
             rise(*crossing_quantity_and_level),
             fall(*crossing_quantity_and_level),
         )
-        for event in self._iterate_events_along_path(tolerance, work_meter, specs, backward=True):
+        for event in self._iterate_events_along_path(tolerance, specs, backward=True):
             if event.specification in specs[2:] and is_start_of_step(event.point):
                 return event.point
         return None
@@ -224,7 +220,6 @@ class CriticalPath(NamedTuple):
     def _iterate_events_along_path(
         self,
         tolerance: float,
-        work_meter: WorkMeter,
         event_specs: Sequence[EventSpecification],
         *,
         backward: bool,
@@ -242,7 +237,7 @@ class CriticalPath(NamedTuple):
         try:
             yield from self.motion_driver.iterate_events(
                 start,
-                work_meter,
+                self.integrator.work_meter,
                 event_specs,
                 tolerance,
                 backward=backward,
@@ -253,9 +248,7 @@ class CriticalPath(NamedTuple):
             if halt.status is Status.WORK_BUDGET_SPENT:
                 raise
 
-    def compute_state_misfit_at_path_start(
-        self, tolerance: float, work_meter: WorkMeter
-    ) -> float | None:
+    def compute_state_misfit_at_path_start(self, tolerance: float) -> float | None:
         """Compute the misfit of the state at the start of the path.
 
         The misfit is the value of Psi/a at the point of the path with the initial slip rate of the
@@ -266,8 +259,6 @@ class CriticalPath(NamedTuple):
         ----------
         tolerance : float
             Local error tolerance of the integration.
-        work_meter : WorkMeter
-            Counter of right-hand-side evaluations.
 
         Returns
         -------
@@ -277,21 +268,18 @@ class CriticalPath(NamedTuple):
         """
         given = self.spring_stress_and_states_after_step, self.parameters
         begin = prepare_scalar_function_for_engine(
-            self.motion_point_evaluator, self.engine, *given
+            self.motion_point_evaluator, self.integrator.engine, *given
         )(*given)
         if begin.log_slip_rate_derivative == 0.0:
             return None
         start = self.find_start_point(
             tolerance,
-            work_meter,
             ("log_slip_rate", begin.log_slip_rate),
             lambda point: point.log_slip_rate_derivative * begin.log_slip_rate_derivative > 0.0,
         )
         return None if start is None else start.psi / self.parameters[A]
 
-    def compute_next_peak_height_above_norm(
-        self, tolerance: float, work_meter: WorkMeter
-    ) -> float | None:
+    def compute_next_peak_height_above_norm(self, tolerance: float) -> float | None:
         """Compute the height of the next ln V peak above the instability norm.
 
         The motion starts at the tangency point and is integrated forwards for one orbit. The
@@ -301,20 +289,18 @@ class CriticalPath(NamedTuple):
         ----------
         tolerance : float
             Local error tolerance of the integration.
-        work_meter : WorkMeter
-            Counter of right-hand-side evaluations.
 
         Returns
         -------
         float or None
             Misfit, or None if ln V has no further peak.
         """
-        for event in self._iterate_events_after_fall_below_load_rate(tolerance, work_meter):
+        for event in self._iterate_events_after_fall_below_load_rate(tolerance):
             if event.kind is EventKind.MAXIMUM:
                 return event.point.log_slip_rate - self.log_slip_rate_at_instability_norm
         return None
 
-    def next_peak_exceeds_norm(self, tolerance: float, work_meter: WorkMeter) -> bool:
+    def next_peak_exceeds_norm(self, tolerance: float) -> bool:
         """Return True if the next peak of ln V exceeds the instability norm.
 
         If the next peak of ln V exceeds the instability norm, other motions may reach the norm at
@@ -324,8 +310,6 @@ class CriticalPath(NamedTuple):
         ----------
         tolerance : float
             Local error tolerance of the integration.
-        work_meter : WorkMeter
-            Counter of right-hand-side evaluations.
 
         Returns
         -------
@@ -337,7 +321,7 @@ class CriticalPath(NamedTuple):
             "log_slip_rate",
             self.log_slip_rate_at_instability_norm + _LOG_RATE_OFFSET_ABOVE_INSTABILITY_NORM,
         )
-        for event in self._iterate_events_after_fall_below_load_rate(tolerance, work_meter, beyond):
+        for event in self._iterate_events_after_fall_below_load_rate(tolerance, beyond):
             if event.kind in (EventKind.RISE, EventKind.MAXIMUM):
                 # A time step may contain the rise above the norm and the following peak.
                 return (
@@ -347,7 +331,7 @@ class CriticalPath(NamedTuple):
         return False
 
     def _iterate_events_after_fall_below_load_rate(
-        self, tolerance: float, work_meter: WorkMeter, *event_specs: EventSpecification
+        self, tolerance: float, *event_specs: EventSpecification
     ) -> Iterator[Event]:
         """Yield the events of the forward motion after V has fallen below V_0.
 
@@ -359,7 +343,7 @@ class CriticalPath(NamedTuple):
             maximum("log_slip_rate"),
             fall("log_slip_rate", self.parameters[LOG_LOAD_VELOCITY], may_defer=True),
         )
-        for event in self._iterate_events_along_path(tolerance, work_meter, asked, backward=False):
+        for event in self._iterate_events_along_path(tolerance, asked, backward=False):
             if fallen:
                 yield event
             fallen = fallen or event.kind is EventKind.FALL

@@ -16,7 +16,7 @@ from rsfstudy.critical_steps.critical_path import CriticalPath
 from rsfstudy.critical_steps.motion_after_step import stability_margin
 from rsfstudy.critical_steps.shooting_steps import LOCAL_TOLERANCE_OF_FIRST_ROOT, StepFamily
 from rsfstudy.critical_steps.slow_manifold_accuracy import slow_manifold_relative_error
-from rsfstudy.motion import MIN_LOCAL_TOLERANCE, Accuracy, WorkMeter, estimate_error
+from rsfstudy.motion import MIN_LOCAL_TOLERANCE, Integrator
 
 #: Minimum error estimate of a critical step, divided by the requested relative accuracy. The
 #: minimum is necessary because two integrations of a path may have the same error by chance.
@@ -49,7 +49,7 @@ class CriticalStepSizeEstimate:
 
 
 def find_boundary_by_critical_path(
-    step_family: StepFamily, accuracy: Accuracy, work_meter: WorkMeter
+    step_family: StepFamily, integrator: Integrator
 ) -> CriticalStepSizeEstimate | None:
     """Find the critical step size from the critical path.
 
@@ -60,10 +60,8 @@ def find_boundary_by_critical_path(
     ----------
     step_family : StepFamily
         Family of steps in which to search for the boundary.
-    accuracy : Accuracy
-        Requested accuracy.
-    work_meter : WorkMeter
-        Counter of right-hand-side evaluations.
+    integrator : Integrator
+        Integrator with the requested accuracy.
 
     Returns
     -------
@@ -71,7 +69,7 @@ def find_boundary_by_critical_path(
         The boundary, or None if there is no critical path or if smaller steps may be unstable.
     """
     boundary = _find_boundary_with_error(
-        step_family, step_family.find_sizes_by_critical_path, accuracy, work_meter
+        step_family, step_family.find_sizes_by_critical_path, integrator
     )
     if boundary is None or not step_family.motions_after_smaller_steps_decay(boundary.step_size):
         return None
@@ -83,15 +81,15 @@ def find_boundary_by_critical_path(
         return boundary
     return (
         None
-        if CriticalPath.from_scene(scene, work_meter.engine).next_peak_exceeds_norm(
-            LOCAL_TOLERANCE_OF_FIRST_ROOT, work_meter
+        if CriticalPath.from_scene(scene, integrator).next_peak_exceeds_norm(
+            LOCAL_TOLERANCE_OF_FIRST_ROOT
         )
         else boundary
     )
 
 
 def find_boundary_by_limit_cycle(
-    step_family: StepFamily, accuracy: Accuracy, work_meter: WorkMeter
+    step_family: StepFamily, integrator: Integrator
 ) -> CriticalStepSizeEstimate | None:
     """Find the step size at which a limit cycle touches the instability norm.
 
@@ -102,10 +100,8 @@ def find_boundary_by_limit_cycle(
     ----------
     step_family : StepFamily
         Family of steps in which to search for the boundary.
-    accuracy : Accuracy
-        Requested accuracy.
-    work_meter : WorkMeter
-        Counter of right-hand-side evaluations.
+    integrator : Integrator
+        Integrator with the requested accuracy.
 
     Returns
     -------
@@ -116,10 +112,10 @@ def find_boundary_by_limit_cycle(
         stability_margin(step_family.scene_with_step(size))
         for size in (step_family.min_size, step_family.max_size)
     )
-    if large >= 0.0 or small - large < 10.0 * accuracy.rtol:
+    if large >= 0.0 or small - large < integrator.result_tolerance(10.0):
         return None
     boundary = _find_boundary_with_error(
-        step_family, step_family.find_sizes_by_limit_cycle, accuracy, work_meter
+        step_family, step_family.find_sizes_by_limit_cycle, integrator
     )
     # A limit cycle attracts nearby motions weakly, so the errors of two runs may be similar.
     error = 5.0 * boundary.relative_error if boundary else math.nan
@@ -128,9 +124,8 @@ def find_boundary_by_limit_cycle(
 
 def _find_boundary_with_error(
     step_family: StepFamily,
-    find_sizes_by_tolerance: Callable[[Iterable[float], WorkMeter], Iterator[float]],
-    accuracy: Accuracy,
-    work_meter: WorkMeter,
+    find_sizes_by_tolerance: Callable[[Iterable[float], Integrator], Iterator[float]],
+    integrator: Integrator,
 ) -> CriticalStepSizeEstimate | None:
     """Find a boundary, and estimate its error from runs with several tolerances.
 
@@ -142,20 +137,20 @@ def _find_boundary_with_error(
     boundary = None
     of_path = slow_manifold_relative_error(step_family.scene) if step_family.scene.has_mass else 0.0
     for size, refined in itertools.pairwise(
-        find_sizes_by_tolerance(_decreasing_local_tolerances(accuracy), work_meter)
+        find_sizes_by_tolerance(_decreasing_local_tolerances(integrator), integrator)
     ):
         if not step_family.min_size <= size <= step_family.max_size:
             break
-        error = estimate_error(size, refined, _MIN_ESTIMATED_ERROR_OVER_RTOL * accuracy.rtol) / size
+        error = integrator.estimate_error(size, refined, _MIN_ESTIMATED_ERROR_OVER_RTOL) / size
         boundary = CriticalStepSizeEstimate(size, error + of_path)
-        if error <= step_family.size_rtol_for_value_rtol(size, accuracy.rtol):
+        if error <= step_family.size_tolerance(size, integrator.result_tolerance()):
             break
     return boundary
 
 
-def _decreasing_local_tolerances(accuracy: Accuracy) -> Iterator[float]:
+def _decreasing_local_tolerances(integrator: Integrator) -> Iterator[float]:
     """Yield local tolerances, each a tenth of the previous tolerance."""
     for _ in range(_MAX_LOCAL_TOLERANCES_TRIED_PER_PATH):
-        if accuracy.local_tolerance > MIN_LOCAL_TOLERANCE:
-            yield accuracy.local_tolerance
-        accuracy = accuracy.refined()
+        if integrator.local_tolerance > MIN_LOCAL_TOLERANCE:
+            yield integrator.local_tolerance
+        integrator = integrator.refined()

@@ -42,7 +42,7 @@ from rsfstudy.critical_steps.step_types import (
 from rsfstudy.error_boundary import wrap_methods_in_error_boundary
 from rsfstudy.errors import InvalidValue
 from rsfstudy.measure_base import Measure, Outcome
-from rsfstudy.motion import MIN_RTOL, RELATIVE_ROUNDING_ERROR, Accuracy, MotionStopped, WorkMeter
+from rsfstudy.motion import MIN_RTOL, RELATIVE_ROUNDING_ERROR, Integrator, MotionStopped
 from rsfstudy.quantities import Output
 from rsfstudy.slider import Scene
 from rsfstudy.status import Status
@@ -200,7 +200,7 @@ class CriticalStep(Measure):
         still = 1.0 if self.of == "load_velocity_ratio" else 0.0
         return {self.primary_output: abs(values[self.primary_output] - still)}
 
-    def compute(self, scene: Scene, accuracy: Accuracy, meter: WorkMeter) -> Outcome:
+    def compute(self, scene: Scene, integrator: Integrator) -> Outcome:
         """Compute the critical step, and confirm it with two motions.
 
         If the effect of inertia is small below the instability norm, the critical step follows from
@@ -211,10 +211,8 @@ class CriticalStep(Measure):
         ----------
         scene : Scene
             Scene to evaluate.
-        accuracy : Accuracy
-            Requested accuracy.
-        meter : WorkMeter
-            Counter of right-hand-side evaluations.
+        integrator : Integrator
+            Integrator with the requested accuracy.
 
         Returns
         -------
@@ -239,7 +237,7 @@ class CriticalStep(Measure):
             below
             and motion_after_step.has_frictional_damping_only(scene)
             and motion_after_step.is_neutrally_stable(
-                steps.scene_with_step(steps.max_size), 10.0 * accuracy.rtol
+                steps.scene_with_step(steps.max_size), integrator.result_tolerance(10.0)
             )
         ):
             return Outcome(
@@ -248,35 +246,34 @@ class CriticalStep(Measure):
             )
         if not scene.critical_stiffness:
             # Perturbations do not grow, so only the step itself can reach the norm.
-            return self._search_critical_step_upward(steps, accuracy, meter)
-        if not inertia_matters_below_norm(scene, accuracy):
+            return self._search_critical_step_upward(steps, integrator)
+        if not inertia_matters_below_norm(scene, integrator):
             # A limit cycle attracts nearby paths weakly, so its boundary needs a smaller tolerance.
-            rtols = accuracy.rtol, min(accuracy.rtol, _MAX_RTOL_OF_LIMIT_CYCLE_BOUNDARY)
-            for find, rtol in zip(
-                (find_boundary_by_critical_path, find_boundary_by_limit_cycle), rtols, strict=True
+            tight = integrator.tightened_to(_MAX_RTOL_OF_LIMIT_CYCLE_BOUNDARY)
+            for find, own in (
+                (find_boundary_by_critical_path, integrator),
+                (find_boundary_by_limit_cycle, tight),
             ):
-                asked = accuracy if rtol == accuracy.rtol else accuracy.with_rtol(rtol)
-                boundary = find(steps, asked, meter)
+                boundary = find(steps, own)
                 if boundary is not None and not steps.inertia_shifts_critical_size(
-                    boundary.step_size, asked.rtol
+                    boundary.step_size, own.result_tolerance()
                 ):
-                    outcome = self._confirm_boundary_by_motions(steps, boundary, asked, meter)
+                    outcome = self._confirm_boundary_by_motions(steps, boundary, own)
                     if outcome.status is Status.OK:
                         return outcome
-            return self._search_critical_step_upward(steps, accuracy, meter)
-        near = _critical_size_without_inertia(steps, meter)
+            return self._search_critical_step_upward(steps, integrator)
+        near = _critical_size_without_inertia(steps, integrator)
         if near is not None and steps.motions_after_smaller_steps_decay(near):
-            bracket = _bracket_critical_log_size(steps, near, accuracy, meter)
+            bracket = _bracket_critical_log_size(steps, near, integrator)
             if bracket is not None:
-                return self._refine_size_bracket(steps, bracket, accuracy, meter)
-        return self._search_critical_step_upward(steps, accuracy, meter)
+                return self._refine_size_bracket(steps, bracket, integrator)
+        return self._search_critical_step_upward(steps, integrator)
 
     def _confirm_boundary_by_motions(
         self,
         step_family: StepFamily,
         boundary: CriticalStepSizeEstimate,
-        accuracy: Accuracy,
-        work_meter: WorkMeter,
+        integrator: Integrator,
     ) -> Outcome:
         """Confirm a critical step with motions after a smaller and a larger step.
 
@@ -293,11 +290,11 @@ class CriticalStep(Measure):
             if boundary.found_from_forward_motions
             else 3.0 * boundary.relative_error
         )
-        first = width = max(first, accuracy.rtol)
+        first = width = max(first, integrator.result_tolerance())
         while width < _MAX_CONFIRMING_BRACKET_OVER_STEP_SIZE:
             inner, outer = boundary.step_size * (1.0 - width), boundary.step_size * (1.0 + width)
             below, above = (
-                _compute_excess_over_norm_after_step(step_family, size, accuracy, work_meter)
+                _compute_excess_over_norm_after_step(step_family, size, integrator)
                 for size in (inner, outer)
             )
             if below is not None and above is not None and above >= 0.0 > below:
@@ -352,7 +349,7 @@ class CriticalStep(Measure):
         }
 
     def _search_critical_step_upward(
-        self, step_family: StepFamily, accuracy: Accuracy, work_meter: WorkMeter
+        self, step_family: StepFamily, integrator: Integrator
     ) -> Outcome:
         """Find the critical step from motions after steps of increasing size.
 
@@ -366,18 +363,18 @@ class CriticalStep(Measure):
         while unstable <= largest + 1e-9:
             try:
                 if motion_after_step.motion_reaches_norm(
-                    step_family.scene_with_step(math.exp(unstable)), accuracy, work_meter
+                    step_family.scene_with_step(math.exp(unstable)), integrator
                 ):
                     break
             except MotionStopped as halt:
                 if halt.status is Status.WORK_BUDGET_SPENT or stable is None:
                     raise
                 return self._no_critical_step_outcome(
-                    step_family, math.exp(stable), work_meter, f", where {halt}"
+                    step_family, math.exp(stable), integrator, f", where {halt}"
                 )
             stable, unstable = unstable, unstable + spacing
         else:
-            return self._no_critical_step_outcome(step_family, step_family.max_size, work_meter)
+            return self._no_critical_step_outcome(step_family, step_family.max_size, integrator)
         if stable is None:
             return Outcome(
                 Status.UNSTABLE_AT_ANY_STEP,
@@ -388,14 +385,13 @@ class CriticalStep(Measure):
                 "already a step to "
                 f"{step_family.step_size_to_field_value(step_family.min_size):.6g} is unstable",
             )
-        return self._refine_size_bracket(step_family, (stable, unstable), accuracy, work_meter)
+        return self._refine_size_bracket(step_family, (stable, unstable), integrator)
 
     def _refine_size_bracket(
         self,
         step_family: StepFamily,
         log_size_bracket: tuple[float, float],
-        accuracy: Accuracy,
-        work_meter: WorkMeter,
+        integrator: Integrator,
     ) -> Outcome:
         """Find the critical step size between a stable and an unstable step size.
 
@@ -403,15 +399,15 @@ class CriticalStep(Measure):
         motion cannot continue, the result is the centre of the remaining interval of ln(step size).
         """
         stable, unstable = log_size_bracket
-        rtol = max(
-            step_family.size_rtol_for_value_rtol(math.exp(unstable), accuracy.rtol), MIN_RTOL
+        tolerance = max(
+            step_family.size_tolerance(math.exp(unstable), integrator.result_tolerance()), MIN_RTOL
         )
-        accuracy = accuracy.with_rtol(rtol)
+        integrator = integrator.with_rtol(tolerance)
 
         def excess(log_size: float) -> float:
             nonlocal stable, unstable
             found = motion_after_step.compute_excess_over_instability_norm(
-                step_family.scene_with_step(math.exp(log_size)), accuracy, work_meter
+                step_family.scene_with_step(math.exp(log_size)), integrator
             )
             if found >= 0.0:
                 unstable = min(unstable, log_size)
@@ -420,29 +416,27 @@ class CriticalStep(Measure):
             return found
 
         try:
-            log_size = toms748(excess, *log_size_bracket, xtol=0.5 * accuracy.rtol, rtol=1e-15)
+            log_size = toms748(excess, *log_size_bracket, xtol=0.5 * tolerance, rtol=1e-15)
         except MotionStopped as halt:
             if halt.status is Status.WORK_BUDGET_SPENT:
                 raise
             if unstable - stable > _MAX_CONFIRMING_BRACKET_OVER_STEP_SIZE:
                 return self._no_critical_step_outcome(
-                    step_family, math.exp(log_size_bracket[0]), work_meter, f", where {halt}"
+                    step_family, math.exp(log_size_bracket[0]), integrator, f", where {halt}"
                 )
             log_size = 0.5 * (stable + unstable)
         # Motions with the same tolerances would repeat the same errors, so the verification uses
         # smaller tolerances.
         size = math.exp(log_size)
         error = max(
-            accuracy.rtol + step_family.size_error_if_neutrally_stable(size, accuracy.rtol),
+            tolerance + step_family.size_error_if_neutrally_stable(size, tolerance),
             unstable - stable,
         )
         boundary = CriticalStepSizeEstimate(size, error, found_from_forward_motions=True)
-        return self._confirm_boundary_by_motions(
-            step_family, boundary, accuracy.refined(), work_meter
-        )
+        return self._confirm_boundary_by_motions(step_family, boundary, integrator.refined())
 
     def _no_critical_step_outcome(
-        self, step_family: StepFamily, largest_size: float, work_meter: WorkMeter, reason: str = ""
+        self, step_family: StepFamily, largest_size: float, integrator: Integrator, reason: str = ""
     ) -> Outcome:
         """Return the outcome if no step up to the largest size is critical.
 
@@ -452,7 +446,7 @@ class CriticalStep(Measure):
         """
         if (
             step_family.scene.has_mass
-            and _critical_size_without_inertia(step_family, work_meter) is not None
+            and _critical_size_without_inertia(step_family, integrator) is not None
         ):
             return Outcome(
                 Status.NORM_UNREACHABLE,
@@ -480,7 +474,7 @@ class CriticalStep(Measure):
 
 
 def _compute_excess_over_norm_after_step(
-    step_family: StepFamily, step_size: float, accuracy: Accuracy, work_meter: WorkMeter
+    step_family: StepFamily, step_size: float, integrator: Integrator
 ) -> float | None:
     """Compute the excess of ln V over the norm after a step of a given size.
 
@@ -488,7 +482,7 @@ def _compute_excess_over_norm_after_step(
     """
     try:
         return motion_after_step.compute_excess_over_instability_norm(
-            step_family.scene_with_step(step_size), accuracy, work_meter
+            step_family.scene_with_step(step_size), integrator
         )
     except MotionStopped as halt:
         if halt.status is Status.WORK_BUDGET_SPENT:
@@ -496,7 +490,7 @@ def _compute_excess_over_norm_after_step(
         return None
 
 
-def _critical_size_without_inertia(step_family: StepFamily, work_meter: WorkMeter) -> float | None:
+def _critical_size_without_inertia(step_family: StepFamily, integrator: Integrator) -> float | None:
     """Compute the critical step for an instability norm with negligible inertia.
 
     The estimate requires few evaluations. The result is None if there is no critical path.
@@ -507,11 +501,11 @@ def _critical_size_without_inertia(step_family: StepFamily, work_meter: WorkMete
     )
     if massless.max_size <= massless.min_size or not massless.scene.critical_stiffness:
         return None
-    return next(massless.find_sizes_by_critical_path((1e-6,), work_meter), None)
+    return next(massless.find_sizes_by_critical_path((1e-6,), integrator), None)
 
 
 def _bracket_critical_log_size(
-    step_family: StepFamily, size_guess: float, accuracy: Accuracy, work_meter: WorkMeter
+    step_family: StepFamily, size_guess: float, integrator: Integrator
 ) -> tuple[float, float] | None:
     """Find a stable and an unstable step size around a guess.
 
@@ -521,14 +515,14 @@ def _bracket_critical_log_size(
     """
     middle = math.log(size_guess)
     reached = motion_after_step.motion_reaches_norm(
-        step_family.scene_with_step(size_guess), accuracy, work_meter
+        step_family.scene_with_step(size_guess), integrator
     )
     inner, reach = middle, 1e-4
     while reach < 1.5:
         outer = middle - reach if reached else min(middle + reach, math.log(step_family.max_size))
         if (
             motion_after_step.motion_reaches_norm(
-                step_family.scene_with_step(math.exp(outer)), accuracy, work_meter
+                step_family.scene_with_step(math.exp(outer)), integrator
             )
             != reached
         ):

@@ -16,14 +16,12 @@ import math
 
 from rsfstudy.critical_steps.slow_manifold_accuracy import inertia_matters_below_norm
 from rsfstudy.motion import (
-    Accuracy,
     Event,
     EventKind,
     EventSpecification,
+    Integrator,
     MotionStopped,
-    WorkMeter,
     fall,
-    integrate_events,
     maximum,
     rise,
 )
@@ -51,9 +49,7 @@ _TESTED_LOG_RATE_INCREASES = (1e-4, 1e-3, 1e-2, 0.1, 1.0)
 _MAX_WEAKENING_OVER_SPRING_UNLOADING = 0.5
 
 
-def compute_peak_excess_over_instability_norm(
-    scene: Scene, accuracy: Accuracy, work_meter: WorkMeter
-) -> float:
+def compute_peak_excess_over_instability_norm(scene: Scene, integrator: Integrator) -> float:
     """Compute the height of the highest ln V peak above the instability norm.
 
     If the effect of inertia is small, the motion is integrated only up to the instability norm. The
@@ -64,10 +60,8 @@ def compute_peak_excess_over_instability_norm(
     ----------
     scene : Scene
         Scene with a held load point.
-    accuracy : Accuracy
-        Requested accuracy.
-    work_meter : WorkMeter
-        Counter of right-hand-side evaluations.
+    integrator : Integrator
+        Integrator with the requested accuracy.
 
     Returns
     -------
@@ -82,14 +76,12 @@ def compute_peak_excess_over_instability_norm(
     """
     norm, heavy, highest = (
         scene.log_instability_rate,
-        inertia_matters_below_norm(scene, accuracy),
+        inertia_matters_below_norm(scene, integrator),
         -math.inf,
     )
     try:
-        for event in integrate_events(
+        for event in integrator.follow(
             scene,
-            accuracy,
-            work_meter,
             _build_event_specs_for_held_load_point(scene, norm, with_inertia=heavy),
         ):
             if event.kind is EventKind.RISE:

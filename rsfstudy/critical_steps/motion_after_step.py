@@ -17,14 +17,11 @@ from rsfstudy.critical_steps.monotone_approach_to_load_rate import (
 )
 from rsfstudy.critical_steps.slow_manifold_accuracy import inertia_matters_below_norm
 from rsfstudy.motion import (
-    Accuracy,
     EventKind,
+    Integrator,
     MotionStopped,
-    WorkMeter,
     approach_to_steady_state,
     initial_point,
-    integrate_events,
-    iterate_events_of_equations,
     maximum,
     minimum,
     rise,
@@ -106,29 +103,25 @@ class _OrbitOutcome:
     initial_log_slip_rate: float = -math.inf
 
 
-def motion_reaches_norm(scene: Scene, accuracy: Accuracy, work_meter: WorkMeter) -> bool:
+def motion_reaches_norm(scene: Scene, integrator: Integrator) -> bool:
     """Return True if the slip rate reaches the instability norm after the step.
 
     Parameters
     ----------
     scene : Scene
         Scene with the step.
-    accuracy : Accuracy
-        Requested accuracy.
-    work_meter : WorkMeter
-        Counter of right-hand-side evaluations.
+    integrator : Integrator
+        Integrator with the requested accuracy.
 
     Returns
     -------
     bool
         True if ``compute_excess_over_instability_norm`` is not negative.
     """
-    return compute_excess_over_instability_norm(scene, accuracy, work_meter) >= 0.0
+    return compute_excess_over_instability_norm(scene, integrator) >= 0.0
 
 
-def compute_excess_over_instability_norm(
-    scene: Scene, accuracy: Accuracy, work_meter: WorkMeter
-) -> float:
+def compute_excess_over_instability_norm(scene: Scene, integrator: Integrator) -> float:
     """Compute the excess of ln V over the instability norm after the step.
 
     The excess is negative if the slip rate never reaches the instability norm. With inertia, the
@@ -140,10 +133,8 @@ def compute_excess_over_instability_norm(
     ----------
     scene : Scene
         Scene with the step.
-    accuracy : Accuracy
-        Requested accuracy.
-    work_meter : WorkMeter
-        Counter of right-hand-side evaluations.
+    integrator : Integrator
+        Integrator with the requested accuracy.
 
     Returns
     -------
@@ -170,20 +161,21 @@ def compute_excess_over_instability_norm(
     repeats. The module ``held_load_point`` handles held load points.
     """
     if scene.log_load_velocity == -math.inf:
-        return compute_peak_excess_over_instability_norm(scene, accuracy, work_meter)
+        return compute_peak_excess_over_instability_norm(scene, integrator)
     steady = _steady_sliding_with_margin(scene)
-    norm, heavy = scene.log_instability_rate, inertia_matters_below_norm(scene, accuracy)
-    if may_have_closed_orbits(scene) and abs(steady.stability_margin) < accuracy.rtol:
-        top = _max_log_slip_rate_of_closed_orbit(scene, accuracy, work_meter)
+    norm, heavy = scene.log_instability_rate, inertia_matters_below_norm(scene, integrator)
+    if (
+        may_have_closed_orbits(scene)
+        and abs(steady.stability_margin) < integrator.result_tolerance()
+    ):
+        top = _max_log_slip_rate_of_closed_orbit(scene, integrator)
         if not heavy or top < min(norm, -math.log(scene.inertial_time) - 7.0):
             return top - norm
-    first = _follow_one_orbit(scene, steady, None, accuracy, work_meter, with_inertia=heavy)
+    first = _follow_one_orbit(scene, steady, None, integrator, with_inertia=heavy)
     reached = first.reached_norm
     if first.point_where_growth_was_too_slow is not None:
         at = first.point_where_growth_was_too_slow
-        reached = _slow_orbit_grows_to_norm(
-            scene, steady, at, accuracy, work_meter, with_inertia=heavy
-        )
+        reached = _slow_orbit_grows_to_norm(scene, steady, at, integrator, with_inertia=heavy)
     excess = _compute_peak_excess_of_orbit_over_norm(first, norm, with_inertia=heavy)
     return max(excess, 1e-12) if reached else min(excess, -1e-12)
 
@@ -324,9 +316,7 @@ def stability_margin(scene: Scene) -> float:
     )
 
 
-def _max_log_slip_rate_of_closed_orbit(
-    scene: Scene, accuracy: Accuracy, work_meter: WorkMeter
-) -> float:
+def _max_log_slip_rate_of_closed_orbit(scene: Scene, integrator: Integrator) -> float:
     """Compute the largest value of ln V on a closed orbit.
 
     The largest ln V on the orbit is the peak that is closest to the start of the motion, either
@@ -344,9 +334,7 @@ def _max_log_slip_rate_of_closed_orbit(
         scene.log_instability_rate,
     )
     specs = (_SLIP_RATE_PEAK_EVENT, minimum("log_slip_rate"), rise("log_slip_rate", norm))
-    for event in iterate_events_of_equations(
-        equations, start, accuracy.local_tolerance, work_meter, specs, backward=not rising
-    ):
+    for event in integrator.follow_equations(equations, start, specs, backward=not rising):
         if event.kind is EventKind.RISE:
             return norm + _ASSUMED_LOG_RATE_OVERSHOOT_OF_NORM
         if (
@@ -358,22 +346,21 @@ def _max_log_slip_rate_of_closed_orbit(
     raise AssertionError("a motion never ends by itself")
 
 
-def _orbit_touching_norm_shrinks(scene: Scene, accuracy: Accuracy, work_meter: WorkMeter) -> bool:
+def _orbit_touching_norm_shrinks(scene: Scene, integrator: Integrator) -> bool:
     """Return True if the orbit that touches the instability norm shrinks.
 
     Paths in a plane cannot cross, so no orbit inside a shrinking orbit reaches the norm.
     """
-    path = CriticalPath.from_scene(scene, work_meter.engine)
-    misfit = path.compute_next_peak_height_above_norm(accuracy.local_tolerance, work_meter)
-    return misfit is not None and misfit < -100.0 * accuracy.local_tolerance
+    path = CriticalPath.from_scene(scene, integrator)
+    misfit = path.compute_next_peak_height_above_norm(integrator.local_tolerance)
+    return misfit is not None and misfit < -100.0 * integrator.local_tolerance
 
 
 def _slow_orbit_grows_to_norm(
     scene: Scene,
     steady_state: _SteadySlidingWithMargin,
     start_point: MotionPoint,
-    accuracy: Accuracy,
-    work_meter: WorkMeter,
+    integrator: Integrator,
     *,
     with_inertia: bool,
 ) -> bool:
@@ -383,7 +370,7 @@ def _slow_orbit_grows_to_norm(
     norm. The difference in size between successive orbits is reduced if the first peak of ln V on
     the next orbit is above the instability norm.
     """
-    if not with_inertia and _orbit_touching_norm_shrinks(scene, accuracy, work_meter):
+    if not with_inertia and _orbit_touching_norm_shrinks(scene, integrator):
         return False
     leap = _LEAP_FACTOR
     while True:
@@ -397,7 +384,7 @@ def _slow_orbit_grows_to_norm(
         )
         beyond = slow_manifold_point(scene, spring_stress, tuple(psis))
         orbit = _follow_one_orbit(
-            scene, steady_state, beyond, accuracy, work_meter, with_inertia=with_inertia
+            scene, steady_state, beyond, integrator, with_inertia=with_inertia
         )
         if orbit.reached_norm and len(orbit.log_slip_rate_peaks) == 1 and leap > _MIN_LEAP_FACTOR:
             leap = math.sqrt(leap)
@@ -411,8 +398,7 @@ def _follow_one_orbit(
     scene: Scene,
     steady_state: _SteadySlidingWithMargin,
     start_point: MotionPoint | None,
-    accuracy: Accuracy,
-    work_meter: WorkMeter,
+    integrator: Integrator,
     *,
     with_inertia: bool,
 ) -> _OrbitOutcome:
@@ -434,11 +420,11 @@ def _follow_one_orbit(
     )
     planar, repeating = (
         scene.state_count == 1,
-        _CycleRepetitionDetector(scene, steady_state, accuracy),
+        _CycleRepetitionDetector(scene, steady_state, integrator),
     )
     peaks: list[float] = []
     at_start = -math.inf
-    for event in integrate_events(scene, accuracy, work_meter, specs, start=start_point):
+    for event in integrator.follow(scene, specs, start=start_point):
         top = event.point.log_slip_rate
         if event.kind is EventKind.START:
             if start_point is None and event.point.log_slip_rate_derivative <= 0.0:
@@ -467,7 +453,7 @@ def _follow_one_orbit(
                 if repeating.is_repeating_at_peak(event.point):
                     return _OrbitOutcome(tuple(peaks), reached_norm=False)
                 continue
-            if len(peaks) > 1 and _peaks_have_stopped_growing(peaks, steady_state, accuracy):
+            if len(peaks) > 1 and _peaks_have_stopped_growing(peaks, steady_state, integrator):
                 return _OrbitOutcome(tuple(peaks), reached_norm=False)
             slow = len(peaks) > 1 and peaks[-1] - peaks[-2] < 0.2 * (norm - top)
             if slow and not steady_state.is_stable and event.regime != RUPTURE_REGIME:
@@ -485,9 +471,9 @@ class _CycleRepetitionDetector:
     """
 
     def __init__(
-        self, scene: Scene, steady_state: _SteadySlidingWithMargin, accuracy: Accuracy
+        self, scene: Scene, steady_state: _SteadySlidingWithMargin, integrator: Integrator
     ) -> None:
-        self._steady, self._tolerance = steady_state, 30.0 * accuracy.local_tolerance * scene.a
+        self._steady, self._tolerance = steady_state, 30.0 * integrator.local_tolerance * scene.a
         self._previous, self._repeat_count = (math.inf,) * (1 + scene.state_count), 0
 
     def is_repeating_at_peak(self, peak_point: MotionPoint) -> bool:
@@ -517,13 +503,13 @@ class _CycleRepetitionDetector:
 
 
 def _peaks_have_stopped_growing(
-    peaks: Sequence[float], steady_state: _SteadySlidingWithMargin, accuracy: Accuracy
+    peaks: Sequence[float], steady_state: _SteadySlidingWithMargin, integrator: Integrator
 ) -> bool:
     """Return True if the last peak is not higher than the previous peak.
 
     If the growth is too small to measure, linear theory determines the sign of the growth.
     """
-    slack = 100.0 * accuracy.local_tolerance
+    slack = 100.0 * integrator.local_tolerance
     linear = (
         peaks[-1] - steady_state.log_slip_rate < _MAX_LINEAR_LOG_RATE_AMPLITUDE
         and not steady_state.is_stable

@@ -18,7 +18,7 @@ from scipy.optimize import brentq
 
 from rsfstudy.critical_steps.critical_path import CriticalPath
 from rsfstudy.critical_steps.motion_after_step import is_linearly_stable
-from rsfstudy.motion import WorkMeter
+from rsfstudy.motion import Integrator
 from rsfstudy.slider import Scene, quasi_static_log_slip_rate
 
 #: Smallest step size of the search. The second number is the largest ratio of the smallest to the
@@ -125,17 +125,17 @@ class StepFamily:
         """
         raise TypeError(f"{type(self).__name__} steps nothing")
 
-    def size_rtol_for_value_rtol(self, step_size: float, rtol: float) -> float:
+    def size_tolerance(self, step_size: float, value_tolerance: float) -> float:
         r"""Return the tolerance of the size for a tolerance of the step value.
 
         If the size has the returned relative error, the change of the step value has the relative
-        error ``rtol``. The size tolerance is at most ``rtol``.
+        error ``value_tolerance``. The size tolerance is at most ``value_tolerance``.
 
         Parameters
         ----------
         step_size : float
             Size of the step.
-        rtol : float
+        value_tolerance : float
             Relative tolerance of the change of the step value.
 
         Returns
@@ -145,12 +145,14 @@ class StepFamily:
 
         Notes
         -----
-        With the step value :math:`v(s)` for the size :math:`s`, the tolerance of the size is
+        With the step value :math:`v(s)` for the size :math:`s` and the tolerance
+        :math:`\epsilon` of the step value, the tolerance of the size is
 
-        .. math:: \mathrm{rtol}\,\frac{|v(s) - v(0)|}{dv/d\ln s}.
+        .. math:: \epsilon\,\frac{|v(s) - v(0)|}{dv/d\ln s}.
         """
         change = abs(self.step_size_to_field_value(step_size) - self.step_size_to_field_value(0.0))
-        return min(rtol, rtol * change / self.compute_field_value_error(step_size, 1.0))
+        error = self.compute_field_value_error(step_size, 1.0)
+        return min(value_tolerance, value_tolerance * change / error)
 
     def extra_output_values(self, step_size: float) -> dict[str, float]:
         """Return the additional results for a critical step.
@@ -168,7 +170,7 @@ class StepFamily:
         return {}
 
     def find_sizes_by_critical_path(
-        self, local_tolerances: Iterable[float], work_meter: WorkMeter
+        self, local_tolerances: Iterable[float], integrator: Integrator
     ) -> Iterator[float]:
         """Yield sizes of the step at which the critical path starts.
 
@@ -176,8 +178,8 @@ class StepFamily:
         ----------
         local_tolerances : iterable of float
             Local tolerances, in decreasing order.
-        work_meter : WorkMeter
-            Counter of right-hand-side evaluations.
+        integrator : Integrator
+            Integrator that counts right-hand-side evaluations.
 
         Yields
         ------
@@ -187,7 +189,7 @@ class StepFamily:
         raise TypeError(f"{type(self).__name__} steps nothing")
 
     def find_sizes_by_limit_cycle(
-        self, local_tolerances: Iterable[float], work_meter: WorkMeter
+        self, local_tolerances: Iterable[float], integrator: Integrator
     ) -> Iterator[float]:
         """Yield step sizes at which a limit cycle touches the instability norm.
 
@@ -195,8 +197,8 @@ class StepFamily:
         ----------
         local_tolerances : iterable of float
             Local tolerances, in decreasing order.
-        work_meter : WorkMeter
-            Counter of right-hand-side evaluations.
+        integrator : Integrator
+            Integrator that counts right-hand-side evaluations.
 
         Returns
         -------
@@ -205,7 +207,7 @@ class StepFamily:
         """
         return iter(())
 
-    def inertia_shifts_critical_size(self, step_size: float, rtol: float) -> bool:
+    def inertia_shifts_critical_size(self, step_size: float, tolerance: float) -> bool:
         """Return True if inertia changes the critical size significantly.
 
         With inertia, the motion after the step reaches the critical path only after a delay.
@@ -214,7 +216,7 @@ class StepFamily:
         ----------
         step_size : float
             Size at which the critical path starts.
-        rtol : float
+        tolerance : float
             Requested relative accuracy of the size.
 
         Returns
@@ -225,7 +227,7 @@ class StepFamily:
         """
         return False
 
-    def size_error_if_neutrally_stable(self, step_size: float, rtol: float) -> float:
+    def size_error_if_neutrally_stable(self, step_size: float, tolerance: float) -> float:
         """Return the error of the step size close to neutral stability.
 
         Close to neutral stability, motions that are integrated forwards in time do not reveal if
@@ -235,7 +237,7 @@ class StepFamily:
         ----------
         step_size : float
             Size of the step.
-        rtol : float
+        tolerance : float
             Relative accuracy of the forward motions.
 
         Returns
@@ -324,7 +326,7 @@ class ShootingStepFamily(StepFamily):
         return math.exp(self.sign * step_size) * step_size * relative_error
 
     def find_sizes_by_critical_path(
-        self, local_tolerances: Iterable[float], work_meter: WorkMeter
+        self, local_tolerances: Iterable[float], integrator: Integrator
     ) -> Iterator[float]:
         """Yield sizes of the step at which the critical path starts.
 
@@ -333,9 +335,9 @@ class ShootingStepFamily(StepFamily):
         with a loose tolerance. For each smaller tolerance, one to three paths are integrated. With
         several states, there are no critical paths. See ``StepFamily.find_sizes_by_critical_path``.
         """
-        path_at = self.build_critical_path_factory(work_meter.engine)
+        path_at = self.build_critical_path_factory(integrator)
         loose = (
-            self._find_misfit_root_at_loose_tolerance(path_at, work_meter)
+            self._find_misfit_root_at_loose_tolerance(path_at, integrator)
             if self.scene.state_count == 1
             else None
         )
@@ -343,28 +345,28 @@ class ShootingStepFamily(StepFamily):
             yield from _refine_misfit_root(
                 *loose,
                 local_tolerances,
-                lambda size, tolerance: path_at(size).compute_state_misfit_at_path_start(
-                    tolerance, work_meter
-                ),
+                lambda size, tolerance: path_at(size).compute_state_misfit_at_path_start(tolerance),
             )
 
-    def build_critical_path_factory(self, engine: str) -> Callable[[float], CriticalPath]:
+    def build_critical_path_factory(
+        self, integrator: Integrator
+    ) -> Callable[[float], CriticalPath]:
         """Return a function that computes the critical path after a step.
 
         Parameters
         ----------
-        engine : str
-            Name of the engine that integrates the paths.
+        integrator : Integrator
+            Integrator of the paths.
 
         Returns
         -------
         callable
             Function ``size -> CriticalPath``.
         """
-        return lambda size: CriticalPath.from_scene(self.scene_with_step(size), engine)
+        return lambda size: CriticalPath.from_scene(self.scene_with_step(size), integrator)
 
     def find_sizes_by_limit_cycle(
-        self, local_tolerances: Iterable[float], work_meter: WorkMeter
+        self, local_tolerances: Iterable[float], integrator: Integrator
     ) -> Iterator[float]:
         """Yield step sizes at which a limit cycle touches the instability norm.
 
@@ -372,13 +374,11 @@ class ShootingStepFamily(StepFamily):
         norm does not shrink. The computation of each misfit requires the integration of one orbit.
         See ``StepFamily.find_sizes_by_limit_cycle``.
         """
-        found, path_at = dict[float, float](), self.build_critical_path_factory(work_meter.engine)
+        found, path_at = dict[float, float](), self.build_critical_path_factory(integrator)
 
         @cache
         def misfit(log_size: float, tolerance: float = LOCAL_TOLERANCE_OF_FIRST_ROOT) -> float:
-            higher = path_at(math.exp(log_size)).compute_next_peak_height_above_norm(
-                tolerance, work_meter
-            )
+            higher = path_at(math.exp(log_size)).compute_next_peak_height_above_norm(tolerance)
             if higher is None:
                 return math.nan
             found[log_size] = higher
@@ -394,7 +394,7 @@ class ShootingStepFamily(StepFamily):
             )
 
     def _find_misfit_root_at_loose_tolerance(
-        self, build_critical_path: Callable[[float], CriticalPath], work_meter: WorkMeter
+        self, build_critical_path: Callable[[float], CriticalPath], integrator: Integrator
     ) -> tuple[float, float] | None:
         """Return the root ln(step size) of the misfit, and the slope of the misfit.
 
@@ -406,11 +406,11 @@ class ShootingStepFamily(StepFamily):
         def misfit(log_size: float) -> float:
             size = math.exp(log_size)
             state = build_critical_path(size).compute_state_misfit_at_path_start(
-                LOCAL_TOLERANCE_OF_FIRST_ROOT, work_meter
+                LOCAL_TOLERANCE_OF_FIRST_ROOT
             )
             if state is None:
                 return self._find_misfit_sign_without_critical_path(
-                    self.scene_with_step(size), work_meter
+                    self.scene_with_step(size), integrator
                 )
             found[log_size] = state
             return state
@@ -472,7 +472,9 @@ class ShootingStepFamily(StepFamily):
         """Return the step size at which the search starts."""
         raise TypeError(f"{type(self).__name__} steps nothing")
 
-    def _find_misfit_sign_without_critical_path(self, scene: Scene, work_meter: WorkMeter) -> float:
+    def _find_misfit_sign_without_critical_path(
+        self, scene: Scene, integrator: Integrator
+    ) -> float:
         """Return the sign of the misfit if there is no critical path.
 
         The sign is positive if the motion after the step is stable. The result is NaN if the sign

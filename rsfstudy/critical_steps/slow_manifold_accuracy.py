@@ -2,19 +2,19 @@
 
 from __future__ import annotations
 
-from rsfstudy.motion import Accuracy
+from rsfstudy.motion import Integrator
 from rsfstudy.slider import Scene
 
 
-def inertia_matters_below_norm(scene: Scene, accuracy: Accuracy) -> bool:
+def inertia_matters_below_norm(scene: Scene, integrator: Integrator) -> bool:
     """Return True if the slow manifold is not accurate enough up to the instability norm.
 
     Parameters
     ----------
     scene : Scene
         Scene with or without inertia.
-    accuracy : Accuracy
-        Requested accuracy.
+    integrator : Integrator
+        Integrator with the requested accuracy.
 
     Returns
     -------
@@ -22,7 +22,7 @@ def inertia_matters_below_norm(scene: Scene, accuracy: Accuracy) -> bool:
         True if the scene has inertia, and if the relative error of a boundary that is computed on
         the slow manifold exceeds a tenth of the requested accuracy.
     """
-    return scene.has_mass and slow_manifold_relative_error(scene) > 0.1 * accuracy.rtol
+    return scene.has_mass and slow_manifold_relative_error(scene) > integrator.result_tolerance(0.1)
 
 
 def slow_manifold_relative_error(scene: Scene) -> float:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import sys
 from collections.abc import Callable, Iterable, Iterator
+from dataclasses import replace
 
 import numpy as np
 from scipy.optimize import brentq
@@ -25,7 +26,7 @@ from rsfstudy.critical_steps.shooting_steps import (
     StepFamily,
     slip_lag_due_to_inertia,
 )
-from rsfstudy.motion import Accuracy, MotionStopped, WorkMeter, slow_manifold_point
+from rsfstudy.motion import Integrator, MotionStopped, slow_manifold_point
 from rsfstudy.slider import (
     Scene,
     compute_steady_states,
@@ -75,13 +76,15 @@ class LoadVelocityStepFamily(ShootingStepFamily):
         """
         return self.scene.with_(load_velocity_ratio=self.step_size_to_field_value(step_size))
 
-    def build_critical_path_factory(self, engine: str) -> Callable[[float], CriticalPath]:
+    def build_critical_path_factory(
+        self, integrator: Integrator
+    ) -> Callable[[float], CriticalPath]:
         """Return a function that computes the critical path after a step.
 
         The step size changes only the load point velocity of the critical path. See
         ``ShootingStepFamily.build_critical_path_factory``.
         """
-        path = CriticalPath.from_scene(self.scene, engine)
+        path = CriticalPath.from_scene(self.scene, integrator)
         return lambda size: path.with_load_velocity(self.step_size_to_field_value(size))
 
     def step_size_to_field_value(self, step_size: float) -> float:
@@ -99,18 +102,16 @@ class LoadVelocityStepFamily(ShootingStepFamily):
         weakening = max(self.scene.parts.law.b_over_a - 1.0, _MIN_B_OVER_A_MINUS_ONE_IN_SIZE_GUESS)
         return float(np.logaddexp(0.0, self.scene.stiffness_ratio - 1.0 - math.log(weakening)))
 
-    def _find_misfit_sign_without_critical_path(self, scene: Scene, work_meter: WorkMeter) -> float:
+    def _find_misfit_sign_without_critical_path(
+        self, scene: Scene, integrator: Integrator
+    ) -> float:
         """Return the sign of the misfit, computed by integration forwards in time.
 
         The result is NaN for downward steps.
         """
         if self.sign != self.sign_of_triggering_steps:
             return math.nan
-        return (
-            -1.0
-            if motion_reaches_norm(scene, Accuracy(LOCAL_TOLERANCE_OF_FIRST_ROOT), work_meter)
-            else 1.0
-        )
+        return -1.0 if _reaches_norm_at_loose_tolerance(scene, integrator) else 1.0
 
     def _compute_max_size(self) -> float:
         """Return the largest size of the search.
@@ -169,7 +170,7 @@ class DisplacementStepFamily(StepFamily):
         """
         return step_size * relative_error
 
-    def inertia_shifts_critical_size(self, step_size: float, rtol: float) -> bool:
+    def inertia_shifts_critical_size(self, step_size: float, tolerance: float) -> bool:
         """Return True if inertia changes the critical size significantly.
 
         With inertia, the slider follows the critical path with a delay, which changes the critical
@@ -184,7 +185,8 @@ class DisplacementStepFamily(StepFamily):
         missed = 0.5 * scene.a * scene.parts.law.state_change_over_a / scene.stiffness
         loaded = scene.load_velocity / rate if rate else 0.0
         return (
-            behind * (loaded + missed) > MAX_NEGLECTED_INERTIA_EFFECT_OVER_RTOL * rtol * step_size
+            behind * (loaded + missed)
+            > MAX_NEGLECTED_INERTIA_EFFECT_OVER_RTOL * tolerance * step_size
         )
 
     def motions_after_smaller_steps_decay(self, step_size: float) -> bool:
@@ -215,7 +217,7 @@ class DisplacementStepFamily(StepFamily):
         return dict(zip(self.extra_output_names, (critical, closed_form), strict=True))
 
     def find_sizes_by_critical_path(
-        self, local_tolerances: Iterable[float], work_meter: WorkMeter
+        self, local_tolerances: Iterable[float], integrator: Integrator
     ) -> Iterator[float]:
         """Yield the size of the step at which the critical path starts.
 
@@ -224,10 +226,10 @@ class DisplacementStepFamily(StepFamily):
         and each tolerance needs only one integration. See
         ``StepFamily.find_sizes_by_critical_path``.
         """
-        path, sign = CriticalPath.from_scene(self.scene, work_meter.engine), self.sign
+        path, sign = CriticalPath.from_scene(self.scene, integrator), self.sign
         for tolerance in local_tolerances:
             start = path.find_start_point(
-                tolerance, work_meter, ("psi", 0.0), lambda point: sign * point.spring_stress > 0.0
+                tolerance, ("psi", 0.0), lambda point: sign * point.spring_stress > 0.0
             )
             if start is None:
                 return
@@ -301,7 +303,7 @@ class NormalStressStepFamily(ShootingStepFamily):
         """
         return math.expm1(self.sign * step_size)
 
-    def inertia_shifts_critical_size(self, step_size: float, rtol: float) -> bool:
+    def inertia_shifts_critical_size(self, step_size: float, tolerance: float) -> bool:
         """Return True if inertia changes the critical size significantly.
 
         With inertia, the slip rate rises with a delay after the step. The effect of inertia on the
@@ -315,18 +317,22 @@ class NormalStressStepFamily(ShootingStepFamily):
         missed = max(1.0, 0.5 * scene.parts.law.state_change_over_a) * behind
         return (
             missed
-            > MAX_NEGLECTED_INERTIA_EFFECT_OVER_RTOL * rtol * step_size * scene.mu_star / scene.a
+            > MAX_NEGLECTED_INERTIA_EFFECT_OVER_RTOL
+            * tolerance
+            * step_size
+            * scene.mu_star
+            / scene.a
         )
 
-    def size_error_if_neutrally_stable(self, step_size: float, rtol: float) -> float:
+    def size_error_if_neutrally_stable(self, step_size: float, tolerance: float) -> float:
         """Return the error of the step size close to neutral stability.
 
         The critical stiffness is proportional to normal stress, and the size is the logarithm of
         normal stress. See ``StepFamily.size_error_if_neutrally_stable``.
         """
         scene = self.scene_with_step(step_size)
-        near = may_have_closed_orbits(scene) and abs(stability_margin(scene)) < 10.0 * rtol
-        return 2.0 * rtol / step_size if near else 0.0
+        near = may_have_closed_orbits(scene) and abs(stability_margin(scene)) < 10.0 * tolerance
+        return 2.0 * tolerance / step_size if near else 0.0
 
     def extra_output_values(self, step_size: float) -> dict[str, float]:
         """Return the slip rate immediately after the critical step.
@@ -355,7 +361,9 @@ class NormalStressStepFamily(ShootingStepFamily):
         friction = max(abs(friction), _MIN_EFFECTIVE_FRICTION_OVER_MU_STAR * scene.mu_star)
         return scene.a * scene.stiffness_ratio / friction
 
-    def _find_misfit_sign_without_critical_path(self, scene: Scene, work_meter: WorkMeter) -> float:
+    def _find_misfit_sign_without_critical_path(
+        self, scene: Scene, integrator: Integrator
+    ) -> float:
         """Return the sign of the misfit, computed by integration forwards in time.
 
         The result is NaN for increases of normal stress, or if the motion cannot continue.
@@ -363,11 +371,7 @@ class NormalStressStepFamily(ShootingStepFamily):
         if self.sign != self.sign_of_triggering_steps:
             return math.nan
         try:
-            return (
-                -1.0
-                if motion_reaches_norm(scene, Accuracy(LOCAL_TOLERANCE_OF_FIRST_ROOT), work_meter)
-                else 1.0
-            )
+            return -1.0 if _reaches_norm_at_loose_tolerance(scene, integrator) else 1.0
         except MotionStopped as halt:
             if halt.status is Status.WORK_BUDGET_SPENT:
                 raise
@@ -437,3 +441,9 @@ class NormalStressStepFamily(ShootingStepFamily):
         scene = self.scene_with_step(step_size).without_mass()
         steady_states = compute_steady_states(scene, 0.0, 0.0)
         return slow_manifold_point(scene, scene.spring_stress_step, steady_states).log_slip_rate
+
+
+def _reaches_norm_at_loose_tolerance(scene: Scene, integrator: Integrator) -> bool:
+    """Return True if a motion that is integrated with a loose tolerance reaches the norm."""
+    loose = replace(integrator.accuracy, rtol=LOCAL_TOLERANCE_OF_FIRST_ROOT, refinement=1.0)
+    return motion_reaches_norm(scene, integrator.with_accuracy(loose))

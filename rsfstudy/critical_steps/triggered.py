@@ -13,7 +13,7 @@ from rsfstudy.critical_steps.loading_checks import (
 from rsfstudy.critical_steps.motion_after_step import is_neutrally_stable, motion_reaches_norm
 from rsfstudy.error_boundary import wrap_methods_in_error_boundary
 from rsfstudy.measure_base import Measure, Outcome
-from rsfstudy.motion import Accuracy, WorkMeter
+from rsfstudy.motion import Integrator
 from rsfstudy.quantities import Output
 from rsfstudy.slider import Scene
 from rsfstudy.status import Status
@@ -62,17 +62,15 @@ class Triggered(Measure):
     outputs = (Output("unstable", "", "1", "whether the step triggers instability", error=True),)
     needs_time: ClassVar[tuple[bool, ...]] = (False,)
 
-    def compute(self, scene: Scene, accuracy: Accuracy, meter: WorkMeter) -> Outcome:
+    def compute(self, scene: Scene, integrator: Integrator) -> Outcome:
         """Compute the flag from motions with two different tolerances.
 
         Parameters
         ----------
         scene : Scene
             Scene to evaluate.
-        accuracy : Accuracy
-            Requested accuracy.
-        meter : WorkMeter
-            Counter of right-hand-side evaluations.
+        integrator : Integrator
+            Integrator with the requested accuracy.
 
         Returns
         -------
@@ -84,11 +82,12 @@ class Triggered(Measure):
             return outcome_if_norm_is_below_load_velocity(scene, scene.load_velocity)
         if not scene.is_perturbed:
             return Outcome(Status.OK, {"unstable": 0.0, "unstable_error": 0.0}, "there is no step")
-        accuracies = accuracy, accuracy.refined()
-        answer, again = (motion_reaches_norm(scene, asked, meter) for asked in accuracies)
+        answer, again = (
+            motion_reaches_norm(scene, each) for each in (integrator, integrator.refined())
+        )
         # If the stiffness is critical within the tolerance, growth and decay of perturbations are
         # indistinguishable.
-        if answer != again or is_neutrally_stable(scene, 10.0 * accuracy.rtol):
+        if answer != again or is_neutrally_stable(scene, integrator.result_tolerance(10.0)):
             return Outcome(
                 Status.UNVERIFIED, message="the tolerance decides: ask for a smaller rtol"
             )

@@ -53,7 +53,7 @@ from rsfstudy.fitting.window_model import (
     parameters_of_law,
 )
 from rsfstudy.measure_base import Measure, Outcome, OutputValue
-from rsfstudy.motion import Accuracy, WorkMeter
+from rsfstudy.motion import Integrator
 from rsfstudy.quantities import Output, Quantity
 from rsfstudy.slider import Scene
 from rsfstudy.status import Status
@@ -370,7 +370,7 @@ class Fit(Measure):
         records = [*dict.fromkeys(window.record for window in self._windows)]
         return {record: sum(map(len, records[:n])) for n, record in enumerate(records)}
 
-    def compute(self, scene: Scene, accuracy: Accuracy, meter: WorkMeter) -> Outcome:
+    def compute(self, scene: Scene, integrator: Integrator) -> Outcome:
         """Fit the parameters, and compute their confidence intervals.
 
         Free parameters that do not occur in the friction law are not fitted.
@@ -379,10 +379,8 @@ class Fit(Measure):
         ----------
         scene : Scene
             Scene with the friction law and the fixed parameters.
-        accuracy : Accuracy
-            Requested accuracy and integrator.
-        meter : WorkMeter
-            Counter of right-hand-side evaluations.
+        integrator : Integrator
+            Integrator with the requested accuracy.
 
         Returns
         -------
@@ -397,10 +395,10 @@ class Fit(Measure):
         own = parameters_of_law(scene, self.free)
         if own != self.free:
             return self._insert_nan_for_absent_parameters(
-                replace(self, free=own).compute(scene, accuracy, meter)
+                replace(self, free=own).compute(scene, integrator)
             )
         windows = self._windows
-        search, found = self.solve(scene, accuracy, meter)
+        search, found = self.solve(scene, integrator)
         model, place = search.model, windows[0].window_properties
         part = model.models[0]
         apart = float(np.median(np.diff(part.displacement[part.time >= windows[0].step.start])))
@@ -449,19 +447,15 @@ class Fit(Measure):
         cuts = [cut for window in windows for cut in window.truncation_remarks]
         return Outcome(status, values, "; ".join(filter(None, (*reasons, *cuts, *remarks))))
 
-    def solve(
-        self, scene: Scene, accuracy: Accuracy, meter: WorkMeter
-    ) -> tuple[FitProblem, FitSolution]:
+    def solve(self, scene: Scene, integrator: Integrator) -> tuple[FitProblem, FitSolution]:
         """Fit the windows if all free parameters occur in the friction law.
 
         Parameters
         ----------
         scene : Scene
             Scene with the friction law and the fixed parameters.
-        accuracy : Accuracy
-            Requested accuracy and integrator.
-        meter : WorkMeter
-            Counter of right-hand-side evaluations.
+        integrator : Integrator
+            Integrator with the requested accuracy.
 
         Returns
         -------
@@ -475,12 +469,12 @@ class Fit(Measure):
         MotionStopped
             If the fit fails.
         """
-        smooth = accuracy.with_rtol(min(accuracy.rtol, _RTOL_FOR_FINITE_DIFFERENCES))
+        smooth = integrator.tightened_to(_RTOL_FOR_FINITE_DIFFERENCES)
         windows = self._windows
         per_um = self.machine_stiffness * self.slip_distance_guess
         scenes = [w.with_machine_stiffness(scene, per_um) for w in windows]
         of_each = zip(windows, scenes, strict=True)
-        parts = [w.create_model(one, self.free, self.loading, smooth, meter) for w, one in of_each]
+        parts = [w.create_model(one, self.free, self.loading, smooth) for w, one in of_each]
         parts = [replace(part, filter=Filter.parse(self.filter)) for part in parts]
         if self.noise == WHITE_NOISE_NAME:  # The usual formula ignores the noise of the load point.
             parts = [replace(part, loadings_with_shifted_steps=()) for part in parts]

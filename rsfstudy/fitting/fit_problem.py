@@ -316,7 +316,10 @@ class FitProblem:
         return self.values_to_coordinates(best[1])
 
     def minimise_weighted_squares(
-        self, initial_coordinates: np.ndarray, noise: NoiseModel, rtol: float = _LEAST_SQUARES_XTOL
+        self,
+        initial_coordinates: np.ndarray,
+        noise: NoiseModel,
+        cost_tolerance: float = _LEAST_SQUARES_XTOL,
     ) -> tuple[np.ndarray, np.ndarray]:
         """Minimise the sum of squared whitened residuals for a fixed noise model.
 
@@ -329,7 +332,7 @@ class FitProblem:
             Initial coordinates.
         noise : NoiseModel
             Noise model that whitens the residuals.
-        rtol : float, optional
+        cost_tolerance : float, optional
             Relative tolerance of the sum of squares. The default is 1e-8.
 
         Returns
@@ -357,7 +360,9 @@ class FitProblem:
             self.has_converged = True
             return initial_coordinates, self._jacobian(initial_coordinates, QUICK_DIFFERENCE_SCHEME)
         bounds = self.lower_bounds, self.upper_bounds
-        found = least_squares(left, inner, slopes, bounds, ftol=rtol, **_LEAST_SQUARES_OPTIONS)
+        found = least_squares(
+            left, inner, slopes, bounds, ftol=cost_tolerance, **_LEAST_SQUARES_OPTIONS
+        )
         self.has_converged = found.status != 0
         return found.x, derivatives["last"]
 

@@ -19,7 +19,7 @@ from rsfstudy.fitting.record import Record, find_steps_between, loading_history,
 from rsfstudy.fitting.stress_steps import MIN_RELATIVE_NORMAL_STRESS_CHANGE
 from rsfstudy.fitting.velocity_steps import LoadingStep, noise_variance
 from rsfstudy.fitting.window_model import WindowModel, scene_to_parameters
-from rsfstudy.motion import Accuracy, MotionStopped, WorkMeter
+from rsfstudy.motion import Integrator, MotionStopped
 from rsfstudy.slider import Scene
 from rsfstudy.status import Status
 
@@ -257,8 +257,7 @@ class FitWindow:
         scene: Scene,
         free_parameters: Collection[str],
         loading_kind: str,
-        accuracy: Accuracy,
-        meter: WorkMeter,
+        integrator: Integrator,
     ) -> WindowModel:
         """Create the model of the window.
 
@@ -272,10 +271,8 @@ class FitWindow:
             Names of the free parameters.
         loading_kind : {"steps", "recorded"}
             Loading of the model (see ``rsfstudy.fitting.Fit``).
-        accuracy : Accuracy
-            Accuracy of the simulated motions.
-        meter : WorkMeter
-            Counter of right-hand-side evaluations.
+        integrator : Integrator
+            Integrator with the requested accuracy.
 
         Returns
         -------
@@ -326,7 +323,7 @@ class FitWindow:
         self._check_normal_stress_matches_loading(rows, pieces)
         steady = stepwise_loading(begins, find_steps_between(record, begins, ends))
         moved = integrate_displacement(steady, time, step.start)
-        return WindowModel(scene, time, moved, friction, pieces, accuracy, meter, moves)
+        return WindowModel(scene, time, moved, friction, pieces, integrator, moves)
 
     def _build_loadings_with_step_errors(
         self, start_time: float, end_time: float

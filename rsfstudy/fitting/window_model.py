@@ -17,11 +17,9 @@ import numpy as np
 from rsfstudy.errors import InvalidValue
 from rsfstudy.fitting.filters import Filter
 from rsfstudy.motion import (
-    Accuracy,
+    Integrator,
     MotionStopped,
     Recording,
-    WorkMeter,
-    integrate_events,
     recorded_friction_coefficient,
 )
 from rsfstudy.quantities import Quantity
@@ -192,10 +190,8 @@ class WindowModel:
         friction.
     loading_segments : ndarray, shape (segments, 4)
         Loading history (see ``rsfstudy.fitting.record.loading_history``).
-    accuracy : Accuracy
-        Accuracy of the simulated motions.
-    work_meter : WorkMeter
-        Counter of right-hand-side evaluations.
+    integrator : Integrator
+        Integrator with the requested accuracy.
     loadings_with_shifted_steps : sequence of ndarray, optional
         Loading histories with shifted step times and velocities (see
         ``rsfstudy.fitting.load_point_noise.shift_steps_by_their_errors``).
@@ -208,8 +204,7 @@ class WindowModel:
     displacement: np.ndarray
     friction: np.ndarray
     loading_segments: np.ndarray
-    accuracy: Accuracy
-    work_meter: WorkMeter
+    integrator: Integrator
     loadings_with_shifted_steps: Sequence[np.ndarray] = ()
     filter: Filter | None = None
 
@@ -314,7 +309,7 @@ class WindowModel:
         MotionStopped
             If the work budget of the meter is exhausted.
         """
-        budget, nothing = self.work_meter.budget, np.full(len(self.time), math.nan)
+        budget, nothing = self.integrator.work_meter.budget, np.full(len(self.time), math.nan)
         stiff = 4.0 * values["stiffness"] * float(np.ptp(self.displacement)) / values["a"]
         most = (
             _MAX_EVALUATIONS
@@ -330,21 +325,22 @@ class WindowModel:
             scale = self.initial_velocity / values["slip_distance"]
             times = self.filter.sample_times(self.time) if self.filter else self.time
             at = np.maximum(times - late - self.loading_segments[0, 0], 0.0) * scale
-            accuracy = self.accuracy.refined() if with_refined_tolerances else self.accuracy
+            integrator = self.integrator.refined() if with_refined_tolerances else self.integrator
             recording, end = Recording(sample_times=at), float(at[-1]) * (1.0 + 1e-12)
-            self.work_meter.budget = min(budget, self.work_meter.evaluations + most)
-            for _event in integrate_events(
-                scene, accuracy, self.work_meter, recording=recording, until=end
-            ):
+            self.integrator.work_meter.budget = min(budget, self.integrator.evaluations + most)
+            for _event in integrator.follow(scene, recording=recording, until=end):
                 pass
         except MotionStopped as halt:
-            if halt.status is Status.WORK_BUDGET_SPENT and self.work_meter.budget == budget:
+            if (
+                halt.status is Status.WORK_BUDGET_SPENT
+                and self.integrator.work_meter.budget == budget
+            ):
                 raise
             return nothing
         except InvalidValue:
             return nothing
         finally:
-            self.work_meter.budget = budget
+            self.integrator.work_meter.budget = budget
         found = recorded_friction_coefficient(recording.as_table(scene))
         if len(found) != len(times):
             return nothing

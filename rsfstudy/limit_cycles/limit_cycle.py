@@ -45,10 +45,8 @@ from rsfstudy.measure_base import (
 from rsfstudy.motion import (
     MAX_ERROR_OVER_RTOL,
     MOTION_VARIABLES,
-    Accuracy,
+    Integrator,
     MotionStopped,
-    WorkMeter,
-    estimate_error,
     resample_motion_along_path,
 )
 from rsfstudy.parts import Segment
@@ -186,7 +184,7 @@ class LimitCycle(RecordingMeasure):
         if isinstance(self.events, bool) or not self.events >= 1 or self.events % 1:
             raise InvalidValue("events", self.events, "must be a whole number from 1")
 
-    def compute(self, scene: Scene, accuracy: Accuracy, meter: WorkMeter) -> Outcome:
+    def compute(self, scene: Scene, integrator: Integrator) -> Outcome:
         """Compute the limit cycle, with error estimates.
 
         The motion is integrated until it approaches the limit cycle. The cycle is then computed
@@ -196,10 +194,8 @@ class LimitCycle(RecordingMeasure):
         ----------
         scene : Scene
             Scene to evaluate.
-        accuracy : Accuracy
-            Requested accuracy.
-        meter : WorkMeter
-            Counter of right-hand-side evaluations.
+        integrator : Integrator
+            Integrator with the requested accuracy.
 
         Returns
         -------
@@ -213,28 +209,25 @@ class LimitCycle(RecordingMeasure):
             # Without a step, the slider would remain in steady sliding, even if it is unstable.
             scene = scene.with_segment(Segment(1.0, INITIAL_PERTURBATION_DISPLACEMENT))
         if scene.state_count > 1:
-            return self._find_multi_state_cycle(scene, accuracy, meter)
-        loose = max(accuracy.rtol, _CYCLE_SEARCH_RTOL)
-        for rtol in dict.fromkeys((loose, accuracy.rtol)):
-            approach = LimitCycleSearch(scene, accuracy.with_rtol(rtol), meter)
+            return self._find_multi_state_cycle(scene, integrator)
+        for own in dict.fromkeys((integrator.loosened_to(_CYCLE_SEARCH_RTOL), integrator)):
+            approach = LimitCycleSearch(scene, own)
             try:
                 found = approach.follow_until_converged(self.events)
             except MotionStopped:
                 # The search may fail with the low accuracy and succeed with the requested accuracy.
-                if rtol == accuracy.rtol or meter.evaluations > meter.budget:
+                if own is integrator or integrator.is_budget_exceeded:
                     raise
                 continue
             if found:
                 outcome = self._refine_known_periodic_orbit(
-                    scene, accuracy, meter, approach.orbit, len(approach.cycles)
+                    scene, integrator, approach.orbit, len(approach.cycles)
                 )
                 if outcome.status is not Status.UNVERIFIED:
                     return outcome
         return outcome if found else outcome_of_settling_motion(scene)
 
-    def _find_multi_state_cycle(
-        self, scene: Scene, accuracy: Accuracy, work_meter: WorkMeter
-    ) -> Outcome:
+    def _find_multi_state_cycle(self, scene: Scene, integrator: Integrator) -> Outcome:
         """Compute the limit cycle of a scene with several states.
 
         The motion is integrated with a low accuracy until it approaches a periodic orbit. The orbit
@@ -242,8 +235,7 @@ class LimitCycle(RecordingMeasure):
         """
         motion = follow_to_periodic_orbit(
             scene,
-            accuracy.with_rtol(max(accuracy.rtol, _CYCLE_SEARCH_RTOL)),
-            work_meter,
+            integrator.loosened_to(_CYCLE_SEARCH_RTOL),
             self.events,
         )
         if motion is None:
@@ -254,8 +246,7 @@ class LimitCycle(RecordingMeasure):
             )
         return self._refine_known_periodic_orbit(
             scene,
-            accuracy,
-            work_meter,
+            integrator,
             motion.orbit.orbit_starting_at_largest_event,
             len(motion.cycles),
         )
@@ -263,8 +254,7 @@ class LimitCycle(RecordingMeasure):
     def _refine_known_periodic_orbit(
         self,
         scene: Scene,
-        accuracy: Accuracy,
-        work_meter: WorkMeter,
+        integrator: Integrator,
         orbit: PeriodicOrbit,
         max_cycles: int,
     ) -> Outcome:
@@ -273,18 +263,17 @@ class LimitCycle(RecordingMeasure):
         The orbit is refined again with smaller tolerances, to estimate the errors and to record the
         orbit.
         """
-        one = ReturnMap(scene, accuracy, work_meter).refine_orbit(orbit)
+        one = ReturnMap(scene, integrator).refine_orbit(orbit)
         fine = ReturnMap(
             scene,
-            accuracy.refined(),
-            work_meter,
+            integrator.refined(),
             recorded=self.phases > _MAX_CYCLE_POINTS_WITHOUT_RECORDING,
         )
         again = one and fine.refine_orbit(one)
         if one is None or again is None:
             why = "with other tolerances the cycle does not close: ask for a smaller rtol"
             return Outcome(Status.UNVERIFIED, message=why)
-        errors = estimate_primary_output_errors(accuracy, one, again)
+        errors = estimate_primary_output_errors(integrator, one, again)
         values = dict(
             zip(_PRIMARY_OUTPUT_NAMES, one.corrected_primary_outputs.tolist(), strict=True)
         )
@@ -304,12 +293,12 @@ class LimitCycle(RecordingMeasure):
         values["period_events"] = float(one.period)
         values["events_until_repeat"] = float(max_cycles)
         values["work_per_cycle"] = one.evaluation_count / one.period
-        status, why = status_from_output_errors(accuracy, one, errors)
+        status, why = status_from_output_errors(integrator, one, errors)
         why = why or _period_of_several_events_message(one)
         path = recorded_rows_of_cycles(scene, again.cycles, again.recording)
         return Outcome(
             status,
-            values | resample_motion_along_path(path, self.phases, engine=accuracy.engine),
+            values | resample_motion_along_path(path, self.phases, engine=integrator.engine),
             why,
         )
 
@@ -396,7 +385,7 @@ def outcome_of_aperiodic_motion(scene: Scene, sequence: StickSlipSequence, remed
 
 
 def status_from_output_errors(
-    accuracy: Accuracy,
+    integrator: Integrator,
     orbit: PeriodicOrbit,
     output_errors: np.ndarray,
     outputs: slice = slice(None),
@@ -405,8 +394,8 @@ def status_from_output_errors(
 
     Parameters
     ----------
-    accuracy : Accuracy
-        Requested accuracy.
+    integrator : Integrator
+        Integrator with the requested accuracy.
     orbit : PeriodicOrbit
         Orbit with the main results.
     output_errors : ndarray
@@ -422,9 +411,10 @@ def status_from_output_errors(
         Largest relative error, or an empty string.
     """
     worst = float((output_errors / _primary_output_error_scales(orbit))[outputs].max())
-    if worst <= MAX_ERROR_OVER_RTOL * accuracy.rtol:
+    if worst <= integrator.result_tolerance(MAX_ERROR_OVER_RTOL):
         return Status.OK, ""
-    why = f"the cycle is known to {worst:.1e} only, where {accuracy.rtol:g} was asked for"
+    asked = integrator.result_tolerance()
+    why = f"the cycle is known to {worst:.1e} only, where {asked:g} was asked for"
     return Status.UNVERIFIED, f"{why}: ask for another rtol"
 
 
@@ -440,7 +430,7 @@ def _primary_output_error_scales(orbit: PeriodicOrbit) -> list[float]:
 
 
 def estimate_primary_output_errors(
-    accuracy: Accuracy, orbit: PeriodicOrbit, refined_orbit: PeriodicOrbit
+    integrator: Integrator, orbit: PeriodicOrbit, refined_orbit: PeriodicOrbit
 ) -> np.ndarray:
     """Estimate the errors of the main results.
 
@@ -449,8 +439,8 @@ def estimate_primary_output_errors(
 
     Parameters
     ----------
-    accuracy : Accuracy
-        Requested accuracy.
+    integrator : Integrator
+        Integrator with the requested accuracy.
     orbit : PeriodicOrbit
         Orbit of the first run.
     refined_orbit : PeriodicOrbit
@@ -461,17 +451,16 @@ def estimate_primary_output_errors(
     ndarray
         Error estimates in the order of the main results.
     """
-    chance, scales = (
-        _MIN_ESTIMATED_ERROR_OVER_RTOL * accuracy.rtol,
-        _primary_output_error_scales(orbit),
-    )
     pairs = zip(
         orbit.corrected_primary_outputs.tolist(),
         refined_orbit.corrected_primary_outputs.tolist(),
-        scales,
+        _primary_output_error_scales(orbit),
         strict=True,
     )
-    errors = [estimate_error(number, refined, chance, scale) for number, refined, scale in pairs]
+    errors = [
+        integrator.estimate_error(number, refined, _MIN_ESTIMATED_ERROR_OVER_RTOL, scale)
+        for number, refined, scale in pairs
+    ]
     return np.asarray(np.abs(orbit.primary_output_corrections) + np.array(errors))
 
 

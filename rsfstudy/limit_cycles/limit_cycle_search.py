@@ -53,7 +53,7 @@ from rsfstudy.limit_cycles.stick_slip_cycles import (
     iterate_cycles,
     suggest_raising_event_limit,
 )
-from rsfstudy.motion import Accuracy, MotionStopped, WorkMeter
+from rsfstudy.motion import Integrator, MotionStopped
 from rsfstudy.slider import Scene, critical_stiffness
 from rsfstudy.status import Status
 
@@ -87,10 +87,8 @@ class LimitCycleSearch:
     ----------
     scene : Scene
         Scene with one state and a moving load point.
-    accuracy : Accuracy
-        Requested accuracy.
-    work_meter : WorkMeter
-        Counter of right-hand-side evaluations.
+    integrator : Integrator
+        Integrator with the requested accuracy.
 
     Attributes
     ----------
@@ -99,10 +97,10 @@ class LimitCycleSearch:
         is the limit cycle.
     """
 
-    def __init__(self, scene: Scene, accuracy: Accuracy, work_meter: WorkMeter) -> None:
-        self._scene, self._accuracy, self._meter = scene, accuracy, work_meter
-        self._return_map = ReturnMap(scene, accuracy, work_meter)
-        self._noise = accuracy.local_tolerance * scene.a
+    def __init__(self, scene: Scene, integrator: Integrator) -> None:
+        self._scene, self._integrator = scene, integrator
+        self._return_map = ReturnMap(scene, integrator)
+        self._noise = integrator.local_tolerance * scene.a
         self._work = 0
         self.cycles: list[Cycle] = []
         #: Columns b and c of P', which are the derivatives of the image with respect to spring
@@ -142,11 +140,14 @@ class LimitCycleSearch:
         """
         start = None
         while True:
-            spent = self._meter.evaluations
-            for cycle in iterate_cycles(self._scene, self._accuracy, self._meter, start):
+            spent = self._integrator.evaluations
+            for cycle in iterate_cycles(self._scene, self._integrator, start):
                 if cycle is None:
                     return False
-                self._work, spent = self._meter.evaluations - spent, self._meter.evaluations
+                self._work, spent = (
+                    self._integrator.evaluations - spent,
+                    self._integrator.evaluations,
+                )
                 self.cycles.append(cycle)
                 self._update_return_map_derivatives()
                 if self._has_converged():
@@ -183,7 +184,11 @@ class LimitCycleSearch:
         """Last cycle as a periodic orbit, with a correction to the limit cycle."""
         last, slopes = self.cycles[-1:], np.array(self._derivatives).T
         return PeriodicOrbit(
-            tuple(last), (slopes,), np.array(self._correction), self._accuracy, self._work
+            tuple(last),
+            (slopes,),
+            np.array(self._correction),
+            self._integrator.accuracy,
+            self._work,
         )
 
     @property
@@ -239,7 +244,9 @@ class LimitCycleSearch:
         The cycles have converged if the derivatives of the return map predict a sufficiently small
         change of the next cycle, or if the last two cycles agree.
         """
-        allowed = [0.3 * self._accuracy.rtol * abs(number) for number in self._image[2:]]
+        allowed = [
+            self._integrator.result_tolerance(0.3) * abs(number) for number in self._image[2:]
+        ]
         if (
             self._has_derivatives
             and self._contraction_ratio_per_cycle < _MAX_CONTRACTION
@@ -265,8 +272,7 @@ class LimitCycleSearch:
             for cycle in self.cycles[-2:]
         )
         near = (
-            ORBIT_CLOSURE_TOLERANCE_OVER_RTOL
-            * self._accuracy.rtol
+            self._integrator.result_tolerance(ORBIT_CLOSURE_TOLERANCE_OVER_RTOL)
             * self._scene.a
             * self.cycles[-1].log_slip_rate_range
         )
@@ -319,8 +325,7 @@ class StickSlipSequence:
 
 def follow_to_periodic_orbit(
     scene: Scene,
-    accuracy: Accuracy,
-    work_meter: WorkMeter,
+    integrator: Integrator,
     max_cycles: int,
     *,
     follow_all_cycles: bool = False,
@@ -331,10 +336,8 @@ def follow_to_periodic_orbit(
     ----------
     scene : Scene
         Scene with a moving load point.
-    accuracy : Accuracy
-        Requested accuracy.
-    work_meter : WorkMeter
-        Counter of right-hand-side evaluations.
+    integrator : Integrator
+        Integrator with the requested accuracy.
     max_cycles : int
         Largest number of cycles.
     follow_all_cycles : bool, default: False
@@ -346,9 +349,9 @@ def follow_to_periodic_orbit(
         Cycles and orbit, or None if the motion settles to steady sliding.
     """
     seen, orbit, repels = list[Cycle](), None, False
-    fine = accuracy.with_rtol(min(accuracy.rtol, _MAX_ORBIT_CLOSURE_RTOL))
+    fine = integrator.tightened_to(_MAX_ORBIT_CLOSURE_RTOL)
     look = min(_MIN_CYCLES_BEFORE_RECURRENCE_TEST, max_cycles)
-    for cycle in iterate_cycles(scene, accuracy, work_meter, None):
+    for cycle in iterate_cycles(scene, integrator, None):
         if cycle is None:
             return None
         seen.append(cycle)
@@ -358,7 +361,7 @@ def follow_to_periodic_orbit(
             for counted in _state_index_sets_to_compare(scene):
                 period, off = find_recurrence_period(scene, seen, counted)
                 if off < _MAX_RECURRENCE_MISFIT:
-                    by = ReturnMap(scene, fine, work_meter, counted=counted)
+                    by = ReturnMap(scene, fine, counted=counted)
                     found = by.find_periodic_orbit(
                         section_coordinates_at_point(cycle.end_point),
                         period,

@@ -50,11 +50,10 @@ from rsfstudy.limit_cycles.stick_slip_cycles import (
 )
 from rsfstudy.motion import (
     Accuracy,
+    Integrator,
     MotionStopped,
     Recording,
-    WorkMeter,
     compute_restart_point,
-    inertia_matters_at,
     point_with_slip_rate,
 )
 from rsfstudy.slider import MotionPoint, Numbers, Scene, equations_without_mass
@@ -224,10 +223,8 @@ class ReturnMap:
     ----------
     scene : Scene
         Scene with a moving load point.
-    accuracy : Accuracy
-        Requested accuracy.
-    work_meter : WorkMeter
-        Counter of right-hand-side evaluations.
+    integrator : Integrator
+        Integrator with the requested accuracy.
     recorded : bool, default: False
         If True, record the motions along an orbit. Otherwise only the ends of the cycles are
         stored.
@@ -239,13 +236,12 @@ class ReturnMap:
     def __init__(
         self,
         scene: Scene,
-        accuracy: Accuracy,
-        work_meter: WorkMeter,
+        integrator: Integrator,
         *,
         recorded: bool = False,
         counted: Sequence[int] | None = None,
     ) -> None:
-        self.scene, self.accuracy, self._meter = scene, accuracy, work_meter
+        self.scene, self.integrator = scene, integrator
         self._with_recording = recorded
         places = (
             scene.friction_functions.indices_of_states_in_distance if counted is None else counted
@@ -284,7 +280,7 @@ class ReturnMap:
 
     def _inertia_matters_at(self, point: MotionPoint) -> bool:
         """Return True if inertia is too important for the slow manifold."""
-        return inertia_matters_at(self.scene, self.accuracy, point)
+        return self.integrator.inertia_matters_at(self.scene, point)
 
     def follow_cycles(
         self, start_section: np.ndarray, cycle_count: int, recording: Recording | None = None
@@ -311,8 +307,7 @@ class ReturnMap:
         try:
             moving = iterate_cycles(
                 self.scene,
-                self.accuracy,
-                self._meter,
+                self.integrator,
                 self.section_coordinates_to_point(start_section),
                 recording,
             )
@@ -365,7 +360,9 @@ class ReturnMap:
         """
         found, step = (
             list[np.ndarray](),
-            DIFFERENCE_STEP_OVER_LOG_RATE_RANGE * math.sqrt(self.accuracy.refinement) * state_scale,
+            DIFFERENCE_STEP_OVER_LOG_RATE_RANGE
+            * math.sqrt(self.integrator.accuracy.refinement)
+            * state_scale,
         )
         current: np.ndarray | None = start_section
         for number in range(cycle_count):
@@ -474,7 +471,7 @@ class ReturnMap:
         cycle_count = self._cycles_until_repeat(found.cycles, scale)
         if (
             np.abs(found.start_section_coordinates - start_section).max()
-            > 10.0 * self.accuracy.rtol * scale
+            > self.integrator.result_tolerance(10.0) * scale
         ):
             slopes = self.compute_cycle_derivatives(
                 found.start_section_coordinates, cycle_count, scale
@@ -498,7 +495,7 @@ class ReturnMap:
         PeriodicOrbit or None
             The refined orbit, or None if the orbit does not close.
         """
-        if orbit.accuracy == self.accuracy:
+        if orbit.accuracy == self.integrator.accuracy:
             return orbit
         return self._solve_for_closed_orbit(
             orbit.start_section_coordinates,
@@ -531,7 +528,7 @@ class ReturnMap:
         """
         at, enough, last = (
             start_section,
-            ORBIT_CLOSURE_TOLERANCE_OVER_RTOL * self.accuracy.rtol * state_scale,
+            self.integrator.result_tolerance(ORBIT_CLOSURE_TOLERANCE_OVER_RTOL) * state_scale,
             math.inf,
         )
         jacobian, move = (
@@ -540,7 +537,7 @@ class ReturnMap:
         )
         for _ in range(_MAX_ITERATIONS):
             spent, recording = (
-                self._meter.evaluations,
+                self.integrator.evaluations,
                 Recording() if self._with_recording else None,
             )
             seen = self.follow_cycles(at, len(cycle_derivatives), recording)
@@ -554,9 +551,14 @@ class ReturnMap:
             # The iteration ends at the requested accuracy, or if numerical errors of the motion
             # prevent further progress.
             if size <= enough or 0.5 * last <= size <= 100.0 * enough:
-                work = self._meter.evaluations - spent
+                work = self.integrator.evaluations - spent
                 return PeriodicOrbit(
-                    tuple(seen), tuple(cycle_derivatives), move, self.accuracy, work, recording
+                    tuple(seen),
+                    tuple(cycle_derivatives),
+                    move,
+                    self.integrator.accuracy,
+                    work,
+                    recording,
                 )
             at, last = at + move, size
             if (

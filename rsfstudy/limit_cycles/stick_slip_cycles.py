@@ -18,15 +18,13 @@ import numpy as np
 
 from rsfstudy.measure_base import steady_sliding_is_linearly_stable
 from rsfstudy.motion import (
-    Accuracy,
     Event,
     EventKind,
     EventSpecification,
+    Integrator,
     Recording,
-    WorkMeter,
     approach_to_steady_state,
     fall,
-    integrate_events,
     maximum,
     minimum,
     recorded_row,
@@ -128,8 +126,7 @@ class Cycle(NamedTuple):
 
 def iterate_cycles(
     scene: Scene,
-    accuracy: Accuracy,
-    work_meter: WorkMeter,
+    integrator: Integrator,
     start_point: MotionPoint | None,
     recording: Recording | None = None,
 ) -> Iterator[Cycle | None]:
@@ -139,10 +136,8 @@ def iterate_cycles(
     ----------
     scene : Scene
         Scene with a moving load point.
-    accuracy : Accuracy
-        Requested accuracy.
-    work_meter : WorkMeter
-        Counter of right-hand-side evaluations.
+    integrator : Integrator
+        Integrator with the requested accuracy.
     start_point : MotionPoint or None
         Point at which the motion starts. If None, the motion starts with the step of the scene, and
         the part of the motion before the first maximum of spring stress is skipped.
@@ -157,9 +152,7 @@ def iterate_cycles(
     begin, begun, fallen, seen = None, 0.0, start_point is None, list[Event]()
     ahead = 0 if start_point else scene.parts.loading.reported_segment_count
     swings, asked = list[float](), _cycle_event_specifications(scene.log_load_velocity)
-    motion = integrate_events(
-        scene, accuracy, work_meter, asked, start=start_point, with_time=True, recording=recording
-    )
+    motion = integrator.follow(scene, asked, start=start_point, with_time=True, recording=recording)
     for event in motion:
         kind = event.kind
         if kind is _SEGMENT:

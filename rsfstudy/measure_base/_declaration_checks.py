@@ -40,10 +40,10 @@ def check_declared_work_estimates(
     """
     if not isinstance(typical_work, int | float) or not 0 < typical_work < np.inf:
         raise InvalidValue("typical_work", typical_work, "must be a number greater than 0")
-    for rtol in (MIN_RTOL, DEFAULT_RTOL, MAX_RTOL):
-        expected = expected_work(Accuracy(rtol))
+    for tolerance in (MIN_RTOL, DEFAULT_RTOL, MAX_RTOL):
+        expected = expected_work(Accuracy(tolerance))
         if not 0 < expected < np.inf:
-            raise InvalidValue("expected_work", expected, f"must exceed 0, at rtol {rtol:g}")
+            raise InvalidValue("expected_work", expected, f"must exceed 0, at rtol {tolerance:g}")
 
 
 def check_measure_description(

@@ -14,7 +14,7 @@ import numpy as np
 from rsfstudy.error_boundary import wrap_methods_in_error_boundary
 from rsfstudy.errors import InvalidValue
 from rsfstudy.measure_base.measure import Measure, Outcome, OutputValue
-from rsfstudy.motion import Accuracy, MotionStopped, WorkMeter
+from rsfstudy.motion import Integrator, MotionStopped
 from rsfstudy.quantities import Output, Quantity
 from rsfstudy.slider import SCENE_FIELD_TYPES, Scene
 from rsfstudy.status import Status
@@ -215,7 +215,7 @@ class Elasticities(Measure):
             "parameters": list(self.parameters),
         }
 
-    def compute(self, scene: Scene, accuracy: Accuracy, meter: WorkMeter) -> Outcome:
+    def compute(self, scene: Scene, integrator: Integrator) -> Outcome:
         """Compute the main result of the inner measure and its elasticities.
 
         If the main result is zero, the status is ``not_applicable``, because zero has no logarithm.
@@ -224,10 +224,8 @@ class Elasticities(Measure):
         ----------
         scene : Scene
             Scene at which the derivatives are computed.
-        accuracy : Accuracy
-            Requested accuracy of the inner measure.
-        meter : WorkMeter
-            Counter of right-hand-side evaluations.
+        integrator : Integrator
+            Integrator with the requested accuracy.
 
         Returns
         -------
@@ -235,7 +233,7 @@ class Elasticities(Measure):
             Main result, elasticities and error estimates. The message lists the parameters without
             an elasticity.
         """
-        outcome = self.measure.run_nested(scene, accuracy, meter)
+        outcome = self.measure.run_nested(scene, integrator)
         if outcome.status is not Status.OK:
             return Outcome(outcome.status, message=outcome.message)
         names = self.primary_output, f"{self.primary_output}_error"
@@ -244,8 +242,9 @@ class Elasticities(Measure):
         if here is None:
             why = f"{self.primary_output} is zero, which has no logarithm"
             return Outcome(Status.NOT_APPLICABLE, values, why)
+        accuracy = integrator.accuracy
         most = min(accuracy.budget, _MAX_EVALUATION_RATIO * (outcome.rhs_evaluations or 1))
-        accuracies = accuracy, *3 * (replace(accuracy, budget=most),)
+        limited = integrator.with_accuracy(replace(accuracy, budget=most))
         step = min(_MAX_LOG_PARAMETER_STEP, (0.5 * here.error) ** (1.0 / 3.0))
         found = np.full((len(self.parameters), 2), np.nan)
         lacking, stated = [], scene.as_dict()
@@ -253,7 +252,7 @@ class Elasticities(Measure):
             if not stated.get(name):
                 continue
             found[place] = self._differentiate_by_parameter(
-                scene, name, here, step, accuracies, meter
+                scene, name, here, step, (integrator, *3 * (limited,))
             )
             if np.isnan(found[place, 0]):
                 lacking.append(name)
@@ -267,8 +266,7 @@ class Elasticities(Measure):
         parameter_name: str,
         central_value: _LogValueWithError,
         log_step: float,
-        accuracies_of_step_fractions: Sequence[Accuracy],
-        work_meter: WorkMeter,
+        integrators: Sequence[Integrator],
     ) -> tuple[float, float]:
         """Compute the derivative with respect to one parameter, and its error.
 
@@ -285,10 +283,8 @@ class Elasticities(Measure):
             Value of ``ln|y|`` at the unchanged scene.
         log_step : float
             Largest step of ln p.
-        accuracies_of_step_fractions : sequence of Accuracy
-            Accuracy for each step.
-        work_meter : WorkMeter
-            Counter of right-hand-side evaluations.
+        integrators : sequence of Integrator
+            Integrator for each step.
 
         Returns
         -------
@@ -297,12 +293,12 @@ class Elasticities(Measure):
             smaller nor for a larger parameter value.
         """
         found: list[tuple[bool, float, float]] = []
-        for part, accuracy in zip(_STEP_FRACTIONS, accuracies_of_step_fractions, strict=True):
+        for part, integrator in zip(_STEP_FRACTIONS, integrators, strict=True):
             size = part * log_step
             try:
                 sides = [
                     self._evaluate_with_changed_parameter(
-                        scene, parameter_name, by * size, accuracy, work_meter
+                        scene, parameter_name, by * size, integrator
                     )
                     for by in _STENCIL
                 ]
@@ -326,8 +322,7 @@ class Elasticities(Measure):
         scene: Scene,
         parameter_name: str,
         log_change: float,
-        accuracy: Accuracy,
-        work_meter: WorkMeter,
+        integrator: Integrator,
     ) -> _LogValueWithError | None:
         """Compute ``ln|y|`` after a change of ln p.
 
@@ -339,10 +334,8 @@ class Elasticities(Measure):
             Name of the parameter.
         log_change : float
             Change of ln p.
-        accuracy : Accuracy
-            Requested accuracy.
-        work_meter : WorkMeter
-            Counter of right-hand-side evaluations.
+        integrator : Integrator
+            Integrator with the requested accuracy.
 
         Returns
         -------
@@ -360,7 +353,7 @@ class Elasticities(Measure):
             )
         except InvalidValue:
             return None
-        outcome = self.measure.run_nested(beside, accuracy, work_meter)
+        outcome = self.measure.run_nested(beside, integrator)
         if not outcome.status.is_answer:
             where = f"at {parameter_name} = {getattr(beside, parameter_name):.9g}"
             raise MotionStopped(outcome.status, f"{where}: {outcome.message}")

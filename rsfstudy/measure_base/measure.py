@@ -28,8 +28,11 @@ from rsfstudy.measure_base._declaration_checks import PlainValue
 from rsfstudy.motion import (
     MAX_ERROR_OVER_RTOL,
     Accuracy,
+    Integrator,
     MotionStopped,
     WorkMeter,
+    accept_accuracy_and_meter,
+    adapt_former_compute,
     suggest_raising_budget,
 )
 from rsfstudy.quantities import Output, Quantity, is_variable_name
@@ -94,17 +97,19 @@ class Measure(ConstructorKeywordCheckMixin):
         primary_output: str                       # name of the main result
         outputs: Sequence[Output]                 # results, with units and error estimates
         typical_work: int                         # right-hand-side evaluations per cell
-        compute(self, scene, accuracy, meter) -> Outcome
+        compute(self, scene, integrator) -> Outcome
 
     The method ``compute`` returns ``Outcome(status, values)``. The mapping ``values`` contains one
     number for each name in ``outputs``. For each output with ``error=True``, the mapping also
     contains an error estimate with the name ``<name>_error``.
 
-    The argument ``accuracy`` contains the requested relative accuracy, ``accuracy.rtol``. The
-    argument ``meter`` counts right-hand-side evaluations, and stops a motion that exceeds the work
-    budget. To compute a motion, pass both arguments to ``rsfstudy.simulate``:
-    ``rsfstudy.simulate(scene, accuracy=accuracy, meter=meter)``. To use the results of another
-    measure, call the ``run_nested`` method of that measure.
+    The argument ``integrator`` is an ``rsfstudy.Integrator``. It contains the requested relative
+    accuracy, ``integrator.rtol``, counts right-hand-side evaluations, and stops a motion that
+    exceeds the work budget. To compute a motion, pass the integrator to ``rsfstudy.simulate``:
+    ``rsfstudy.simulate(scene, integrator=integrator)``. The functions ``rsfstudy.critical_step``
+    and ``rsfstudy.limit_cycle`` also take ``integrator=integrator``. To use the outcome of another
+    measure, call the ``run_nested`` method of that measure. The results of
+    ``integrator.refined()``, whose tolerances are ten times smaller, are used to estimate errors.
 
     Override ``error_scales`` to set the status to ``unverified`` if the error estimates are far too
     large::
@@ -126,7 +131,7 @@ class Measure(ConstructorKeywordCheckMixin):
     ...     outputs = (Output("b_minus_a", "$b-a$", "1", "rate weakening"),)
     ...     typical_work = 1
     ...
-    ...     def compute(self, scene, accuracy, meter):
+    ...     def compute(self, scene, integrator):
     ...         return Outcome(Status.OK, {"b_minus_a": scene.b - scene.a})
     >>> outcome = RateWeakening()(Scene(a=0.01, b_over_a=1.5), Accuracy())
     >>> round(outcome.values["b_minus_a"], 6)
@@ -146,6 +151,7 @@ class Measure(ConstructorKeywordCheckMixin):
         """Adopt former names of members that the subclass defines."""
         super().__init_subclass__()
         add_new_names_for_former_members(cls)
+        adapt_former_compute(cls)
 
     @property
     def primary_output(self) -> str:
@@ -240,7 +246,7 @@ class Measure(ConstructorKeywordCheckMixin):
         float
             The typical number of evaluations, scaled to the accuracy.
         """
-        return self.typical_work * relative_work_at_rtol(accuracy.rtol, self.work_by_digits)
+        return self.typical_work * relative_work_at_accuracy(accuracy, self.work_by_digits)
 
     @property
     def plain_fields(self) -> dict[str, PlainValue]:
@@ -308,17 +314,15 @@ class Measure(ConstructorKeywordCheckMixin):
         """
         return {}
 
-    def compute(self, scene: Scene, accuracy: Accuracy, meter: WorkMeter) -> Outcome:
+    def compute(self, scene: Scene, integrator: Integrator) -> Outcome:
         """Compute the results for one scene.
 
         Parameters
         ----------
         scene : Scene
             Scene to evaluate.
-        accuracy : Accuracy
-            Requested accuracy.
-        meter : WorkMeter
-            Counter of right-hand-side evaluations.
+        integrator : Integrator
+            Integrator with the requested accuracy.
 
         Returns
         -------
@@ -379,28 +383,27 @@ class Measure(ConstructorKeywordCheckMixin):
             return replace(outcome, message=outcome.message + suggest_raising_budget(meter.budget))
         return outcome
 
-    def run_nested(self, scene: Scene, accuracy: Accuracy, meter: WorkMeter) -> Outcome:
+    @accept_accuracy_and_meter
+    def run_nested(self, scene: Scene, integrator: Integrator) -> Outcome:
         """Compute the results for use in another measure.
 
-        The right-hand-side evaluations are added to the meter of the other measure.
+        The right-hand-side evaluations are added to the count of the other measure.
 
         Parameters
         ----------
         scene : Scene
             Scene to evaluate.
-        accuracy : Accuracy
-            Requested accuracy and work budget.
-        meter : WorkMeter
-            Meter of the other measure.
+        integrator : Integrator
+            Integrator of the other measure.
 
         Returns
         -------
         Outcome
             Outcome of ``__call__``, without the advice on a larger budget.
         """
-        outcome, own = self.run_metered(scene, accuracy)
+        outcome, own = self.run_metered(scene, integrator.accuracy)
         for regime, spent in own.evaluations_by_regime.items():
-            meter.add_evaluations(regime, spent)
+            integrator.work_meter.add_evaluations(regime, spent)
         return outcome
 
     def run_metered(self, scene: Scene, accuracy: Accuracy) -> tuple[Outcome, WorkMeter]:
@@ -420,15 +423,16 @@ class Measure(ConstructorKeywordCheckMixin):
         meter : WorkMeter
             Right-hand-side evaluations by regime.
         """
-        meter = WorkMeter(accuracy.budget, dict(accuracy.methods), accuracy.engine)
+        integrator = Integrator(accuracy)
         try:
-            outcome = self._validate_outcome(self.compute(scene, accuracy, meter))
+            outcome = self._validate_outcome(self.compute(scene, integrator))
             if outcome.status.has_values:
-                outcome = self._mark_unverified_if_errors_are_large(accuracy.rtol, scene, outcome)
+                outcome = self._mark_unverified_if_errors_are_large(integrator, scene, outcome)
         except MotionStopped as halt:
             outcome = Outcome(halt.status, message=str(halt))
-        spent = _declaration_checks.check_evaluation_count(meter.evaluations)
-        return Outcome(outcome.status, outcome.values, outcome.message, spent), meter
+        spent = _declaration_checks.check_evaluation_count(integrator.evaluations)
+        outcome = Outcome(outcome.status, outcome.values, outcome.message, spent)
+        return outcome, integrator.work_meter
 
     def _validate_outcome(self, outcome: Outcome) -> Outcome:
         """Check that the results of an outcome match their declarations.
@@ -483,12 +487,12 @@ class Measure(ConstructorKeywordCheckMixin):
         return None
 
     def _mark_unverified_if_errors_are_large(
-        self, rtol: float, scene: Scene, outcome: Outcome
+        self, integrator: Integrator, scene: Scene, outcome: Outcome
     ) -> Outcome:
         """Set the status to ``unverified`` if an error is too large."""
         values, doubts = outcome.values, []
         for name, scale in self.error_scales(scene, values).items():
-            error, asked = values.get(f"{name}_error", 0.0), rtol * scale
+            error, asked = values.get(f"{name}_error", 0.0), integrator.result_tolerance() * scale
             if error > MAX_ERROR_OVER_RTOL * asked:
                 text = f"{name} = {values[name]:.6g} is known to {error:.2g}, and {asked:.2g}"
                 doubts.append(f"{text} was asked for")
@@ -569,25 +573,25 @@ def _check_names_declared_by_measure(measure: Measure) -> None:
             )
 
 
-def relative_work_at_rtol(rtol: float, work_by_digits: Mapping[float, float]) -> float:
+def relative_work_at_accuracy(accuracy: Accuracy, work_by_digits: Mapping[float, float]) -> float:
     """Return the cost of an accuracy relative to the cost of the default accuracy.
 
     The function interpolates costs that were measured for several numbers of digits.
 
     Parameters
     ----------
-    rtol : float
-        Relative accuracy of the cells.
+    accuracy : Accuracy
+        Accuracy of the cells.
     work_by_digits : mapping of float to float
         Relative cost by number of digits ``-log10(rtol)``.
 
     Returns
     -------
     float
-        Cost at ``rtol`` divided by the cost at the default accuracy.
+        Cost at ``accuracy`` divided by the cost at the default accuracy.
     """
     known = sorted(work_by_digits)
-    digits = min(-math.log10(rtol), known[-1] + 2.0)
+    digits = min(accuracy.digits, known[-1] + 2.0)
     above = next((d for d in known[1:] if d >= digits), known[-1])
     below = known[known.index(above) - 1]
     share = (digits - below) / (above - below)

@@ -1,9 +1,10 @@
 """Integration of the equations of motion of a scene in time.
 
-``Accuracy`` defines the tolerances, the work budget and the engine. ``integrate_events`` integrates
-a scene through its loading segments and regimes, and yields events. A ``Recording`` also stores the
-samples of the motion. To read the implementation, start with ``event_integration``, followed by
-``motion_driver`` and ``motion_loop``. The engines are SciPy, Python and the compiled engine. The
+``Accuracy`` defines the tolerances, the work budget and the engine. An ``Integrator`` integrates
+scenes to an accuracy and counts the work: ``Integrator.follow`` integrates a scene through its
+loading segments and regimes, and yields events. A ``Recording`` also stores the samples of the
+motion. To read the implementation, start with ``integrator``, followed by ``motion_driver`` and
+``motion_loop``. The engines are SciPy, Python and the compiled engine. The
 package never interprets a motion. The measures in ``rsfstudy.measures`` compute results from
 motions.
 """
@@ -36,7 +37,6 @@ if TYPE_CHECKING:
         is_engine_installed,
         register_user_steppers,
     )
-    from rsfstudy.motion.event_integration import integrate_events
     from rsfstudy.motion.events import (
         Event,
         EventKind,
@@ -47,6 +47,7 @@ if TYPE_CHECKING:
         minimum,
         rise,
     )
+    from rsfstudy.motion.former_arguments import accept_accuracy_and_meter, adapt_former_compute
     from rsfstudy.motion.initial_points import (
         compute_restart_point,
         initial_point,
@@ -54,7 +55,8 @@ if TYPE_CHECKING:
         point_with_slip_rate,
         slow_manifold_point,
     )
-    from rsfstudy.motion.motion_driver import MotionDriver, iterate_events_of_equations
+    from rsfstudy.motion.integrator import Integrator
+    from rsfstudy.motion.motion_driver import MotionDriver
     from rsfstudy.motion.neglected_inertia_error import estimate_neglected_inertia_error
     from rsfstudy.motion.recorded_motion_readings import (
         recorded_friction_coefficient,
@@ -70,7 +72,6 @@ if TYPE_CHECKING:
         Recording,
         recorded_row,
     )
-    from rsfstudy.motion.regime_switching import inertia_matters_at
     from rsfstudy.motion.root_finding import build_root_finder
     from rsfstudy.motion.work_meter import (
         MIN_LOCAL_TOLERANCE,
@@ -92,7 +93,7 @@ else:
                 "RELATIVE_ROUNDING_ERROR",
                 "estimate_error",
             ),
-            "motion.motion_driver": ("MotionDriver", "iterate_events_of_equations"),
+            "motion.motion_driver": ("MotionDriver",),
             "motion.engine_factory": ("check_engine_is_usable", "import_compiled_engine"),
             "motion.engines": (
                 "COMPILED",
@@ -121,7 +122,8 @@ else:
                 "compute_restart_point",
                 "point_with_slip_rate",
             ),
-            "motion.event_integration": ("integrate_events",),
+            "motion.former_arguments": ("accept_accuracy_and_meter", "adapt_former_compute"),
+            "motion.integrator": ("Integrator",),
             "motion.work_meter": (
                 "MIN_LOCAL_TOLERANCE",
                 "MotionStopped",
@@ -143,7 +145,6 @@ else:
                 "SAMPLE_COLUMN",
                 "recorded_row",
             ),
-            "motion.regime_switching": ("inertia_matters_at",),
             "motion.root_finding": ("build_root_finder",),
         },
     )
@@ -158,6 +159,7 @@ __all__ = [
     "EventKind",
     "EventSpecification",
     "FIRST_STATE_COLUMN",
+    "Integrator",
     "MAX_ERROR_OVER_RTOL",
     "MAX_RTOL",
     "MIN_LOCAL_TOLERANCE",
@@ -173,6 +175,8 @@ __all__ = [
     "SAMPLE_COLUMN",
     "SCIPY",
     "WorkMeter",
+    "accept_accuracy_and_meter",
+    "adapt_former_compute",
     "approach_to_steady_state",
     "build_root_finder",
     "check_engine_is_usable",
@@ -180,12 +184,9 @@ __all__ = [
     "import_compiled_engine",
     "estimate_error",
     "estimate_neglected_inertia_error",
-    "iterate_events_of_equations",
     "fall",
     "recorded_friction_coefficient",
-    "inertia_matters_at",
     "initial_point",
-    "integrate_events",
     "is_engine_installed",
     "suggest_raising_budget",
     "recorded_load_point_displacement",

@@ -131,6 +131,11 @@ class Accuracy:
         return _cached_copy_with_tolerances(self, rtol, self.refinement)
 
     @property
+    def digits(self) -> float:
+        """Number of digits of the requested accuracy."""
+        return -math.log10(self.rtol)
+
+    @property
     def local_tolerance(self) -> float:
         """Local error tolerance of an integration step.
 

@@ -242,6 +242,8 @@ class MotionDriver:
         Inertial equations of motion in ruptures. Omit these equations if the scene has no inertia.
     engine : str
         Name of the engine.
+    methods : sequence of (str, str), default: ()
+        Pairs of a regime and the SciPy solver for this regime. The default solver is DOP853.
     **fields : float
         Initial values of motion state fields. See ``array_layout.MOTION_STATE_DTYPE``.
     """
@@ -252,8 +254,10 @@ class MotionDriver:
         fast_equations: Equations | None = None,
         *,
         engine: str,
+        methods: Sequence[tuple[str, str]] = (),
         **fields: float,
     ) -> None:
+        self._engine, self._methods = engine, dict(methods)
         self._equations: tuple[Equations, ...] = (
             (slow_equations,) if fast_equations is None else (slow_equations, fast_equations)
         )
@@ -390,7 +394,7 @@ class MotionDriver:
             ),
         )
         asked, meanings = _pack_event_specifications(tuple(event_specs))
-        stepper = create_stepper(work_meter.engine, systems, work_meter.methods)
+        stepper = create_stepper(self._engine, systems, self._methods)
         columns = array_layout.EVENT_POINT + array_layout.FIRST_STATE + states
         events = np.empty((max(_MIN_EVENT_ROWS, 2 * len(event_specs) + 4), columns))
         block = np.empty(workspace.workspace_size(self._unknowns, states, len(event_specs)))
@@ -439,49 +443,10 @@ def _shift_stresses_of_point(point: MotionPoint, stress_change: float) -> Motion
     )
 
 
-def iterate_events_of_equations(
-    equations: Equations,
-    initial_unknowns: Numbers,
-    tolerance: float,
-    work_meter: WorkMeter,
-    event_specs: Sequence[EventSpecification] = (),
-    *,
-    backward: bool = False,
-    recording: Recording | None = None,
-) -> Iterator[Event]:
-    """Yield the events of a motion that follows a single system of equations.
-
-    Parameters
-    ----------
-    equations : Equations
-        System of equations.
-    initial_unknowns : tuple of float
-        Initial values of the unknowns.
-    tolerance : float
-        Local error tolerance of a step.
-    work_meter : WorkMeter
-        Counter of right-hand side evaluations.
-    event_specs : sequence of EventSpecification, default: ()
-        Requested events.
-    backward : bool, default: False
-        If True, the independent variable decreases.
-    recording : Recording, optional
-        Object that receives the recorded rows. The independent variable of a rigid slider is slip,
-        so the ``sample_times`` of the recording are slips.
-
-    Yields
-    ------
-    Event
-        Events in the order of their occurrence.
-    """
-    runner = MotionDriver(equations, engine=work_meter.engine)
-    return runner.iterate_events(
-        initial_unknowns, work_meter, event_specs, tolerance, backward=backward, recording=recording
-    )
-
-
 @cached_per_scene
-def get_motion_driver(scene: Scene, engine: str, *, with_time: bool) -> MotionDriver:
+def get_motion_driver(
+    scene: Scene, engine: str, methods: tuple[tuple[str, str], ...], *, with_time: bool
+) -> MotionDriver:
     """Return the driver of the motions of a scene.
 
     Parameters
@@ -490,6 +455,8 @@ def get_motion_driver(scene: Scene, engine: str, *, with_time: bool) -> MotionDr
         Scene with the parameters of its first loading segment.
     engine : str
         Name of the engine.
+    methods : tuple of (str, str)
+        Pairs of a regime and the SciPy solver for this regime.
     with_time : bool
         If True, time is one of the unknowns.
 
@@ -502,6 +469,7 @@ def get_motion_driver(scene: Scene, engine: str, *, with_time: bool) -> MotionDr
         equations_between_ruptures(scene, with_time=with_time),
         equations_in_rupture(scene, with_time=with_time) if scene.has_mass else None,
         engine=engine,
+        methods=methods,
         unknowns_behind_fluid=len(scene.parts.fluid.unknowns)
         if scene.parts.loading.unknowns
         else 0,

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 from rsfstudy._deprecation import add_former_member_names, build_getattr_for_former_names
 from rsfstudy.errors import RsfStudyError
-from rsfstudy.motion.engines import SCIPY
 from rsfstudy.status import Status
 
 #: Reference local tolerance for the maximum step size, which is proportional to the eighth root of
@@ -60,10 +59,6 @@ class WorkMeter:
     ----------
     budget : int
         Maximum number of right-hand side evaluations.
-    methods : mapping of str to str, optional
-        Name of the SciPy solver for each regime. The default is DOP853 for all regimes.
-    engine : str, default: "scipy"
-        Name of the engine.
     evaluations_by_regime : dict of str to int, optional
         Number of right-hand side evaluations in each regime.
     evaluations : int, default: 0
@@ -75,8 +70,6 @@ class WorkMeter:
     """
 
     budget: int
-    methods: Mapping[str, str] = field(default_factory=dict)
-    engine: str = SCIPY
     evaluations_by_regime: dict[str, int] = field(default_factory=dict)
     evaluations: int = 0
     steps: int = 0

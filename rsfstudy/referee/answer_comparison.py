@@ -188,9 +188,9 @@ def known_answer(
     engine = COMPILED if is_engine_installed(COMPILED) else SCIPY
     rough, fine = (
         reference_answers.compute_answer(
-            problem, Accuracy(rtol, reference_answers.ANSWER_EVALUATION_BUDGET, engine=engine)
+            problem, Accuracy(tolerance, reference_answers.ANSWER_EVALUATION_BUDGET, engine=engine)
         )
-        for rtol in _REFERENCE_RTOLS
+        for tolerance in _REFERENCE_RTOLS
     )
     both = [a.agreeing_digits for a in _compute_quantity_agreements(problem, rough, fine, 0.0)]
     return replace(problem, digits=max(1, math.floor(min(both)))), fine

@@ -15,10 +15,9 @@ from rsfstudy.motion import (
     MOTION_VARIABLES,
     Accuracy,
     EventKind,
+    Integrator,
     MotionStopped,
     Recording,
-    WorkMeter,
-    integrate_events,
     maximum,
 )
 from rsfstudy.referee.problem_files import BenchmarkProblem
@@ -90,14 +89,9 @@ def _compute_series_answer(problem: BenchmarkProblem, accuracy: Accuracy) -> Ans
     """
     scene, rig = problem.scene, problem.rig
     at = np.array(problem.times) * rig.dimensionless("1 s")
-    recording, meter = (
-        Recording(sample_times=at),
-        WorkMeter(accuracy.budget, engine=accuracy.engine),
-    )
-    moving = integrate_events(
+    recording = Recording(sample_times=at)
+    moving = Integrator(accuracy).follow(
         scene,
-        accuracy,
-        meter,
         recording=recording,
         until=float(at[-1]),
         resume_from=problem.initial_event,
@@ -128,11 +122,9 @@ def _compute_times_and_rates_of_peaks(
     problem: BenchmarkProblem, accuracy: Accuracy
 ) -> AnswerColumnByQuantity:
     """Compute the times and values of slip rate maxima."""
-    rig, meter = problem.rig, WorkMeter(accuracy.budget, engine=accuracy.engine)
-    watched = integrate_events(
+    rig = problem.rig
+    watched = Integrator(accuracy).follow(
         problem.scene,
-        accuracy,
-        meter,
         [maximum("log_slip_rate")],
         with_time=True,
         resume_from=problem.initial_event,

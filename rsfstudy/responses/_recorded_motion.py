@@ -10,16 +10,13 @@ import numpy as np
 
 from rsfstudy.motion import (
     SAMPLE_COLUMN,
-    Accuracy,
     Event,
     EventKind,
     EventSpecification,
+    Integrator,
     MotionStopped,
     Recording,
-    WorkMeter,
-    estimate_error,
     estimate_neglected_inertia_error,
-    integrate_events,
     point_before_start,
     recorded_friction_coefficient,
 )
@@ -89,8 +86,7 @@ class RecordedMotion(NamedTuple):
 
 def record_motion_of_segment(
     scene: Scene,
-    accuracy: Accuracy,
-    work_meter: WorkMeter,
+    integrator: Integrator,
     specifications: Sequence[EventSpecification],
     first_segment: int,
     peak_segment: int,
@@ -107,10 +103,8 @@ def record_motion_of_segment(
     ----------
     scene : Scene
         Scene of the motion.
-    accuracy : Accuracy
-        Requested accuracy.
-    work_meter : WorkMeter
-        Counter of right-hand-side evaluations.
+    integrator : Integrator
+        Integrator with the requested accuracy.
     specifications : sequence of EventSpecification
         Specification of the extremum, followed by other events that may end the motion.
     first_segment : int
@@ -134,10 +128,8 @@ def record_motion_of_segment(
     """
     recording, begun, peak = Recording(), list[Event](), None
     try:
-        for event in integrate_events(
+        for event in integrator.follow(
             scene,
-            accuracy,
-            work_meter,
             specifications,
             with_time=True,
             recording=recording,
@@ -200,7 +192,7 @@ def estimate_error_at_instant(
     refined_value: float,
     friction_derivative: float,
     scene: Scene,
-    accuracy: Accuracy,
+    integrator: Integrator,
     neglected_inertia_error: float = 0.0,
 ) -> float:
     r"""Estimate the error of a result that is read at a single instant.
@@ -220,8 +212,8 @@ def estimate_error_at_instant(
         read.
     scene : Scene
         Scene of the motion.
-    accuracy : Accuracy
-        Accuracy of the first run.
+    integrator : Integrator
+        Integrator with the requested accuracy.
     neglected_inertia_error : float, default: 0.0
         Error of ln V that both runs share, because both runs neglect the same part of inertia.
 
@@ -241,10 +233,10 @@ def estimate_error_at_instant(
     because friction changes by :math:`a` if :math:`\ln V` changes by 1.
     """
     friction = (
-        _FRICTION_ERROR_FLOOR_OVER_A_AND_RTOL * accuracy.rtol + neglected_inertia_error
+        integrator.result_tolerance(_FRICTION_ERROR_FLOOR_OVER_A_AND_RTOL) + neglected_inertia_error
     ) * scene.a
-    chance = ERROR_FLOOR_OVER_RTOL * accuracy.rtol
-    return estimate_error(value, refined_value, chance) + friction * abs(friction_derivative)
+    error = integrator.estimate_error(value, refined_value, ERROR_FLOOR_OVER_RTOL)
+    return error + friction * abs(friction_derivative)
 
 
 def estimate_errors_at_instants(
@@ -252,7 +244,7 @@ def estimate_errors_at_instants(
     refined_values: Mapping[str, float],
     friction_derivatives: Mapping[str, float],
     scene: Scene,
-    accuracy: Accuracy,
+    integrator: Integrator,
     neglected_inertia_errors: Mapping[str, float] | None = None,
 ) -> dict[str, float]:
     """Estimate the errors of several results that are read at single instants.
@@ -269,8 +261,8 @@ def estimate_errors_at_instants(
         Derivatives of the results with respect to the friction coefficient.
     scene : Scene
         Scene of the motion.
-    accuracy : Accuracy
-        Accuracy of the first run.
+    integrator : Integrator
+        Integrator with the requested accuracy.
     neglected_inertia_errors : mapping of str to float, optional
         Errors of ln V by name of the result. By default, all errors are zero.
 
@@ -282,7 +274,7 @@ def estimate_errors_at_instants(
     shared = neglected_inertia_errors or dict.fromkeys(values, 0.0)
     return {
         f"{name}_error": estimate_error_at_instant(
-            value, refined_values[name], friction_derivatives[name], scene, accuracy, shared[name]
+            value, refined_values[name], friction_derivatives[name], scene, integrator, shared[name]
         )
         for name, value in values.items()
     }

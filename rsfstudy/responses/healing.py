@@ -19,11 +19,10 @@ from rsfstudy.measure_base import (
 )
 from rsfstudy.motion import (
     RECORDED_VARIABLES,
-    Accuracy,
     Event,
     EventKind,
+    Integrator,
     MotionStopped,
-    WorkMeter,
     approach_to_steady_state,
     maximum,
     recorded_friction_coefficient,
@@ -164,7 +163,7 @@ class Healing(RecordingMeasure):
         least = {"healing": scene.a, "relaxation": scene.a, "peak_displacement": 1.0}
         return {name: abs(values[name]) + scale for name, scale in least.items()}
 
-    def compute(self, scene: Scene, accuracy: Accuracy, meter: WorkMeter) -> Outcome:
+    def compute(self, scene: Scene, integrator: Integrator) -> Outcome:
         """Compute relaxation and healing, with error estimates.
 
         The motion is computed twice, with the requested accuracy and with smaller tolerances. The
@@ -174,10 +173,8 @@ class Healing(RecordingMeasure):
         ----------
         scene : Scene
             Scene to evaluate.
-        accuracy : Accuracy
-            Requested accuracy.
-        meter : WorkMeter
-            Counter of right-hand-side evaluations.
+        integrator : Integrator
+            Integrator with the requested accuracy.
 
         Returns
         -------
@@ -185,12 +182,12 @@ class Healing(RecordingMeasure):
             Status, results and message.
         """
         hold = _find_first_hold_segment(scene)
-        first = _record_hold_and_reloading(scene, hold, accuracy, meter)
+        first = _record_hold_and_reloading(scene, hold, integrator)
         said = _describe_unsteady_start_of_hold(
             scene,
             hold,
             first.start_event,
-            max(_MAX_STEADY_STATE_DISTANCE_BEFORE_HOLD, accuracy.rtol),
+            max(_MAX_STEADY_STATE_DISTANCE_BEFORE_HOLD, integrator.result_tolerance()),
         )
         peakless = Outcome(
             Status.NOT_APPLICABLE,
@@ -205,8 +202,7 @@ class Healing(RecordingMeasure):
         again = _record_hold_and_reloading(
             scene,
             hold,
-            accuracy.refined(),
-            meter,
+            integrator.refined(),
             self._compute_end_time_of_record(scene, hold, first.peak_event),
         )
         if again.peak_event is None:
@@ -227,7 +223,7 @@ class Healing(RecordingMeasure):
         # growth rises earlier.
         neglected["peak_displacement"] = first.neglected_error_until(math.inf)
         errors = estimate_errors_at_instants(
-            values, refined, by_friction, scene, accuracy, neglected
+            values, refined, by_friction, scene, integrator, neglected
         )
         above = again.peak_event.point.apparent_friction - float(
             recorded_friction_coefficient(again.recorded_rows)[-1]
@@ -235,7 +231,7 @@ class Healing(RecordingMeasure):
         # Near steady sliding, friction may have spurious peaks on which both runs agree.
         if above <= max(
             errors["healing_error"],
-            _FRICTION_NOISE_OVER_LOCAL_TOLERANCE * accuracy.refined().local_tolerance,
+            _FRICTION_NOISE_OVER_LOCAL_TOLERANCE * integrator.refined().local_tolerance,
         ):
             return peakless
         return Outcome(
@@ -304,8 +300,7 @@ def _describe_unsteady_start_of_hold(
 def _record_hold_and_reloading(
     scene: Scene,
     hold_index: int,
-    accuracy: Accuracy,
-    work_meter: WorkMeter,
+    integrator: Integrator,
     end_time: float = math.inf,
 ) -> RecordedMotion:
     """Record a motion from the state before the hold to the peak of friction.
@@ -323,8 +318,7 @@ def _record_hold_and_reloading(
     asked = peak, settled
     return record_motion_of_segment(
         scene,
-        accuracy,
-        work_meter,
+        integrator,
         asked,
         hold_index,
         hold_index + 1,

@@ -15,7 +15,7 @@ from scipy.optimize import brentq
 
 from rsfstudy.error_boundary import wrap_methods_in_error_boundary
 from rsfstudy.measure_base import Measure, Outcome
-from rsfstudy.motion import Accuracy, WorkMeter
+from rsfstudy.motion import Integrator
 from rsfstudy.quantities import Output
 from rsfstudy.slider import (
     Equations,
@@ -116,7 +116,7 @@ class LinearStability(Measure):
         """Stiffness of the scene. The measure ignores this value."""
         return ("stiffness_ratio",)
 
-    def compute(self, scene: Scene, accuracy: Accuracy, meter: WorkMeter) -> Outcome:
+    def compute(self, scene: Scene, integrator: Integrator) -> Outcome:
         """Compute the critical stiffness from friction and from growth rates.
 
         The error estimate is the difference between the critical stiffness from friction and the
@@ -126,10 +126,8 @@ class LinearStability(Measure):
         ----------
         scene : Scene
             Scene to evaluate.
-        accuracy : Accuracy
-            Requested accuracy.
-        meter : WorkMeter
-            Counter of right-hand-side evaluations.
+        integrator : Integrator
+            Integrator with the requested accuracy.
 
         Returns
         -------
@@ -174,7 +172,7 @@ class LinearStability(Measure):
                 values,
                 f"at V T/(2 pi D_c) = {norm:.3g} the direct effect cannot damp the spring",
             )
-        by_growth = _find_stiffness_at_zero_growth(scene, steady, critical, meter)
+        by_growth = _find_stiffness_at_zero_growth(scene, steady, critical, integrator)
         if math.isnan(by_growth):
             why = f"growth of the equations does not end at a stiffness of {critical:.9g}"
             return Outcome(Status.UNVERIFIED, values, why)
@@ -209,7 +207,7 @@ def _closed_form_critical_stiffness(scene: Scene) -> float:
 
 
 def _find_stiffness_at_zero_growth(
-    scene: Scene, steady_state: SteadySliding, stiffness_guess: float, work_meter: WorkMeter
+    scene: Scene, steady_state: SteadySliding, stiffness_guess: float, integrator: Integrator
 ) -> float:
     """Find the stiffness at which the largest growth rate is zero.
 
@@ -229,7 +227,7 @@ def _find_stiffness_at_zero_growth(
         else:
             equations = build_equations_against_displacement(changed)
             state = (steady_state.spring_stress, *steady_state.states)
-        work_meter.charge(equations.regime, 2 * len(state))
+        integrator.work_meter.charge(equations.regime, 2 * len(state))
         return max_growth_rate(compute_jacobian(equations, state))
 
     # With several states, sliding may be stable again below the next smaller critical stiffness.

@@ -14,13 +14,11 @@ from rsfstudy.errors import InvalidValue
 from rsfstudy.measure_base import Measure, Outcome
 from rsfstudy.motion import (
     RECORDED_VARIABLES,
-    Accuracy,
     EventKind,
+    Integrator,
     MotionStopped,
     Recording,
-    WorkMeter,
     fall,
-    iterate_events_of_equations,
     rise,
 )
 from rsfstudy.quantities import Output
@@ -170,7 +168,7 @@ class RigidResponse(Measure):
         part = 1.0 + math.e * scene.a / evolution
         return {"evolution_distance": part * abs(values["evolution_distance"])}
 
-    def compute(self, scene: Scene, accuracy: Accuracy, meter: WorkMeter) -> Outcome:
+    def compute(self, scene: Scene, integrator: Integrator) -> Outcome:
         """Compute the response of the slider, with an error estimate.
 
         The response is computed twice, with the requested accuracy and with smaller tolerances. The
@@ -180,10 +178,8 @@ class RigidResponse(Measure):
         ----------
         scene : Scene
             Scene to evaluate.
-        accuracy : Accuracy
-            Requested accuracy.
-        meter : WorkMeter
-            Counter of right-hand-side evaluations.
+        integrator : Integrator
+            Integrator with the requested accuracy.
 
         Returns
         -------
@@ -205,9 +201,9 @@ class RigidResponse(Measure):
         if abs(start - steady) < _MIN_FRICTION_EVOLUTION_OVER_A * scene.a:
             return Outcome(Status.NOT_APPLICABLE, message="friction does not evolve after the step")
         level = steady + (start - steady) / math.e
-        distance, left, rows = self._follow_stress_over_slip(scene, start, level, accuracy, meter)
+        distance, left, rows = self._follow_stress_over_slip(scene, start, level, integrator)
         again, _left, _rows = self._follow_stress_over_slip(
-            scene, start, level, accuracy.refined(), meter
+            scene, start, level, integrator.refined()
         )
         # Derivative of the distance with respect to friction, for an exponential decay.
         by_friction = math.e * distance / (start - steady)
@@ -219,7 +215,7 @@ class RigidResponse(Measure):
             {
                 "evolution_distance": distance,
                 "evolution_distance_error": estimate_error_at_instant(
-                    distance, again, by_friction, scene, accuracy
+                    distance, again, by_friction, scene, integrator
                 ),
                 "direct_stress_change": start,
                 **_compute_step_asymmetries(scene, log_slip_rate),
@@ -238,8 +234,7 @@ class RigidResponse(Measure):
         scene: Scene,
         start_stress: float,
         stress_level: float,
-        accuracy: Accuracy,
-        work_meter: WorkMeter,
+        integrator: Integrator,
     ) -> tuple[float, float, np.ndarray]:
         """Integrate the response of the slider over slip.
 
@@ -258,10 +253,8 @@ class RigidResponse(Measure):
         watches = (rise("frictional_stress", stress_level), fall("frictional_stress", stress_level))
         # The step does not change the states Psi, which have their values of steady sliding at V_*.
         state = (start_stress, *compute_steady_states(scene, 0.0, 0.0)[1:])
-        tolerance, complete = accuracy.local_tolerance, False
-        for event in iterate_events_of_equations(
-            equations, state, tolerance, work_meter, watches, recording=recording
-        ):
+        complete = False
+        for event in integrator.follow_equations(equations, state, watches, recording=recording):
             if event.specification is not None and math.isnan(distance):
                 distance = event.slip
             complete = complete or event.kind is EventKind.SAMPLED

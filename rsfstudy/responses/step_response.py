@@ -20,15 +20,12 @@ from rsfstudy.measure_base import (
 )
 from rsfstudy.motion import (
     MOTION_VARIABLES,
-    Accuracy,
     Event,
     EventKind,
+    Integrator,
     MotionStopped,
     Recording,
-    WorkMeter,
     approach_to_steady_state,
-    estimate_error,
-    integrate_events,
     maximum,
     resample_motion_along_path,
 )
@@ -151,7 +148,7 @@ class StepResponse(RecordingMeasure):
         """
         return {"max_log10_slip_rate": abs(values["max_log10_slip_rate"]) + 1.0 / LN10}
 
-    def compute(self, scene: Scene, accuracy: Accuracy, meter: WorkMeter) -> Outcome:
+    def compute(self, scene: Scene, integrator: Integrator) -> Outcome:
         """Compute the peaks and the path of the motion, with error estimates.
 
         The motion is computed twice, with the requested accuracy and with smaller tolerances. The
@@ -161,10 +158,8 @@ class StepResponse(RecordingMeasure):
         ----------
         scene : Scene
             Scene to evaluate.
-        accuracy : Accuracy
-            Requested accuracy.
-        meter : WorkMeter
-            Counter of right-hand-side evaluations.
+        integrator : Integrator
+            Integrator with the requested accuracy.
 
         Returns
         -------
@@ -176,8 +171,8 @@ class StepResponse(RecordingMeasure):
             return Outcome(Status.NO_STEADY_STATE, message="the load point is held")
         if not scene.is_perturbed:
             return Outcome(Status.NO_STEP, message="V_0 = V_* is no step")
-        peaks, rows = self._follow_and_record_oscillations(scene, accuracy, meter)
-        again, _rows = self._follow_and_record_oscillations(scene, accuracy.refined(), meter)
+        peaks, rows = self._follow_and_record_oscillations(scene, integrator)
+        again, _rows = self._follow_and_record_oscillations(scene, integrator.refined())
         heights = peaks - scene.log_load_velocity / LN10
         log_slip_rates = np.full(self.peaks, np.nan)
         log_slip_rates[: len(peaks)] = peaks
@@ -185,10 +180,10 @@ class StepResponse(RecordingMeasure):
             Status.OK,
             {
                 "max_log10_slip_rate": float(peaks.max()),
-                "max_log10_slip_rate_error": estimate_error(
-                    peaks.max(), again.max(), ERROR_FLOOR_OVER_RTOL * accuracy.rtol
+                "max_log10_slip_rate_error": integrator.estimate_error(
+                    peaks.max(), again.max(), ERROR_FLOOR_OVER_RTOL
                 )
-                + _error_of_neglected_initial_rise(scene, accuracy),
+                + _error_of_neglected_initial_rise(scene, integrator),
                 "peak_ratio": float(heights[1] / heights[0]) if len(peaks) > 1 else 0.0,
                 "peak_log10_slip_rate": log_slip_rates,
                 **resample_motion_along_path(rows, self.phases),
@@ -196,7 +191,7 @@ class StepResponse(RecordingMeasure):
         )
 
     def _follow_and_record_oscillations(
-        self, scene: Scene, accuracy: Accuracy, work_meter: WorkMeter
+        self, scene: Scene, integrator: Integrator
     ) -> tuple[np.ndarray, np.ndarray]:
         """Integrate the motion, and return its peaks and the record."""
         peaks: list[float] = []
@@ -207,9 +202,7 @@ class StepResponse(RecordingMeasure):
                 approach_to_steady_state(_SETTLING_TOLERANCE_OVER_MAX_DISTANCE),
             ),
         )
-        for event in integrate_events(
-            scene, accuracy, work_meter, asked, with_time=True, recording=recording
-        ):
+        for event in integrator.follow(scene, asked, with_time=True, recording=recording):
             if event.kind is EventKind.MAXIMUM or _slip_rate_peaks_at_start(scene, event):
                 peaks.append(event.point.log_slip_rate / LN10)
             settles = event.kind is EventKind.SETTLED and steady_sliding_is_linearly_stable(scene)
@@ -234,12 +227,16 @@ def _slip_rate_peaks_at_start(scene: Scene, event: Event) -> bool:
     )
 
 
-def _error_of_neglected_initial_rise(scene: Scene, accuracy: Accuracy) -> float:
+def _error_of_neglected_initial_rise(scene: Scene, integrator: Integrator) -> float:
     """Return the error of log10(V/V_*) caused by an initial rise of slip rate.
 
     The error is zero unless inertia delays the initial rise of slip rate.
     """
-    slip = accuracy.max_remaining_slip if _does_inertia_delay_initial_slip_rate_rise(scene) else 0.0
+    slip = (
+        integrator.accuracy.max_remaining_slip
+        if _does_inertia_delay_initial_slip_rate_rise(scene)
+        else 0.0
+    )
     return (1.0 + scene.stiffness / scene.a) * slip / LN10
 
 

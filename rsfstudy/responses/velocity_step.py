@@ -20,12 +20,10 @@ from rsfstudy.measure_base import (
 from rsfstudy.motion import (
     MOTION_VARIABLES,
     RECORDED_VARIABLES,
-    Accuracy,
     Event,
+    Integrator,
     MotionStopped,
-    WorkMeter,
     fall,
-    integrate_events,
     maximum,
     minimum,
     recorded_friction_coefficient,
@@ -242,7 +240,7 @@ class VelocityStep(RecordingMeasure):
             "corrected_slip_distance": over_friction * values["corrected_slip_distance"],
         }
 
-    def compute(self, scene: Scene, accuracy: Accuracy, meter: WorkMeter) -> Outcome:
+    def compute(self, scene: Scene, integrator: Integrator) -> Outcome:
         """Compute the response to the step, with error estimates.
 
         The motion is computed twice, with the requested accuracy and with smaller tolerances. The
@@ -253,10 +251,8 @@ class VelocityStep(RecordingMeasure):
         ----------
         scene : Scene
             Scene to evaluate.
-        accuracy : Accuracy
-            Requested accuracy.
-        meter : WorkMeter
-            Counter of right-hand-side evaluations.
+        integrator : Integrator
+            Integrator with the requested accuracy.
 
         Returns
         -------
@@ -266,12 +262,12 @@ class VelocityStep(RecordingMeasure):
         check_loading_changes_stress_only_in_steps(scene)
         step = self._find_evaluated_step(scene)
         records = [
-            self._record_response(scene, step, a, meter) for a in (accuracy, accuracy.refined())
+            self._record_response(scene, step, each) for each in (integrator, integrator.refined())
         ]
         (record, values), (_again, again) = records
         slopes = self._compute_output_derivatives_by_friction(step.log_velocity_ratio, values)
         neglected = dict.fromkeys(slopes, record.neglected_error_until(record.last_event.time))
-        errors = estimate_errors_at_instants(values, again, slopes, scene, accuracy, neglected)
+        errors = estimate_errors_at_instants(values, again, slopes, scene, integrator, neglected)
         found = {**values, **errors, **self._compute_outputs_along_record(scene, step, record)}
         if not abs(values["apparent_b"]) > errors["apparent_b_error"]:
             text = "friction has no extremum after the step, or does not evolve from there"
@@ -305,18 +301,15 @@ class VelocityStep(RecordingMeasure):
         self,
         scene: Scene,
         evaluated_step: _EvaluatedVelocityStep,
-        accuracy: Accuracy,
-        work_meter: WorkMeter,
+        integrator: Integrator,
     ) -> tuple[RecordedMotion, dict[str, float]]:
         """Record the motion, and return the record and the results."""
         extreme = maximum if evaluated_step.log_velocity_ratio > 0.0 else minimum
         number, end = self.step_number - 1, evaluated_step.start_time + evaluated_step.duration
         turn = extreme(choose_friction_quantity_for_events(scene)[0])
-        record = record_motion_of_segment(
-            scene, accuracy, work_meter, [turn], number, number, end_time=end
-        )
+        record = record_motion_of_segment(scene, integrator, [turn], number, number, end_time=end)
         return record, self._read_step_results(
-            evaluated_step, record, self._find_decay_event(scene, record, accuracy, work_meter)
+            evaluated_step, record, self._find_decay_event(scene, record, integrator)
         )
 
     def _read_step_results(
@@ -355,8 +348,7 @@ class VelocityStep(RecordingMeasure):
         self,
         scene: Scene,
         recorded_motion: RecordedMotion,
-        accuracy: Accuracy,
-        work_meter: WorkMeter,
+        integrator: Integrator,
     ) -> Event | None:
         """Return the event at which 1/e of the evolution of friction remains.
 
@@ -375,9 +367,7 @@ class VelocityStep(RecordingMeasure):
         watch = fall(of, level, terminal=True) if top > after else rise(of, level, terminal=True)
         stepped = scene.segment_scene(self.step_number - 1)
         rest = recorded_motion.last_event.time - peak.time
-        events = integrate_events(
-            stepped, accuracy, work_meter, [watch], start=peak.point, until=rest
-        )
+        events = integrator.follow(stepped, [watch], start=peak.point, until=rest)
         return next((event for event in events if event.specification == watch), None)
 
     def _compute_outputs_along_record(

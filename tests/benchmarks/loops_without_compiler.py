@@ -16,10 +16,10 @@ from functools import partial
 from typing import Any
 from unittest import mock
 
-from contest import hand_written_loops, rsfstudy_engines
+from contest import hand_written_loops
 from contest.calls import cycling_scene
 from contest.hand_written_loops import HandNumba, HandScipy
-from contest.problem import Problem, cycle_problem, meter
+from contest.problem import Problem, cycle_problem
 from contest.rsfstudy_engines import RsfstudyEngine
 from engine_benchmark import with_best_marks
 
@@ -52,10 +52,9 @@ def evaluations_by_hand(run: Callable[[], Any]) -> int:
 
 def evaluations_of_engines(problems: list[Problem]) -> int:
     """Return the number of evaluations, which is equal for both engines."""
-    counted = meter("scipy")
-    with mock.patch.object(rsfstudy_engines, "meter", return_value=counted):
-        RsfstudyEngine("scipy").run(problems, RTOL)
-    return counted.evaluations
+    engine = RsfstudyEngine("scipy")
+    engine.run(problems, RTOL)
+    return engine.integrator.evaluations
 
 
 def shortest_times(runs: dict[str, Callable[[], Any]], rounds: int) -> dict[str, float]:

@@ -29,8 +29,7 @@ import rsfstudy
 from rsfstudy import Axis, Scene, Study
 from rsfstudy.execution import study_run
 from rsfstudy.measures import Measure, Outcome
-from rsfstudy.motion.accuracy import Accuracy
-from rsfstudy.motion.work_meter import WorkMeter
+from rsfstudy.motion.integrator import Integrator
 from rsfstudy.status import Status
 
 
@@ -43,9 +42,9 @@ class TrivialMeasure(Measure):
     variables: ClassVar = {"total": ()}
     typical_work: ClassVar[int] = 1
 
-    def compute(self, scene: Scene, accuracy: Accuracy, meter: WorkMeter) -> Outcome:
+    def compute(self, scene: Scene, integrator: Integrator) -> Outcome:
         """Return b/a, and charge one right-hand-side evaluation."""
-        meter.charge("any", 1)
+        integrator.work_meter.charge("any", 1)
         return Outcome(Status.OK, {"total": scene.b_over_a})
 
 

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 from rsfstudy import Axis, Scene, Segment, Study
 from rsfstudy.measures import Measure, Outcome, Output, Status
-from rsfstudy.motion import EventKind, estimate_error, integrate_events, maximum
+from rsfstudy.motion import EventKind, maximum
 from rsfstudy.parts import Loading, number
 
 
@@ -31,16 +31,16 @@ class PeakAfterRest(Measure):
     )
     typical_work = 4_000
 
-    def compute(self, scene, accuracy, meter):
+    def compute(self, scene, integrator):
         (left, peak), (_left, again) = (
-            self.read(scene, asked, meter) for asked in (accuracy, accuracy.refined())
+            self.read(scene, each) for each in (integrator, integrator.refined())
         )
-        error = estimate_error(peak, again, 0.01 * accuracy.rtol)
+        error = integrator.estimate_error(peak, again, 0.01)
         values = {"peak_stress": peak, "peak_stress_error": error, "relaxation": left}
         return Outcome(Status.OK, values)
 
-    def read(self, scene, accuracy, meter):
-        motion = integrate_events(scene, accuracy, meter, [maximum("spring_stress")])
+    def read(self, scene, integrator):
+        motion = integrator.follow(scene, [maximum("spring_stress")])
         reload = next(event for event in motion if event.kind is EventKind.SEGMENT)
         peak = next(event for event in motion if event.kind is EventKind.MAXIMUM)
         return reload.point.spring_stress, peak.point.spring_stress

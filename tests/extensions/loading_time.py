@@ -14,7 +14,7 @@ class LoadingTime(Measure):
     outputs = (Output("loading_time", "$t_a$", "s", "time in which loading speeds slip up"),)
     typical_work = 1
 
-    def compute(self, scene, accuracy, meter):
+    def compute(self, scene, integrator):
         stressing = scene.stiffness * scene.load_velocity * scene.reference_rate
         return Outcome(Status.OK, {"loading_time": scene.a / stressing})
 

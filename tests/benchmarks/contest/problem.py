@@ -21,9 +21,8 @@ from rsfstudy import Scene
 from rsfstudy.limit_cycles.limit_cycle_search import LimitCycleSearch
 from rsfstudy.limit_cycles.stick_slip_cycles import _cycle_event_specifications, iterate_cycles
 from rsfstudy.motion.accuracy import MIN_RTOL, Accuracy
-from rsfstudy.motion.event_integration import integrate_events
 from rsfstudy.motion.events import EventKind, approach_to_steady_state, rise
-from rsfstudy.motion.work_meter import WorkMeter
+from rsfstudy.motion.integrator import Integrator
 from rsfstudy.slider.dynamics.inertia import DIFFERENCE_STEP, NEGLIGIBLE_SECOND_ORDER_WEIGHT
 from rsfstudy.slider.equations import RUPTURE_REGIME, equations_between_ruptures
 from rsfstudy.slider.motion_point import MotionPoint
@@ -92,11 +91,11 @@ class Problem:
 def cycle_problem(scene: Scene) -> Problem:
     """Return the problem of a scene, without marks."""
     tight = Accuracy(MIN_RTOL, budget=BUDGET, engine="compiled")
-    approach = LimitCycleSearch(scene, tight, meter("compiled"))
+    approach = LimitCycleSearch(scene, Integrator(tight))
     if not approach.follow_until_converged(300):
         raise ValueError(f"no limit cycle: {scene}")
     begin = approach.cycles[-1].end_point
-    truth = next(iterate_cycles(scene, tight, meter("compiled"), begin))
+    truth = next(iterate_cycles(scene, Integrator(tight), begin))
     coupling = scene.parts.normal_stress.coupling
     assert truth is not None
     assert coupling is not None
@@ -120,10 +119,8 @@ def with_marks(it: Problem, rtol: float) -> Problem:
     """Return a problem with the marks of the package for an accuracy."""
     scene, passed = it.scene, dict[str, float]()
     allowed = Accuracy(rtol, budget=BUDGET, engine="compiled")
-    moving = integrate_events(
+    moving = Integrator(allowed).follow(
         scene,
-        allowed,
-        meter("compiled"),
         _cycle_event_specifications(scene.log_load_velocity),
         start=it.begin,
         with_time=True,
@@ -154,9 +151,7 @@ def stretch_lengths(scene: Scene, accuracy: Accuracy, begin: MotionPoint) -> lis
     """Return the path lengths of the three stretches of a cycle."""
     lengths, regime, load = list[float](), "", scene.log_load_velocity
     watches = rise("log_slip_rate", load), approach_to_steady_state(2.0)
-    for event in integrate_events(
-        scene, accuracy, meter("scipy"), watches, start=begin, with_time=True
-    ):
+    for event in Integrator(accuracy).follow(scene, watches, start=begin, with_time=True):
         if event.regime != regime:
             regime = event.regime
             lengths.append(0.0)
@@ -164,11 +159,6 @@ def stretch_lengths(scene: Scene, accuracy: Accuracy, begin: MotionPoint) -> lis
         if len(lengths) == 3 and event.kind is EventKind.RISE:
             break
     return lengths
-
-
-def meter(engine: str) -> WorkMeter:
-    """Return a work meter with a practically unlimited budget."""
-    return WorkMeter(BUDGET, engine=engine)
 
 
 def _identity(function: Any) -> Any:

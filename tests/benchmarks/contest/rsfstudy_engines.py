@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from contest.hand_written_loops import CycleNumbers
-from contest.problem import BUDGET, Problem, meter
+from contest.problem import BUDGET, Problem
 from rsfstudy.limit_cycles.stick_slip_cycles import iterate_cycles
 from rsfstudy.motion.accuracy import Accuracy
+from rsfstudy.motion.integrator import Integrator
 
 
 class RsfstudyEngine:
@@ -13,6 +14,8 @@ class RsfstudyEngine:
 
     def __init__(self, engine: str) -> None:
         self.engine, self.name = engine, f"rsfstudy, {engine}"
+        #: Integrator of the last run.
+        self.integrator = Integrator(Accuracy(engine=engine))
 
     def prepare(self, law: str, variable: bool) -> None:
         """Do nothing, because the first call compiles the equations."""
@@ -20,9 +23,9 @@ class RsfstudyEngine:
     def run(self, problems: list[Problem], tolerance: float) -> CycleNumbers:
         """Integrate one cycle of each problem."""
         found: CycleNumbers = []
-        accuracy = Accuracy(tolerance, budget=BUDGET, engine=self.engine)
+        self.integrator = Integrator(Accuracy(tolerance, budget=BUDGET, engine=self.engine))
         for it in problems:
-            cycle = next(iterate_cycles(it.scene, accuracy, meter(self.engine), it.begin))
+            cycle = next(iterate_cycles(it.scene, self.integrator, it.begin))
             assert cycle is not None
             found.append(
                 (cycle.recurrence_interval, cycle.max_spring_stress - cycle.min_spring_stress)

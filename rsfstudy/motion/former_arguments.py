@@ -1,0 +1,133 @@
+"""Former arguments ``accuracy`` and ``meter``, which an integrator has replaced.
+
+Functions that took an accuracy and a work meter now take an integrator. Calls with the former
+arguments, and user-defined measures with the former signature of ``compute``, work until version
+1.0.0 and emit a ``DeprecationWarning``.
+"""
+
+from __future__ import annotations
+
+import functools
+import inspect
+import warnings
+from collections.abc import Callable
+from typing import Any, TypeVar
+
+from rsfstudy.error_boundary import find_stacklevel_of_user_code
+from rsfstudy.errors import InvalidValue
+from rsfstudy.motion.accuracy import Accuracy
+from rsfstudy.motion.integrator import Integrator
+from rsfstudy.motion.work_meter import WorkMeter
+
+AnyFunction = TypeVar("AnyFunction", bound=Callable[..., Any])
+
+_FORMER_NAMES = ("accuracy", "meter")
+_CALL_REMEDY = (
+    "Pass integrator=integrator, as Measure.compute receives it. The arguments accuracy=accuracy, "
+    "meter=meter will be removed in 1.0.0."
+)
+
+
+def accept_accuracy_and_meter(function: AnyFunction) -> AnyFunction:
+    """Let a function with the parameter ``integrator`` accept the former arguments.
+
+    Parameters
+    ----------
+    function : callable
+        Function or method that is wrapped in the error boundary, which converts the arguments.
+
+    Returns
+    -------
+    callable
+        The same function.
+    """
+    function.convert_arguments = replace_accuracy_and_meter  # type: ignore[attr-defined]
+    return function
+
+
+def replace_accuracy_and_meter(
+    arguments: tuple[Any, ...], keywords: dict[str, Any]
+) -> tuple[tuple[Any, ...], dict[str, Any]]:
+    """Replace an accuracy and a work meter among the arguments by an integrator.
+
+    Parameters
+    ----------
+    arguments : tuple
+        Positional arguments of a call.
+    keywords : dict
+        Keyword arguments of a call.
+
+    Returns
+    -------
+    arguments : tuple
+        Positional arguments without accuracy and work meter.
+    keywords : dict
+        Keyword arguments, with an integrator if the call contains the former arguments.
+
+    Raises
+    ------
+    InvalidValue
+        If the call contains only one of the former arguments, or arguments of other types.
+    """
+    pair = {
+        **dict(
+            zip(
+                _FORMER_NAMES,
+                (a for a in arguments if isinstance(a, Accuracy | WorkMeter)),
+                strict=False,
+            )
+        ),
+        **{name: keywords[name] for name in _FORMER_NAMES if keywords.get(name) is not None},
+    }
+    if not pair:
+        return arguments, keywords
+    accuracy, meter = (pair.get(name) for name in _FORMER_NAMES)
+    if not (isinstance(accuracy, Accuracy) and isinstance(meter, WorkMeter)):
+        rule = "must be an Accuracy and a WorkMeter"
+        raise InvalidValue("accuracy, meter", (accuracy, meter), rule, remedy=_CALL_REMEDY)
+    text = f"An integrator has replaced the arguments accuracy and meter. {_CALL_REMEDY}"
+    warnings.warn(text, DeprecationWarning, stacklevel=find_stacklevel_of_user_code())
+    rest = tuple(a for a in arguments if not isinstance(a, Accuracy | WorkMeter))
+    others = {name: value for name, value in keywords.items() if name not in _FORMER_NAMES}
+    return rest, {**others, "integrator": Integrator(accuracy).counted_by(meter)}
+
+
+def adapt_former_compute(measure_class: type) -> None:
+    """Let the method ``compute`` of a measure take an integrator.
+
+    A method with the former parameters ``scene``, ``accuracy`` and ``meter`` is replaced by a
+    method that takes an integrator.
+
+    Parameters
+    ----------
+    measure_class : type
+        Class of a measure. The class is modified in place.
+    """
+    compute = vars(measure_class).get("compute")
+    if not inspect.isfunction(compute):
+        return
+    if not _takes_accuracy_and_meter(compute):
+        accept_accuracy_and_meter(compute)
+        return
+    text = (
+        f"{measure_class.__name__}.compute takes scene, accuracy and meter. Write "
+        "compute(self, scene, integrator), pass integrator=integrator to rsfstudy.simulate, and "
+        "replace accuracy.rtol by integrator.rtol. The old signature will be removed in 1.0.0."
+    )
+    warnings.warn(text, DeprecationWarning, stacklevel=find_stacklevel_of_user_code())
+
+    @functools.wraps(compute)
+    def compute_with_integrator(*arguments: Any, **keywords: Any) -> Any:
+        (measure, scene, *given), keywords = replace_accuracy_and_meter(arguments, keywords)
+        integrator = given[0] if given else keywords["integrator"]
+        return compute(measure, scene, integrator.accuracy, integrator.work_meter)
+
+    measure_class.compute = compute_with_integrator  # type: ignore[attr-defined]
+
+
+def _takes_accuracy_and_meter(compute: Callable[..., Any]) -> bool:
+    """Return True if a method has three parameters in addition to ``self``."""
+    kinds = inspect.Parameter.POSITIONAL_ONLY, inspect.Parameter.POSITIONAL_OR_KEYWORD
+    parameters = inspect.signature(compute).parameters.values()
+    required = [p for p in parameters if p.kind in kinds and p.default is p.empty]
+    return len(required) == 4

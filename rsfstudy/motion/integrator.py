@@ -1,0 +1,400 @@
+"""Integrator of the motions of a measurement.
+
+An ``Integrator`` has an accuracy and counts right-hand side evaluations. ``Integrator.follow``
+integrates a scene through its loading segments, as a series of events. Consecutive loading segments
+without a jump in stress form a chain. The driver of the event loop integrates each chain, and
+``Integrator.follow`` handles the jumps in stress between the chains.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+
+from rsfstudy.error_boundary import wrap_methods_in_error_boundary
+from rsfstudy.motion.accuracy import Accuracy, estimate_error
+from rsfstudy.motion.events import Event, EventKind, EventSpecification
+from rsfstudy.motion.initial_points import initial_point, point_after_loading_jump
+from rsfstudy.motion.motion_driver import MotionDriver, get_motion_driver
+from rsfstudy.motion.recording import Recording
+from rsfstudy.motion.regime_switching import compute_switch_thresholds, inertia_matters_at
+from rsfstudy.motion.segment_chains import (
+    find_remaining_segment_chains,
+    iterate_segment_start_events,
+    list_segment_chains,
+    select_event_specs,
+    truncate_segments_at,
+)
+from rsfstudy.motion.work_meter import WorkMeter
+from rsfstudy.parts import (
+    LOADING,
+    LOG_LOAD_VELOCITY,
+    SEGMENT_END,
+    SEGMENT_LOG_VELOCITY,
+)
+from rsfstudy.slider import (
+    Equations,
+    MotionPoint,
+    Numbers,
+    Scene,
+)
+
+
+@wrap_methods_in_error_boundary
+class Integrator:
+    """Integrator of motions to a requested accuracy, with a count of the work.
+
+    A measure receives the integrator of its cell. The attribute ``work_meter`` counts all motions
+    that are integrated with an integrator or with its copies, which share the work budget.
+
+    Parameters
+    ----------
+    accuracy : Accuracy
+        Requested accuracy, work budget and engine.
+
+    Examples
+    --------
+    >>> from rsfstudy import Accuracy, Integrator, Scene
+    >>> integrator = Integrator(Accuracy(rtol=1e-5))
+    >>> scene = Scene(normal_stress="constant", stiffness_ratio=2.0, load_velocity_ratio=2.0)
+    >>> *_, last = integrator.follow(scene, until=1.0)
+    >>> last.time
+    1.0
+    >>> integrator.evaluations > 0
+    True
+    """
+
+    __slots__ = ("accuracy", "work_meter")
+
+    def __init__(self, accuracy: Accuracy) -> None:
+        """Create an integrator whose count starts at zero."""
+        self.accuracy, self.work_meter = accuracy, WorkMeter(accuracy.budget)
+
+    @property
+    def rtol(self) -> float:
+        """Requested relative error of the main results."""
+        return self.accuracy.rtol
+
+    @property
+    def engine(self) -> str:
+        """Name of the engine."""
+        return self.accuracy.engine
+
+    @property
+    def local_tolerance(self) -> float:
+        """Local error tolerance of an integration step."""
+        return self.accuracy.local_tolerance
+
+    @property
+    def evaluations(self) -> int:
+        """Number of right-hand side evaluations of all motions."""
+        return self.work_meter.evaluations
+
+    @property
+    def is_budget_exceeded(self) -> bool:
+        """True if the evaluations exceed the work budget."""
+        return self.work_meter.evaluations > self.work_meter.budget
+
+    def counted_by(self, work_meter: WorkMeter) -> Integrator:
+        """Return a copy that adds its evaluations to another counter.
+
+        Parameters
+        ----------
+        work_meter : WorkMeter
+            Counter, which also defines the work budget.
+
+        Returns
+        -------
+        Integrator
+            Copy with the same accuracy.
+        """
+        copied = object.__new__(Integrator)  # The checks of the constructor are not necessary.
+        copied.accuracy, copied.work_meter = self.accuracy, work_meter
+        return copied
+
+    def with_accuracy(self, accuracy: Accuracy) -> Integrator:
+        """Return a copy with another accuracy that shares the count.
+
+        Parameters
+        ----------
+        accuracy : Accuracy
+            New accuracy. The budget of the count does not change.
+
+        Returns
+        -------
+        Integrator
+            Copy that adds its evaluations to the same count.
+        """
+        copied = object.__new__(Integrator)
+        copied.accuracy, copied.work_meter = accuracy, self.work_meter
+        return copied
+
+    def with_rtol(self, rtol: float) -> Integrator:
+        """Return a copy with another relative error tolerance that shares the count.
+
+        Parameters
+        ----------
+        rtol : float
+            New relative error tolerance of the main results.
+
+        Returns
+        -------
+        Integrator
+            Copy that adds its evaluations to the same count.
+        """
+        return self.with_accuracy(self.accuracy.with_rtol(rtol))
+
+    def refined(self) -> Integrator:
+        """Return a copy with ten times smaller tolerances that shares the count.
+
+        The difference between the results of the two integrators is an estimate of the error. See
+        ``estimate_error`` and ``Accuracy.refined``.
+
+        Returns
+        -------
+        Integrator
+            Copy that adds its evaluations to the same count.
+        """
+        return self.with_accuracy(self.accuracy.refined())
+
+    def tightened_to(self, rtol: float) -> Integrator:
+        """Return an integrator whose relative error tolerance is at most ``rtol``.
+
+        Parameters
+        ----------
+        rtol : float
+            Largest relative error tolerance.
+
+        Returns
+        -------
+        Integrator
+            This integrator, or a copy that shares the count.
+        """
+        return self if self.rtol <= rtol else self.with_rtol(rtol)
+
+    def loosened_to(self, rtol: float) -> Integrator:
+        """Return an integrator whose relative error tolerance is at least ``rtol``.
+
+        Parameters
+        ----------
+        rtol : float
+            Smallest relative error tolerance.
+
+        Returns
+        -------
+        Integrator
+            This integrator, or a copy that shares the count.
+        """
+        return self if self.rtol >= rtol else self.with_rtol(rtol)
+
+    def result_tolerance(self, factor: float = 1.0) -> float:
+        """Return a multiple of the requested relative error of the main results.
+
+        Parameters
+        ----------
+        factor : float, default: 1.0
+            Factor by which the requested relative error is multiplied.
+
+        Returns
+        -------
+        float
+            Relative tolerance of a result.
+        """
+        return factor * self.accuracy.rtol
+
+    def estimate_error(
+        self,
+        value: float,
+        refined_value: float,
+        floor_over_tolerance: float,
+        error_scale: float | None = None,
+    ) -> float:
+        """Estimate the error of a result from the result of a refined run.
+
+        Parameters
+        ----------
+        value : float
+            Result that was computed with this integrator.
+        refined_value : float
+            Result that was computed with the refined integrator.
+        floor_over_tolerance : float
+            Minimum relative error, as a fraction of the requested relative error. The error
+            estimate includes the minimum even if both runs agree by chance.
+        error_scale : float, optional
+            Reference value by which relative errors are multiplied. The default is ``value``.
+
+        Returns
+        -------
+        float
+            Absolute error estimate.
+        """
+        floor = floor_over_tolerance * self.accuracy.rtol
+        return estimate_error(value, refined_value, floor, error_scale)
+
+    def inertia_matters_at(self, scene: Scene, point: MotionPoint) -> bool:
+        """Return True if the slow manifold is not accurate enough at a point.
+
+        Parameters
+        ----------
+        scene : Scene
+            Scene with or without inertia.
+        point : MotionPoint
+            Point of a motion.
+
+        Returns
+        -------
+        bool
+            True if the scene has inertia, and its effect exceeds its limit on the slow manifold.
+        """
+        return inertia_matters_at(scene, self.accuracy, point)
+
+    def follow_equations(
+        self,
+        equations: Equations,
+        initial_unknowns: Numbers,
+        event_specs: Sequence[EventSpecification] = (),
+        *,
+        local_tolerance: float | None = None,
+        backward: bool = False,
+        recording: Recording | None = None,
+    ) -> Iterator[Event]:
+        """Yield the events of a motion that follows a single system of equations.
+
+        Parameters
+        ----------
+        equations : Equations
+            System of equations.
+        initial_unknowns : tuple of float
+            Initial values of the unknowns.
+        event_specs : sequence of EventSpecification, default: ()
+            Requested events.
+        local_tolerance : float, optional
+            Local error tolerance of a step. The default follows from the accuracy.
+        backward : bool, default: False
+            If True, the independent variable decreases.
+        recording : Recording, optional
+            Object that receives the recorded rows. The independent variable of a rigid slider is
+            slip, so the ``sample_times`` of the recording are slips.
+
+        Returns
+        -------
+        iterator of Event
+            Events in the order of their occurrence.
+        """
+        driver = MotionDriver(equations, engine=self.engine, methods=self.accuracy.methods)
+        return driver.iterate_events(
+            initial_unknowns,
+            self.work_meter,
+            event_specs,
+            self.local_tolerance if local_tolerance is None else local_tolerance,
+            backward=backward,
+            recording=recording,
+        )
+
+    def follow(
+        self,
+        scene: Scene,
+        event_specs: Sequence[EventSpecification] = (),
+        *,
+        start: MotionPoint | None = None,
+        with_time: bool = False,
+        recording: Recording | None = None,
+        until: float = math.inf,
+        resume_from: Event | None = None,
+    ) -> Iterator[Event]:
+        """Integrate a scene, starting immediately after its first loading step.
+
+        Parameters
+        ----------
+        scene : Scene
+            Scene to integrate.
+        event_specs : sequence of EventSpecification, default: ()
+            Requested events.
+        start : MotionPoint, optional
+            Initial point within the last loading segment. By default, the motion starts in the
+            first segment, from steady sliding at V_* or from the initial stress and state of the
+            scene.
+        with_time : bool, default: False
+            If True, time is one of the unknowns. If False, the times and slips of events may be
+            NaN, and the integration needs fewer right-hand side evaluations.
+        recording : Recording, optional
+            Object that records the motion.
+        until : float, default: inf
+            Time at which the motion ends, in D_c/V_*.
+        resume_from : Event, optional
+            Last event of an earlier motion of the scene. The motion continues from this event.
+
+        Yields
+        ------
+        Event
+            Events in the order of their occurrence.
+
+        Raises
+        ------
+        MotionStopped
+            If the motion cannot continue. The status is ``normal_stress_lost``,
+            ``shear_stress_reversed``, ``locked``, ``slip_stopped`` or ``slip_rate_unbounded`` if
+            the slider reaches a point beyond which the equations are not valid. The status is
+            ``work_budget_spent`` if the budget is exhausted. The status is ``integration_failed``
+            if the stepper fails or a value is not finite.
+        """
+        chains = list_segment_chains(scene, only_last_segment=start is not None)
+        with_time = with_time or until < math.inf or len(chains) > 1 or len(chains[0][1]) > 1
+        time, slip, before, told = 0.0, 0.0, None, scene.parts.loading.reported_segment_count
+        if resume_from is not None:
+            chains, start = find_remaining_segment_chains(scene, resume_from)
+            time, slip = resume_from.time, resume_from.slip
+        for number, (acting, table) in enumerate(chains):
+            if start is None:
+                start = initial_point(acting)
+            elif number:
+                start = point_after_loading_jump(acting, start)
+            is_last = number == len(chains) - 1
+            asked = select_event_specs(scene, acting, event_specs, is_last_chain=is_last)
+            table = truncate_segments_at(table, until)
+            end = float(table[-1, SEGMENT_END])
+            motion = get_motion_driver(
+                acting, self.engine, self.accuracy.methods, with_time=with_time
+            ).iterate_events(
+                start,
+                self.work_meter,
+                asked,
+                self.local_tolerance,
+                duration_start_time_and_slip=(
+                    float(table[0, SEGMENT_END]) - time if with_time else math.inf,
+                    time,
+                    slip,
+                ),
+                switch_thresholds=compute_switch_thresholds(acting, self.accuracy),
+                recording=recording,
+                kinks_and_reported_count=(table[1:], told),
+                initial_imposed_stress=acting.parameter_values[LOADING + 2]
+                if acting.parts.loading.has_load_point_unknown
+                else None,
+            )
+            if before is None and end == math.inf:  # The motion consists of a single chain.
+                yield from motion
+                return
+            for last in motion:
+                if before is not None and last.kind is EventKind.START:
+                    for event in iterate_segment_start_events(last, before, acting, asked):
+                        yield event
+                        if event.specification is not None and event.specification.terminal:
+                            return
+                elif last.kind is not EventKind.END:
+                    yield last
+                    if last.specification is not None and last.specification.terminal:
+                        return
+            if last.kind is EventKind.END:
+                # The located end time has a rounding error.
+                last = last._replace(time=end)
+                if recording is not None:
+                    recording.clip_recorded_times(end)
+            if end >= until:
+                yield last
+                return
+            # The parameters of the scene belong to the first segment of the chain.
+            numbers = list(acting.parameter_values)
+            numbers[LOG_LOAD_VELOCITY] = float(table[-1, SEGMENT_LOG_VELOCITY])
+            start, before = last.point, (last.point, tuple(numbers))
+            time, slip = last.time, last.slip

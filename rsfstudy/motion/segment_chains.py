@@ -1,0 +1,183 @@
+"""Chains of loading segments between which stress jumps, and the events at their starts."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+
+import numpy as np
+
+from rsfstudy.motion.events import Event, EventKind, EventSpecification
+from rsfstudy.motion.initial_points import point_after_loading_jump
+from rsfstudy.motion.motion_driver import find_events_at_jump
+from rsfstudy.parts import SEGMENT_END, SEGMENT_START
+from rsfstudy.slider import (
+    SINGLE_ENDLESS_SEGMENT_TABLE,
+    MotionPoint,
+    Numbers,
+    Scene,
+    largest_linear_growth_rate,
+)
+
+
+def list_segment_chains(
+    scene: Scene, *, only_last_segment: bool
+) -> Sequence[tuple[Scene, np.ndarray]]:
+    """Return the segment chains of a motion.
+
+    Parameters
+    ----------
+    scene : Scene
+        Scene of the motion.
+    only_last_segment : bool
+        If True, the motion starts in the last loading segment, which has no end.
+
+    Returns
+    -------
+    sequence of (Scene, ndarray)
+        Scene and segment table of each chain.
+    """
+    if only_last_segment:
+        return ((scene.segment_scene(-1), SINGLE_ENDLESS_SEGMENT_TABLE),)
+    return scene.continuous_segments
+
+
+def find_remaining_segment_chains(
+    scene: Scene, resume_from: Event
+) -> tuple[Sequence[tuple[Scene, np.ndarray]], MotionPoint]:
+    """Return the segment chains after the end of a motion, and the initial point.
+
+    If the motion ended at a jump in stress, the initial point is the point after this jump.
+
+    Parameters
+    ----------
+    scene : Scene
+        Scene of the motion.
+    resume_from : Event
+        Last event of the motion.
+
+    Returns
+    -------
+    chains : list of (Scene, ndarray)
+        Scene and segment table of each remaining chain.
+    point : MotionPoint
+        Point at which the motion continues.
+    """
+    first, point, left = 0, resume_from.point, []
+    for acting, table in scene.continuous_segments:
+        number = int(np.searchsorted(table[:, SEGMENT_START], resume_from.time, side="right")) - 1
+        if number > 0:
+            acting = scene.segment_scene(first + number)
+        if first and number == 0 and table[0, SEGMENT_START] == resume_from.time:
+            point = point_after_loading_jump(acting, point)
+        rest = table[max(number, 0) :].copy()
+        rest[0, SEGMENT_START] = max(rest[0, SEGMENT_START], resume_from.time)
+        if rest[-1, SEGMENT_END] > resume_from.time:
+            left.append((acting, rest))
+        first += len(table)
+    return left, point
+
+
+def truncate_segments_at(segment_table: np.ndarray, end_time: float) -> np.ndarray:
+    """Return the loading segments of a chain up to an end time.
+
+    Parameters
+    ----------
+    segment_table : ndarray
+        Table with one row per loading segment.
+    end_time : float
+        End time in D_c/V_*.
+
+    Returns
+    -------
+    ndarray
+        Rows of the segments that start before the end time.
+    """
+    if end_time == math.inf or segment_table[-1, SEGMENT_END] <= end_time:
+        return segment_table
+    count = max(int(np.searchsorted(segment_table[:, SEGMENT_START], end_time)), 1)
+    cut = segment_table[:count].copy()
+    cut[-1, SEGMENT_END] = min(end_time, cut[-1, SEGMENT_END])
+    return cut
+
+
+def iterate_segment_start_events(
+    event: Event,
+    point_and_parameters_before: tuple[MotionPoint, Numbers],
+    segment_scene: Scene,
+    event_specs: Sequence[EventSpecification],
+) -> Iterator[Event]:
+    """Yield the events at the start of a segment chain, except the first chain.
+
+    The first event is the start of the loading segment. The following events are requested events
+    that occur at the jump in stress.
+
+    Parameters
+    ----------
+    event : Event
+        Start of the motion in the chain.
+    point_and_parameters_before : tuple of (MotionPoint, tuple of float)
+        Last point and last parameters of the previous chain.
+    segment_scene : Scene
+        Scene of the first segment of the chain.
+    event_specs : sequence of EventSpecification
+        Requested events.
+
+    Yields
+    ------
+    Event
+        Events at the start of the chain.
+    """
+    yield event._replace(kind=EventKind.SEGMENT)
+    for spec, point in find_events_at_jump(
+        *point_and_parameters_before, event.point, segment_scene.parameter_values, event_specs
+    ):
+        # The slip of the start event is valid for both points, because slip never jumps.
+        yield event._replace(kind=spec.kind, specification=spec, point=point)
+
+
+def select_event_specs(
+    scene: Scene,
+    chain_scene: Scene,
+    event_specs: Sequence[EventSpecification],
+    *,
+    is_last_chain: bool,
+) -> Sequence[EventSpecification]:
+    """Select the requested events that can occur in a segment chain.
+
+    The motion can settle only in the last chain. Settling events are omitted if the load point
+    oscillates, or if steady sliding is unstable.
+
+    Parameters
+    ----------
+    scene : Scene
+        Scene of the motion.
+    chain_scene : Scene
+        Scene of the first segment of the chain.
+    event_specs : sequence of EventSpecification
+        Requested events.
+    is_last_chain : bool
+        True if no other chain follows.
+
+    Returns
+    -------
+    sequence of EventSpecification
+        Events to detect.
+    """
+    may_settle = is_last_chain and not chain_scene.parts.loading.unknowns
+    if may_settle and _steady_sliding_may_be_stable(scene, event_specs):
+        return event_specs
+    return [spec for spec in event_specs if spec.kind is not EventKind.SETTLED]
+
+
+def _steady_sliding_may_be_stable(scene: Scene, event_specs: Sequence[EventSpecification]) -> bool:
+    """Return False if steady sliding is unstable in the last loading segment.
+
+    The growth rate of small perturbations is computed only if a settling event is requested.
+    """
+    if scene.log_load_velocity == -math.inf or all(
+        spec.kind is not EventKind.SETTLED for spec in event_specs
+    ):
+        return True
+    growth = largest_linear_growth_rate(scene.segment_scene(-1), scene.log_load_velocity)
+    return growth is None or not growth.is_positive
