@@ -34,7 +34,9 @@ def closed_form(row: xr.Dataset) -> tuple[np.ndarray, np.ndarray]:
         Slip rates V/V_* and critical stiffness in sigma_*/D_c.
     """
     velocity = float(row["weakening_velocity_ratio"])
-    rates = np.geomspace(*row["load_velocity_ratio"].values[[0, -1]], 400)
+    rates = np.geomspace(
+        row["load_velocity_ratio"].values[0], row["load_velocity_ratio"].values[-1], 400
+    )
     ratio = (rates / velocity) ** _EXPONENT
     fall = ((1.0 + velocity**-_EXPONENT) / (1.0 + ratio)) ** (1.0 / _EXPONENT)
     excess = float(row["mu_star"]) - _WEAK - _WEAKENING * np.log(rates)

@@ -144,7 +144,7 @@ def critical_stiffness_at_reference(row: xr.Dataset) -> tuple[np.ndarray, np.nda
     tuple of ndarray
         Cooling rates C and critical stiffness in sigma_*/D_c.
     """
-    cooling = np.geomspace(*row["cooling"].values[[0, -1]], 200)
+    cooling = np.geomspace(row["cooling"].values[0], row["cooling"].values[-1], 200)
     direct, turning = _A * _ACTIVATION, (_B - _A) * _ACTIVATION
     found = []
     for rate in cooling.tolist():

@@ -61,7 +61,7 @@ def closed_form(row: xr.Dataset) -> tuple[np.ndarray, np.ndarray]:
     tuple of ndarray
         Drainage rates and critical stiffness in sigma_*/D_c.
     """
-    rates = np.geomspace(*row["drainage"].values[[0, -1]], 100)
+    rates = np.geomspace(row["drainage"].values[0], row["drainage"].values[-1], 100)
     fixed = float(row["heating"]), float(row["cooling"])
     return rates, np.array([quartic_threshold(*fixed, rate) for rate in rates.tolist()])
 

@@ -201,9 +201,6 @@ def test_the_measure_finds_the_threshold_of_growth(
         within = 1e-6 if log_norm is None else max(1e-6, 2e-11 * 100.0 ** -max(log_norm, -3.0))
         slack = within * max(undamped, told["critical_stiffness"])
         slack *= 1.0 + max(0.0, told["rise_by_dynamics"])
-        if log_norm is not None:
-            # A small mass makes one eigenvalue large, and differences lose digits in proportion.
-            slack *= 1.0 + 1e-5 * 10.0 ** (-2.0 * log_norm)
         found = told["critical_stiffness_from_growth"]
         assert found == pytest.approx(told["critical_stiffness"], abs=slack)
 

@@ -19,13 +19,13 @@ import numpy as np
 from error_estimates import decades, random_slider
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
-from time_domain_reference import TimeDomainMotion  # noqa: E402
+from time_domain_reference import TimeDomainMotion
 
-from rsfstudy import Accuracy, Scene  # noqa: E402
-from rsfstudy.errors import InvalidValue  # noqa: E402
-from rsfstudy.measures import StepResponse  # noqa: E402
-from rsfstudy.motion import COMPILED, SCIPY  # noqa: E402
-from rsfstudy.status import Status  # noqa: E402
+from rsfstudy import Accuracy, Scene
+from rsfstudy.errors import InvalidValue
+from rsfstudy.measures import StepResponse
+from rsfstudy.motion import COMPILED, SCIPY
+from rsfstudy.status import Status
 
 EFFECTS = ("flash", "heating", "pressurisation")
 #: Error of the reference values, relative to the requested accuracy of ln V.
