@@ -2,10 +2,10 @@
 
 The static stress drop increases with E, the undrained pressure by slip of D_c at unit friction. For
 small E, the drop is that of a drained fault. For E = 0.01, the pressure in a rupture removes most
-of the effective normal stress, and the stress drop is six times as large under the slip law. The
-pore pressure that remains after a rupture also lowers the slowest slip rate by several decades.
-Steady temperatures at the slip rate of a rupture are extremely large, so the distance from steady
-sliding does not contain the temperature.
+of the effective normal stress, and the stress drop is almost seven times as large under the slip
+law. After such a rupture, the pressure drains and the strength recovers, so the slowest slip rate
+is lower by several decades. Steady temperatures at the slip rate of a rupture are extremely large,
+so the distance from steady sliding does not contain the temperature.
 """
 
 from rsfstudy import Accuracy, Axis, Claim, Figure, Panel, Study
