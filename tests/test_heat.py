@@ -12,6 +12,7 @@ import itertools
 import math
 from dataclasses import dataclass
 
+import heat_estimates
 import numpy as np
 import pytest
 from scipy.integrate import quad, solve_ivp
@@ -560,3 +561,14 @@ def test_the_named_combinations_are_complete():
         heat = heated(1e-4, 1.0) if several else heated(1e-4, 1.0, 20.0, 20.0)
         scene = Scene(law=law, fluid=pores, stiffness=0.01, normal_stress="constant", **heat)
         assert "shear_heating" in scene.effects
+
+
+@pytest.mark.parametrize("effect", heat_estimates.EFFECTS)
+def test_error_estimates_cover_the_errors(effect):
+    """The benchmark ``heat_estimates`` compares 60 scenes for each effect."""
+    random, compared = np.random.default_rng(5), []
+    while len(compared) < 2:
+        fields = heat_estimates.random_fields(effect, random)
+        compared += [heat_estimates.compare_peak(fields, 1e-6, SCIPY)]
+        compared = [pair for pair in compared if pair is not None]
+    assert all(error <= estimate for error, estimate in compared)
