@@ -1,5 +1,6 @@
 """Tests of the command line: printed output, files and exit statuses."""
 
+import json
 import re
 import subprocess
 import sys
@@ -39,7 +40,15 @@ def test_run_writes_the_dataset_and_the_figure_and_prints_what_it_found(results)
         f"{NAME}.cells.sqlite",
     }
     assert (output / f"{NAME}.png").read_bytes().startswith(b"\x89PNG")
-    for words in ("zeta", "0.9999", "C6", "C7", "reproduced", "9 ok", "right-hand sides"):
+    for words in (
+        "zeta",
+        "0.9999",
+        "C6",
+        "C7",
+        "reproduced",
+        "9 ok",
+        "right-hand-side evaluations",
+    ):
         assert words in said
 
 
@@ -87,14 +96,14 @@ def test_other_lattices_run_check_and_plot_and_say_what_they_are(settings, tmp_p
     checked = call_main("check", NAME, "--output", tmp_path)
     counted = next(line for line in checked.stdout.splitlines() if " of 6 claims checked" in line)
     assert counted in ran.stdout
-    nothing = counted == "0 of 6 claims checked: other values or units have no published numbers"
+    nothing = counted.endswith(": no published values for overrides or other units")
     assert checked.returncode == int(nothing), checked.stderr
     drawn = call_main("plot", NAME, "--output", tmp_path)
     assert drawn.returncode == 0, drawn.stderr
-    assert "not as declared" in ran.stdout
+    assert "overrides: " in ran.stdout
     assert settings[1].split("=")[0] in ran.stdout
     # A fit of a slope needs more than one point.
-    few = "no zeta: among these cells are none, or too few, to draw on, with 0.25 <= a_over_b_minus"
+    few = "no zeta: too few suitable cells, with 0.25 <= a_over_b_minus"
     assert (few in " ".join(ran.stdout.split())) == (settings[1] == "b_over_a=1.5")
 
 
@@ -126,7 +135,7 @@ def test_list_and_show():
     shown = call_main("show", NAME, "--set", "b_over_a=2,3")
     assert shown.returncode == 0
     assert ["cells", "6"] in [line.split() for line in shown.stdout.splitlines()]
-    assert "right-hand sides" in shown.stdout
+    assert "right-hand-side evaluations" in shown.stdout
 
 
 @pytest.mark.parametrize(
@@ -215,6 +224,19 @@ def test_run_all_goes_on_whatever_becomes_of_a_study(catalogued, tmp_path, monke
     }
     assert ended["moving"][1] == "1 differs"
     assert (tmp_path / "fine.nc").exists()
+    again = call_main("run", "--all", "--serial", "--output", tmp_path, "--json")
+    found = {one["study"]: one for one in json.loads(again.stdout)["studies"]}
+    assert again.returncode == 1
+    assert {name: one["outcome"] for name, one in found.items()} == {
+        "failing": "failed",
+        "moving": "failed",
+        "undrawn": "failed",
+        "taken": "not_finished",
+        "fine": "ok",
+    }
+    assert found["moving"]["problems"] == ["C1 moved"]
+    assert "taken.cells.sqlite" in found["taken"]["message"]
+    assert found["taken"]["results"] is None
 
 
 @pytest.fixture
@@ -237,11 +259,14 @@ def test_run_all_names_the_studies_it_leaves_out(catalogued, tmp_path, monkeypat
     catalogued(compiled(name="dear"), replace(faulty_study(), name="plain"))
     ran = call_main("run", "--all", "--serial", "--output", tmp_path)
     assert ran.returncode == 0, ran.stderr
-    said, short = "left out: needs Numba (pip install 'rsfstudy[fast]')", "left out: needs Numba"
+    said, short = "skipped: needs Numba (pip install 'rsfstudy[fast]')", "skipped: needs Numba"
     assert f"dear: {said}" in ran.stdout
     ended = {name: row[-1] for name, row in rows(ran.stdout).items()}
     assert ended == {"plain": "ok", "dear": short}
     assert not list(tmp_path.glob("dear*"))
+    again = call_main("run", "--all", "--serial", "--output", tmp_path, "--json")
+    plain, dear = json.loads(again.stdout)["studies"]
+    assert (plain["outcome"], dear["outcome"], dear["seconds"]) == ("ok", "skipped", None)
     checked = call_main("check", "--all", "--output", tmp_path)
     assert f"dear: {said}" in checked.stdout
     assert "not run yet" not in checked.stdout
@@ -306,7 +331,7 @@ def test_exit_statuses_of_a_motion(duration, budget, status, said, tmp_path):
     assert said in ran.stderr
     assert ("budget" in ran.stdout) is (status == 1)
     assert len(ran.stderr.splitlines()) == (status == 3)
-    assert ("no physics after 114.5" in " ".join(ran.stdout.split())) is (status == 3)
+    assert ("no physical meaning after 114.5" in " ".join(ran.stdout.split())) is (status == 3)
 
 
 def test_a_motion_that_cannot_begin_is_told(tmp_path):
@@ -314,5 +339,5 @@ def test_a_motion_that_cannot_begin_is_told(tmp_path):
     ended = call_main("simulate", "--set", "displacement_step=-200", "--output", output)
     assert (ended.returncode, ended.stderr) == (1, "")
     assert "normal_stress_lost" in ended.stdout
-    assert "nothing moved" in ended.stdout
+    assert "the motion has no points" in ended.stdout
     assert not output.exists()

@@ -185,7 +185,7 @@ def test_the_command_says_what_differs(files):
         "b_over_a only in A (2): 2.5,3",
         "law = slowness, b_over_a = 1.5",
         "no_steady_state",
-        f"{NUMBER} differs beyond error estimates; 1 cell ended otherwise",
+        f"{NUMBER} differs beyond error estimates; 1 cell with different statuses",
     ):
         assert words in ran.stdout
 

@@ -15,7 +15,7 @@ from synthetic_records import EXACT_PARAMETERS, FIT_OPTIONS, STEP_UP
 
 import rsfstudy
 from rsfstudy.reductions import Range, apply_reductions
-from rsfstudy.reporting import fit_tables, summaries
+from rsfstudy.reporting import fit_summaries, fit_tables, summaries
 from rsfstudy.status import Status
 
 
@@ -53,7 +53,7 @@ def test_autocorrelated_whitened_residuals_change_the_status() -> None:
 
 def test_tables_mark_standard_errors_that_are_not_valid() -> None:
     assert not fit_tables.all_fits_are_valid(naive())  # The exit status is 1.
-    assert fit_tables.format_with_stderr(naive().squeeze(), "a").endswith("*")
+    assert fit_summaries.format_with_stderr(naive().squeeze(), "a").endswith("*")
     texts = [
         piece
         for piece in summaries.build_summary_tables_and_sentences(naive())

@@ -14,7 +14,7 @@ from study_runs import call_main
 
 import rsfstudy
 from rsfstudy.reporting import fit_tables
-from rsfstudy.reporting.fit_tables import format_with_stderr
+from rsfstudy.reporting.fit_summaries import format_with_stderr
 from rsfstudy.status import Status
 
 PAGES = Path(__file__).parent.parent / "studies" / "pages"
@@ -65,7 +65,7 @@ def test_it_prints_the_steps_and_a_table_that_is_never_broken(written):
     for name in ("a", "b", "a_minus_b", r"Dc \(um\)", "mu_0", r"trend \(1/um\)"):
         row = rf"^{name} +\S.* \+- \S.*$"
         assert len(re.findall(row, said, re.MULTILINE)) == 2, name
-    short = said.split("Of all:")[1]
+    short = said.split("All fits:")[1]
     assert (
         len(re.findall(r"^ +[12] +slowness( +[\d.]+ \+- [\d.]+){3} +ok", short, re.MULTILINE)) == 2
     )
@@ -94,7 +94,7 @@ def test_its_file_is_shown_drawn_and_exported(written):
     table = [line for line in said.splitlines() if "+-" in line]
     assert table
     assert all(line.rstrip() in map(str.rstrip, shown.stdout.splitlines()) for line in table)
-    assert "made by rsfstudy fit record.csv" in " ".join(shown.stdout.split())
+    assert "command rsfstudy fit record.csv" in " ".join(shown.stdout.split())
     assert (here / "fit.png").read_bytes().startswith(b"\x89PNG")
     drawn = call_main("plot", file, "--output", str(here / "again.pdf"))
     assert drawn.returncode == 0, drawn.stderr
@@ -139,7 +139,7 @@ def test_files_of_others_are_not_replaced(written, tmp_path):
     (tmp_path / "fit.nc").write_text("mine")
     ran = call_main("fit", str(here / "record.csv"), *FIT, "--output", str(tmp_path / "fit.png"))
     assert ran.returncode == 2
-    assert "no fit" in ran.stderr
+    assert "does not contain a fit" in " ".join(ran.stderr.split())
     assert (tmp_path / "fit.nc").read_text() == "mine"
 
 
@@ -175,10 +175,10 @@ def test_a_number_has_the_digits_that_its_error_gives_it():
     assert told(1234.5, 120.0) == "1234 +- 120"
     assert told(-5.29e-6, 3.7e-7) == "(-5.29 +- 0.37)e-06"
     assert told(1e-9, 4e-7) == "(0.0 +- 4.0)e-07"
-    assert told(3.0, math.inf) == "not told"
+    assert told(3.0, math.inf) == "unconstrained"
     assert told(3.0, 0.0) == "3 +- 0"
     assert told(math.nan, math.nan) == "-"
-    assert told(1e-4, 1e7) == "not told"
+    assert told(1e-4, 1e7) == "unconstrained"
 
 
 #: A number and its error as printed, with an optional power of ten.

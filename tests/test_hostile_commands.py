@@ -129,7 +129,7 @@ def test_a_full_disk_is_named_whatever_prints(monkeypatch):
         with contextlib.suppress(OSError):
             full.flush()
     text = " ".join(said.getvalue().split())
-    assert text.startswith("error: rsfstudy list: No space left on device. Check that the place")
+    assert text.startswith("error: rsfstudy list: No space left on device. Check that")
     assert ended.value.code == 1
 
 

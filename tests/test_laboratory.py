@@ -311,7 +311,7 @@ def test_a_motion_replaces_a_motion_whole_and_nothing_else(tmp_path):
         data.write_bytes(other)
         ran = call_main(*words, "5", "--output", image)
         assert ran.returncode == 2
-        assert "is there already, and no motion" in " ".join(ran.stderr.split())
+        assert "already exists and does not contain a motion" in " ".join(ran.stderr.split())
         assert data.read_bytes() == other
 
 

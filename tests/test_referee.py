@@ -220,8 +220,8 @@ def test_conventions_of_the_problem_explain_a_difference(number, changes, explan
         (lambda rate: -rate, "growth_rate has the opposite sign. With that undone, 12.0 digits"),
         (lambda rate: rate / (2.0 * math.pi), "growth_rate is 1/(2 pi) times the known answer"),
         # A factor combined with an offset would explain any value.
-        (lambda rate: 1.7 * rate, "no usual difference of conventions explains it"),
-        (lambda rate: -1.3 * rate, "no usual difference of conventions explains it"),
+        (lambda rate: 1.7 * rate, "no common difference of conventions explains the disagreement"),
+        (lambda rate: -1.3 * rate, "no common difference of conventions explains the disagreement"),
     ],
 )
 def test_a_single_value_is_explained_by_usual_factors_only(wrong, explanation, tmp_path):
@@ -273,7 +273,7 @@ def test_where_they_part_is_told(tmp_path):
     said = " ".join(ran.stdout.split())
     pattern = r"slip_rate 3\.0 digits, fewest at time = [234]\d s; they part at time = 25 s"
     assert re.search(pattern, said)
-    assert "no usual difference of conventions explains it" in said
+    assert "no common difference of conventions explains the disagreement" in said
     assert "0 problems of 24" in said
     assert ran.returncode == 1
 

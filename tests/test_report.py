@@ -141,7 +141,7 @@ def test_it_tells_verdicts_failures_and_what_cannot_be_read(written):
     assert ran.returncode == 1
     assert said.count("cannot be read") >= 4
     for name in ("cut.nc", "foreign.nc"):
-        assert f"{name} cannot be read: the page says why" in ran.stdout
+        assert f"{name} cannot be read (see the page for the reason)" in ran.stdout
 
 
 def test_python_names_the_page_and_refuses_what_is_none(tmp_path):

@@ -264,13 +264,13 @@ def test_one_scale_for_several_rigs_is_refused(cycles):
 
 def test_figures_and_tables_show_units(cycles, capsys):
     from rsfstudy.cli import table_layout
-    from rsfstudy.reporting import tables
+    from rsfstudy.reporting import lattice_tables
 
     drawn = rsfstudy.plot(cycles)
     texts = [axes.get_xlabel() + axes.get_ylabel() for axes in drawn.axes]
     assert any(r"Load point velocity" in text and r"($\mu$m/s)" in text for text in texts)
     assert any("(s)" in text for text in texts)
-    table_layout.print_summary_piece(tables.build_primary_output_table(cycles))
+    table_layout.print_summary_piece(lattice_tables.build_primary_output_table(cycles))
     said = capsys.readouterr().out
     assert "recurrence interval of stick-slip, in s" in said
     interval = float(cycles.rsf.in_units()["recurrence_interval"][0, 0, 0])

@@ -18,7 +18,7 @@ from rsfstudy.critical_steps.critical_step import CriticalStep
 from rsfstudy.errors import IncompleteWarning
 from rsfstudy.quantities import html_symbol, html_table
 from rsfstudy.reductions import SobolIndices
-from rsfstudy.reporting import tables
+from rsfstudy.reporting import lattice_tables
 from rsfstudy.reporting.tables import build_single_scene_result_table, format_rounded_to_error
 from rsfstudy.responses.linear_stability import LinearStability
 from rsfstudy.status import Status
@@ -114,10 +114,10 @@ def test_the_accessor_shows_numbers_and_verdicts():
     """
     declared = study_loader.load_study("linear_stability")
     few = run(declared.with_(b_over_a=2.0, phi=[40]), rtol=1e-3).rsf._repr_html_()
-    assert "11 claims not checked: other values or units have no published numbers" in few
+    assert "11 claims not checked: no published values for overrides or other units" in few
     done = run(declared, rtol=1e-3)
     shown = rows(done.rsf._repr_html_())
-    assert ["id", "claim", "published", "ours", "tolerance, and why", "verdict"] in shown
+    assert ["id", "claim", "published", "ours", "tolerance and reason", "verdict"] in shown
     values = {
         f"{value:.8g}" for value in done[rebuild_from_file.find_primary_output(done)].values.flat
     }
@@ -194,7 +194,7 @@ def test_a_motion_by_a_law_that_is_not_known_is_shown(tmp_path):
     text = (Path(__file__).parent / "extensions" / "steep_law.py").read_text()
     (tmp_path / "study.py").write_text(text.replace('"steep"', '"of_a_stranger"'))
     for study, told in (
-        ([], "neither its stability nor its events: law = 'of_a_stranger'"),
+        ([], "stability and events are unavailable: law = 'of_a_stranger'"),
         (["--study", tmp_path / "study.py"], "no event faster than 20 V_*"),
     ):
         shown = call_main("show", tmp_path / "motion.nc", *study)
@@ -258,9 +258,9 @@ def test_indices_that_are_refused_say_why(tmp_path, monkeypatch):
 
 @pytest.mark.parametrize("sizes", [{"x": 5}, {"x": 3, "y": 28}, {"x": 9, "y": 9, "z": 2, "u": 7}])
 def test_a_sample_has_both_ends_and_so_many_cells_at_most(sizes):
-    at = tables.select_thinned_points(sizes, 24)
+    at = lattice_tables.select_thinned_points(sizes, 24)
     assert math.prod(map(len, at.values())) <= 24
     for name, size in sizes.items():
         assert at[name][0] == 0
         assert len(at[name]) == 1 or at[name][-1] == size - 1
-    assert len(tables.select_thinned_points({"x": 5}, 24)["x"]) == 5
+    assert len(lattice_tables.select_thinned_points({"x": 5}, 24)["x"]) == 5

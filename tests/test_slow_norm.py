@@ -7,7 +7,7 @@ import pytest
 
 import rsfstudy
 from rsfstudy import Rig, Scene, Study
-from rsfstudy.cli import printed_reports
+from rsfstudy.cli.file_summaries import FileSummary, print_file_summary
 from rsfstudy.critical_steps.triggered import Triggered
 from rsfstudy.errors import InvalidValue
 from rsfstudy.motion.accuracy import Accuracy
@@ -65,7 +65,7 @@ def test_a_norm_near_the_load_point_is_told_once(capsys):
     in_units = SHORT.in_units(found, stress="MPa", length="um")
     # 2 pi D_c 5e-4/T
     assert float(in_units.instability_slip_rate) == pytest.approx(math.pi, rel=1e-12)
-    printed_reports.print_results_summary(in_units, "falls.nc")
+    print_file_summary(FileSummary(in_units, "falls.nc"))
     assert "3.142 um/s" in capsys.readouterr().out
     quiet = {"workers": 0, "output": None, "progress": False}
     with pytest.warns(UserWarning, match=re.escape(f"2 of 2 answers: {SLOW}")) as told:

@@ -12,10 +12,17 @@ from test_shown import rows as of_html
 import rsfstudy
 from rsfstudy import Scene
 from rsfstudy.api import study_runs
-from rsfstudy.cli import printed_reports, table_layout
+from rsfstudy.cli import study_declarations, table_layout
+from rsfstudy.cli.commands import rerun
 from rsfstudy.formatting import format_overrides
 from rsfstudy.measures import Outcome
-from rsfstudy.reporting import tables
+from rsfstudy.reporting import (
+    cell_tables,
+    lattice_tables,
+    machine_readable,
+    reduction_tables,
+    verdict_tables,
+)
 from rsfstudy.reporting.tables import TextTable
 from rsfstudy.status import Status
 from rsfstudy.study import study_index, study_loader
@@ -62,11 +69,11 @@ def in_one_piece(piece: str, lines: list[str]) -> bool:
 def test_results_of_every_study(name, printed, tmp_path_factory):
     dataset, _path = named_results(name, tmp_path_factory)
     shown = [
-        tables.build_primary_output_table(dataset),
-        *tables.reduction_tables(dataset),
-        printed_reports.build_contents_table(dataset),
+        lattice_tables.build_primary_output_table(dataset),
+        *reduction_tables.build_reduction_tables(dataset),
+        machine_readable.build_contents_table(dataset),
     ]
-    shown += [tables.claims_table(study_runs.check(dataset))]
+    shown += [verdict_tables.claims_table(study_runs.check(dataset))]
     for table in (table for table in shown if table.rows):
         for width in WIDTHS:
             lines = printed(width, table_layout.print_summary_piece, table)
@@ -78,7 +85,8 @@ def test_declarations_of_every_study(width, printed, tmp_path):
     """The points of all axes are printed in one piece."""
     for name in study_index.study_names():
         study = study_loader.load_study(name)
-        lines = printed(width, printed_reports.print_study_declaration, study, tmp_path)
+        declared = study_declarations.StudyDeclaration(study, tmp_path)
+        lines = printed(width, study_declarations.print_study_declaration, declared)
         for axis in study.axes:
             shown = (
                 axis.point_names
@@ -93,9 +101,13 @@ def test_declarations_of_every_study(width, printed, tmp_path):
 def test_where_no_cell_has_a_number_the_status_is_explained():
     dataset = xr.Dataset({"status": ("x", [3, 3]), "rhs_evaluations": ("x", [5, 5])})
     why = Status.NO_LIMIT_CYCLE.meaning
-    assert tables.format_status_counts(dataset) == f"2 no_limit_cycle ({why}); 10 right-hand sides"
+    work = "10 right-hand-side evaluations"
+    assert cell_tables.format_status_counts(dataset) == f"2 no_limit_cycle ({why}); {work}"
     one = dataset.assign(status=("x", [0, 3]))
-    assert tables.format_status_counts(one) == "1 ok, 1 no_limit_cycle; 10 right-hand sides"
+    assert (
+        cell_tables.format_status_counts(one)
+        == "1 ok, 1 no_limit_cycle; 10 right-hand-side evaluations"
+    )
 
 
 def test_a_relation_stays_with_its_number(printed):
@@ -131,7 +143,7 @@ def test_notebooks_show_the_same_claims(tmp_path_factory):
     dataset, _path = named_results("rate_step_boundary", tmp_path_factory)
     found = rsfstudy.check(dataset)
     shown = of_html(found._repr_html_())
-    told = tables.claims_table(found).rows
+    told = verdict_tables.claims_table(found).rows
     assert [list(row.values()) for row in told] == [list(row) for row in shown[1:]]
     assert call_main("check", _path).returncode == 0
 
@@ -140,7 +152,7 @@ def test_a_cell_is_told_in_a_line_for_each_number_beside_that_of_its_file(printe
     orbit, other = np.linspace(0.0, 2.0, 400), np.linspace(0.0, 3.0, 400)
     there = xr.Dataset({"interval": 1.5, "orbit": ("phase", other)})
     now = Outcome(Status.OK, {"interval": 1.5, "orbit": orbit})
-    told = printed(80, printed_reports.print_recomputed_cell, Scene(), now, there)
+    told = printed(80, rerun.print_recomputed_cell, Scene(), now, there)
     lines = [" ".join(line.split()) for line in told]
     assert "interval 1.5 same" in lines
     assert "orbit 400 values, 0 to 2 400 values, 0 to 3" in lines

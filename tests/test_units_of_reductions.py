@@ -22,7 +22,7 @@ from rsfstudy.reductions import (
     StandardDeviation,
     apply_reductions,
 )
-from rsfstudy.reporting import tables
+from rsfstudy.reporting import lattice_tables, reduction_tables
 from rsfstudy.responses.linear_stability import LinearStability
 from rsfstudy.rig.dataset_scales import convert_to_display_units
 from rsfstudy.study.reductions.base import read_quantities_not_in_vocabulary
@@ -163,8 +163,12 @@ def test_tables_tell_them():
     )
     axis, base = rig.axis("load_velocity", "1:100:3:log um/s"), rig.scene(**fields)
     of_rig = run(study_of("of", LinearStability(), axis, base=base, rig=rig, reductions=fits))
-    slope, decade = (list(table.rows[0]) for table in tables.reduction_tables(of_rig))
+    slope, decade = (
+        list(table.rows[0]) for table in reduction_tables.build_reduction_tables(of_rig)
+    )
     assert slope[0] == "static_slope (MPa/um/(um/s))"
     assert slope[2] == "largest misfit (MPa/um)"
     assert decade[:2] == ["per_decade (MPa/um)", "standard error"]
-    assert any(line.endswith(" MPa/um") for line in tables.summarise_study_as_text_lines(of_rig))
+    assert any(
+        line.endswith(" MPa/um") for line in lattice_tables.summarise_study_as_text_lines(of_rig)
+    )

@@ -248,9 +248,9 @@ def _build_section_of_dataset(results_path: Path, dataset: xr.Dataset) -> _Resul
     verdicts, wrong = summarise_verdicts(dataset, study_runs.check(dataset))
     if undone := count_pending_cells(dataset):
         wrong.append(f"{undone} cells not computed")
-    failed, commands = failures_table(dataset, results_path.name)
-    if commands:
-        lines = _escape("\n".join(commands))
+    failed = failures_table(dataset, results_path.name)
+    if failed.rows:
+        lines = _escape("\n".join(row["command"] for row in failed.values))
         parts.append(
             f"<h3>Failures</h3>\n{_format_summary_piece_as_html(failed)}<pre>{lines}</pre>"
         )

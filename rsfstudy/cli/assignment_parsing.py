@@ -154,9 +154,11 @@ def parse_rig(option_texts: Mapping[str, str]) -> Rig:
     }
     for field in fields(Rig):
         if field.default is MISSING and field.name not in stated:
-            remedy = "A rig is stated by these three at least."
+            needed = "a normal stress, a slip distance and a reference velocity"
             option = f"--{field.name.replace('_', '-')}"
-            raise InvalidValue(option, None, "must be stated", remedy=remedy)
+            raise InvalidValue(
+                option, None, "is required", remedy=f"A rig requires at least {needed}."
+            )
     return Rig(**stated)
 
 
@@ -263,7 +265,7 @@ def parse_axis_assignment(text: str, known_labels: Collection[str]) -> tuple[str
         values = values.replace(label, label.replace(",", "\0"))
     parts = [part.strip().replace("\0", ",") for part in values.split(",")]
     if not all(parts):
-        raise InvalidValue("--set", text, "leaves a value out")
+        raise InvalidValue("--set", text, "has an empty value")
     if len(parts) > 1:
         return name, [parse_boolean_number_or_text(part) for part in parts]
     return name, expand_range(

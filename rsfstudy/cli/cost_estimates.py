@@ -7,6 +7,7 @@ the description contains a rough estimate.
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -26,8 +27,37 @@ _NAME_OF_MEASURE_REQUIRING_SCIPY_ENGINE = "work_precision"
 _MIN_SECONDS_FOR_FASTER_ENGINE_HINT = 60.0
 
 
-def describe_study_cost(cell_plan: CellPlan, output_directory: Path) -> str:
-    """Describe the work and the computing time of a study on one core.
+@dataclass(frozen=True)
+class CostEstimate:
+    """Expected work and computing time of a study on one core.
+
+    Parameters
+    ----------
+    rhs_evaluations : int
+        Expected number of right-hand-side evaluations, rounded to two significant digits.
+    seconds : float
+        Computing time in s.
+    cell_count : int
+        Number of distinct cells of the study.
+    measured_cells : int
+        Number of cells of the study whose computing times have been measured.
+    timed_cells : int
+        Number of cells with measured times in the journal. If the number is 0, the computing time
+        is a rough estimate.
+    journal : Path
+        Path of the journal.
+    """
+
+    rhs_evaluations: int
+    seconds: float
+    cell_count: int
+    measured_cells: int
+    timed_cells: int
+    journal: Path
+
+
+def estimate_study_cost(cell_plan: CellPlan, output_directory: Path) -> CostEstimate:
+    """Estimate the work and the computing time of a study on one core.
 
     Parameters
     ----------
@@ -39,34 +69,49 @@ def describe_study_cost(cell_plan: CellPlan, output_directory: Path) -> str:
 
     Returns
     -------
-    str
-        Number of right-hand-side evaluations, and measured or estimated time.
+    CostEstimate
+        Expected work, and measured or estimated time.
     """
     work, guess = estimate_evaluations_and_time(cell_plan)
     work = round(work, 2 - len(str(work)))  # more digits would not be significant
-    text = f"about {work:,} right-hand sides at rtol {cell_plan.study.accuracy.rtol:g}; "
-    kept = output_directory / f"{cell_plan.study.name}.cells.sqlite"
-    took = read_timings(kept)
+    journal = output_directory / f"{cell_plan.study.name}.cells.sqlite"
+    took, cells = read_timings(journal), len(cell_plan.unique_cell_numbers)
     if (
         took is None
         or not _timings_match_accuracy_and_engine(cell_plan, took)
         or not took.seconds_by_cell_key
     ):
-        return (
-            f"{text}at a guess {format_duration(guess)} on one core, "
-            "but ten times as long is possible"
-        )
-    cells = len(cell_plan.unique_cell_numbers)
-    known = [
-        took.seconds_by_cell_key[key]
-        for key in cell_plan.keys[cell_plan.unique_cell_numbers].tolist()
-        if key in took.seconds_by_cell_key
-    ]
-    if len(known) == cells:
-        return text + f"took {format_duration(math.fsum(known))} on one core here last ({kept})"
-    missing = (cells - len(known)) * float(np.mean(list(took.seconds_by_cell_key.values())))
-    by = f"by the {len(took.seconds_by_cell_key):,} cells in {kept}"
-    return text + f"about {format_duration(math.fsum(known) + missing)} on one core, {by}"
+        return CostEstimate(work, guess, cells, 0, 0, journal)
+    times = took.seconds_by_cell_key
+    keys = cell_plan.keys[cell_plan.unique_cell_numbers].tolist()
+    known = [times[key] for key in keys if key in times]
+    missing = (cells - len(known)) * float(np.mean(list(times.values())))
+    return CostEstimate(work, math.fsum(known) + missing, cells, len(known), len(times), journal)
+
+
+def describe_study_cost(cell_plan: CellPlan, output_directory: Path) -> str:
+    """Describe the work and the computing time of a study on one core.
+
+    Parameters
+    ----------
+    cell_plan : CellPlan
+        Cells of the study.
+    output_directory : Path
+        Directory of results, as for ``estimate_study_cost``.
+
+    Returns
+    -------
+    str
+        Number of right-hand-side evaluations, and measured or estimated time.
+    """
+    cost = estimate_study_cost(cell_plan, output_directory)
+    rtol, time = cell_plan.study.accuracy.rtol, f"{format_duration(cost.seconds)} on one core"
+    text = f"about {cost.rhs_evaluations:,} right-hand-side evaluations at rtol {rtol:g}; "
+    if not cost.timed_cells:
+        return f"{text}roughly {time} (may be up to ten times longer)"
+    if cost.measured_cells == cost.cell_count:
+        return f"{text}last run took {time} ({cost.journal})"
+    return f"{text}about {time}, based on {cost.timed_cells:,} cells in {cost.journal}"
 
 
 def compiled_engine_hint(cell_plan: CellPlan, output_directory: Path) -> str:
@@ -102,7 +147,7 @@ def compiled_engine_hint(cell_plan: CellPlan, output_directory: Path) -> str:
     each = ", ".join(
         f"{times} times with {name}" for name, times in _COMPILED_SPEEDUP_BY_MEASURE.items()
     )
-    return f"--engine compiled is faster as a rule: about {each}"
+    return f"--engine compiled is usually faster: about {each}"
 
 
 def format_duration(seconds: float) -> str:

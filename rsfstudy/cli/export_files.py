@@ -1,7 +1,7 @@
 """Export of results files to CSV and MATLAB.
 
 A new export format needs a function in this module, an entry in the dictionary ``writers`` of
-``commands.export``, and an option of the command ``export`` in ``command_line``. The formats in
+``commands/export.py``, and an option of the command ``export`` in the same file. The formats in
 ``rsfstudy.defaults.RESULT_FORMATS`` are formats of results files, not export formats.
 """
 
@@ -67,8 +67,11 @@ def to_mat(dataset: xr.Dataset, path: Path) -> None:
 
     for name in map(str, (*dataset.variables, *dataset.attrs)):
         if not re.fullmatch(r"[A-Za-z]\w{0,62}", name, re.ASCII):
-            rule = "is no name in MATLAB, which has letters, digits and _, and a letter first"
-            remedy = "Rename it, as in dataset.rename(old='new')."
+            rule = (
+                "is not a valid MATLAB name, which consists of letters, digits and _ and starts "
+                "with a letter"
+            )
+            remedy = "Rename the variable, for example with dataset.rename(old='new')."
             raise InvalidValue("name", name, rule, remedy=remedy)
     data: dict[str, Any] = {str(n): values.values for n, values in dataset.variables.items()}
     for name, values in data.items():

@@ -6,7 +6,6 @@ Slow modules are imported only when the value of an option is checked.
 from __future__ import annotations
 
 import functools
-import importlib
 import os
 import shlex
 import sys
@@ -61,44 +60,6 @@ class CommandOptions(SimpleNamespace):
             for name in EXAMPLE_VALUES_OF_RIG_OPTIONS
             if (text := getattr(self, name)) is not None
         }
-
-
-class LazilyLoadedCommand(click.Command):
-    """Command whose implementation is imported when the command is called.
-
-    The implementation is a function with the name of the command, in a module of ``rsfstudy.cli``.
-    The function takes the options and returns the exit status.
-
-    Parameters
-    ----------
-    *args : Any
-        Arguments of ``click.Command``.
-    does : str, default: "commands"
-        Name of the module with the implementation.
-    **command_settings : Any
-        Keyword arguments of ``click.Command``.
-    """
-
-    def __init__(self, *args: Any, does: str = "commands", **command_settings: Any) -> None:
-        """Create the command without importing the implementation."""
-        super().__init__(*args, **command_settings)
-        self._module_name = does
-
-    def invoke(self, context: click.Context) -> Any:
-        """Import the implementation and call it with the options.
-
-        Parameters
-        ----------
-        context : click.Context
-            Context with the values of arguments and options.
-
-        Returns
-        -------
-        int
-            Exit status.
-        """
-        module = importlib.import_module(f"rsfstudy.cli.{self._module_name}")
-        return getattr(module, str(self.name))(CommandOptions(**context.params))
 
 
 class FilePath(click.Path):
@@ -209,9 +170,12 @@ def make_output_option(
     return click.option("--output", type=FilePath(**path_settings), default=default, help=help_text)
 
 
+json_option = click.option(
+    "--json", "as_json", is_flag=True, help="Print the result as JSON on the standard output."
+)
 study_name_or_all_argument = combine_option_decorators(
     click.argument("name", required=False),
-    click.option("--all", "every", is_flag=True, help="Every named study."),
+    click.option("--all", "every", is_flag=True, help="Process all named studies."),
 )
 output_option = make_output_option("Directory of the results.", OUTPUT_DIRECTORY, file_okay=False)
 set_values_option = click.option(
@@ -219,31 +183,33 @@ set_values_option = click.option(
     "settings",
     multiple=True,
     metavar="AXIS=VALUES",
-    help="Other values: a comma list, start:stop:count or start:stop:count:log; of a rig with "
-    "units, as in hold_time='10 s,100 s'; of loading CSV files of protocols or records.",
+    help="Override an axis or a field with a comma-separated list, start:stop:count or "
+    "start:stop:count:log. With a rig, values can have units, for example "
+    "hold_time='10 s,100 s'. Values of loading can be CSV files of protocols or records.",
 )
 rtol_option = click.option(
     "--rtol",
     type=float,
     metavar="RTOL",
-    help="Accuracy of each cell, 1e-11 to 0.01.  [default: the study's, 1e-07]",
+    help="Relative tolerance of each cell, from 1e-11 to 0.01.  "
+    "[default: value of the study, 1e-07]",
 )
 engine_option = click.option(
     "--engine",
     type=click.Choice(ENGINES),
-    help="What integrates motions; compiled, which needs Numba, is much faster.  "
-    "[default: the study's, scipy]",
+    help="Integration engine. The engine compiled requires Numba and is much faster.  "
+    "[default: engine of the study, scipy]",
 )
 
 budget_option = make_count_option(
     "--budget",
     None,
-    "Right-hand sides a cell may evaluate; with more, cells that have an answer keep it.  "
-    "[default: the study's, 500000]",
+    "Maximum number of right-hand-side evaluations per cell. If you increase it, cells with an "
+    "answer are not recomputed.  [default: value of the study, 500000]",
 )
 #: Options of the worker pool that computes the cells.
 worker_options = combine_option_decorators(
-    make_count_option("--workers", 2, "Worker processes of this machine."),
+    make_count_option("--workers", 2, "Number of worker processes on this machine."),
     click.option("--serial", is_flag=True, help="Compute in this process."),
     click.option("--scheduler", metavar="ADDRESS", help="Use an existing Dask cluster."),
     click.option(
@@ -251,14 +217,15 @@ worker_options = combine_option_decorators(
         type=float,
         metavar="SECONDS",
         default=CELL_TIME_LIMIT,
-        help="CPU time after which a worker gives a cell up.",
+        help="CPU time limit for each cell on a worker.",
     ),
-    click.option("--quiet", is_flag=True, help="Do not show how far it has come."),
+    click.option("--quiet", is_flag=True, help="Do not show progress."),
 )
 study_file_option = click.option(
     "--study",
     type=FilePath(),
-    help="File that declares the study, if its measure, a part or the figure is its own.",
+    help="Python file of the study. Required if the study defines a measure, a part or a figure "
+    "itself.",
 )
 
 #: Mapping from the names of abscissae on the command line to variable names, if the names differ.
@@ -267,8 +234,8 @@ abscissa_option = click.option(
     "--against",
     type=click.Choice(["displacement", "slip", "time"]),
     callback=lambda _context, _option, value: _ABSCISSA_VARIABLES.get(value, value),
-    help="Abscissa of the picture of a motion; displacement is that of the load point.  "
-    "[default: displacement, or slip where the load point is held]",
+    help="Abscissa of the figure of a motion. The choice displacement refers to the load point.  "
+    "[default: displacement, or slip if the load point is held fixed]",
 )
 
 
@@ -302,7 +269,8 @@ figure_options = combine_option_decorators(
         "--style",
         metavar="STYLE",
         callback=_check_style_option,
-        help="Style sheet of matplotlib (FILE.mplstyle), or the name of one, on top of ours.",
+        help="Matplotlib style sheet (FILE.mplstyle) or name of a style, applied after the default "
+        "style.",
     ),
 )
 
@@ -391,7 +359,7 @@ EXAMPLE_VALUES_OF_RIG_OPTIONS = {
 }
 
 
-_RIG_OPTION_HELP = "Of the rig, as in '{}'; a plain number is in SI units."
+_RIG_OPTION_HELP = "Rig parameter, for example '{}'. A number without units is in SI units."
 #: Options that define a rig.
 rig_options = combine_option_decorators(
     *(

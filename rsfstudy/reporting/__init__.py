@@ -11,11 +11,36 @@ from typing import TYPE_CHECKING
 from rsfstudy._lazy_exports import build_lazy_export_functions
 
 if TYPE_CHECKING:
+    from rsfstudy.reporting.cell_tables import (
+        build_frame_of_cells,
+        count_pending_cells,
+        count_statuses,
+        failures_table,
+        format_notes_on_incomplete_results,
+        format_status_counts,
+    )
     from rsfstudy.reporting.fit_tables import (
         all_fits_are_valid,
         fit_table,
         is_fit,
+        list_fit_values,
         split_into_single_fits,
+    )
+    from rsfstudy.reporting.lattice_tables import (
+        summarise_study_as_text_lines,
+    )
+    from rsfstudy.reporting.machine_readable import (
+        build_contents_table,
+        classify_contents,
+        summarise_file_as_fields,
+        summarise_study_as_fields,
+    )
+    from rsfstudy.reporting.origin_tables import (
+        describe_scene_and_rig_fields,
+        note_on_norms_near_load_velocity,
+    )
+    from rsfstudy.reporting.reduction_tables import (
+        build_reduction_tables_and_sentences,
     )
     from rsfstudy.reporting.summaries import (
         SummaryTableOrSentence,
@@ -26,53 +51,58 @@ if TYPE_CHECKING:
     )
     from rsfstudy.reporting.tables import (
         TextTable,
-        build_frame_of_cells,
-        build_reduction_tables_and_sentences,
-        claims_table,
-        count_pending_cells,
-        count_statuses,
-        count_verdicts,
-        describe_scene_and_rig_fields,
-        failures_table,
-        format_notes_on_incomplete_results,
         format_number_or_dash,
-        format_status_counts,
-        note_on_norms_near_load_velocity,
-        summarise_study_as_text_lines,
+    )
+    from rsfstudy.reporting.verdict_tables import (
+        claims_table,
+        count_verdicts,
         summarise_verdicts,
     )
 else:
     __getattr__, __dir__ = build_lazy_export_functions(
         __name__,
         {
+            "reporting.cell_tables": (
+                "build_frame_of_cells",
+                "count_pending_cells",
+                "count_statuses",
+                "failures_table",
+                "format_notes_on_incomplete_results",
+                "format_status_counts",
+            ),
             "reporting.fit_tables": (
                 "all_fits_are_valid",
                 "fit_table",
                 "is_fit",
+                "list_fit_values",
                 "split_into_single_fits",
             ),
+            "reporting.lattice_tables": ("summarise_study_as_text_lines",),
+            "reporting.machine_readable": (
+                "build_contents_table",
+                "classify_contents",
+                "summarise_file_as_fields",
+                "summarise_study_as_fields",
+            ),
+            "reporting.origin_tables": (
+                "describe_scene_and_rig_fields",
+                "note_on_norms_near_load_velocity",
+            ),
+            "reporting.reduction_tables": ("build_reduction_tables_and_sentences",),
             "reporting.summaries": (
                 "SummaryTableOrSentence",
-                "describe_dataset_origin",
-                "is_motion",
                 "build_motion_tables_and_sentences",
                 "build_summary_tables_and_sentences",
+                "describe_dataset_origin",
+                "is_motion",
             ),
             "reporting.tables": (
                 "TextTable",
-                "build_frame_of_cells",
-                "claims_table",
-                "count_pending_cells",
-                "count_statuses",
-                "count_verdicts",
-                "describe_scene_and_rig_fields",
-                "failures_table",
                 "format_number_or_dash",
-                "format_status_counts",
-                "format_notes_on_incomplete_results",
-                "build_reduction_tables_and_sentences",
-                "note_on_norms_near_load_velocity",
-                "summarise_study_as_text_lines",
+            ),
+            "reporting.verdict_tables": (
+                "claims_table",
+                "count_verdicts",
                 "summarise_verdicts",
             ),
         },
@@ -82,25 +112,30 @@ __all__ = [
     "SummaryTableOrSentence",
     "TextTable",
     "all_fits_are_valid",
+    "build_contents_table",
     "build_frame_of_cells",
+    "build_motion_tables_and_sentences",
+    "build_reduction_tables_and_sentences",
+    "build_summary_tables_and_sentences",
     "claims_table",
+    "classify_contents",
     "count_pending_cells",
     "count_statuses",
     "count_verdicts",
-    "describe_scene_and_rig_fields",
     "describe_dataset_origin",
+    "describe_scene_and_rig_fields",
     "failures_table",
     "fit_table",
+    "format_notes_on_incomplete_results",
     "format_number_or_dash",
     "format_status_counts",
-    "format_notes_on_incomplete_results",
     "is_fit",
     "is_motion",
-    "build_motion_tables_and_sentences",
-    "build_reduction_tables_and_sentences",
+    "list_fit_values",
     "note_on_norms_near_load_velocity",
     "split_into_single_fits",
+    "summarise_file_as_fields",
+    "summarise_study_as_fields",
     "summarise_study_as_text_lines",
     "summarise_verdicts",
-    "build_summary_tables_and_sentences",
 ]

@@ -1,13 +1,8 @@
-"""Tables of fits, for users, commands and reports.
-
-``fit_table`` returns a table for users. ``summarise_fits`` yields the tables and remarks that
-commands print and reports show.
-"""
+"""Numbers of fits, as a table for users and as dictionaries for machine-readable results."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
 from typing import Any
 
 import numpy as np
@@ -17,13 +12,10 @@ import xarray as xr
 from rsfstudy.errors import DataError
 from rsfstudy.fitting import (
     PARAMETERS,
-    describe_whiteness,
     split_window_number,
 )
-from rsfstudy.formatting import pluralize
-from rsfstudy.reporting.tables import TextTable
+from rsfstudy.reporting.tables import format_units
 from rsfstudy.status import STATUS_LABELS, Status
-from rsfstudy.storage import read_declaration
 
 #: Names that laboratories use for parameters, if the names in rsfstudy are different.
 _LABORATORY_NAME_BY_PARAMETER_NAME = {
@@ -33,20 +25,8 @@ _LABORATORY_NAME_BY_PARAMETER_NAME = {
     "stiffness": "k",
     "trend1": "trend",
 }
-#: Maximum number of fits next to each other in a table.
-_MAX_FITS_PER_TABLE = 3
-#: Headings of the parameters in the final table, which has one row per fit.
-_PARAMETERS_IN_FIT_SUMMARY = ("a", "b", "b1", "b2", "Dc")
 #: Status of fits that have values and valid standard errors.
 _STATUS_LABELS_OF_FITS_WITH_VALUES = (Status.OK.label, Status.NOT_IDENTIFIED.label)
-#: If the ratio of a standard error to the value of the parameter exceeds this limit, neither number
-#: is printed.
-_MAX_PRINTED_RELATIVE_ERROR = 1e4
-#: If the AIC values of two friction laws differ by more than this limit, the comparison of the laws
-#: is decisive.
-_DECISIVE_AIC_DIFFERENCE = 10.0
-#: Symbol that marks invalid standard errors.
-_MARK_OF_INVALID_STDERRS = "*"
 
 
 def is_fit(dataset: xr.Dataset) -> bool:
@@ -86,7 +66,7 @@ def split_into_single_fits(dataset: xr.Dataset) -> list[xr.Dataset]:
         If the dataset contains no fits.
     """
     if not is_fit(dataset):
-        raise DataError("the dataset holds no fit: it is not what rsfstudy.fit gives")
+        raise DataError("the dataset contains no fit. Use a dataset from rsfstudy.fit.")
     if "part" in dataset.dims:
         dataset = dataset.isel(part=0)
     dims = dataset["rows_fitted"].dims
@@ -170,7 +150,7 @@ def fit_table(dataset: xr.Dataset) -> pd.DataFrame:
                 row[f"{short}_windows"] = one[f"{name}_windows"].item()
         row |= {"V0": one["velocity_before"].item(), "V1": one["velocity_after"].item()}
         row |= {"law": one["law"].item() if "law" in one.coords else ""}
-        row |= _normal_stresses_in_mpa(one)
+        row |= normal_stresses_in_mpa(one)
         if "window_stiffness" in one and "stiffness" not in one["parameter"].values:
             row["k"] = one["window_stiffness"].item()
         row["window"] = f"{one['window_begins'].item():g} to {one['window_ends'].item():g}"
@@ -180,11 +160,67 @@ def fit_table(dataset: xr.Dataset) -> pd.DataFrame:
     return pd.DataFrame(rows)
 
 
-def _normal_stresses_in_mpa(fit: xr.Dataset) -> dict[str, float]:
+def list_fit_values(dataset: xr.Dataset) -> list[dict[str, Any]]:
+    """Return the numbers of each fit for machine-readable results.
+
+    Parameters
+    ----------
+    dataset : xarray.Dataset
+        Dataset from ``rsfstudy.fit``.
+
+    Returns
+    -------
+    list of dict
+        One dictionary per fit, with the keys that the page on running studies documents. The values
+        of the fitted parameters have the names, values and units of the dataset.
+
+    Raises
+    ------
+    DataError
+        If the dataset contains no fits.
+    """
+    numbers = {
+        "velocity_before": "velocity_before", "velocity_after": "velocity_after",
+        "window_begins": "window_begins", "window_ends": "window_ends",
+        "rows_fitted": "rows_fitted", "r_squared": "r_squared", "aic": "criterion",
+        "noise_order": "noise_order", "noise_sd": "noise_size", "n_eff": "effective_samples",
+        "p_value": "whiteness",
+    }  # fmt: skip
+    return [
+        {
+            **dict.fromkeys(("record", "step")),
+            **record_and_step_of_fit(one),
+            "law": str(one["law"].item()) if "law" in one.coords else None,
+            "status": status_label_of_fit(one),
+            "message": str(one["message"].item()),
+            "parameters": [
+                {
+                    "name": name,
+                    "units": format_units(one[name]),
+                    "value": one[name].item(),
+                    "stderr": one[f"{name}_stderr"].item(),
+                }
+                for name in parameter_headings(one)
+            ],
+            **{key: one[name].item() for key, name in numbers.items()},
+        }
+        for one in split_into_single_fits(dataset)
+    ]
+
+
+def normal_stresses_in_mpa(fit: xr.Dataset) -> dict[str, float]:
     """Return the normal stress before each step in MPa.
 
-    If the fit has one step, the key is ``normal_stress``. If the fit has several steps, each step
-    has a numbered key. Normal stresses that are not finite are omitted.
+    Parameters
+    ----------
+    fit : xarray.Dataset
+        Dataset with a single fit.
+
+    Returns
+    -------
+    dict of str to float
+        If the fit has one step, the key is ``normal_stress``. If the fit has several steps, each
+        step has a numbered key. Normal stresses that are not finite are omitted.
     """
     names = [str(n) for n in fit.data_vars if str(n).startswith("normal_stress_before_")]
     stresses = {n: fit[n].item() * 1e-6 for n in names or ["normal_stress_before"] if n in fit}
@@ -206,9 +242,6 @@ def status_label_of_fit(fit: xr.Dataset) -> str:
         Label such as ``ok`` or ``not_identified``.
     """
     return STATUS_LABELS[int(fit["status"])]
-
-
-# ---- tables for commands and reports ------------------------------------------------------------
 
 
 def all_fits_are_valid(dataset: xr.Dataset) -> bool:
@@ -233,197 +266,3 @@ def all_fits_are_valid(dataset: xr.Dataset) -> bool:
         status_label_of_fit(one) in _STATUS_LABELS_OF_FITS_WITH_VALUES
         for one in split_into_single_fits(dataset)
     )
-
-
-def summarise_fits(dataset: xr.Dataset) -> Iterator[TextTable | str]:
-    """Yield tables of all fits, with remarks on each fit.
-
-    Parameters
-    ----------
-    dataset : xarray.Dataset
-        Dataset from ``rsfstudy.fit``.
-
-    Yields
-    ------
-    TextTable or str
-        Parameter tables with up to three fits of the same step side by side. The tables are
-        followed by remarks and a comparison of the laws. If there are several steps or records, a
-        final table has one row per fit.
-    """
-    places: dict[str, list[xr.Dataset]] = {}
-    for one in split_into_single_fits(dataset):
-        where = ", ".join(f"{n} {value}" for n, value in record_and_step_of_fit(one).items())
-        places.setdefault(where, []).append(one)
-    measure: Any = read_declaration(dataset).measure
-    together = ", ".join(f"step {step} of {record}" for record, step in measure.get("together", ()))
-    for where, fits in places.items():
-        if together:
-            yield f"together: {together}; the window is that of the first"
-        for first in range(0, len(fits), _MAX_FITS_PER_TABLE):
-            yield _parameter_table(where, fits[first : first + _MAX_FITS_PER_TABLE])
-        for one in fits:
-            yield from _iterate_fit_remarks(one)
-        yield from _compare_laws_of_fits(fits)
-    if len(places) > 1:
-        yield TextTable(
-            [_summary_row_of_fit(one) for fits in places.values() for one in fits], "Of all:"
-        )
-
-
-def _compare_laws_of_fits(fits: Sequence[xr.Dataset]) -> Iterator[str]:
-    """Yield a sentence that names the law with the lowest AIC.
-
-    The sentence also reports whether the AIC difference to the second-best law is decisive.
-    """
-    known = [(one["criterion"].item(), str(one["law"].item())) for one in fits]
-    known = sorted(pair for pair in known if math.isfinite(pair[0]))
-    if len(known) > 1:
-        (best, law), (next_best, _other) = known[:2]
-        by = next_best - best
-        enough = (
-            "decides"
-            if by >= _DECISIVE_AIC_DIFFERENCE
-            else f"does not decide: {_DECISIVE_AIC_DIFFERENCE:g} would"
-        )
-        yield f"{law} explains the record best; its criterion is lower by {by:.1f}, which {enough}"
-
-
-def _summary_row_of_fit(fit: xr.Dataset) -> dict[str, str]:
-    """Return the row of a fit in the table with one row per fit."""
-    few = {
-        n: format_with_stderr(fit, name)
-        for name, n in parameter_headings(fit).items()
-        if n in _PARAMETERS_IN_FIT_SUMMARY
-    }
-    at = {n: str(value) for n, value in record_and_step_of_fit(fit).items()}
-    return {**at, "law": str(fit["law"].item()), **few, "status": status_label_of_fit(fit)}
-
-
-def _parameter_table(table_title: str, fits: Sequence[xr.Dataset]) -> TextTable:
-    """Return a table of the parameters with one column per fit."""
-    columns = {str(one["law"].item()): _build_parameter_column(one) for one in fits}
-    headings = next(iter(columns.values()))
-    rows = [{"parameter": h, **{law: c[h] for law, c in columns.items()}} for h in headings]
-    windows = (_describe_window(one) for one in fits if np.isfinite(one["rows_fitted"].item()))
-    return TextTable(rows, "\n".join(filter(None, (table_title, next(windows, "")))))
-
-
-def _build_parameter_column(fit: xr.Dataset) -> dict[str, str]:
-    """Return a table column with the parameters, quality and noise of a fit."""
-    found = {
-        n + _bracketed_units(split_window_number(name)[0]): format_with_stderr(fit, name)
-        for name, n in parameter_headings(fit).items()
-    }
-    if "window_stiffness" in fit and "stiffness" not in fit["parameter"].values:
-        found["k" + _bracketed_units("stiffness")] = f"{fit['window_stiffness'].item():.6g}"
-    stresses = [f"{stress:.6g}" for stress in _normal_stresses_in_mpa(fit).values()]
-    if stresses:
-        found["normal stress (MPa)"] = ", ".join(stresses)
-    quality = dict.fromkeys(("R2", "criterion", "noise", "worth"), "-")
-    if np.isfinite(fit["rows_fitted"].item()):
-        order = int(fit["noise_order"].item())
-        process = f"AR({order})" if order else "white"
-        quality = {
-            "R2": f"{fit['r_squared'].item():.4f}",
-            "criterion": f"{fit['criterion'].item():.1f}",
-            "noise": f"{process}, sd {fit['noise_size'].item():.2g}",
-            "worth": pluralize(round(fit["effective_samples"].item()), "independent row"),
-        }
-    return found | quality | {"status": status_label_of_fit(fit)}
-
-
-def _bracketed_units(parameter_name: str) -> str:
-    """Return the units of a parameter in brackets.
-
-    The string is empty if the parameter is dimensionless.
-    """
-    units = PARAMETERS[parameter_name].units if parameter_name in PARAMETERS else "1"
-    if units.startswith("um-"):
-        units = f"1/um^{units[3:]}".removesuffix("^1")
-    return "" if units == "1" else f" ({units})"
-
-
-def _describe_window(fit: xr.Dataset) -> str:
-    """Describe the velocities of the step and the fitted window."""
-    speeds = (fit[n].item() for n in ("velocity_before", "velocity_after"))
-    ends = (fit[n].item() for n in ("window_begins", "window_ends"))
-    rows = int(fit["rows_fitted"].item())
-    return (
-        f"{' to '.join(f'{v:.4g}' for v in speeds)} um/s, "
-        f"fitted from {' to '.join(f'{x:.6g}' for x in ends)} um, {rows:,} rows"
-    )
-
-
-def format_with_stderr(fit: xr.Dataset, parameter_name: str) -> str:
-    """Format a fitted parameter with its standard error.
-
-    The value and the error are rounded to two significant digits of the error.
-
-    Parameters
-    ----------
-    fit : xarray.Dataset
-        Dataset with a single fit.
-    parameter_name : str
-        Name of the parameter.
-
-    Returns
-    -------
-    str
-        Formatted parameter. An asterisk marks a standard error that is not valid.
-    """
-    text = _format_rounded_to_error(
-        fit[parameter_name].item(), fit[f"{parameter_name}_stderr"].item()
-    )
-    is_marked = " +- " in text and status_label_of_fit(fit) == Status.ERRORS_NOT_VALID.label
-    return text + _MARK_OF_INVALID_STDERRS * is_marked
-
-
-def _format_rounded_to_error(value: float, error: float) -> str:
-    """Format a value with its standard error.
-
-    The value and the error are rounded to two significant digits of the error.
-    """
-    if not math.isfinite(value):
-        return "-"
-    if error > _MAX_PRINTED_RELATIVE_ERROR * abs(value) > 0.0:
-        return "not told"
-    if not (math.isfinite(error) and error > 0.0):
-        return f"{value:.6g} +- {error:g}"
-    digits = 1 - math.floor(math.log10(error))
-    size = math.floor(math.log10(max(abs(value), error)))
-    if -5 <= size < 6 and digits <= 9:
-        digits = max(digits, 0)
-        return f"{value:z.{digits}f} +- {error:.{digits}f}"
-    scale = 10.0**size
-    digits = max(digits + size, 0)
-    return f"({value / scale:z.{digits}f} +- {error / scale:.{digits}f})e{size:+03d}"
-
-
-def _iterate_fit_remarks(fit: xr.Dataset) -> Iterator[str]:
-    """Yield remarks on a fit.
-
-    The remarks include the message of the fit, the differences between windows, the credible
-    intervals of the posterior, and the result of the autocorrelation test.
-    """
-    law, message = fit["law"].item(), str(fit["message"].item())
-    if status_label_of_fit(fit) == Status.ERRORS_NOT_VALID.label:
-        mark = _MARK_OF_INVALID_STDERRS
-        yield f"{law}: standard errors marked by {mark} are not valid: {message}"
-    elif message:
-        yield f"{law}: {status_label_of_fit(fit).replace('_', ' ')}: {message}"
-    short = parameter_headings(fit)
-    spreads = ((short[n], fit[f"{n}_windows"].item()) for n in short if f"{n}_windows" in fit)
-    if each := ", ".join(f"{n} {value:.2g}" for n, value in spreads if not math.isnan(value)):
-        yield f"{law}: among windows parameters differ by {each}"
-    if "posterior" in fit and math.isfinite(fit["autocorrelation_time"].item()):
-        drawn = fit["posterior"].quantile([0.025, 0.975], "draw")
-        each = ", ".join(
-            f"{short[str(of.parameter.values)]} {of.values[0]:.4g} to {of.values[1]:.4g}"
-            for of in drawn.dropna("parameter").transpose("parameter", ...)
-        )
-        time = f"{fit['autocorrelation_time'].item():.2g} steps"
-        yield f"{law}: 95 % of the posterior: {each} (autocorrelation time {time})"
-    p_value = fit["whiteness"].item()
-    if math.isfinite(p_value):
-        order, rows = int(fit["noise_order"]), int(fit["rows_fitted"])
-        yield f"{law}: {describe_whiteness(p_value, order, rows)}"

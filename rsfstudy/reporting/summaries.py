@@ -7,6 +7,7 @@ and sentences.
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
+from typing import Any
 
 import numpy as np
 import xarray as xr
@@ -14,10 +15,17 @@ import xarray as xr
 from rsfstudy.errors import InvalidValue
 from rsfstudy.fitting import EVENT_QUANTITIES
 from rsfstudy.formatting import read_flag_meanings
-from rsfstudy.reporting import fit_tables, tables
+from rsfstudy.reporting import fit_tables, origin_tables
+from rsfstudy.reporting.fit_summaries import summarise_fits
+from rsfstudy.reporting.lattice_tables import build_primary_output_table
+from rsfstudy.reporting.reduction_tables import (
+    build_reduction_tables,
+    find_refusal_reasons_of_reductions,
+)
 from rsfstudy.reporting.tables import (
     MAX_CELLS_SHOWN,
     TextTable,
+    build_single_scene_result_table,
     format_number_or_dash,
     format_units,
 )
@@ -43,24 +51,23 @@ def build_summary_tables_and_sentences(dataset: xr.Dataset) -> Iterator[SummaryT
         events.
     """
     if fit_tables.is_fit(dataset):
-        yield from fit_tables.summarise_fits(dataset)
+        yield from summarise_fits(dataset)
     elif not is_of_single_scene(dataset):
-        yield tables.build_primary_output_table(dataset)
-        yield from tables.reduction_tables(dataset)
+        yield build_primary_output_table(dataset)
+        yield from build_reduction_tables(dataset)
         yield {
-            f"no {name}": why
-            for name, why in tables.find_refusal_reasons_of_reductions(dataset).items()
+            f"no {name}": why for name, why in find_refusal_reasons_of_reductions(dataset).items()
         }
-        yield from filter(None, [tables.note_on_norms_near_load_velocity(dataset)])
+        yield from filter(None, [origin_tables.note_on_norms_near_load_velocity(dataset)])
     elif is_motion(dataset):
         yield summarise_motion(dataset)
         try:
             yield describe_stability(dataset.rsf.scene)
             yield build_events_table(dataset.rsf.events())
         except InvalidValue as error:  # The scene has a user-defined part.
-            yield f"neither its stability nor its events: {error}"
+            yield f"stability and events are unavailable: {error}"
     else:
-        yield tables.build_single_scene_result_table(dataset)
+        yield build_single_scene_result_table(dataset)
 
 
 def build_motion_tables_and_sentences(
@@ -116,15 +123,46 @@ def describe_dataset_origin(dataset: xr.Dataset) -> dict[str, str]:
         Descriptions of the scene or the lattice, the command, the versions and the status.
     """
     if not is_of_single_scene(dataset):
-        return tables.describe_study_origin(dataset)
+        return origin_tables.describe_study_origin(dataset)
     about, scene = dataset.attrs, read_scene_fields(dataset)
     fields = {n: v for n, v in scene.items() if n not in ("segments", "samples")}
     rig = read_json_attribute(dataset, "laboratory") if "laboratory" in about else {}
     return {
-        **tables.describe_scene_and_rig_fields("scene", fields, rig),
-        "made by": about.get("history", "unknown"),
-        "with": about.get("source", "unknown"),
+        **origin_tables.describe_scene_and_rig_fields("scene", fields, rig),
+        "command": about.get("history", "unknown"),
+        "versions": about.get("source", "unknown"),
         "status": f"{about['status']} {about.get('message', '')}".strip(),
+    }
+
+
+def measure_motion(dataset: xr.Dataset) -> dict[str, Any]:
+    """Measure the duration and the peak values of a motion.
+
+    Parameters
+    ----------
+    dataset : xarray.Dataset
+        Motion from ``rsfstudy.simulate``, in any units.
+
+    Returns
+    -------
+    dict of str to object
+        Numbers by name, and the units of times and slip rates. If the motion does not exceed the
+        instability norm, or if it has inertia or radiation damping, ``instability_time`` is None.
+    """
+    time, friction = dataset["time"], dataset["friction_coefficient"]
+    over_reference = (10.0 ** dataset["log10_slip_rate"]).assign_attrs(scale="V_*")
+    rate = dataset.get("slip_rate", over_reference)
+    peaks = {"friction": friction, "slip_rate": rate}
+    at = {name: int(np.argmax(values.values)) for name, values in peaks.items()}
+    norm = dataset.get("instability_time")
+    return {
+        "duration": float(time[-1]),
+        "time_units": format_units(time),
+        "slip_rate_units": format_units(rate),
+        **{f"peak_{name}": float(values[at[name]]) for name, values in peaks.items()},
+        **{f"peak_{name}_time": float(time[at[name]]) for name in peaks},
+        "instability_time": None if norm is None else float(norm),
+        "final_friction": float(friction[-1]),
     }
 
 
@@ -143,18 +181,15 @@ def summarise_motion(dataset: xr.Dataset) -> dict[str, str]:
         inertia nor radiation damping and exceeds the instability norm, the time at which the motion
         exceeds the norm is included.
     """
-    time, friction = dataset["time"], dataset["friction_coefficient"]
-    over_reference = (10.0 ** dataset["log10_slip_rate"]).assign_attrs(scale="V_*")
-    rate, unit = dataset.get("slip_rate", over_reference), format_units(time)
-    per = f" {format_units(rate)}"
-    told = {"duration": f"{float(time[-1]):.6g} {unit}"}
-    for name, values, of in (("peak friction", friction, ""), ("peak slip rate", rate, per)):
-        peak = int(np.argmax(values.values))
-        told[name] = f"{float(values[peak]):.6g}{of} after {float(time[peak]):.6g} {unit}"
-    if "instability_time" in dataset:
-        since = f"{float(dataset['instability_time']):.6g} {unit}"
-        told["beyond the instability norm"] = f"no physics after {since}"
-    told["friction at the end"] = f"{float(friction[-1]):.6g}"
+    found, unit = measure_motion(dataset), format_units(dataset["time"])
+    told = {"duration": f"{found['duration']:.6g} {unit}"}
+    for name, units in (("friction", ""), ("slip_rate", f" {found['slip_rate_units']}")):
+        peak, time = found[f"peak_{name}"], found[f"peak_{name}_time"]
+        told[f"peak {name.replace('_', ' ')}"] = f"{peak:.6g}{units} after {time:.6g} {unit}"
+    if found["instability_time"] is not None:
+        since = f"{found['instability_time']:.6g} {unit}"
+        told["beyond the instability norm"] = f"no physical meaning after {since}"
+    told["friction at the end"] = f"{found['final_friction']:.6g}"
     return told
 
 
@@ -172,7 +207,7 @@ def describe_stability(scene: Scene) -> str:
         Sentence with the ratio of the stiffness to the critical stiffness.
     """
     sliding = "stable" if scene.stiffness_ratio > 1.0 else "unstable"
-    ratio = f"{scene.stiffness_ratio:.4g} of the critical"
+    ratio = f"{scene.stiffness_ratio:.4g} times the critical stiffness"
     return f"stiffness is {ratio}: steady sliding at V_* is {sliding}"
 
 

@@ -121,7 +121,7 @@ def format_verdict_row(verdict_row: dict[Any, Any]) -> dict[str, str]:
         "claim": f"{of}{verdict_row['claim']}",
         "published": format_published_value(verdict_row),
         "ours": "-" if pd.isna(verdict_row["ours"]) else f"{verdict_row['ours']:.6g}",
-        "tolerance, and why": reason,
+        "tolerance and reason": reason,
         "verdict": verdict_row["verdict"]
         + f", expected {verdict_row['expected']}" * bool(verdict_row["moved"]),
     }

@@ -757,7 +757,7 @@ _EXCEPTION = re.compile(r"(?<!raises )\b(?:[A-Z]\w*(?:Error|Exception|Halt)|Exce
 _CATCH_ALL_MESSAGES = (
     "cannot be answered (",
     "cannot be had of this dataset",
-    "Look at what it names",
+    "A file may be damaged or not writable",
 )
 
 

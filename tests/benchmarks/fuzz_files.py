@@ -402,7 +402,8 @@ def run_case(case: Case, whole: Path, truths: dict[str, Any]) -> Answer:
 
 # ---- faults --------------------------------------------------------------------------------------
 _CATCH_ALL_MESSAGES = re.compile(
-    "cannot be answered|cannot be had of this dataset|as rsfstudy made it|Look at what it names"
+    "cannot be answered|cannot be had of this dataset|as rsfstudy made it|"
+    "A file may be damaged or not writable"
 )
 _CONTROLS = re.compile(r"[\x00-\x08\x0b-\x1f\x7f-\x9f]")
 _RICH_ESCAPES = re.compile(r"\x1b\[(?:[0-9;]*m|\?25[lh]|2K|1A)")

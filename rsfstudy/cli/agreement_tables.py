@@ -1,0 +1,34 @@
+"""Tables of the agreement of two datasets."""
+
+from __future__ import annotations
+
+import pandas as pd
+
+from rsfstudy.reporting import TextTable, format_number_or_dash
+
+
+def build_agreement_table(agreement: pd.DataFrame) -> TextTable:
+    """Build a table of the agreement of each variable.
+
+    Parameters
+    ----------
+    agreement : pandas.DataFrame
+        Agreement by variable, as ``rsfstudy.rerun`` and ``rsfstudy.compare`` return it.
+
+    Returns
+    -------
+    TextTable
+        Number of identical values of each variable, and number of values that differ by more than
+        the sum of both error estimates.
+    """
+    rows = [
+        {
+            "variable": row["variable"],
+            "values": str(row["values"]),
+            "identical": str(row["identical"]),
+            "beyond errors": format_number_or_dash(row["beyond_errors"], ".0f"),
+            "largest difference": format_number_or_dash(row["largest_difference"], ".3g"),
+        }
+        for row in agreement.to_dict("records")
+    ]
+    return TextTable(rows)

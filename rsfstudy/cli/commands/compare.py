@@ -1,0 +1,193 @@
+"""Command ``rsfstudy compare``."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+import rsfstudy
+from rsfstudy.cli import options
+from rsfstudy.cli.command_group import Command
+from rsfstudy.cli.printing import print_line, print_pieces
+from rsfstudy.cli.results import EXIT_STATUS_FAILED, EXIT_STATUS_OK, CommandResult, output_result
+from rsfstudy.errors import shorten_text
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+    from rsfstudy.reporting import TextTable
+    from rsfstudy.storage import Comparison
+
+#: Maximum number of printed cells with different statuses, and maximum number of characters of a
+#: printed value.
+_MAX_DIFFERING_CELLS, _MAX_VALUE_CHARACTERS = 10, 60
+
+
+@dataclass(frozen=True)
+class FileComparison(CommandResult):
+    """Comparison of two results files.
+
+    Parameters
+    ----------
+    files : sequence of Path
+        Paths of both files.
+    provenance : sequence of mapping of str to object
+        Provenance of both files.
+    differences : Comparison
+        Differences between the files.
+    """
+
+    files: Sequence[Path]
+    provenance: Sequence[Mapping[str, Any]]
+    differences: Comparison
+
+    @property
+    def exit_status(self) -> int:
+        """Failure if a status or a number differs, or if there is no common cell."""
+        return EXIT_STATUS_OK if self.differences.agrees else EXIT_STATUS_FAILED
+
+    @property
+    def verdict(self) -> str:
+        """Sentence that summarises the comparison."""
+        found = self.differences
+        if not found.finished_cell_counts[0]:
+            return "nothing to compare: the files have no finished cell in common"
+        wrong = [f"{name} differs beyond error estimates" for name in found.beyond_errors]
+        if len(found.statuses):
+            from rsfstudy.formatting import pluralize
+
+            wrong.append(f"{pluralize(len(found.statuses), 'cell')} with different statuses")
+        return "; ".join(wrong) or "nothing differs beyond error estimates"
+
+    def json_fields(self) -> dict[str, Any]:
+        """Return the fields of the JSON output."""
+        found = self.differences
+        both, first, second = found.finished_cell_counts
+        places = found.statuses.drop(columns=["first", "second"]).to_dict("records")
+        statuses = found.statuses[["first", "second"]].to_dict("records")
+        return {
+            "files": [
+                {"file": file, "time": about["time"], "command_line": about["command"]}
+                for file, about in zip(self.files, self.provenance, strict=True)
+            ],
+            "agrees": found.agrees,
+            "verdict": self.verdict,
+            "cells": {"both": both, "first_only": first, "second_only": second},
+            "declaration": _list_differences(found.declaration),
+            "provenance": _list_differences(found.origin),
+            "axes": [
+                {"dimension": name, "first_only": first, "second_only": second}
+                for name, (first, second) in found.differing_axis_points.items()
+            ],
+            "statuses": [
+                {"coordinates": place, **labels}
+                for place, labels in zip(places, statuses, strict=True)
+            ],
+            "variables": found.agreement_table.to_dict("records"),
+            "uncompared_variables": found.uncompared_variables,
+        }
+
+
+def _list_differences(differences: Mapping[str, tuple[Any, Any]]) -> list[dict[str, Any]]:
+    """Return one entry per difference for the JSON output."""
+    return [{"name": n, "first": a, "second": b} for n, (a, b) in differences.items()]
+
+
+@click.command(cls=Command)
+@click.argument("first")
+@click.argument("second")
+@options.output_option
+@options.json_option
+def compare(given: options.CommandOptions) -> int:
+    """Compare two results files: declarations, versions and numbers.
+
+    The results of two studies can be compared by name. Cells are matched by their coordinates. Two
+    numbers agree if they differ by no more than the sum of both error estimates. The exit status is
+    0 if all numbers and statuses agree. The exit status is 1 if a number or a status differs, or if
+    the files have no cell in common.
+    """
+    from rsfstudy.api import find_results
+    from rsfstudy.storage import read_provenance
+
+    files = [find_results(name, given.output) for name in (given.first, given.second)]
+    datasets = [rsfstudy.open(file) for file in files]
+    result = FileComparison(
+        files, [read_provenance(one) for one in datasets], rsfstudy.compare(*datasets)
+    )
+    return output_result(result, _print_comparison, given.as_json)
+
+
+def _print_comparison(result: FileComparison) -> None:
+    """Print the files, the differences and the verdict."""
+    from rsfstudy.cli.agreement_tables import build_agreement_table
+    from rsfstudy.formatting import format_list, pluralize
+
+    found = result.differences
+    for letter, file, about in zip("AB", result.files, result.provenance, strict=True):
+        print_line(f"{letter}: {file}, {about['time']}, {about['command']}")
+    print_pieces([_differences_table("declaration", found.declaration)])
+    print_pieces([_differences_table("provenance", found.origin)])
+    both, first, second = found.finished_cell_counts
+    print_line(f"{pluralize(both, 'cell')} in both, {first:,} only in A, {second:,} only in B")
+    for axis, alone in found.differing_axis_points.items():
+        for letter, points in zip("AB", alone, strict=True):
+            if points:
+                print_line(f"{axis} only in {letter} ({len(points)}): {format_list(points)}")
+    print_pieces([_statuses_table(found.statuses)])
+    if len(found.statuses) > _MAX_DIFFERING_CELLS:
+        print_line(f"and {len(found.statuses) - _MAX_DIFFERING_CELLS} more cells")
+    print_pieces([build_agreement_table(_rows_with_differences(found.agreement_table))])
+    for line in _uncompared_lines(found.uncompared_variables):
+        print_line(line)
+    print_line(result.verdict, style="green" if found.agrees else "red")
+
+
+def _differences_table(title: str, differences: Mapping[str, tuple[Any, Any]]) -> TextTable:
+    """Return a table of the entries that differ between the files."""
+    from rsfstudy.formatting import format_value
+    from rsfstudy.reporting import TextTable
+
+    headings = f"{title} differs", "A", "B"
+    rows = [
+        (name, *(shorten_text(format_value(v), _MAX_VALUE_CHARACTERS) for v in pair))
+        for name, pair in differences.items()
+    ]
+    return TextTable([dict(zip(headings, row, strict=True)) for row in rows], "", headings)
+
+
+def _statuses_table(differing_statuses: pd.DataFrame) -> TextTable:
+    """Return a table of the first cells whose statuses in the two files differ."""
+    from rsfstudy.formatting import format_nonempty_fields
+    from rsfstudy.reporting import TextTable
+
+    few = differing_statuses[:_MAX_DIFFERING_CELLS]
+    places: list[dict[Any, Any]] = few.drop(columns=["first", "second"]).to_dict("records")
+    rows = [
+        {
+            "cell": format_nonempty_fields({str(name): value for name, value in place.items()}),
+            "A": a,
+            "B": b,
+        }
+        for place, a, b in zip(places, few["first"], few["second"], strict=True)
+    ]
+    return TextTable(rows, "", {"cell"})
+
+
+def _rows_with_differences(agreement_table: pd.DataFrame) -> pd.DataFrame:
+    """Return the rows of the results that are not identical or that have error estimates."""
+    from rsfstudy.vocabulary import find_coverage_content_type
+
+    differs = agreement_table["identical"] < agreement_table["values"]
+    is_result = agreement_table["variable"].map(find_coverage_content_type) == "modelResult"
+    return agreement_table[is_result & (differs | agreement_table["beyond_errors"].notna())]
+
+
+def _uncompared_lines(uncompared_variables: Mapping[str, str]) -> Iterator[str]:
+    """Yield one line per reason why variables are not compared."""
+    for why in dict.fromkeys(uncompared_variables.values()):
+        names = [name for name, reason in uncompared_variables.items() if reason == why]
+        yield f"not compared, because {why}: {', '.join(names)}"

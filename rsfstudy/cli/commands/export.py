@@ -1,0 +1,60 @@
+"""Command ``rsfstudy export``."""
+
+from __future__ import annotations
+
+import os
+
+import click
+
+from rsfstudy.cli import options
+from rsfstudy.cli.command_group import Command
+from rsfstudy.cli.printing import print_line
+from rsfstudy.cli.results import EXIT_STATUS_OK
+from rsfstudy.errors import DataError, InvalidValue
+
+_UNIT_OPTION_NAMES = ("stress", "length", "time")
+
+
+@click.command(cls=Command)
+@click.argument("file", type=options.FilePath())
+@click.option("--csv", is_flag=True, help="Write a CSV table without constant columns.")
+@click.option("--mat", is_flag=True, help="Write a MATLAB file with all variables.")
+@click.option(
+    "--units",
+    nargs=3,
+    metavar="STRESS LENGTH TIME",
+    help="Convert results of a rig to these units, for example MPa um s.",
+)
+@click.option(
+    "--output",
+    type=options.FilePath(dir_okay=False),
+    help="Path of the output; the suffix is replaced by .csv or .mat.  [default: next to FILE]",
+)
+def export(given: options.CommandOptions) -> int:
+    """Export results or a motion to other programs.
+
+    The command writes a CSV table, a MATLAB file, or both. The table has one row per cell of a
+    study or per time of a motion.
+    """
+    from rsfstudy.cli.export_files import to_csv, to_mat
+    from rsfstudy.storage import read_dataset
+
+    writers = {"csv": to_csv, "mat": to_mat}
+    asked = [ending for ending in writers if getattr(given, ending)]
+    if not asked:
+        raise click.UsageError("pass --csv, --mat, or both")
+    dataset = read_dataset(given.file)
+    paths = {ending: (given.output or given.file).with_suffix(f".{ending}") for ending in asked}
+    for path in paths.values():
+        if os.path.lexists(path):
+            remedy = "Choose another path."
+            raise InvalidValue("--output", str(path), "already exists", remedy=remedy)
+    if given.units:
+        dataset = dataset.rsf.in_units(**dict(zip(_UNIT_OPTION_NAMES, given.units, strict=True)))
+    for ending, path in paths.items():
+        try:
+            writers[ending](dataset, path)
+        except OSError as error:
+            raise DataError(f"{path}: cannot be written ({error})") from error
+        print_line(f"{path}")
+    return EXIT_STATUS_OK

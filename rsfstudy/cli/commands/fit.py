@@ -1,0 +1,315 @@
+"""Command ``rsfstudy fit``."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+import rsfstudy
+from rsfstudy.cli import options
+from rsfstudy.cli.command_group import Command
+from rsfstudy.cli.options import DecoratedFunction
+from rsfstudy.cli.printing import print_line, print_pieces
+from rsfstudy.cli.results import EXIT_STATUS_FAILED, EXIT_STATUS_OK, CommandResult, output_result
+from rsfstudy.defaults import FIT_EVALUATION_BUDGET
+from rsfstudy.errors import InvalidValue
+from rsfstudy.motion import ENGINES
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+    from rsfstudy.fitting import LoadingStep, Record
+
+#: Maximum number of steps of a record that are printed.
+_MAX_LISTED_STEPS = 24
+#: Options that are passed to ``rsfstudy.fit`` unchanged.
+_OPTIONS_PASSED_TO_FIT = (
+    "stiffness", "slip_distance", "laws", "free", "together", "before", "after", "windows",
+    "noise", "loading", "averaging", "low_pass", "posterior", "budget", "engine",
+)  # fmt: skip
+
+
+@dataclass(frozen=True)
+class RecordFits(CommandResult):
+    """Fits of records.
+
+    Parameters
+    ----------
+    records : sequence of Record
+        Records with their detected steps.
+    dataset : xarray.Dataset
+        Fits.
+    files : sequence of Path
+        Figure and data file.
+    """
+
+    records: Sequence[Record]
+    dataset: xr.Dataset
+    files: Sequence[Path]
+
+    @property
+    def exit_status(self) -> int:
+        """Failure if a fit has no values or no valid standard errors."""
+        from rsfstudy.reporting import all_fits_are_valid
+
+        return EXIT_STATUS_OK if all_fits_are_valid(self.dataset) else EXIT_STATUS_FAILED
+
+    def json_fields(self) -> dict[str, Any]:
+        """Return the fields of the JSON output."""
+        from rsfstudy.reporting import list_fit_values
+
+        return {
+            "records": [
+                {
+                    "record": record.name,
+                    "rows": len(record),
+                    "steps": [_step_to_json(*step) for step in enumerate(record.loading_steps, 1)],
+                }
+                for record in self.records
+            ],
+            "fits": list_fit_values(self.dataset),
+            "files": self.files,
+        }
+
+
+def _step_to_json(number: int, step: LoadingStep) -> dict[str, Any]:
+    """Return the entry of a step in the JSON output, in s, um/s and Pa."""
+    names = "start", "end", "velocity_before", "velocity_after", "stress_before", "stress_after"
+    return {"step": number, **{name: getattr(step, name) for name in names}}
+
+
+def _split_commas(
+    _context: click.Context, _option: click.Parameter, text: str | None
+) -> tuple[str, ...]:
+    """Split a comma-separated list."""
+    return tuple(part.strip() for part in (text or "").split(",") if part.strip())
+
+
+def _parse_number_or_text(
+    _context: click.Context, _option: click.Parameter, text: str | None
+) -> Any:
+    """Convert the value of an option to a number if it has no units."""
+    from rsfstudy.cli.assignment_parsing import parse_number_or_text
+
+    return None if text is None else parse_number_or_text(text)
+
+
+def _make_comma_list_option(
+    *option_names: str, help_text: str, default: str | None = None, metavar: str = "TEXT"
+) -> Callable[[DecoratedFunction], DecoratedFunction]:
+    """Create an option for a comma-separated list."""
+    return click.option(
+        *option_names, callback=_split_commas, default=default, metavar=metavar, help=help_text
+    )
+
+
+def _make_quantity_option(
+    option_name: str, help_text: str, default: str | None = None
+) -> Callable[[DecoratedFunction], DecoratedFunction]:
+    """Create an option for a number with units.
+
+    The help text of the option describes the default.
+    """
+    about: dict[str, Any] = {"default": default, "show_default": False, "help": help_text}
+    return click.option(option_name, callback=_parse_number_or_text, **about)
+
+
+@click.command(cls=Command)
+@click.argument("records", nargs=-1, required=True, type=options.FilePath())
+@click.option(
+    "--columns",
+    metavar="NAME=HEADING,...",
+    help="Columns of the record, for example 'time=t (s),displacement=lp (um),friction=mu'. Other "
+    "quantities are shear_stress and normal_stress. Raw values can be scaled, for example "
+    "'lp (um) * 0.1 + 5'.  [default: recognised headings]",
+)
+@click.option(
+    "--normal-stress",
+    help="Normal stress, for example '20 MPa', if the record has no such column.",
+)
+@_make_quantity_option(
+    "--stiffness",
+    "Stiffness divided by normal stress, for example '1.6e-3 /um', or stiffness, for example "
+    "'0.03 MPa/um'.",
+)
+@_make_quantity_option("--slip-distance", "Initial guess of D_c, for example '10 um'.")
+@_make_comma_list_option(
+    "--law",
+    "laws",
+    default="slip,slowness",
+    help_text="State evolution laws. One fit is computed for each law.",
+)
+@_make_comma_list_option(
+    "--free",
+    help_text="Free parameters. Parameters that a law does not have are ignored for this law. "
+    "Further choices are stiffness, step_time, trend2, alpha, and law_exponent for law=family.  "
+    "[default: a, b (b1 and b2 for two states), slip_distance (slip_distance_2), mu_star, trend1]",
+)
+@_make_comma_list_option(
+    "--step", "steps", metavar="N,...", help_text="Steps to fit.  [default: all]"
+)
+@click.option(
+    "--together",
+    is_flag=True,
+    help="Fit the steps of all RECORDS jointly, with common values of a, b and D_c.",
+)
+@_make_quantity_option(
+    "--before",
+    "Load point displacement of the fit window before a step.  [default: half the displacement "
+    "since the previous step]",
+    "0 um",
+)
+@_make_quantity_option(
+    "--after",
+    "Load point displacement of the fit window after a step, for example '250 um'.  [default: up "
+    "to the next step]",
+    "0 um",
+)
+@options.make_count_option(
+    "--windows",
+    1,
+    "Number of fit windows. The windows contain between half and all of the data after a step, and "
+    "show the sensitivity of the parameters to the window.",
+)
+@click.option(
+    "--noise",
+    default="ar",
+    help="Noise model: white, ar (autoregressive with automatic order), or ar1, ar2, ...",
+)
+@click.option(
+    "--loading",
+    type=click.Choice(["steps", "recorded"]),
+    default="steps",
+    help="Load point history: ideal velocity steps, or the recorded displacement.",
+)
+@_make_quantity_option(
+    "--averaging",
+    "Averaging time of the data logger, for example '1 s', or 'trailing 1 s' if the averaging "
+    "window ends at the time of the row.  [default: no averaging]",
+)
+@click.option(
+    "--low-pass",
+    default="",
+    show_default=False,
+    help="Low-pass filter of the friction data: first_order, butterworth_2 or butterworth_4 with a "
+    "corner frequency, for example 'butterworth_2 2 Hz'.  [default: no filter]",
+)
+@click.option(
+    "--posterior",
+    type=click.IntRange(0),
+    metavar="N",
+    default=0,
+    show_default=False,
+    help="Number of posterior samples, computed with emcee.  [default: 0]",
+)
+@options.make_set_scene_fields_option(
+    "Set a field of the scene that is not fitted, for example a=0.01."
+)
+@options.make_count_option(
+    "--budget", FIT_EVALUATION_BUDGET, "Maximum number of right-hand-side evaluations per fit."
+)
+@click.option(
+    "--engine",
+    type=click.Choice(ENGINES),
+    help="Integration engine.  [default: compiled if Numba is installed, otherwise scipy]",
+)
+@options.make_image_option(
+    "--output",
+    Path("fit.png"),
+    "Path of the figure. The data are written to a NetCDF file next to the figure.",
+)
+@options.json_option
+def fit(given: options.CommandOptions) -> int:
+    """Fit friction parameters to velocity steps in RECORDS.
+
+    The command prints the detected steps and a table of a, b, D_c and their standard errors, which
+    include the correlation of the noise. The command also lists the parameters that the record does
+    not constrain, and writes a figure and a data file.
+
+    The exit status is 1 if a fit has no values, values that are not verified or standard errors
+    that are not valid, and 2 for wrong usage. Otherwise the exit status is 0, even if a parameter
+    is not identified.
+    """
+    from rsfstudy.cli.assignment_parsing import parse_column_assignments
+    from rsfstudy.cli.data_files import check_output_may_be_replaced
+    from rsfstudy.reporting import is_fit
+
+    data = given.output.with_suffix(".nc")
+    check_output_may_be_replaced(data, is_fit, "fit")
+    columns = parse_column_assignments(given.columns)
+    about = {"normal_stress": given.normal_stress, "stiffness": given.stiffness}
+    records = [rsfstudy.read_record(path, columns, **about) for path in given.records]
+    if not given.as_json:
+        for record in records:
+            _print_steps(record)
+    dataset = _fit_and_write_files(records, data, given)
+    result = RecordFits(records, dataset, [given.output, data])
+    return output_result(result, _print_fits, given.as_json)
+
+
+def _fit_and_write_files(
+    records: Sequence[Record], data_path: Path, given: options.CommandOptions
+) -> xr.Dataset:
+    """Fit the records, and write the figure and the data."""
+    from rsfstudy.cli.assignment_parsing import parse_scene_field_assignments
+    from rsfstudy.plots import save_figure
+    from rsfstudy.storage import write_dataset
+
+    dataset = rsfstudy.fit(
+        records,
+        steps=[_parse_step_number(text) for text in given.steps],
+        command=given.command_line,
+        **given.collect_option_values(*_OPTIONS_PASSED_TO_FIT),
+        **parse_scene_field_assignments(given.settings),
+    )
+    dataset = write_dataset(dataset, data_path)
+    save_figure(dataset, given.output)
+    return dataset
+
+
+def _parse_step_number(text: str) -> int:
+    """Convert a step number of the option ``--step``."""
+    if not text.isdecimal():
+        rule = "must be an integer or a list of integers, for example 1,2"
+        raise InvalidValue("--step", text, rule)
+    return int(text)
+
+
+def _print_fits(result: RecordFits) -> None:
+    """Print the parameters of the fits, and the files."""
+    from rsfstudy.reporting import build_summary_tables_and_sentences
+
+    print_pieces(build_summary_tables_and_sentences(result.dataset))
+    print_line(f"wrote {' and '.join(map(str, result.files))}", soft_wrap=True)
+
+
+def _print_steps(record: Record) -> None:
+    """Print the steps of a record."""
+    from rsfstudy.reporting import TextTable
+
+    print_line(f"{record.name}: {len(record):,} rows, {len(record.loading_steps)} steps")
+    stressed = any(step.stress_ratio != 1.0 for step in record.loading_steps)
+    rows = [
+        {
+            "step": str(number),
+            "time (s)": f"{step.start:.6g}",
+            "lasts (s)": f"{step.end - step.start:.6g}",
+            "V0 (um/s)": f"{step.velocity_before:.6g}",
+            "V1 (um/s)": f"{step.velocity_after:.6g}",
+            **_format_normal_stresses_of_step(step, stressed),
+        }
+        for number, step in enumerate(record.loading_steps[:_MAX_LISTED_STEPS], start=1)
+    ]
+    print_pieces([TextTable(rows)])
+    if (left := len(record.loading_steps) - _MAX_LISTED_STEPS) > 0:
+        print_line(f"and {left} more steps")
+
+
+def _format_normal_stresses_of_step(step: LoadingStep, is_shown: bool) -> dict[str, str]:
+    """Return the normal stresses of a step in MPa, or an empty dictionary."""
+    stresses = {"sigma0 (MPa)": step.stress_before, "sigma1 (MPa)": step.stress_after}
+    return {heading: f"{of * 1e-6:.6g}" for heading, of in stresses.items() if is_shown}

@@ -1,0 +1,85 @@
+"""Command ``rsfstudy plot``."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import click
+
+from rsfstudy.cli import options
+from rsfstudy.cli.command_group import Command
+from rsfstudy.cli.printing import print_line
+from rsfstudy.cli.results import EXIT_STATUS_FAILED, EXIT_STATUS_OK
+from rsfstudy.defaults import FIGURE_FORMATS, OUTPUT_DIRECTORY
+from rsfstudy.error_boundary import check_regular_file
+from rsfstudy.errors import InvalidValue
+
+
+@click.command(cls=Command)
+@options.study_name_or_all_argument
+@options.make_output_option(
+    "Directory of the results and the figure, or path of the figure, such as fig.pdf.  "
+    "[default: outputs, or the directory of FILE]"
+)
+@options.figure_options
+@click.option("--variable", metavar="NAME", help="Draw this variable as maps or lines.")
+@options.study_file_option
+@options.abscissa_option
+def plot(given: options.CommandOptions) -> int:
+    """Draw the figure of a results file or of a motion.
+
+    NAME is a named study or a file with results or a motion. By default, the figure is written to
+    the directory of the file. If the study defines its own figure, pass the Python file of the
+    study with --study. The command executes this file.
+    """
+    from rsfstudy.api import find_results
+    from rsfstudy.cli.figure_files import default_figure_path
+    from rsfstudy.cli.study_options import selected_study_names
+
+    status, target = EXIT_STATUS_OK, _figure_path_from_output_option(given)
+    for name in selected_study_names(given):
+        results = find_results(name, OUTPUT_DIRECTORY if target else given.output)
+        beside = results if given.output is None else given.output / results.name
+        drawn = _draw_figure(results, target or default_figure_path(beside, given), given)
+        status = status if drawn else EXIT_STATUS_FAILED
+        for file in drawn:
+            print_line(f"{file}")
+    return status
+
+
+def _draw_figure(results: Path, figure_path: Path, given: options.CommandOptions) -> list[Path]:
+    """Draw the figure of a file, and return the paths of the figures that were written."""
+    from rsfstudy.cli import figure_files
+    from rsfstudy.cli.study_options import read_results_file
+    from rsfstudy.storage import is_of_single_scene
+
+    dataset = read_results_file(results, given.study)
+    if is_of_single_scene(dataset):
+        drawing = dataset.rsf.plot(against=given.against)
+        figure_files.write_figure(drawing, figure_path, given.style)
+        return [figure_path]
+    own = None if given.variable else figure_files.load_user_figure_or_default(dataset, given.study)
+    return figure_files.draw_and_save_figure(dataset, figure_path, given, own)
+
+
+def _figure_path_from_output_option(given: options.CommandOptions) -> Path | None:
+    """Return the path of ``--output`` if it is a figure file.
+
+    If the path is a directory, the function returns None. If the path has the suffix of another
+    file type, the path must be an existing directory.
+    """
+    output: Path | None = given.output
+    ending = "" if output is None else output.suffix[1:].lower()
+    if output is None or not ending:
+        return None
+    if ending in FIGURE_FORMATS:
+        if given.every or given.form not in (None, ending):
+            rule = "is a single figure and cannot be combined with --all or another --figure format"
+            raise click.UsageError(f"{output} {rule}")
+        check_regular_file("--output", output)
+        return output
+    if not output.is_dir():
+        rule = "has a suffix that is not a figure format"
+        remedy = "To use it as a directory, create the directory first."
+        raise InvalidValue("--output", str(output), rule, choices=FIGURE_FORMATS, remedy=remedy)
+    return None

@@ -1,0 +1,36 @@
+"""Command ``rsfstudy report``."""
+
+from __future__ import annotations
+
+import click
+
+from rsfstudy.cli import options
+from rsfstudy.cli.command_group import Command
+from rsfstudy.cli.printing import print_line
+from rsfstudy.cli.results import EXIT_STATUS_FAILED, EXIT_STATUS_OK
+from rsfstudy.defaults import OUTPUT_DIRECTORY
+
+
+@click.command(cls=Command)
+@click.argument("directory", default=OUTPUT_DIRECTORY, type=options.FilePath())
+@click.option(
+    "--output",
+    type=options.FilePath(dir_okay=False),
+    metavar="FILE",
+    help="Path of the page.  [default: DIRECTORY/report.html]",
+)
+def report(given: options.CommandOptions) -> int:
+    """Write an HTML page with all results in a directory.
+
+    The page contains verdicts, figures, slopes, failed cells and the provenance of each file. The
+    page is a single file that can be viewed in a browser or printed. The exit status is 1 if a
+    results file cannot be read. In this case, the page shows the reason.
+    """
+    from rsfstudy.api import write_report
+
+    page, unread = write_report(given.directory, given.output)
+    print_line(f"wrote {page}", soft_wrap=True)
+    for file in unread:
+        text = f"{file} cannot be read (see the page for the reason)"
+        print_line(text, style="red", soft_wrap=True)
+    return EXIT_STATUS_FAILED if unread else EXIT_STATUS_OK

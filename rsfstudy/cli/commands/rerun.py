@@ -1,0 +1,152 @@
+"""Command ``rsfstudy rerun``."""
+
+from __future__ import annotations
+
+import traceback
+import warnings
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, Any
+
+import click
+
+import rsfstudy
+from rsfstudy.cli import options
+from rsfstudy.cli.command_group import Command
+from rsfstudy.cli.printing import print_line, print_pieces
+from rsfstudy.cli.results import EXIT_STATUS_FAILED, EXIT_STATUS_OK
+from rsfstudy.errors import RsfStudyError
+
+if TYPE_CHECKING:
+    import pandas as pd
+    import xarray as xr
+
+    from rsfstudy import Scene
+    from rsfstudy.measures import Outcome
+
+
+@click.command(cls=Command)
+@click.argument("file", type=options.FilePath())
+@click.option(
+    "--cell",
+    "place",
+    multiple=True,
+    metavar="AXIS=VALUE",
+    help="Compute only this cell, in this process, and show the traceback of any error.",
+)
+@options.study_file_option
+@options.make_output_option(
+    "Directory for the new results. By default, no file is written.", file_okay=False
+)
+@options.worker_options
+def rerun(given: options.CommandOptions) -> int:
+    """Compute a results file again, and compare all numbers.
+
+    The study is restored from the results file. The exit status is 1 if a number differs.
+    """
+    from rsfstudy.cli.study_options import open_worker_pool
+
+    if given.place:
+        return _recompute_cell(given)
+    with open_worker_pool(given) as where:
+        asked = given.collect_option_values("study", "output", "time_limit")
+        agreement = rsfstudy.rerun(
+            given.file,
+            workers=where.process_count,
+            client=where.client,
+            progress=not given.quiet,
+            **asked,
+        )
+    _print_agreement(agreement)
+    return EXIT_STATUS_OK if _is_identical(agreement) else EXIT_STATUS_FAILED
+
+
+def _is_identical(agreement: pd.DataFrame) -> bool:
+    """Return True if there are numbers to compare and all of them are identical."""
+    values = agreement["values"]
+    return bool(values.sum()) and bool((values == agreement["identical"]).all())
+
+
+def _print_agreement(agreement: pd.DataFrame) -> None:
+    """Print the agreement of the recomputed results with the results file."""
+    from rsfstudy.cli.agreement_tables import build_agreement_table
+
+    for name, (in_file, now) in agreement.attrs["differs"].items():
+        print_line(f"{name}: {in_file} in the file, {now} now", style="yellow")
+    print_pieces([build_agreement_table(agreement)])
+    if not agreement["values"].sum():
+        print_line("nothing to compare: the file has no finished cell")
+    else:
+        same = _is_identical(agreement)
+        print_line("all numbers are identical" if same else "some numbers differ")
+
+
+def _recompute_cell(given: options.CommandOptions) -> int:
+    """Compute one cell, and print its results next to the stored values."""
+    import numpy as np
+
+    from rsfstudy.cli import assignment_parsing
+    from rsfstudy.storage import find_cell_number
+
+    place = dict(map(assignment_parsing.parse_cell_coordinate, given.place))
+    try:
+        with warnings.catch_warnings(record=True, action="always") as caught:
+            scene, outcome = rsfstudy.recompute_cell(given.file, place, study=given.study)
+    except RsfStudyError:
+        raise
+    except Exception:  # the traceback helps to debug the cell
+        traceback.print_exc()
+        return EXIT_STATUS_FAILED
+    results = rsfstudy.open(given.file)
+    index = np.unravel_index(find_cell_number(results, place), results["status"].shape)
+    stored = results.isel(dict(zip(results["status"].dims, index, strict=True)))
+    for one in caught:
+        print_line(str(one.message), style="yellow")
+    print_recomputed_cell(scene, outcome, stored)
+    return EXIT_STATUS_OK if outcome.status.is_answer else EXIT_STATUS_FAILED
+
+
+def print_recomputed_cell(scene: Scene, outcome: Outcome, stored_values: xr.Dataset) -> None:
+    """Print a recomputed cell next to the stored values.
+
+    The function prints the scene, a table of numbers, and the status of the cell. For an array, the
+    table contains the number of values and their range.
+
+    Parameters
+    ----------
+    scene : Scene
+        Scene of the cell.
+    outcome : Outcome
+        New results.
+    stored_values : xarray.Dataset
+        Values of the cell in the results file.
+    """
+    from rsfstudy.formatting import format_nonempty_fields
+    from rsfstudy.reporting import TextTable
+
+    print_line(f"{format_nonempty_fields(scene.as_dict())}\n")
+    print_pieces([TextTable(_rows_of_cell(outcome.values, stored_values))])
+    text = f"{outcome.status.label}{': ' * bool(outcome.message)}{outcome.message}"
+    print_line(f"{text} ({outcome.rhs_evaluations:,} right-hand-side evaluations)")
+
+
+def _rows_of_cell(values: Mapping[str, Any], stored_values: xr.Dataset) -> Sequence[dict[str, str]]:
+    """Return one row per number, with the new value and the stored value."""
+    import numpy as np
+
+    rows = []
+    for name, value in values.items():
+        same = np.array_equal(value, stored_values[name], equal_nan=True)
+        now = _format_number_or_array(value)
+        stored = "same" if same else _format_number_or_array(stored_values[name])
+        rows.append({"number": name, "now": now, "in the file": stored})
+    return rows
+
+
+def _format_number_or_array(value: Any) -> str:
+    """Format a number in full, or an array as its size and its range."""
+    import numpy as np
+
+    finite = np.asarray(value, dtype=float)[np.isfinite(np.asarray(value, dtype=float))]
+    if not np.ndim(value) or not finite.size:
+        return str(value)
+    return f"{np.size(value)} values, {finite.min():.6g} to {finite.max():.6g}"

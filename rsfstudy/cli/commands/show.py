@@ -1,0 +1,44 @@
+"""Command ``rsfstudy show``."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import click
+
+from rsfstudy.cli import options
+from rsfstudy.cli.command_group import Command
+from rsfstudy.cli.results import output_result
+
+_SUFFIXES_OF_RESULTS_FILES = (".nc", ".zarr")
+
+
+@click.command(cls=Command)
+@click.argument("name")
+@options.set_values_option
+@options.rtol_option
+@options.output_option
+@options.study_file_option
+@options.rig_options
+@options.json_option
+def show(given: options.CommandOptions) -> int:
+    """Show a study before a run, or summarise a results file.
+
+    For the name or the file of a study, the command prints the axes, the fixed fields, the measure
+    and the expected cost. The cost is the measured time if OUTPUT contains cells of an earlier run.
+    For a results file, the command prints the results, their provenance, and a command that
+    reproduces each failed cell.
+    """
+    from rsfstudy.cli import study_options
+    from rsfstudy.cli.file_summaries import FileSummary, print_file_summary
+    from rsfstudy.cli.study_declarations import StudyDeclaration, print_study_declaration
+
+    if Path(given.name).suffix not in _SUFFIXES_OF_RESULTS_FILES:
+        study = study_options.build_study_from_options(given.name, given)
+        declared = StudyDeclaration(study, given.output)
+        return output_result(declared, print_study_declaration, given.as_json)
+    if given.settings or given.rtol is not None or given.rig_option_texts:
+        rule = "--set, --rtol and rig options cannot be used with a results file"
+        raise click.UsageError(rule)
+    dataset = study_options.read_results_file(Path(given.name), given.study)
+    return output_result(FileSummary(dataset, given.name), print_file_summary, given.as_json)

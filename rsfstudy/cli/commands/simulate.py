@@ -1,0 +1,142 @@
+"""Command ``rsfstudy simulate``."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import click
+
+import rsfstudy
+from rsfstudy.cli import options
+from rsfstudy.cli.command_group import Command
+from rsfstudy.cli.printing import print_line, print_pieces
+from rsfstudy.cli.results import EXIT_STATUS_FAILED, EXIT_STATUS_OK
+from rsfstudy.errors import InvalidValue
+from rsfstudy.motion import DEFAULT_EVALUATION_BUDGET, DEFAULT_RTOL, ENGINES, SCIPY
+from rsfstudy.status import Status
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+    from rsfstudy import Rig, Scene
+
+#: Exit status if the slip rate of a motion exceeds the instability norm without inertia and without
+#: radiation damping.
+_EXIT_STATUS_UNPHYSICAL_MOTION = 3
+
+
+@click.command(cls=Command)
+@options.make_set_scene_fields_option(
+    "Set a field of the scene, for example law=slowness. With a rig, values can have units, for "
+    "example hold_time='100 s'. A loading can be read from a CSV file, for example "
+    "loading=record.csv."
+)
+@click.option(
+    "--protocol",
+    "protocol_file",
+    type=options.FilePath(dir_okay=False),
+    help="CSV file with the load point history. The header is, for example, 'velocity (um/s), "
+    "duration (s)' for a protocol or 'time (s), displacement (um)' for a record. Equivalent to "
+    "--set loading=FILE.",
+)
+@click.option(
+    "--duration", help="Duration of the motion.  [default: duration of the protocol, or 50]"
+)
+@options.abscissa_option
+@options.rig_options
+@click.option("--rtol", type=float, default=DEFAULT_RTOL, help="Relative tolerance.")
+@options.make_count_option(
+    "--budget", DEFAULT_EVALUATION_BUDGET, "Maximum number of right-hand-side evaluations."
+)
+@click.option("--engine", type=click.Choice(ENGINES), default=SCIPY, help="Integration engine.")
+@options.make_image_option(
+    "--output",
+    Path("motion.png"),
+    "Path of the figure. The data are written to a NetCDF file next to the figure.",
+)
+@click.option("--quiet", is_flag=True, help="Print only the status, without peaks and events.")
+def simulate(given: options.CommandOptions) -> int:
+    """Compute a single motion, and write its figure and its data.
+
+    The figure shows friction and slip rate along the motion, and the path in the phase plane.
+
+    The exit status is 1 if the motion ends early, and 2 for wrong usage. The exit status is 3 if
+    the slip rate exceeds the instability norm without inertia and without radiation damping,
+    because the motion is then unphysical. Otherwise the exit status is 0.
+    """
+    from rsfstudy.cli.data_files import check_output_may_be_replaced
+    from rsfstudy.execution import provenance_attributes
+    from rsfstudy.reporting import is_motion
+
+    check_output_may_be_replaced(given.output.with_suffix(".nc"), is_motion, "motion")
+    scene, rig = _build_scene_and_rig(given)
+    duration, accuracy = _parse_duration(given.duration, rig), ("rtol", "budget", "engine")
+    motion = rsfstudy.simulate(scene, duration=duration, **given.collect_option_values(*accuracy))
+    motion = motion.assign_attrs(provenance_attributes(given.command_line))
+    _write_motion_and_figure(motion, rig, given)
+    return _exit_status_of_motion(motion)
+
+
+def _exit_status_of_motion(motion: xr.Dataset) -> int:
+    """Return the exit status for a motion."""
+    from rsfstudy.api import BEYOND_INSTABILITY_NORM_ATTRIBUTE_NAME
+
+    if motion.attrs["status"] != Status.OK.label:
+        return EXIT_STATUS_FAILED
+    unphysical = BEYOND_INSTABILITY_NORM_ATTRIBUTE_NAME in motion.attrs
+    return _EXIT_STATUS_UNPHYSICAL_MOTION if unphysical else EXIT_STATUS_OK
+
+
+def _build_scene_and_rig(given: options.CommandOptions) -> tuple[Scene, Rig | None]:
+    """Build the scene, and the rig if the options define a rig."""
+    from rsfstudy.cli import assignment_parsing as parsing
+
+    fields = parsing.parse_scene_field_assignments(given.settings)
+    quantities = given.rig_option_texts
+    if (velocity := quantities.pop("load_velocity", None)) is not None:
+        fields["load_velocity"] = parsing.parse_number_or_text(velocity)
+    rig = parsing.parse_rig(quantities) if quantities else None
+    if given.protocol_file is not None:
+        fields["loading"] = parsing.read_loading_file(given.protocol_file, rig)
+    elif "loading" in fields:
+        fields["loading"] = parsing.parse_loading_file(fields["loading"], rig)
+    return (rig.scene(**fields) if rig else rsfstudy.Scene(**fields)), rig
+
+
+def _parse_duration(text: str | None, rig: Rig | None) -> float | None:
+    """Convert a duration to units of D_c/V_*."""
+    from rsfstudy.cli.assignment_parsing import parse_number_or_text
+
+    time = None if text is None else parse_number_or_text(text)
+    if time is not None and rig is not None:
+        return rig.dimensionless(time, name="--duration")
+    if isinstance(time, str):
+        remedy = "Pass a number in units of D_c/V_*, or define a rig."
+        raise InvalidValue("--duration", time, "has units, but no rig is defined", remedy=remedy)
+    return time
+
+
+def _write_motion_and_figure(
+    motion: xr.Dataset, rig: Rig | None, given: options.CommandOptions
+) -> None:
+    """Write the figure and the data of a motion, and print a summary."""
+    from rsfstudy.cli.figure_files import write_figure
+    from rsfstudy.reporting import build_motion_tables_and_sentences
+    from rsfstudy.rig import DISPLAY_BASE_UNITS
+    from rsfstudy.storage import write_dataset
+
+    status = f"{motion.attrs['status']} {motion.attrs['message']}".strip()
+    if not motion.sizes["time"]:
+        reason = "the motion has no points, so no figure and no data are written"
+        print_line(f"{status}\n{reason}")
+        return
+    data = given.output.with_suffix(".nc")
+    write_dataset(rig.in_units(motion, **DISPLAY_BASE_UNITS) if rig else motion, data)
+    write_figure(rsfstudy.plot_motion(motion, rig, against=given.against), given.output)
+    if not given.quiet:
+        found = [motion, motion.rsf.events()]
+        if rig:
+            found = [rig.in_units(of, **DISPLAY_BASE_UNITS) for of in found]
+        print_pieces(build_motion_tables_and_sentences(found[0], motion.rsf.scene, found[1]))
+    print_line(f"{status}\nwrote {given.output} and {data}")

@@ -1,0 +1,166 @@
+"""Command ``rsfstudy verify``."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from rsfstudy.cli import options
+from rsfstudy.cli.command_group import Command
+from rsfstudy.cli.printing import print_line
+from rsfstudy.cli.results import EXIT_STATUS_FAILED, EXIT_STATUS_OK, CommandResult, output_result
+from rsfstudy.errors import InvalidValue
+
+if TYPE_CHECKING:
+    from rsfstudy.referee import AnswerComparison
+
+
+@dataclass(frozen=True)
+class Verification(CommandResult):
+    """Comparison of solution files with the reference solutions."""
+
+    files: Sequence[Path]
+    comparisons: Sequence[AnswerComparison]
+
+    @property
+    def exit_status(self) -> int:
+        """Failure if a file does not have the required number of digits."""
+        passed = all(one.has_required_digits for one in self.comparisons)
+        return EXIT_STATUS_OK if passed else EXIT_STATUS_FAILED
+
+    def json_fields(self) -> dict[str, Any]:
+        """Return the fields of the JSON output."""
+        from rsfstudy.referee import summarise_comparisons
+
+        pairs = zip(self.files, self.comparisons, strict=True)
+        return {
+            "summary": summarise_comparisons(self.comparisons),
+            "files": [_comparison_to_json(file, one) for file, one in pairs],
+        }
+
+
+def _comparison_to_json(file: Path, comparison: AnswerComparison) -> dict[str, Any]:
+    """Return the entry of a file in the JSON output."""
+    problem = comparison.problem
+    index = problem.index_values if problem.index_column else None
+    return {
+        "file": file,
+        "problem": problem.number or None,
+        "title": problem.title,
+        "passed": comparison.has_required_digits,
+        "digits": comparison.agreeing_digits,
+        "required_digits": comparison.required_digits,
+        "reference_digits": problem.digits,
+        "explanation": comparison.explanation_of_disagreement,
+        "index_column": problem.index_column or None,
+        "quantities": [
+            {
+                "name": one.quantity_name,
+                "digits": one.agreeing_digits,
+                "agrees_to_written_digits": one.agrees_to_written_digits,
+                "least_agreeing_at": None if index is None else index[one.least_agreeing_row],
+                "first_failing_at": None
+                if index is None or one.first_failing_row is None
+                else index[one.first_failing_row],
+            }
+            for one in comparison.quantity_agreements
+        ],
+    }
+
+
+@click.command(cls=Command)
+@click.argument("files", metavar="FILE...", nargs=-1, required=True, type=options.FilePath())
+@click.option(
+    "--problem",
+    metavar="N|TOML",
+    help="Number of the problem, or a TOML file that defines a problem.  [default: number at the "
+    "beginning of the name of FILE]",
+)
+@click.option(
+    "--columns",
+    metavar="MAP",
+    help="Columns of the files, for example 'time=t (s), friction=mu, slip_rate=v (um/s)'.  "
+    "[default: headings of the file]",
+)
+@click.option(
+    "--digits",
+    type=click.FloatRange(1.0, 12.0),
+    default=6.0,
+    help="Number of correct digits that is required to pass.",
+)
+@options.make_image_option(
+    "--figure", None, "Path of a figure of the agreement (.png, .pdf or .svg)."
+)
+@options.json_option
+def verify(given: options.CommandOptions) -> int:
+    """Compare solutions of another code with reference solutions.
+
+    For each quantity, the command prints the number of correct digits, the first row with a larger
+    difference, and a possible explanation. The last line summarises all files. The exit status is 1
+    if a problem is not passed.
+    """
+    from rsfstudy.cli import assignment_parsing
+    from rsfstudy.referee import compare_file_with_known_answer
+
+    if math.isnan(given.digits):  # click accepts NaN for any range
+        raise InvalidValue("--digits", given.digits, "must be a number, from 1 to 12")
+    columns = assignment_parsing.parse_column_assignments(given.columns)
+    found = [
+        compare_file_with_known_answer(file, given.problem or "", columns, given.digits)
+        for file in given.files
+    ]
+    status = output_result(Verification(given.files, found), _print_verification, given.as_json)
+    if given.figure is not None:
+        _write_agreement_figure(found, given.figure)
+    return status
+
+
+def _print_verification(result: Verification) -> None:
+    """Print the agreement of each quantity, and a possible cause of differences."""
+    from rsfstudy.referee import summarise_comparisons
+
+    for file, one in zip(result.files, result.comparisons, strict=True):
+        problem = one.problem
+        known = f"reference known to {problem.digits} digits"
+        name = f"problem {problem.number}" if problem.number else known
+        outcome = "passed" if one.has_required_digits else "not passed"
+        print_line(f"{file}: {problem.title} ({name}): {outcome}", style="bold")
+        for line in one.describe_agreements():
+            print_line(line)
+        if not one.has_required_digits:
+            unexplained = "no common difference of conventions explains the disagreement"
+            print_line(f"  {one.explanation_of_disagreement or unexplained}")
+    print_line(summarise_comparisons(result.comparisons), style="bold")
+
+
+def _write_agreement_figure(comparisons: Sequence[AnswerComparison], figure_path: Path) -> None:
+    """Draw the number of agreeing digits of each quantity.
+
+    If a single file is compared and its problem has an index column, the abscissa is the index.
+    Otherwise the abscissa is the number of the problem.
+    """
+    import numpy as np
+
+    from rsfstudy.cli.figure_files import write_figure
+    from rsfstudy.plots import draw_agreement, style_context
+
+    digits: dict[str, list[tuple[float, float]]] = {}
+    problem, label = comparisons[0].problem, "problem"
+    if len(comparisons) == 1 and problem.index_column:
+        label = f"{problem.index_column} ({problem.quantity_units[problem.index_column]})"
+        for one in comparisons[0].quantity_agreements:
+            along = -np.log10(np.maximum(one.relative_differences, 10.0**-problem.digits))
+            digits[one.quantity_name] = list(zip(problem.index_values, along, strict=True))
+    else:
+        for number, comparison in enumerate(comparisons, start=1):
+            at = comparison.problem.number or number
+            for one in comparison.quantity_agreements:
+                digits.setdefault(one.quantity_name, []).append((at, one.agreeing_digits))
+    with style_context(None):
+        drawn = draw_agreement(digits, label, comparisons[0].required_digits)
+    write_figure(drawn, figure_path)

@@ -1,0 +1,54 @@
+"""Functions that print lines and tables, and import the consoles when they are called."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from rsfstudy.reporting import SummaryTableOrSentence
+
+
+def print_line(text: str, style: str = "", soft_wrap: bool = False) -> None:
+    """Print a text on the standard output.
+
+    Parameters
+    ----------
+    text : str
+        Text to print.
+    style : str, optional
+        Style, such as "bold" or "red".
+    soft_wrap : bool, default: False
+        If True, long lines are not wrapped. Lines with paths and commands should not be wrapped, so
+        that users can copy them.
+    """
+    from rsfstudy.cli.console import stdout_console
+
+    stdout_console.print(text, style=style or None, soft_wrap=soft_wrap)
+
+
+def print_note(text: str) -> None:
+    """Print a text on the standard error.
+
+    Parameters
+    ----------
+    text : str
+        Text to print.
+    """
+    from rsfstudy.cli.console import stderr_console
+
+    stderr_console.print(text)
+
+
+def print_pieces(pieces: Iterable[SummaryTableOrSentence]) -> None:
+    """Print tables, lists of headings and values, and sentences.
+
+    Parameters
+    ----------
+    pieces : iterable of (TextTable, mapping of str to str, or str)
+        Parts to print. Empty tables and empty mappings are not printed.
+    """
+    from rsfstudy.cli.table_layout import print_summary_piece
+
+    for piece in pieces:
+        print_summary_piece(piece)

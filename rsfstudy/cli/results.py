@@ -1,0 +1,109 @@
+"""Results of commands, and their output as text or as JSON.
+
+Each command first computes a result, which includes the exit status, and then prints the result.
+The printed text and the JSON output are generated from the same result.
+"""
+
+from __future__ import annotations
+
+import math
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Mapping
+from typing import Any, TypeVar
+
+import click
+
+from rsfstudy.errors import RunError
+
+EXIT_STATUS_OK, EXIT_STATUS_FAILED = 0, 1
+#: Version of the JSON output. The version changes if a key is removed, renamed or redefined.
+JSON_FORMAT = 1
+
+
+class CommandResult(ABC):
+    """Base class of the results of commands."""
+
+    @property
+    @abstractmethod
+    def exit_status(self) -> int:
+        """Exit status of the command."""
+
+    @abstractmethod
+    def json_fields(self) -> Mapping[str, Any]:
+        """Return the fields of the JSON output.
+
+        Returns
+        -------
+        mapping of str to object
+            Numbers, strings, Boolean values, and sequences and mappings of these.
+        """
+
+
+Result = TypeVar("Result", bound=CommandResult)
+
+
+def output_result(result: Result, print_result: Callable[[Result], None], as_json: bool) -> int:
+    """Print a result as text or as JSON.
+
+    Parameters
+    ----------
+    result : CommandResult
+        Result of a command.
+    print_result : callable
+        Function that prints the result as text.
+    as_json : bool
+        If True, print JSON instead of text.
+
+    Returns
+    -------
+    int
+        Exit status of the command.
+
+    Raises
+    ------
+    RunError
+        If the output cannot be written, for example because the disk is full.
+    """
+    if not as_json:
+        print_result(result)
+        return result.exit_status
+    import json
+
+    about = {
+        "command": click.get_current_context().info_name,
+        "format": JSON_FORMAT,
+        "exit_status": result.exit_status,
+    }
+    text = json.dumps(to_json_value(about | {**result.json_fields()}), indent=2, allow_nan=False)
+    try:
+        click.echo(text)
+    except OSError as error:
+        raise RunError(f"cannot print: {error.strerror}.") from error
+    return result.exit_status
+
+
+def to_json_value(value: Any) -> Any:
+    """Convert a value to a value that JSON can represent.
+
+    Parameters
+    ----------
+    value : object
+        Value to convert.
+
+    Returns
+    -------
+    object
+        Mappings, sequences and arrays are converted element by element. NaN and infinite numbers
+        become None. Values of other types, such as paths, become strings.
+    """
+    if hasattr(value, "tolist"):  # a scalar or an array of NumPy
+        value = value.tolist()
+    if isinstance(value, float):
+        return value if math.isfinite(value) else None
+    if value is None or isinstance(value, bool | int | str):
+        return value
+    if isinstance(value, Mapping):
+        return {str(name): to_json_value(part) for name, part in value.items()}
+    if isinstance(value, list | tuple | set | frozenset):
+        return [to_json_value(part) for part in value]
+    return str(value)

@@ -1,0 +1,150 @@
+"""Declaration of a study before a run, with its expected cost."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+from rsfstudy import Study
+from rsfstudy.cli import cost_estimates
+from rsfstudy.cli.printing import print_line, print_pieces
+from rsfstudy.cli.results import EXIT_STATUS_OK, CommandResult
+from rsfstudy.execution import CellPlan
+from rsfstudy.reporting import describe_scene_and_rig_fields
+from rsfstudy.rig import in_display_units
+
+#: Maximum number of printed values of an axis.
+_MAX_PRINTED_AXIS_POINTS = 40
+
+
+@dataclass(frozen=True)
+class StudyDeclaration(CommandResult):
+    """Declaration of a study, and the plan of its cells.
+
+    Parameters
+    ----------
+    study : Study
+        Study.
+    output_directory : Path
+        Directory of results. Measured times in this directory are used for the cost.
+    """
+
+    study: Study
+    output_directory: Path
+    exit_status = EXIT_STATUS_OK
+
+    @cached_property
+    def plan(self) -> CellPlan:
+        """Cells of the study."""
+        return CellPlan(self.study)
+
+    @cached_property
+    def varied_fields(self) -> set[str]:
+        """Names of the fields that vary between cells."""
+        varied = {field for axis in self.study.axes for field in axis.fields}
+        if self.study.scene_builder:
+            scales = self.study.scene_builder.build_scale_coordinates()
+            varied |= {name for name, (dims, _values) in scales.items() if dims}
+        return varied
+
+    @property
+    def measure_fields(self) -> dict[str, Any]:
+        """Fields of the measure that have the same value in all cells."""
+        fields = self.study.measure.describe().items()
+        return {name: value for name, value in fields if name not in self.varied_fields}
+
+    @property
+    def rig_quantities(self) -> Mapping[str, float]:
+        """Quantities of the rig in SI units."""
+        return self.study.rig.as_dict() if self.study.rig else {}
+
+    def json_fields(self) -> dict[str, Any]:
+        """Return the fields of the JSON output."""
+        study, varied = self.study, self.varied_fields
+        cost = cost_estimates.estimate_study_cost(self.plan, self.output_directory)
+        variables = study.measure.variables
+        return {
+            "kind": "study",
+            "study": study.name,
+            "title": study.title,
+            "summary": study.summary,
+            "axes": [{"size": len(axis), **axis.describe()} for axis in study.axes],
+            "scene": {
+                name: value
+                for name, value in study.base.as_dict().items()
+                if name not in varied and value is not None
+            },
+            "rig": {
+                n: self.rig_quantities[n] for n in in_display_units(self.rig_quantities, varied)
+            },
+            "measure": self.measure_fields,
+            "outputs": [
+                {"name": name, "has_error": f"{name}_error" in variables}
+                for name in variables
+                if not name.endswith("_error")
+            ],
+            "reductions": [reduction.describe()["name"] for reduction in study.reductions],
+            "claims": list(dict.fromkeys(claim.id for claim in study.claims)),
+            "cells": study.size,
+            "distinct_cells": len(self.plan.unique_cell_numbers),
+            "rtol": study.accuracy.rtol,
+            "cost": {
+                "rhs_evaluations": cost.rhs_evaluations,
+                "seconds": cost.seconds,
+                "measured_cells": cost.measured_cells,
+            },
+        }
+
+
+def print_study_declaration(declared: StudyDeclaration) -> None:
+    """Print the declaration of a study and its expected cost.
+
+    Parameters
+    ----------
+    declared : StudyDeclaration
+        Declaration to print.
+    """
+    study = declared.study
+    print_line(f"{study.name}: {study.title}\n", style="bold")
+    if study.summary:
+        print_line(study.summary + "\n")
+    measured = {
+        name: f"{len(value)} values" if isinstance(value, tuple | list) else value
+        for name, value in declared.measure_fields.items()
+    }
+    gives = study.measure.variables
+    with_errors = {n: " (with its error)" * (f"{n}_error" in gives) for n in gives}
+    different = len(declared.plan.unique_cell_numbers)
+    others = f" ({different:,} of them different)" if different < study.size else ""
+    costs = (
+        cost_estimates.describe_study_cost(declared.plan, declared.output_directory),
+        cost_estimates.compiled_engine_hint(declared.plan, declared.output_directory),
+    )
+    about = {
+        **{
+            f"axis {axis.dimension} ({len(axis)})": _format_axis_points(axis.point_names)
+            for axis in study.axes
+        },
+        **describe_scene_and_rig_fields(
+            "fixed", study.base.as_dict(), declared.rig_quantities, declared.varied_fields
+        ),
+        "measure": ", ".join(f"{n} = {v}" for n, v in measured.items()),
+        "outputs": ", ".join(f"{n}{w}" for n, w in with_errors.items() if not n.endswith("_error")),
+        "reductions": ", ".join(r.describe()["name"] for r in study.reductions),
+        "claims": ", ".join(dict.fromkeys(c.id for c in study.claims)),
+        "cells": f"{study.size:,}{others}",
+        "cost": "; ".join(filter(None, costs)),
+    }
+    print_pieces([{name: text or "-" for name, text in about.items()}])
+
+
+def _format_axis_points(axis_points: Sequence[str]) -> str:
+    """Format the values of an axis, and abbreviate a long list."""
+    return ", ".join(
+        axis_points
+        if len(axis_points) <= _MAX_PRINTED_AXIS_POINTS
+        else [*axis_points[:10], "...", *axis_points[-3:]]
+    )

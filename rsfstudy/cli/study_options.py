@@ -1,0 +1,137 @@
+"""Studies and worker pools that the options of a command describe."""
+
+from __future__ import annotations
+
+import contextlib
+from collections.abc import Iterator
+from dataclasses import replace
+from pathlib import Path
+
+import click
+import xarray as xr
+
+from rsfstudy import Study
+from rsfstudy.api import apply_overrides_to_study
+from rsfstudy.cli import assignment_parsing
+from rsfstudy.cli.options import CommandOptions
+from rsfstudy.execution import WorkerPool, connect_to_cluster
+from rsfstudy.rig import RIG_QUANTITIES, parse_number
+from rsfstudy.storage import read_dataset
+from rsfstudy.study import convert_study_to_rig_units, load_study, study_names
+
+
+def selected_study_names(options: CommandOptions) -> list[str]:
+    """Return the requested study name or file, or the names of all studies.
+
+    Parameters
+    ----------
+    options : CommandOptions
+        Arguments and options of the command.
+
+    Returns
+    -------
+    list of str
+        Names of studies, or paths of files.
+
+    Raises
+    ------
+    click.UsageError
+        If the user passed both a name and ``--all``, or neither of them.
+    """
+    if options.every == (options.name is not None):
+        raise click.UsageError("pass the name of a study, or --all")
+    return list(study_names()) if options.every else [options.name]
+
+
+def build_study_from_options(study_name: str, options: CommandOptions) -> Study:
+    """Load a study, and apply the overrides and the rig of the options.
+
+    If the rig has a stiffness, the stiffness of the rig replaces the values of a stiffness axis.
+
+    Parameters
+    ----------
+    study_name : str
+        Name of a study, or path of a study file.
+    options : CommandOptions
+        Arguments and options of the command.
+
+    Returns
+    -------
+    Study
+        Study with the overrides.
+
+    Raises
+    ------
+    InvalidValue
+        If an option is invalid.
+    """
+    study, stated = load_study(study_name), options.rig_option_texts
+    varied = {field for axis in study.axes for field in axis.fields}
+    taken = {"load_velocity", *(["stiffness"] * bool(varied & {"stiffness", "stiffness_ratio"}))}
+    if {*stated} - taken and study.rig is None:
+        rig = {name: text for name, text in stated.items() if name not in taken}
+        study = convert_study_to_rig_units(study, assignment_parsing.parse_rig(rig))
+        study = replace(study, overrides={**study.overrides, **rig})
+        stated = {name: text for name, text in stated.items() if name in taken}
+    in_si = {
+        "load_velocity": "m/s",
+        **{name: about.si_units for name, about in RIG_QUANTITIES.items()},
+    }
+    texts = {n: t if parse_number(t) is None else f"{t} {in_si[n]}" for n, t in stated.items()}
+    changes = texts | assignment_parsing.parse_overrides(study, options.settings)
+    return apply_overrides_to_study(
+        study, changes, **options.collect_option_values("rtol", "engine", "budget")
+    )
+
+
+@contextlib.contextmanager
+def open_worker_pool(options: CommandOptions, log_path: Path | None = None) -> Iterator[WorkerPool]:
+    """Open the worker pool that computes the cells.
+
+    Parameters
+    ----------
+    options : CommandOptions
+        Arguments and options of the command.
+    log_path : Path, optional
+        File for the error output of the worker processes.
+
+    Yields
+    ------
+    WorkerPool
+        Worker processes, or the cluster that the user specified.
+
+    Raises
+    ------
+    click.UsageError
+        If the options are contradictory.
+    """
+    if options.serial and options.scheduler:
+        raise click.UsageError("--serial and --scheduler exclude each other")
+    nowhere = contextlib.nullcontext()
+    with nowhere if options.scheduler is None else connect_to_cluster(options.scheduler) as client:
+        processes = 0 if options.serial else options.workers
+        with WorkerPool(processes, client, options.time_limit, log_path) as workers:
+            yield workers
+
+
+def read_results_file(file: Path, study_file: Path | None) -> xr.Dataset:
+    """Read a results file.
+
+    If a study file is passed, the file is executed first, because the file may define laws or other
+    components of the scenes.
+
+    Parameters
+    ----------
+    file : Path
+        Results file.
+    study_file : Path or None
+        Python file that declares the study.
+
+    Returns
+    -------
+    xarray.Dataset
+        Contents of the results file.
+    """
+    if study_file is not None:
+        load_study(str(study_file))
+    return read_dataset(file)

@@ -1,0 +1,210 @@
+"""Tables and counts of the cells of a study by status."""
+
+from __future__ import annotations
+
+import shlex
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+import pandas as pd
+import xarray as xr
+
+from rsfstudy.formatting import format_nonempty_fields, pluralize
+from rsfstudy.reporting.reduction_tables import find_refusal_reasons_of_reductions
+from rsfstudy.reporting.tables import TextTable
+from rsfstudy.status import STATUS_LABELS, Status
+from rsfstudy.storage import read_provenance
+
+#: Maximum number of failed cells in a table.
+_MAX_FAILURES = 20
+
+
+def count_statuses(dataset: xr.Dataset) -> Mapping[str, int]:
+    """Count the cells per status.
+
+    Parameters
+    ----------
+    dataset : xarray.Dataset
+        Results of a study.
+
+    Returns
+    -------
+    mapping of str to int
+        Number of cells by status label.
+    """
+    status = np.asarray(dataset["status"].values)
+    return {s.label: int((status == int(s)).sum()) for s in Status if (status == int(s)).any()}
+
+
+def count_failures(dataset: xr.Dataset) -> Mapping[str, int]:
+    """Count the failed cells per status.
+
+    Parameters
+    ----------
+    dataset : xarray.Dataset
+        Results of a study.
+
+    Returns
+    -------
+    mapping of str to int
+        Number of failed cells by status label.
+    """
+    return {
+        label: n
+        for label, n in count_statuses(dataset).items()
+        if not Status[label.upper()].is_answer
+    }
+
+
+def count_pending_cells(dataset: xr.Dataset) -> int:
+    """Count the cells that have not been computed.
+
+    Parameters
+    ----------
+    dataset : xarray.Dataset
+        Results of a study.
+
+    Returns
+    -------
+    int
+        Number of cells.
+    """
+    return int((dataset["status"] == int(Status.PENDING)).sum())
+
+
+def format_status_counts(dataset: xr.Dataset) -> str:
+    """Format the number of cells with each status, and the computational work.
+
+    Parameters
+    ----------
+    dataset : xarray.Dataset
+        Results of a study.
+
+    Returns
+    -------
+    str
+        Number of cells per status, and total number of right-hand-side evaluations. If no cell has
+        the status ``ok``, each status is followed by its meaning.
+    """
+    work, counts = int(dataset["rhs_evaluations"].sum()), count_statuses(dataset)
+    nothing = Status.OK.label not in counts
+    told = ", ".join(
+        f"{count} {label}" + f" ({Status[label.upper()].meaning})" * nothing
+        for label, count in counts.items()
+    )
+    return f"{told}; {work:,} right-hand-side evaluations"
+
+
+def format_notes_on_incomplete_results(results: xr.Dataset) -> list[str]:
+    """Describe failed cells and reductions that could not be computed.
+
+    Parameters
+    ----------
+    results : xarray.Dataset
+        Results of a study.
+
+    Returns
+    -------
+    list of str
+        Notes, or an empty list if the results are complete.
+    """
+    told = [
+        f"no {name}: {why}" for name, why in find_refusal_reasons_of_reductions(results).items()
+    ]
+    if failed := count_failures(results):
+        each = ", ".join(f"{label} {number}" for label, number in failed.items())
+        first = f"{sum(failed.values())} of {results['status'].size} cells failed: {each}"
+        told = [first, *told, "dataset.rsf.failures() lists them"]
+    return told
+
+
+def failures_table(dataset: xr.Dataset, file: str) -> TextTable:
+    """Build a table of the first failed cells, and the commands to rerun them.
+
+    Parameters
+    ----------
+    dataset : xarray.Dataset
+        Results of a study.
+    file : str
+        Path of the results file.
+
+    Returns
+    -------
+    TextTable
+        Table with up to 20 failed cells. Each entry of ``values`` has the keys ``coordinates``,
+        ``status``, ``message`` and ``command``. The command recomputes the cell.
+    """
+    status = dataset["status"]
+    failed = (status >= int(Status.WORK_BUDGET_SPENT)) & (status != int(Status.PENDING))
+    found = build_frame_of_cells(dataset, failed, list(map(str, failed.dims)))
+    first = found[:_MAX_FAILURES]
+    places: list[dict[Any, Any]] = first[list(failed.dims)].to_dict("records")
+    rows = [
+        {"cell": format_nonempty_fields(place), "status": label, "message": message}
+        for place, label, message in zip(places, first["status"], first["message"], strict=True)
+    ]
+    commands = [format_recompute_command(dataset, file, place) for place in places]
+    values = [
+        {"coordinates": place, "status": label, "message": message, "command": command}
+        for place, label, message, command in zip(
+            places, first["status"], first["message"], commands, strict=True
+        )
+    ]
+    caption = f"{pluralize(len(found), 'cell')} failed"
+    if len(found) > len(rows):
+        caption += f" (first {len(rows)} shown)"
+    return TextTable(rows, caption, {"cell", "message"}, values=values)
+
+
+def build_frame_of_cells(
+    dataset: xr.Dataset, cell_mask: xr.DataArray, axis_names: Sequence[str]
+) -> pd.DataFrame:
+    """Build a table of selected cells.
+
+    Parameters
+    ----------
+    dataset : xarray.Dataset
+        Results of a study.
+    cell_mask : xarray.DataArray
+        True for the selected cells.
+    axis_names : sequence of str
+        Names of the axes.
+
+    Returns
+    -------
+    pandas.DataFrame
+        Table with one row per cell: coordinates on the axes, ``status`` and ``message``.
+    """
+    at = cell_mask.values
+    columns = {name: dataset[name].broadcast_like(cell_mask).values[at] for name in axis_names}
+    columns["status"] = [STATUS_LABELS[code] for code in dataset["status"].values[at].tolist()]
+    return pd.DataFrame(columns | {"message": dataset["message"].values[at]})
+
+
+def format_recompute_command(
+    dataset: xr.Dataset, results_file: str, cell_coordinates: Mapping[str, Any]
+) -> str:
+    """Format the command that recomputes one cell.
+
+    Parameters
+    ----------
+    dataset : xarray.Dataset
+        Results of a study.
+    results_file : str
+        Path of the results file.
+    cell_coordinates : mapping of str to object
+        Coordinates of the cell on the axes.
+
+    Returns
+    -------
+    str
+        Command for a shell.
+    """
+    words = ["rsfstudy", "rerun", results_file]
+    declared_in = read_provenance(dataset)["declared_in"]
+    if declared_in:
+        words += ["--study", declared_in]
+    for name, value in cell_coordinates.items():
+        words += ["--cell", f"{name}={value}"]
+    return shlex.join(words)

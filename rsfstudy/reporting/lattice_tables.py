@@ -1,0 +1,142 @@
+"""Tables and short descriptions of the main result of a study along its axes."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import replace
+from functools import partial
+
+import numpy as np
+import xarray as xr
+
+from rsfstudy.formatting import format_list, format_value
+from rsfstudy.reporting.cell_tables import format_status_counts
+from rsfstudy.reporting.reduction_tables import names_of_slope_reductions
+from rsfstudy.reporting.tables import (
+    MAX_CELLS_SHOWN,
+    Column,
+    TextTable,
+    build_table_along_dimensions,
+    format_axis_name,
+    format_number_or_dash,
+    format_units,
+)
+from rsfstudy.rig import convert_to_dimensional_name, convert_to_display_units
+from rsfstudy.status import STATUS_LABELS, Status
+from rsfstudy.storage import find_primary_output, read_declaration
+
+#: Maximum number of cells in a table that shows all cells.
+_MAX_CELLS_SHOWN_WITHOUT_THINNING = 36
+#: If each point of a numbered axis has more fields than this number, a table shows fewer cells.
+_MAX_FIELDS_PER_POINT_WITHOUT_THINNING = 4
+
+
+def build_primary_output_table(dataset: xr.Dataset) -> TextTable:
+    """Build a table of the primary output along the axes.
+
+    The table contains the coordinates, the error estimates, and the status if some cells have no
+    result. If the lattice has many cells, the table contains a selection of the cells.
+
+    Parameters
+    ----------
+    dataset : xarray.Dataset
+        Results of a study.
+
+    Returns
+    -------
+    TextTable
+        Table of the primary output. The table is empty if the study has no primary output.
+    """
+    name = find_primary_output(dataset)
+    if name is None:
+        return TextTable([])
+    dataset = convert_to_display_units(dataset)
+    name = name if name in dataset else convert_to_dimensional_name(name)
+    dims = dataset["status"].dims
+    drawn = [n for n in _find_fields_along_numbered_axes(dataset) if n in dataset.coords]
+    columns = [Column(format_axis_name(dataset[n]), n, format_value) for n in drawn]
+    columns.append(Column(name, name, format_number_or_dash, "value"))
+    if f"{name}_error" in dataset:
+        short = partial(format_number_or_dash, format_specification=".1e")
+        columns.append(Column("error", f"{name}_error", short, "error"))
+    size, fewer = dataset["status"].size, 1 + len(drawn) // _MAX_FIELDS_PER_POINT_WITHOUT_THINNING
+    most = size if size <= _MAX_CELLS_SHOWN_WITHOUT_THINNING // fewer else MAX_CELLS_SHOWN // fewer
+    at = select_thinned_points({str(d): dataset.sizes[d] for d in dims}, most)
+    few = dataset[[*(column.variable for column in columns), "status"]].isel(at).load()
+    if (few["status"] != int(Status.OK)).any():
+        columns.append(Column("status", "status", STATUS_LABELS.__getitem__, "status"))
+    units, shown = format_units(dataset[name]), few["status"].size
+    caption = str(dataset[name].attrs.get("long_name", name)) + f", in {units}" * (units != "1")
+    if shown < size:
+        full = dataset.sizes
+        every = [f"{n} of {full[d]} {d}" for d, n in few.sizes.items() if n < full[d]]
+        which = f"{shown} of {size:,} cells, {', '.join(every)}, from first to last"
+        caption += f" ({which}; rsfstudy export --csv writes all)"
+    table = build_table_along_dimensions(few, dims, columns, caption)
+    about = {"name": name, "units": units}
+    return replace(table, values=[{**about, **row} for row in table.values])
+
+
+def _find_fields_along_numbered_axes(dataset: xr.Dataset) -> list[str]:
+    """Return the fields that vary along numbered axes, such as samples."""
+    axes = [axis["values"] for axis in read_declaration(dataset).axes]
+    columns = [
+        v for v in axes if isinstance(v, Mapping) and isinstance(next(iter(v.values())), list)
+    ]
+    return [name for column in columns for name in column]
+
+
+def select_thinned_points(
+    dimension_sizes: Mapping[str, int], max_cells: int
+) -> dict[str, np.ndarray]:
+    """Select points of each dimension so that the number of cells is limited.
+
+    The first and the last point of a dimension are selected if at least two points of the dimension
+    are selected.
+
+    Parameters
+    ----------
+    dimension_sizes : mapping of str to int
+        Size of each dimension.
+    max_cells : int
+        Maximum number of selected cells. The longest dimensions are thinned first.
+
+    Returns
+    -------
+    dict of str to numpy.ndarray
+        Indices of the selected points of each dimension.
+    """
+    kept = {dimension: min(size, max_cells) for dimension, size in dimension_sizes.items()}
+    while math.prod(kept.values()) > max_cells:
+        kept[max(kept, key=kept.__getitem__)] -= 1
+    return {
+        dimension: np.unique(np.linspace(0, size - 1, kept[dimension]).round().astype(int))
+        for dimension, size in dimension_sizes.items()
+    }
+
+
+def summarise_study_as_text_lines(dataset: xr.Dataset) -> list[str]:
+    """Summarise the results of a study in lines of text.
+
+    Parameters
+    ----------
+    dataset : xarray.Dataset
+        Results of a study.
+
+    Returns
+    -------
+    list of str
+        Range of the primary output, one line per slope, and the number of cells per status.
+    """
+    lines, converted = [], convert_to_display_units(dataset)
+    if (name := find_primary_output(dataset)) is not None:
+        values = converted[name if name in converted else convert_to_dimensional_name(name)]
+        told, units = np.unique(values.values[np.isfinite(values.values)]), format_units(values)
+        ends = " to ".join(map(format_value, dict.fromkeys((*told[:1], *told[-1:]))))
+        text = f"{ends}{f' {units}' * (units != '1')}" if ends else "no values"
+        lines.append(f"{values.name}: {text}")
+    for slope in names_of_slope_reductions(converted):
+        slopes, units = converted[slope].values.ravel().tolist(), format_units(converted[slope])
+        lines.append(f"{slope}: {format_list(slopes, ', ')}{f' {units}' * (units != '1')}")
+    return [*lines, format_status_counts(dataset)]

@@ -1,0 +1,167 @@
+"""Machine-readable summaries of datasets, for the JSON output of commands.
+
+The functions return dictionaries of numbers, labels and texts. The dictionaries contain the numbers
+of the printed tables without rounding.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import xarray as xr
+
+from rsfstudy.reporting.cell_tables import count_pending_cells, count_statuses, failures_table
+from rsfstudy.reporting.fit_tables import is_fit, list_fit_values
+from rsfstudy.reporting.lattice_tables import build_primary_output_table
+from rsfstudy.reporting.origin_tables import find_constant_fields
+from rsfstudy.reporting.reduction_tables import build_reduction_tables, missing_result_reasons
+from rsfstudy.reporting.summaries import is_motion, measure_motion
+from rsfstudy.reporting.tables import TextTable, build_single_scene_result_table
+from rsfstudy.storage import (
+    is_of_single_scene,
+    read_declaration,
+    read_provenance,
+    read_scene_fields,
+)
+from rsfstudy.vocabulary import find_coverage_content_type
+
+
+def summarise_study_as_fields(dataset: xr.Dataset, file: str) -> dict[str, Any]:
+    """Summarise the results of a study.
+
+    Parameters
+    ----------
+    dataset : xarray.Dataset
+        Results of a study.
+    file : str
+        Path of the results file, for the commands that recompute failed cells.
+
+    Returns
+    -------
+    dict of str to object
+        Status counts, reductions, missing reductions and failed cells.
+    """
+    rows = [row for table in build_reduction_tables(dataset) for row in table.values]
+    return {
+        "study": dataset.attrs["id"],
+        "title": dataset.attrs["title"],
+        "file": file,
+        "completeness": dataset.attrs["completeness"],
+        "overrides": read_declaration(dataset).overrides,
+        "statuses": count_statuses(dataset),
+        "rhs_evaluations": int(dataset["rhs_evaluations"].sum()),
+        "pending_cells": count_pending_cells(dataset),
+        "failed_cells": failures_table(dataset, file).values,
+        "reductions": [row for row in rows if "name" in row],
+        "cheapest_integrators": [row for row in rows if "name" not in row],
+        "missing_reductions": missing_result_reasons(dataset),
+    }
+
+
+def classify_contents(dataset: xr.Dataset) -> str:
+    """Return the kind of the contents of a file.
+
+    Parameters
+    ----------
+    dataset : xarray.Dataset
+        Contents of a file.
+
+    Returns
+    -------
+    str
+        "results" (of a study), "fit", "motion", or "scene" for other results of a single scene.
+    """
+    if is_fit(dataset):
+        return "fit"
+    if not is_of_single_scene(dataset):
+        return "results"
+    return "motion" if is_motion(dataset) else "scene"
+
+
+def summarise_file_as_fields(dataset: xr.Dataset, file: str) -> dict[str, Any]:
+    """Summarise the contents of a file.
+
+    Parameters
+    ----------
+    dataset : xarray.Dataset
+        Contents of the file.
+    file : str
+        Path of the file.
+
+    Returns
+    -------
+    dict of str to object
+        Kind of the contents, and the fields of this kind.
+    """
+    kind = classify_contents(dataset)
+    about = {"kind": kind, "file": file}
+    if kind == "results":
+        return about | _summarise_results(dataset, file)
+    if kind == "fit":
+        return about | {"fits": list_fit_values(dataset)}
+    about["status"] = dataset.attrs["status"]
+    about["message"] = dataset.attrs.get("message", "")
+    scene = {"scene": _select_applicable_fields(read_scene_fields(dataset))}
+    if kind == "motion":
+        return about | scene | {"motion": measure_motion(dataset)}
+    return about | scene | {"values": build_single_scene_result_table(dataset).values}
+
+
+def _summarise_results(dataset: xr.Dataset, file: str) -> dict[str, Any]:
+    """Summarise the results and the provenance of a study."""
+    about, sizes = read_provenance(dataset), dataset.sizes
+    scene, rig = find_constant_fields(dataset)
+    return summarise_study_as_fields(dataset, file) | {
+        "lattice": {str(dimension): sizes[dimension] for dimension in dataset["status"].dims},
+        "scene": _select_applicable_fields(scene),
+        "rig": rig,
+        "primary_output": build_primary_output_table(dataset).values,
+        "variables": _list_results(dataset),
+        "provenance": {
+            "command_line": about["command"],
+            **{name: about[name] for name in ("time", "git", "machine", "versions")},
+        },
+    }
+
+
+def _select_applicable_fields(fields: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the fields of a scene that are not None, because None marks absent fields."""
+    return {name: value for name, value in fields.items() if value is not None}
+
+
+def _list_results(dataset: xr.Dataset) -> list[dict[str, Any]]:
+    """Return name, description and dimensions of each result in a dataset."""
+    return [
+        {
+            "name": str(name),  # users may add variables without long_name
+            "description": str(values.attrs.get("long_name", "")),
+            "dimensions": list(map(str, values.dims)),
+        }
+        for name, values in dataset.data_vars.items()
+        if find_coverage_content_type(str(name)) == "modelResult"
+    ]
+
+
+def build_contents_table(dataset: xr.Dataset) -> TextTable:
+    """Build a table of the results that a dataset contains.
+
+    Parameters
+    ----------
+    dataset : xarray.Dataset
+        Results of a study.
+
+    Returns
+    -------
+    TextTable
+        Name, description and dimensions of each result.
+    """
+    found = _list_results(dataset)
+    rows = [
+        {
+            "variable": one["name"],
+            "description": f"{one['description']} ({', '.join(one['dimensions'])})".strip(),
+        }
+        for one in found
+    ]
+    return TextTable(rows, "", {"description"}, values=found)

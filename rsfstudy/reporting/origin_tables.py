@@ -1,0 +1,135 @@
+"""Descriptions of the scene, the rig and the provenance of results."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Collection, Mapping
+from typing import Any
+
+import xarray as xr
+
+from rsfstudy.critical_steps import SLOW_INSTABILITY_NORM_WARNING_PREFIX
+from rsfstudy.formatting import format_nonempty_fields, pluralize
+from rsfstudy.reporting.cell_tables import format_status_counts
+from rsfstudy.rig import DIMENSIONLESS_PREFIX, in_display_units
+from rsfstudy.status import Status
+from rsfstudy.storage import read_declaration, read_provenance
+
+
+def describe_scene_and_rig_fields(
+    heading: str,
+    scene_fields: Mapping[str, Any],
+    rig_values: Mapping[str, float],
+    varied_names: Collection[str] = (),
+) -> dict[str, str]:
+    """Describe the fields of a scene and of a rig.
+
+    Parameters
+    ----------
+    heading : str
+        Key in the returned dictionary for the fields that have a nonzero value.
+    scene_fields : mapping of str to object
+        Fields of the scene.
+    rig_values : mapping of str to float
+        Quantities of the rig in SI units.
+    varied_names : collection of str, optional
+        Names of the fields that vary along an axis. These fields are omitted.
+
+    Returns
+    -------
+    dict of str to str
+        Descriptions of the nonzero fields, the zero fields, the rig, and the slip rate of the
+        instability norm. Empty descriptions are omitted.
+    """
+    scene_fields = {n: v for n, v in scene_fields.items() if n not in varied_names}
+    sizes = in_display_units(rig_values, varied_names)
+    told = {
+        heading: format_nonempty_fields({n: v for n, v in scene_fields.items() if v}),
+        "zero": ", ".join(n for n, v in scene_fields.items() if not v and v is not None),
+        "laboratory": format_nonempty_fields(
+            {n: f"{v:g} {units}" for n, (v, units) in sizes.items()}
+        ),
+    }
+    norm, period = scene_fields.get("instability_norm"), scene_fields.get("period")
+    if norm and period and {"slip_distance", "reference_velocity"} <= set(sizes):
+        rate = norm * math.tau * sizes["slip_distance"][0] / period
+        # A norm below the reference velocity does not indicate an instability.
+        if rate > sizes["reference_velocity"][0]:
+            told["instability threshold"] = f"a slip rate of {rate:.4g} um/s on"
+    return {name: text for name, text in told.items() if text}
+
+
+def find_constant_fields(dataset: xr.Dataset) -> tuple[dict[str, Any], dict[str, float]]:
+    """Find the fields of the scene and of the rig that have the same value in all cells.
+
+    Parameters
+    ----------
+    dataset : xarray.Dataset
+        Results of a study.
+
+    Returns
+    -------
+    scene : dict of str to object
+        Fields of the scene. Fields that do not apply are None.
+    rig : dict of str to float
+        Quantities of the rig in SI units. The dictionary is empty if the study has no rig.
+    """
+    declared = read_declaration(dataset)
+    varied = {
+        str(n).removeprefix(DIMENSIONLESS_PREFIX)
+        for n, along in dataset.coords.items()
+        if along.dims
+    }
+    scene = {n: v for n, v in declared.base.items() if n not in varied}
+    rig = declared.laboratory or {}
+    return scene, {name: rig[name] for name in in_display_units(rig, varied)}
+
+
+def describe_study_origin(dataset: xr.Dataset) -> dict[str, str]:
+    """Describe the lattice and the provenance of the results of a study.
+
+    Parameters
+    ----------
+    dataset : xarray.Dataset
+        Results of a study.
+
+    Returns
+    -------
+    dict of str to str
+        Descriptions of the lattice, the fixed fields, the cells, the command and the versions.
+    """
+    attrs, about = dataset.attrs, read_provenance(dataset)
+    dims = dataset["status"].dims
+    scene, rig = find_constant_fields(dataset)
+    reduced = attrs.get("reduced_despite")
+    versions = ", ".join(f"{name} {version}" for name, version in about["versions"].items())
+    return {
+        "lattice": " x ".join(f"{dataset.sizes[d]} {d}" for d in dims),
+        **describe_scene_and_rig_fields("fixed", scene, rig),
+        "cells": f"{attrs['completeness']}; {format_status_counts(dataset)}",
+        **({"reductions": reduced} if reduced else {}),
+        "command": f"{about['command']}, {about['time']}",
+        "versions": f"{versions}; git {about['git']}; {about['machine']}",
+    }
+
+
+def note_on_norms_near_load_velocity(dataset: xr.Dataset) -> str:
+    """Describe results whose instability norm is close to the load velocity.
+
+    Parameters
+    ----------
+    dataset : xarray.Dataset
+        Results of a study.
+
+    Returns
+    -------
+    str
+        Number of results whose instability norm is close to the load point velocity, and the
+        message of the first such result. The string is empty if there is no such result, or if the
+        study has no rig.
+    """
+    if read_declaration(dataset).laboratory is None:
+        return ""
+    ok = dataset["message"].values[dataset["status"].values == int(Status.OK)]
+    near = [text for text in ok.tolist() if text.startswith(SLOW_INSTABILITY_NORM_WARNING_PREFIX)]
+    return f"{len(near)} of {pluralize(len(ok), 'answer')}: {near[0]}" if near else ""

@@ -1,0 +1,163 @@
+"""Tables of reductions, and reasons for missing results of reductions."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import replace
+from typing import Any
+
+import xarray as xr
+
+from rsfstudy.formatting import format_value
+from rsfstudy.reporting.tables import (
+    Column,
+    TextTable,
+    build_table_along_dimensions,
+    format_axis_name,
+    format_units,
+)
+from rsfstudy.rig import convert_to_display_units
+from rsfstudy.storage import read_declaration
+
+#: Headings and formats of the columns of a slope table, by the suffix of the variable name.
+_COLUMNS_OF_SLOPE_TABLE = {
+    "stderr": ("standard error", ".2g"),
+    "misfit": ("largest misfit", ".2g"),
+    "points": ("points", ".0f"),
+    "error": ("numerical error", ".2g"),
+}
+#: Columns of the comparison of integrators.
+_INTEGRATOR_COLUMNS = (
+    Column("cheapest", "cheapest_integrator", str, "integrator"),
+    Column("work", "cheapest_work", "{:,.0f}".format, "work"),
+    Column("work of the default", "cheapest_default_work", "{:,.0f}".format, "default_work"),
+    Column(
+        "required rtol",
+        "cheapest_default_request",
+        lambda digits: f"{10.0**-digits:.1g}",
+        "default_request",
+    ),
+)
+
+
+def build_reduction_tables(dataset: xr.Dataset) -> Iterator[TextTable]:
+    """Yield tables of the slopes and of the comparison of integrators.
+
+    Parameters
+    ----------
+    dataset : xarray.Dataset
+        Results of a study.
+
+    Yields
+    ------
+    TextTable
+        One table for each reduction with a standard error, such as a slope. If the study compares
+        integrators, a final table lists the cheapest integrator for each accuracy.
+    """
+    converted = convert_to_display_units(dataset)
+    for slope in names_of_slope_reductions(converted):
+        yield _slope_table(converted, slope)
+    if {column.variable for column in _INTEGRATOR_COLUMNS} <= set(dataset.data_vars):
+        dims = dataset["cheapest_work"].dims
+        yield build_table_along_dimensions(
+            dataset, dims, _INTEGRATOR_COLUMNS, wrappable_columns={"problem", "cheapest"}
+        )
+
+
+def _slope_table(dataset: xr.Dataset, reduction_name: str) -> TextTable:
+    """Return a table of a slope with its standard error and misfit."""
+    slope = dataset[reduction_name]
+    units, description = format_units(slope), slope.attrs.get("comment", reduction_name)
+    heading = f"{reduction_name} ({units})" if units != "1" else reduction_name
+    columns = [Column(heading, reduction_name, format_value, "value")]
+    for suffix, (heading, form) in _COLUMNS_OF_SLOPE_TABLE.items():
+        if (name := f"{reduction_name}_{suffix}") in dataset:
+            if suffix != "points" and (own := format_units(dataset[name])) != units:
+                heading += f" ({own})"
+            columns.append(Column(heading, name, f"{{:{form}}}".format, suffix))
+    names = {format_axis_name(dataset[d]) for d in slope.dims}
+    table = build_table_along_dimensions(dataset, slope.dims, columns, description, names)
+    about = {"name": reduction_name, "units": units}
+    return replace(table, values=[{**about, **row} for row in table.values])
+
+
+def names_of_slope_reductions(dataset: xr.Dataset) -> list[str]:
+    """Return the names of the reductions that have a standard error.
+
+    Parameters
+    ----------
+    dataset : xarray.Dataset
+        Results of a study.
+
+    Returns
+    -------
+    list of str
+        Names in the order of the declaration.
+    """
+    named = [reduction["name"] for reduction in read_declaration(dataset).reductions]
+    return [name for name in named if {name, f"{name}_stderr"} <= set(dataset.data_vars)]
+
+
+def build_reduction_tables_and_sentences(dataset: xr.Dataset) -> Iterator[TextTable | str]:
+    """Yield the tables of reductions, and the reasons for missing reductions.
+
+    Parameters
+    ----------
+    dataset : xarray.Dataset
+        Results of a study.
+
+    Yields
+    ------
+    TextTable or str
+        Tables, followed by one sentence per reduction without results.
+    """
+    yield from build_reduction_tables(dataset)
+    for name, why in missing_result_reasons(dataset).items():
+        yield f"no {name}: {why}"
+
+
+def find_refusal_reasons_of_reductions(dataset: xr.Dataset) -> dict[str, str]:
+    """Find the reasons why reductions were refused, such as failed cells.
+
+    Parameters
+    ----------
+    dataset : xarray.Dataset
+        Results of a study.
+
+    Returns
+    -------
+    dict of str to str
+        Reasons by reduction name.
+    """
+    named = [str(reduction["name"]) for reduction in read_declaration(dataset).reductions]
+    named.sort(key=len, reverse=True)  # A name may begin with another name.
+    found: dict[str, str] = {}
+    for result, values in dataset.data_vars.items():
+        name = next((n for n in named if f"{result}_".startswith(f"{n}_")), "")
+        if name and "refused" in values.attrs:
+            found.setdefault(name, str(values.attrs["refused"]))
+    return found
+
+
+def missing_result_reasons(dataset: xr.Dataset) -> dict[str, str]:
+    """Find the reasons why reductions have no results.
+
+    Parameters
+    ----------
+    dataset : xarray.Dataset
+        Results of a study.
+
+    Returns
+    -------
+    dict of str to str
+        Reasons by reduction name.
+    """
+    found, there = find_refusal_reasons_of_reductions(dataset), tuple(map(str, dataset.data_vars))
+    for stated_as in read_declaration(dataset).reductions:
+        about: Mapping[str, Any] = {**stated_as}
+        if not any(name.startswith(about["name"]) for name in there):
+            least, most = map(format_value, about.get("within") or ("", ""))
+            on = format_axis_name(dataset[about["on"]]) if most else ""
+            span = f", with {least} <= {on} <= {most}" if most else ""
+            found[about["name"]] = f"too few suitable cells{span}"
+    return found

@@ -1,0 +1,82 @@
+"""Tables and counts of the verdicts on claims."""
+
+from __future__ import annotations
+
+import pandas as pd
+import xarray as xr
+
+from rsfstudy.formatting import pluralize
+from rsfstudy.reporting.cell_tables import count_failures
+from rsfstudy.reporting.tables import TextTable
+from rsfstudy.study import NOT_APPLICABLE_VERDICT, VERDICTS, format_verdict_row
+
+
+def claims_table(verdicts: pd.DataFrame) -> TextTable | str:
+    """Build a table of claims and their verdicts.
+
+    Parameters
+    ----------
+    verdicts : pandas.DataFrame
+        Verdicts of one or several studies, from ``rsfstudy.check``.
+
+    Returns
+    -------
+    TextTable or str
+        Table of the claims. If no claim applies, the function returns a sentence. The sentence is
+        empty if there are no claims.
+    """
+    rows = verdicts.to_dict("records")
+    if not any(row["verdict"] != NOT_APPLICABLE_VERDICT for row in rows):
+        return f"{pluralize(len(rows), 'claim')} not checked: {count_verdicts(verdicts)}" * bool(
+            rows
+        )
+    colours = [
+        "red" if row["moved"] else "green" if row["verdict"] == "reproduced" else "yellow"
+        for row in rows
+    ]
+    return TextTable(
+        [format_verdict_row(row) for row in rows],
+        wrappable_columns={"claim", "tolerance and reason"},
+        row_colours=colours,
+    )
+
+
+def count_verdicts(verdicts: pd.DataFrame) -> str:
+    """Count the claims per verdict.
+
+    Parameters
+    ----------
+    verdicts : pandas.DataFrame
+        Verdicts, from ``rsfstudy.check``.
+
+    Returns
+    -------
+    str
+        Number of claims per verdict. If no claim applies, the string contains the reason.
+    """
+    given = list(verdicts["verdict"])
+    if set(given) == {NOT_APPLICABLE_VERDICT}:
+        return "no published values for overrides or other units"
+    return ", ".join(f"{given.count(v)} {v}" for v in VERDICTS if v in given)
+
+
+def summarise_verdicts(dataset: xr.Dataset, verdicts: pd.DataFrame) -> tuple[str, list[str]]:
+    """Summarise the verdicts of claims and the failures of cells.
+
+    Parameters
+    ----------
+    dataset : xarray.Dataset
+        Results of a study.
+    verdicts : pandas.DataFrame
+        Verdicts, from ``rsfstudy.check``.
+
+    Returns
+    -------
+    counts : str
+        Number of claims per verdict.
+    problems : list of str
+        Descriptions of failed cells, and of claims whose verdict differs from the expected verdict.
+    """
+    wrong = [f"{count} {label}" for label, count in count_failures(dataset).items()]
+    wrong += [f"{claim} moved" for claim in dict.fromkeys(verdicts["id"][verdicts["moved"]])]
+    return count_verdicts(verdicts), wrong
