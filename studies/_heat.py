@@ -1,5 +1,6 @@
 """Scenes, references and claims of the studies with heat."""
 
+from collections.abc import Callable, Sequence
 from typing import Any
 
 from rsfstudy import Claim, Scene
@@ -89,3 +90,19 @@ def known_value_claim(
         tolerance=relative_tolerance * abs(published),
         reason="the accuracy of the study, or the printed digits of the value",
     )
+
+
+def closest_to(target: float) -> Callable[[Sequence[float]], float]:
+    """Return a function that selects the axis value with the smallest distance.
+
+    Parameters
+    ----------
+    target : float
+        Value to compare with.
+
+    Returns
+    -------
+    callable
+        Function of the axis values, which returns one of them.
+    """
+    return lambda values: min(values, key=lambda value: abs(value - target))

@@ -10,6 +10,7 @@ rate, and the critical stiffness is slightly below (b - a) sigma_*/D_c.
 """
 
 import math
+from collections.abc import Sequence
 
 import numpy as np
 import xarray as xr
@@ -19,7 +20,13 @@ from rsfstudy import Axis, Claim, Figure, Panel, Study
 from rsfstudy.measures import LinearStability
 from rsfstudy.study.figure_declarations import Axes
 
-from ._heat import HEATED_FAULT, HEATING_REFERENCES, INDEPENDENT, known_value_claim
+from ._heat import (
+    HEATED_FAULT,
+    HEATING_REFERENCES,
+    INDEPENDENT,
+    closest_to,
+    known_value_claim,
+)
 
 #: Heating H, both activation terms, a and b of the fault.
 _HEATING, _ACTIVATION, _A, _B, _MU_STAR = 0.001, 35.0, 0.01, 0.015, 0.6
@@ -62,6 +69,22 @@ def transition_rate(cooling: float) -> float:
     return math.exp(brentq(excess, 0.0, rising[0])) if rising and rising[0] > 0.0 else math.nan
 
 
+def shown_cooling_rates(values: Sequence[float]) -> list[float]:
+    """Return the cooling rates whose curves of steady friction are shown.
+
+    Parameters
+    ----------
+    values : sequence of float
+        All cooling rates.
+
+    Returns
+    -------
+    list of float
+        Powers of ten from 0.1, or all cooling rates if there are none.
+    """
+    return [v for v in values if v in (0.1, 1.0, 10.0, 100.0)] or list(values)
+
+
 def plot_transitions(dataset: xr.Dataset, axes: Axes) -> None:
     """Draw dotted lines at the slip rates of lowest friction, in closed form.
 
@@ -74,10 +97,7 @@ def plot_transitions(dataset: xr.Dataset, axes: Axes) -> None:
     """
     from rsfstudy.plots import cycle_style
 
-    shown = dataset["cooling"].values.tolist()
-    for number, cooling in enumerate(
-        shown if len(shown) == len(_SHOWN) else np.array(shown)[_SHOWN]
-    ):
+    for number, cooling in enumerate(shown_cooling_rates(dataset["cooling"].values.tolist())):
         rate = transition_rate(cooling)
         if rate <= float(dataset["load_velocity_ratio"].max()):
             axes.axvline(rate, color=cycle_style(number)["color"], linestyle=":", linewidth=0.8)
@@ -157,15 +177,13 @@ def critical_stiffness_at_reference(row: xr.Dataset) -> tuple[np.ndarray, np.nda
     return cooling, np.array(found)
 
 
-#: Indices of the cooling rates 0.1, 1, 10 and 100, and of the slip rate V_*.
-_SHOWN, _AT_REFERENCE = [3, 6, 9, 12], 12
 figure = Figure(
     [
         Panel(
             x="load_velocity_ratio",
             y="steady_friction",
             hue=["cooling"],
-            isel={"cooling": _SHOWN},
+            isel={"cooling": shown_cooling_rates},
             overlays=[plot_transitions],
             style={"markersize": 2},
             x_label="Slip rate, $V/V_*$",
@@ -176,7 +194,7 @@ figure = Figure(
         Panel(
             x="cooling",
             y="critical_stiffness_from_growth",
-            isel={"load_velocity_ratio": _AT_REFERENCE},
+            isel={"load_velocity_ratio": closest_to(1.0)},
             fit_line=critical_stiffness_at_reference,
             y_label=r"Critical stiffness, $k_{cr}D_c/\sigma_*$",
             title="At $V_*$; line: closed form, points: growth",

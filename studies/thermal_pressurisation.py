@@ -16,7 +16,7 @@ from rsfstudy import Axis, Claim, Figure, Panel, Study
 from rsfstudy.measures import LinearStability
 from rsfstudy.study.figure_declarations import horizontal_line
 
-from ._heat import PRESSURE_REFERENCES, PRESSURISED_FAULT, known_value_claim
+from ._heat import PRESSURE_REFERENCES, PRESSURISED_FAULT, closest_to, known_value_claim
 
 _A, _B, _MU_STAR = 0.01, 0.015, 0.6
 
@@ -92,7 +92,7 @@ panel = Panel(
     x="drainage",
     y="critical_stiffness_from_growth",
     hue=["heating"],
-    isel={"cooling": 1},
+    isel={"cooling": closest_to(0.01)},
     fit_line=closed_form,
     curve_label=lambda row: f"$E = {float(row['heating']):g}$",
     overlays=[horizontal_line(_B - _A, color="0.75", linewidth=2.0, label="drained, $b-a$")],
@@ -109,7 +109,7 @@ figure = Figure(
             x="drainage",
             y="critical_stiffness_from_growth",
             hue=["cooling"],
-            isel={"heating": 2},
+            isel={"heating": closest_to(0.01)},
             fit_line=closed_form,
             curve_label=lambda row: f"$C = {float(row['cooling']):g}$",
             style={"markersize": 2.5},

@@ -156,7 +156,9 @@ def build_friction_functions(scene: SceneView) -> FrictionFunctions:
     )
     if not scene.parts.temperature.unknowns:
         return functions
-    return functions._replace(**temperature_functions.build_replacements(scene, functions))
+    return functions._replace(
+        **temperature_functions.build_replacements(scene, functions._asdict())
+    )
 
 
 def _find_stress_effects_on_state(scene: SceneView) -> tuple[Function, ...]:

@@ -22,8 +22,9 @@ arguments that ``friction.FrictionFunctions`` describes.
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from functools import cache
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 from scipy.optimize import newton
 
@@ -33,9 +34,6 @@ from rsfstudy.slider.parts import Function, Numbers, collect_parameter_values
 from rsfstudy.slider.scene_caching import cached_per_scene
 from rsfstudy.slider.scene_view import SceneView
 from rsfstudy.slider.state_functions import build_sum_function, find_law_functions
-
-if TYPE_CHECKING:
-    from rsfstudy.slider.friction import FrictionFunctions
 
 #: Number of parameters that precede the parameters that the temperature part declares.
 _COMMON_PARAMETER_COUNT = 3
@@ -62,15 +60,15 @@ class _Places(NamedTuple):
     end: int
 
 
-def build_replacements(scene: SceneView, isothermal: FrictionFunctions) -> dict[str, Any]:
+def build_replacements(scene: SceneView, isothermal: Mapping[str, Any]) -> dict[str, Any]:
     """Build the friction functions that the temperature of a scene changes.
 
     Parameters
     ----------
     scene : Scene
         Scene whose temperature is an unknown.
-    isothermal : FrictionFunctions
-        Friction functions of the scene without the temperature.
+    isothermal : mapping of str to object
+        Attributes of the ``FrictionFunctions`` of the scene without the temperature.
 
     Returns
     -------
@@ -100,13 +98,13 @@ def build_replacements(scene: SceneView, isothermal: FrictionFunctions) -> dict[
         ),
         "steady_states": _insert_steady_temperature(steady_states, source.auxiliary_steady_states),
         "indices_of_states_in_distance": tuple(
-            i + (i >= law_states) for i in isothermal.indices_of_states_in_distance
+            i + (i >= law_states) for i in isothermal["indices_of_states_in_distance"]
         ),
     }
     if any(parts.temperature.activation):
-        contribution = isothermal.state_contribution
+        contribution = isothermal["state_contribution"]
         replacements |= {
-            "strength": _add_temperature_to_strength(isothermal.strength, places),
+            "strength": _add_temperature_to_strength(isothermal["strength"], places),
             "state_contribution": _add_temperature_to_contribution(contribution, places),
             "state_variable": _build_state_variable_function(places),
         }
