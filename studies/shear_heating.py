@@ -196,6 +196,7 @@ figure = Figure(
             y="critical_stiffness_from_growth",
             isel={"load_velocity_ratio": closest_to(1.0)},
             fit_line=critical_stiffness_at_reference,
+            x_label="Cooling rate, $c_{th}D_c/V_*$",
             y_label=r"Critical stiffness, $k_{cr}D_c/\sigma_*$",
             title="At $V_*$; line: closed form, points: growth",
             log="x",
