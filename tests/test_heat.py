@@ -477,7 +477,7 @@ def test_a_temperature_step_of_a_rigid_slider_is_an_integral():
     [
         ({"fluid": "thermal"}, "Set temperature='shear_heating'"),
         ({"heating": 0.1}, "set temperature='shear_heating'"),
-        ({"pressurisation": 1.0}, "pressurisation"),
+        ({"pressurisation": 1.0}, "set fluid=.thermal."),
         ({**HOT, "law": "two_slip_states", "stiffness": 0.01}, "laws with one state"),
         ({**HOT, "heating": 0.2}, "colder than absolute zero"),
         ({**HOT, "regularised": True, "stiffness": 0.01}, "regularised"),

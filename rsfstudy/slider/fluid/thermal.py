@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
+from rsfstudy.errors import InvalidValue
 from rsfstudy.quantities import Quantity
 from rsfstudy.slider.fluid import (
     PORE_PRESSURE_QUANTITY,
@@ -160,7 +161,7 @@ class ThermalFluid(Fluid):
         if not scene.parts.temperature.unknowns:
             rule = f"has no meaning for temperature={scene.parts.temperature.name!r}"
             remedy = "Set temperature='shear_heating', or choose another fluid."
-            raise self.field_error("name", rule, remedy)
+            raise InvalidValue("fluid", self.name, rule, remedy=remedy)
         if lacks_critical_stiffness(scene):
             rule = "leaves no critical stiffness with thermal pressurisation"
             raise self.field_error("drainage", rule, "Give stiffness itself, or raise drainage.")
