@@ -157,7 +157,8 @@ NEW_NAME_BY_OWNER_AND_FORMER_NAME: Mapping[str, Mapping[str, str]] = {
         "COUNT": "POSITIVE_INTEGER",
     },
     "rsfstudy.slider.parts:number()": {
-        "if_stated": "omit_if_none",
+        "if_stated": "omit_if_default",
+        "omit_if_none": "omit_if_default",
     },
     "rsfstudy.slider.parts:Part": {
         "called_by": "selected_by",

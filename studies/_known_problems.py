@@ -193,17 +193,17 @@ class ProblemMeasure(Measure):
         DataError
             If a problem is not registered.
         """
-        from rsfstudy.storage import schema  # Worker processes do not need this module.
+        from rsfstudy.storage import plain_data  # Worker processes do not need this module.
 
         if "problems" not in described:
             return {}
         known = [json.loads(json.dumps(problem.describe())) for problem in REGISTERED_PROBLEMS]
-        listed = schema.convert_plain_data_to_type(
+        listed = plain_data.convert_plain_data(
             described.pop("problems"), Sequence[dict[str, Any]], path
         )
         for number, each in enumerate(listed):
             if each not in known:
-                raise schema.invalid_part_error(
+                raise plain_data.invalid_part_error(
                     f"{path}.problems[{number}]", "is posed by no study"
                 )
         return {"problems": tuple(REGISTERED_PROBLEMS[known.index(each)] for each in listed)}

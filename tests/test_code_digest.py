@@ -18,6 +18,7 @@ from rsfstudy import measures
 from rsfstudy.critical_steps.critical_step import CriticalStep
 from rsfstudy.errors import DataError, RunError
 from rsfstudy.execution import code_digest, provenance
+from rsfstudy.execution.module_graph import ModuleGraph
 from rsfstudy.limit_cycles.limit_cycle import LimitCycle
 from rsfstudy.measures import Outcome
 from rsfstudy.reductions import Reduction
@@ -167,7 +168,7 @@ def test_the_code_of_a_measure_within_another_counts(tmp_path):
     found = set()
     for number, helper in enumerate((HELPER, HELPER, HELPER.replace("2.0 * x", "3.0 * x"))):
         study = study_in(tmp_path / str(number), helper=helper, measure=text)
-        found.add(provenance.run_fingerprint(study)["own_code"])
+        found.add(provenance.run_fingerprint(study, [study.base])["own_code"])
     assert len(found - {"none"}) == 2
 
 
@@ -240,7 +241,7 @@ def test_a_worker_with_another_helper_is_refused(tmp_path, monkeypatch, cluster)
 
 
 def physics_of(study):
-    return provenance.run_fingerprint(study)["physics"]
+    return provenance.run_fingerprint(study, [study.base])["physics"]
 
 
 def with_measures_of_their_own():
@@ -253,9 +254,9 @@ def with_measures_of_their_own():
 
 
 def test_a_measure_in_the_file_of_a_named_study_is_no_code_of_ones_own():
-    fingerprint = provenance.run_fingerprint(effects.study)
+    fingerprint = provenance.run_fingerprint(effects.study, [effects.study.base])
     assert fingerprint["own_code"] == "none"
-    assert fingerprint["physics"] != provenance.code_fingerprint()["physics"]
+    assert "named_studies.effects" in fingerprint["physics"]
 
 
 def digest_of_edited(module, edits, monkeypatch):
@@ -328,9 +329,10 @@ def test_of_the_physics_its_code_counts_and_no_remark(old, new, same, tmp_path):
         (tmp_path / name / "slider" / "law.py").write_text(text)
     assert old in LAW
     before, after = (
-        code_digest.digest_sources(provenance.read_physics_sources(tmp_path / name))
+        ModuleGraph(provenance.read_physics_sources(tmp_path / name)).digests()
         for name in ("before", "after")
     )
+    assert before.keys() == {"slider.law"}
     assert (before == after) is same
 
 
@@ -339,7 +341,7 @@ def test_the_digest_of_the_physics_is_that_of_its_files():
     files = provenance.read_physics_sources(package)
     assert {"slider/friction.py", "motion/motion_loop.py", "measure_base/measure.py"} <= set(files)
     moved = {**files, "slider/moved.py": files["slider/friction.py"]}
-    digests = [code_digest.digest_sources(each) for each in (files, moved)]
+    digests = [ModuleGraph(each).combined_digest for each in (files, moved)]
     assert digests[0] == provenance.code_fingerprint()["physics"] != digests[1]
 
 
@@ -347,7 +349,7 @@ def test_the_digest_of_the_physics_is_that_of_its_files():
 def test_cached_properties_of_a_study_do_not_change_its_digest(name):
     """The digest is the same before and after the use of a study."""
     study = study_loader.load_study(name)
-    fresh = code_digest.digest_physics_and_measures("", study.measure.code_classes)
+    fresh = code_digest.digest_measures_of_studies(study.measure.code_classes)
     values = [
         value
         for kind in study.measure.code_classes
@@ -356,4 +358,4 @@ def test_cached_properties_of_a_study_do_not_change_its_digest(name):
     values += [part for value in values if isinstance(value, dict) for part in value.values()]
     used = [value.variables for value in values if isinstance(value, measures.Measure)]
     assert used
-    assert code_digest.digest_physics_and_measures("", study.measure.code_classes) == fresh
+    assert code_digest.digest_measures_of_studies(study.measure.code_classes) == fresh

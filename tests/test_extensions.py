@@ -39,9 +39,7 @@ from rsfstudy.study.figure_declarations import Figure, Panel
 
 #: Fields of every scene. Other fields are part of a scene only if they have a value.
 PLAIN = tuple(
-    name
-    for name in part_registry.SCENE_FIELD_NAMES
-    if name not in part_registry.FIELDS_OMITTED_IF_NONE
+    name for name in part_registry.SCENE_FIELD_NAMES if name not in part_registry.OMITTED_DEFAULTS
 )
 EXAMPLES = sorted((Path(__file__).parent / "extensions").glob("*.py"))
 #: One cell of each study.

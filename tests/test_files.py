@@ -23,8 +23,9 @@ from rsfstudy.errors import DataError, InvalidValue
 from rsfstudy.execution.provenance import read_git_commit_and_state
 from rsfstudy.measures import Measure, Outcome
 from rsfstudy.status import Status
-from rsfstudy.storage import dataset_files, rebuild_from_file, schema
-from rsfstudy.storage.cell_journal import CellJournal, OutputPacker
+from rsfstudy.storage import dataset_files, declarations, rebuild_from_file, schema
+from rsfstudy.storage.cell_columns import OutputPacker
+from rsfstudy.storage.cell_journal import CellJournal
 from rsfstudy.study import study_index, study_loader
 
 
@@ -264,7 +265,7 @@ def test_every_declaration_restores_its_study(name):
     study = study_loader.load_study(name)
     described = json.loads(json.dumps(study.describe()))
     restored = rebuild_from_file.study_from_declaration(
-        schema.parse_declaration(described), study.user_parts
+        declarations.parse_declaration(described), study.user_parts
     )
     assert json.loads(json.dumps(restored.describe())) == described
     assert restored.size == study.size
@@ -277,7 +278,7 @@ def test_measures_and_reductions_in_the_files_of_studies_are_found_by_their_name
     """The modules are found by a process that has not loaded any study."""
     described = [study_loader.load_study(name).describe() for name in ("effects", "coverage")]
     asked = (
-        "import json, sys; from rsfstudy.storage import schema as contents, "
+        "import json, sys; from rsfstudy.storage import declarations as contents, "
         "rebuild_from_file as restore\n"
         "for plain in json.load(sys.stdin):\n"
         "    study = restore.study_from_declaration(contents.parse_declaration(plain), {})\n"
@@ -292,7 +293,7 @@ def test_measures_and_reductions_in_the_files_of_studies_are_found_by_their_name
     )
     assert ran.stdout == "EffectCost RelativeDifference\nCoverage CoverageStatistics\n"
     with pytest.raises(InvalidValue, match="Did you mean 'effect_cost'"):
-        rebuild_from_file.rebuild_measure({"name": "effect_costs"}, "")
+        declarations.build_measure({"name": "effect_costs"}, "")
 
 
 def test_a_rerun_reproduces_every_number(small):

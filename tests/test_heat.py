@@ -21,6 +21,7 @@ from scipy.optimize import brentq
 import rsfstudy
 from rsfstudy import Scene
 from rsfstudy.errors import InvalidValue
+from rsfstudy.execution.cell_plan import compute_cell_key
 from rsfstudy.measures import CriticalStep, LimitCycle, RigidResponse, StepResponse
 from rsfstudy.motion.accuracy import Accuracy
 from rsfstudy.motion.engines import COMPILED, SCIPY
@@ -384,6 +385,15 @@ def test_other_scenes_do_not_list_the_temperature():
     plain, hot = Scene().as_dict(), Scene(**HOT).as_dict()
     assert not {"temperature", "heating", "pressurisation", "weakened_friction"} & set(plain)
     assert {"temperature", "heating", "cooling"} <= set(hot)
+    # Keys of cells before heat was added.
+    keys = {
+        "d644d6e6df1d801716788fc7cf8a13d5": {},
+        "61b4408daac251a37a3d446bd939892f": {
+            "law": "slowness", "fluid": "dilatant", "inertia": True
+        },
+    }  # fmt: skip
+    for key, fields in keys.items():
+        assert compute_cell_key(Scene(**fields), LimitCycle()).hex() == key
     assert Scene(**hot) == Scene(**HOT)
     assert Scene(**HOT).with_(temperature="isothermal") == Scene()
 

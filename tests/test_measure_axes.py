@@ -29,7 +29,6 @@ from rsfstudy.execution.cell_plan import CellPlan
 from rsfstudy.measures import Measure, Outcome
 from rsfstudy.status import Status
 from rsfstudy.storage import rebuild_from_file, schema
-from rsfstudy.storage.lattice_datasets import build_lattice_coordinates
 
 BOTH = study_of(
     "both",
@@ -188,8 +187,8 @@ def test_the_file_alone_reproduces_its_cells(tmp_path):
     )
     assert restored.describe() == BOTH.describe()
     xr.testing.assert_identical(
-        xr.Dataset(coords=build_lattice_coordinates(restored)),
-        xr.Dataset(coords=build_lattice_coordinates(BOTH)),
+        xr.Dataset(coords=CellPlan(restored).coordinates),
+        xr.Dataset(coords=CellPlan(BOTH).coordinates),
     )
     table = rsfstudy.rerun(file, workers=0, progress=False)
     assert (table["values"] == table["identical"]).all()

@@ -95,7 +95,9 @@ def test_a_run_goes_on(older, tmp_path, monkeypatch):
     journal.write_bytes((older / "tiny.cells.sqlite").read_bytes())
     with contextlib.closing(sqlite3.connect(journal)) as db, db:
         (text,) = db.execute("SELECT json FROM fingerprint").fetchone()
-        now = json.dumps({**json.loads(text), **provenance.run_fingerprint(study)}, sort_keys=True)
+        now = json.dumps(
+            {**json.loads(text), **provenance.run_fingerprint(study, [study.base])}, sort_keys=True
+        )
         db.execute("UPDATE fingerprint SET json = ?", (now,))
     monkeypatch.setattr("rsfstudy.execution.cell_computation.compute_cell", None)
     resumed = run(study, output=tmp_path)

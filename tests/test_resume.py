@@ -326,8 +326,8 @@ def test_two_runs_at_a_time_are_refused(tmp_path, monkeypatch):
     have_same_numbers(rsfstudy.open("faulty", tmp_path), uninterrupted())
 
 
-@pytest.mark.parametrize("name", ["physics", "numpy", "scipy"])
-def test_other_physics_or_versions_are_not_mixed(name, tmp_path, monkeypatch):
+@pytest.mark.parametrize("name", ["python", "numpy", "scipy"])
+def test_other_versions_are_not_mixed(name, tmp_path, monkeypatch):
     from rsfstudy.execution import provenance
 
     run(output=tmp_path)

@@ -17,7 +17,7 @@ from rsfstudy.limit_cycles.limit_cycle import LimitCycle
 from rsfstudy.responses.linear_stability import LinearStability
 from rsfstudy.slider.laws.slip import SlipLaw
 from rsfstudy.slider.parts import number
-from rsfstudy.storage.lattice_datasets import build_lattice_coordinates
+from rsfstudy.storage import rebuild_from_file
 from rsfstudy.study import study_index, study_loader
 
 CASES = {
@@ -107,7 +107,23 @@ def declared(**fields) -> Study:
 def test_a_zipped_axis_bears_its_own_values_whatever_the_first_cell_needs(order):
     case = Axis("case", {"weak": {"alpha": 0.25}, "strong": {"alpha": 0.5}})
     study = declared(axes=[Axis("normal_stress", order), case])
-    assert build_lattice_coordinates(study)["alpha"][1].tolist() == [0.25, 0.5]
+    assert CellPlan(study).coordinates["alpha"][1].tolist() == [0.25, 0.5]
+
+
+def test_coordinates_are_taken_from_the_scenes_of_the_plan(monkeypatch, tmp_path):
+    """Neither the run of a study nor the check of its file builds a scene for the coordinates."""
+    cases = Axis("case", {"weak": {"alpha": 0.25}, "steady": {"normal_stress": "constant"}})
+    axes = [Axis("b_over_a", [1.5, 2.0]), cases]
+    study = declared(axes=axes, measure=LinearStability())
+    monkeypatch.setattr(Study, "cell", None)
+    rsfstudy.run(study, output=tmp_path, workers=0, progress=False)
+    found = rsfstudy.open(tmp_path / "trial.nc")
+    assert rebuild_from_file.rebuild_study(found).describe() == study.describe()
+    assert found.normal_stress.values.tolist() == ["variable", "constant"]
+    assert found.alpha.values.tolist() == pytest.approx([0.25, np.nan], nan_ok=True)
+    assert (found.b_over_a.dims, found.law.item()) == (("b_over_a",), "slip")
+    assert "fluid" in found.coords
+    assert "dilatancy" not in found.coords
 
 
 def test_claims_on_a_point_apply_if_its_value_is_given_again():

@@ -513,7 +513,7 @@ class DatasetAccessor:
         from rsfstudy.storage import read_declaration
 
         if self._is_study:
-            axes = [axis["dimension"] for axis in read_declaration(self._dataset).axes]
+            axes = [axis.dimension for axis in read_declaration(self._dataset).axes]
             return build_frame_of_cells(
                 self._dataset, self._dataset["status"] != int(Status.OK), axes
             )
@@ -536,7 +536,7 @@ class DatasetAccessor:
         """Raise ``DataError`` if a selection has removed an axis."""
         from rsfstudy.storage import read_declaration
 
-        axes = [axis["dimension"] for axis in read_declaration(self._dataset).axes]
+        axes = [axis.dimension for axis in read_declaration(self._dataset).axes]
         selected = [name for name in axes if name not in self._dataset["status"].dims]
         if selected:
             text = (

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import math
 
 import numpy as np
@@ -16,7 +15,7 @@ from rsfstudy.reporting import split_into_single_fits
 from rsfstudy.rig import Rig
 from rsfstudy.slider import Scene
 from rsfstudy.status import STATUS_LABELS
-from rsfstudy.storage import build_scene_from_stored
+from rsfstudy.storage import build_scene_from_stored, read_declaration
 
 
 def _require_single_fit(dataset: xr.Dataset) -> xr.Dataset:
@@ -111,12 +110,12 @@ def fitted_scene(dataset: xr.Dataset) -> Scene:
         Scene of the fit.
     """
     one = _require_single_fit(dataset)
-    plain = json.loads(dataset.attrs["declaration"])
-    first = build_scene_from_stored(plain["base"], {})
+    declared = read_declaration(dataset)
+    first = build_scene_from_stored(declared.base)
     if "law" in one.coords:
         first = first.with_(law=str(one["law"].item()))
     distances = (
-        float(plain["measure"][f"{n}_guess"]) for n in ("slip_distance", "slip_distance_2")
+        float(declared.measure[f"{n}_guess"]) for n in ("slip_distance", "slip_distance_2")
     )
     found = {n: one[n].item() for n in map(str, one["parameter"].values)}
     stiffness = one["window_stiffness"].item() if "window_stiffness" in one else None

@@ -736,7 +736,7 @@ def _find_cell_in_results_file(
     results = open(results_file)
     number = find_cell_number(results, cell_coordinates)
     declared = rebuild_study(results, study_file)
-    now = run_fingerprint(declared)
+    now = run_fingerprint(declared, [declared.scene(number)])
     return (
         declared,
         number,

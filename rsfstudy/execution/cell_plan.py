@@ -20,6 +20,7 @@ from rsfstudy.errors import InvalidValue
 from rsfstudy.measures import Measure
 from rsfstudy.motion import COMPILED, PYTHON, SCIPY
 from rsfstudy.slider import Scene
+from rsfstudy.storage import LatticeCoordinates
 from rsfstudy.study import CellChanges, Study
 
 _CELL_KEY_DTYPE = np.dtype("V16")
@@ -49,7 +50,7 @@ def compute_cell_key(scene: Scene, measure: Measure) -> bytes:
     bytes
         Key of 16 bytes.
     """
-    of_scene, of_measure = scene.as_dict(), measure.plain_fields
+    of_scene, of_measure = scene.stored_fields(), measure.plain_fields
     values = (*of_scene.values(), *of_measure.values())
     floats = [value for value in values if type(value) is float]
     others = tuple(None if type(value) is float else value for value in values)
@@ -75,7 +76,7 @@ def _digest_cell_fields(
 class CellPlan:
     """Keys of the cells of a study, in row-major order.
 
-    A plan does not contain the scenes of the cells, so that plans of large lattices fit in memory.
+    A plan contains only a few of the scenes, so that plans of large lattices fit in memory.
 
     Parameters
     ----------
@@ -102,16 +103,25 @@ class CellPlan:
         self.study = study
         self.keys = np.empty(study.size, dtype=_CELL_KEY_DTYPE)
         example_scenes = dict[tuple[type, ...], Scene]()
+        self._coordinates = LatticeCoordinates(study)
+        self._scenes_for_coordinates = dict[int, Scene]()
         number = 0
         try:
             for scene, changes in study.cells():
                 self.keys[number] = compute_cell_key(scene, study.measure.with_(**changes))
                 example_scenes.setdefault(scene.field_index.part_classes, scene)
+                if number in self._coordinates.cell_numbers:
+                    self._scenes_for_coordinates[number] = scene
                 number += 1
         except InvalidValue as error:
             raise _add_failure_counts_to_error(study, number, error) from None
         self.example_scenes = list(example_scenes.values())
         self.unique_cell_numbers = np.sort(np.unique(self.keys, return_index=True)[1])
+
+    @functools.cached_property
+    def coordinates(self) -> dict[Any, Any]:
+        """Coordinates of the lattice, in a form that ``xarray.Dataset`` accepts."""
+        return self._coordinates.build(self._scenes_for_coordinates)
 
     def select_cells(self, cell_numbers: np.ndarray) -> Iterator[tuple[bytes, CellChanges]]:
         """Select cells by their numbers.

@@ -20,15 +20,20 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from rsfstudy.execution import code_digest
+from rsfstudy.execution.module_graph import ModuleGraph
 from rsfstudy.motion import COMPILED, SCIPY
+from rsfstudy.slider import Scene
 
 if TYPE_CHECKING:
+    from rsfstudy.measures import Measure
     from rsfstudy.study import Study
 
 _PACKAGE_DIRECTORY = Path(__file__).parent.parent
-#: Packages of rsfstudy that affect the results of cells.
+#: Packages of rsfstudy that affect the results of cells. The package ``parts`` only exports names
+#: of ``slider``.
 _PACKAGES_AFFECTING_CELL_RESULTS = (
     "slider",
+    "parts",
     "motion",
     "measure_base",
     "critical_steps",
@@ -39,7 +44,7 @@ _PACKAGES_AFFECTING_CELL_RESULTS = (
 
 
 def read_physics_sources(package_directory: Path) -> dict[str, bytes]:
-    """Read the source files that affect the results of all studies.
+    """Read the source files that may affect the results of cells.
 
     Parameters
     ----------
@@ -59,9 +64,9 @@ def read_physics_sources(package_directory: Path) -> dict[str, bytes]:
     return {file.relative_to(package_directory).as_posix(): file.read_bytes() for file in files}
 
 
-#: Contents of the source files at the time of the import. Later changes of the files do not affect
-#: the running code.
-_PHYSICS_SOURCES_AT_IMPORT = read_physics_sources(_PACKAGE_DIRECTORY)
+#: Modules with the contents of the source files at the time of the import. Later changes of the
+#: files do not affect the running code.
+_modules_at_import = ModuleGraph(read_physics_sources(_PACKAGE_DIRECTORY))
 
 
 def code_fingerprint(engine: str = SCIPY, user_classes: Iterable[object] = ()) -> dict[str, str]:
@@ -80,7 +85,7 @@ def code_fingerprint(engine: str = SCIPY, user_classes: Iterable[object] = ()) -
         Versions and digests by name.
     """
     return {
-        "physics": _physics_digest(),
+        "physics": _modules_at_import.combined_digest,
         "own_code": code_digest.digest_user_classes(*user_classes),
         "python": f"{sys.version_info.major}.{sys.version_info.minor}",  # It affects the byte code.
         "numpy": version("numpy"),
@@ -89,13 +94,39 @@ def code_fingerprint(engine: str = SCIPY, user_classes: Iterable[object] = ()) -
     }
 
 
-@functools.cache
-def _physics_digest() -> str:
-    """Compute the digest of the physics code."""
-    return code_digest.digest_sources(_PHYSICS_SOURCES_AT_IMPORT)
+def digest_reachable_modules(measure: Measure, scenes: Iterable[Scene]) -> dict[str, str]:
+    """Compute the code digests of all modules that a measure and scenes can reach.
+
+    A measure that is defined outside rsfstudy may use any module, so the digests of all modules are
+    computed. A part that is defined outside rsfstudy may use any module of ``slider``.
+
+    Parameters
+    ----------
+    measure : Measure
+        Measure of the study.
+    scenes : iterable of Scene
+        One scene for each combination of slider parts.
+
+    Returns
+    -------
+    dict of str to str
+        Digest of each module, by name.
+    """
+    if not all(map(code_digest.is_defined_in_rsfstudy, measure.code_classes)):
+        return {
+            **_modules_at_import.digests(),
+            **code_digest.digest_measures_of_studies(measure.code_classes),
+        }
+    parts = {type(part) for scene in scenes for part in scene.parts}
+    roots = {kind.__module__ for kind in (Scene, *measure.code_classes, *parts)}
+    if not all(map(code_digest.is_defined_in_rsfstudy, parts)):
+        roots |= {
+            f"rsfstudy.{name}" for name in _modules_at_import.names if name.startswith("slider.")
+        }
+    return _modules_at_import.digests(roots)
 
 
-def run_fingerprint(study: Study) -> dict[str, Any]:
+def run_fingerprint(study: Study, scenes: Iterable[Scene]) -> dict[str, Any]:
     """Collect all settings, versions and digests that affect the results.
 
     The scene fields and the plain fields of the measure are excluded, because the keys of the cells
@@ -105,14 +136,16 @@ def run_fingerprint(study: Study) -> dict[str, Any]:
     ----------
     study : Study
         Study to run.
+    scenes : iterable of Scene
+        One scene for each combination of slider parts in the lattice.
 
     Returns
     -------
     dict of str to object
-        Fingerprint as plain data.
+        Fingerprint as plain data. The entry ``physics`` contains one code digest for each module
+        that the measure and the parts of the scenes can reach.
     """
     plain, accuracy = study.measure.plain_fields, study.accuracy
-    shared = code_fingerprint(accuracy.engine, study.user_classes)
     return {
         "study": f"{study.name} version {study.version}",
         "measure": {n: v for n, v in study.measure.describe().items() if n not in plain},
@@ -120,14 +153,12 @@ def run_fingerprint(study: Study) -> dict[str, Any]:
         "budget": accuracy.budget,
         "methods": [list(pair) for pair in accuracy.methods],
         "engine": accuracy.engine,
-        **shared,
-        "physics": code_digest.digest_physics_and_measures(
-            shared["physics"], study.measure.code_classes
-        ),
+        **code_fingerprint(accuracy.engine, study.user_classes),
+        "physics": digest_reachable_modules(study.measure, scenes),
     }
 
 
-def collect_provenance(study: Study, command_line: str) -> dict[str, Any]:
+def collect_provenance(study: Study, command_line: str, scenes: Iterable[Scene]) -> dict[str, Any]:
     """Collect the provenance of a run.
 
     Parameters
@@ -136,6 +167,8 @@ def collect_provenance(study: Study, command_line: str) -> dict[str, Any]:
         Study to run.
     command_line : str
         Command line or Python call of the user.
+    scenes : iterable of Scene
+        One scene for each combination of slider parts in the lattice.
 
     Returns
     -------
@@ -150,7 +183,7 @@ def collect_provenance(study: Study, command_line: str) -> dict[str, Any]:
             "python": platform.python_version(),
             **{name: version(name) for name in _PACKAGES_WITH_RECORDED_VERSION},
         },
-        "fingerprint": run_fingerprint(study),
+        "fingerprint": run_fingerprint(study, scenes),
         "git": read_git_commit_and_state(_PACKAGE_DIRECTORY.parent),
         "machine": f"{platform.system()} {platform.machine()}, {os.cpu_count()} cores",
         "mathematical_library": " ".join(platform.libc_ver()).strip() or "unknown",

@@ -116,7 +116,9 @@ class StudyRun:
     ) -> None:
         self.study, self.options, self.task, self.workers = study, options, task, workers
         self.plan = CellPlan(study)
-        self.provenance = provenance.collect_provenance(study, options.command_line)
+        self.provenance = provenance.collect_provenance(
+            study, options.command_line, self.plan.example_scenes
+        )
         self._check_reductions_and_claims()
 
     def _check_reductions_and_claims(self) -> None:
@@ -128,7 +130,7 @@ class StudyRun:
         pending = CellColumns.build_pending_cells(
             self.study.size, self.task.output_packer.packed_number_count
         )
-        lattice = assemble_dataset(self.study, pending, self.provenance)
+        lattice = assemble_dataset(self.study, self.plan.coordinates, pending, self.provenance)
         for reduction in self.study.reductions:
             try:
                 lattice = apply_reductions(lattice, (reduction,))
@@ -292,7 +294,8 @@ class StudyRun:
         xarray.Dataset
             Dataset with all cells of the study. Cells that are not in the journal are pending.
         """
-        return assemble_dataset(self.study, journal.read_cells(self.plan.keys), self.provenance)
+        cells = journal.read_cells(self.plan.keys)
+        return assemble_dataset(self.study, self.plan.coordinates, cells, self.provenance)
 
     def _apply_reductions(self, lattice: xr.Dataset) -> xr.Dataset:
         despite = self.options.despite_failures
@@ -303,7 +306,12 @@ class StudyRun:
             return journal.read_cells(self.plan.keys[some])
 
         return write_store(
-            self.study, read, self.provenance, self._apply_reductions, self.output_path(".zarr")
+            self.study,
+            self.plan.coordinates,
+            read,
+            self.provenance,
+            self._apply_reductions,
+            self.output_path(".zarr"),
         )
 
     def _save_partial_results(self, journal: CellJournal, error: BaseException) -> RunError:

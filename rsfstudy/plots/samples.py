@@ -24,7 +24,7 @@ from rsfstudy.plots._axes import (
 )
 from rsfstudy.plots._style import cycle_style
 from rsfstudy.plots._text import format_units, quantity_symbol, wrap_text
-from rsfstudy.storage import build_axis_from_stored, read_declaration
+from rsfstudy.storage import read_declaration
 from rsfstudy.study import DrawFunction, Panel, read_quantities_not_in_vocabulary
 from rsfstudy.vocabulary import find_quantity
 
@@ -93,7 +93,7 @@ def count_panels_per_side_of_scatter_matrix(panels: Sequence[Panel]) -> int:
 def _sampled_fields(dataset: xr.Dataset) -> dict[str, list[str]]:
     """Return the field names of each axis with numbered points, by dimension."""
     found: dict[str, list[str]] = {}
-    for axis in map(build_axis_from_stored, read_declaration(dataset).axes):
+    for axis in (stored.build() for stored in read_declaration(dataset).axes):
         if axis.has_numbered_points and dataset.sizes.get(axis.dimension, 1) > 1:
             found[axis.dimension] = [name for name in axis.fields if name in dataset.coords]
     return found

@@ -89,7 +89,7 @@ if TYPE_CHECKING:
     from rsfstudy.slider.motion_point import MotionPoint
     from rsfstudy.slider.parameter_layout import LARGEST_LOG_SLIP_RATE
     from rsfstudy.slider.part_registry import (
-        FIELDS_OMITTED_IF_NONE,
+        OMITTED_DEFAULTS,
         PART_SELECTING_FIELDS,
         SCENE_FIELD_NAMES,
         SCENE_FIELD_QUANTITIES,
@@ -184,7 +184,7 @@ else:
                 "SCENE_FIELD_NAMES",
                 "SCENE_FIELD_QUANTITIES",
                 "SCENE_FIELD_TYPES",
-                "FIELDS_OMITTED_IF_NONE",
+                "OMITTED_DEFAULTS",
                 "PART_SELECTING_FIELDS",
                 "SLOTS",
                 "SLOT_NAMES",
@@ -238,7 +238,7 @@ __all__ = [
     "MIN_SEGMENT_DURATION",
     "NEGLIGIBLE_SECOND_ORDER_WEIGHT",
     "Numbers",
-    "FIELDS_OMITTED_IF_NONE",
+    "OMITTED_DEFAULTS",
     "LOG_SLIP_RATE_PER_PATH_LENGTH",
     "MotionPoint",
     "Protocol",

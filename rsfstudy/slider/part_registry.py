@@ -48,6 +48,9 @@ class Slot:
         Description of the slot.
     user_parts : dict of str to type or UserLoading, optional
         User-defined parts by name that have been used in this process.
+    omit_if_default : bool, default: False
+        If True, the keys of cells and stored scenes omit the name of the default part. Use True for
+        slots that are added to rsfstudy later, so that existing journals and files stay valid.
     """
 
     name: str
@@ -56,6 +59,7 @@ class Slot:
     default_part_name: str
     long_name: str
     user_parts: dict[str, UserPart] = field(default_factory=dict)
+    omit_if_default: bool = False
 
     @property
     def field_quantity(self) -> Quantity:
@@ -92,11 +96,9 @@ SLOTS: tuple[Slot, ...] = (
         temperature.BUILT_IN_PARTS,
         "isothermal",
         "temperature of the fault",
+        omit_if_default=True,
     ),
 )
-#: Names of parts that are not included among the values of a scene, by slot. The slots were
-#: introduced later, and the keys of existing results do not contain them.
-PART_NAMES_OMITTED: Mapping[str, str] = {"temperature": "isothermal"}
 #: Slots whose part is selected by name. In the other slots, the values of fields such as
 #: ``inertia`` select the part.
 SLOTS_WITH_PART_CHOSEN_BY_NAME = tuple(
@@ -119,12 +121,16 @@ SCENE_FIELD_QUANTITIES: tuple[Quantity, ...] = (
 SCENE_FIELD_NAMES: tuple[str, ...] = tuple(
     dict.fromkeys(about.name for about in SCENE_FIELD_QUANTITIES)
 )
-#: Names of the fields that are included among the values of a scene only if the user sets them.
-FIELDS_OMITTED_IF_NONE: frozenset[str] = frozenset(
-    name
-    for name, part in PART_CLASS_BY_FIELD_NAME.items()
-    if part.__dataclass_fields__[name].metadata.get("omit_if_none")
-)
+#: Fields that were added to rsfstudy later, with their default values. Scenes list such a field
+#: only if it has a value. The keys of cells and stored scenes also omit the default value.
+OMITTED_DEFAULTS: dict[str, Any] = {
+    **{slot.name: slot.default_part_name for slot in SLOTS if slot.omit_if_default},
+    **{
+        name: part.__dataclass_fields__[name].default
+        for name, part in PART_CLASS_BY_FIELD_NAME.items()
+        if part.__dataclass_fields__[name].metadata.get("omit_if_default")
+    },
+}
 #: Names of the slots.
 SLOT_NAMES: frozenset[str] = frozenset(slot.name for slot in SLOTS)
 #: Names of the fields whose values select a part.
@@ -474,6 +480,7 @@ def scene_field_types(user_parts: Iterable[UserPart]) -> Mapping[str, Any]:
             for name in field_names(part):
                 kind: Any = bool if is_boolean_field(part, name) else float
                 stated = name == part.selected_by or all(name in field_names(one) for one in every)
+                stated = stated and name not in OMITTED_DEFAULTS
                 default = part.__dataclass_fields__[name].default
                 kinds[name] = kind if stated and default is not None else kind | None
     return {name: kinds[name] for name in scene_field_quantities(classes)}

@@ -222,7 +222,7 @@ def number(
     *,
     rule: str = "",
     remedy: str = "",
-    omit_if_none: bool = False,
+    omit_if_default: bool = False,
 ) -> Any:
     """Declare a numeric field of a part.
 
@@ -242,10 +242,11 @@ def number(
         Condition that values must satisfy, a key of ``CONDITION_BY_VALUE_RULE``.
     remedy : str, optional
         Last sentence of the error message if a value violates the rule.
-    omit_if_none : bool, default: False
-        If True, the field is included among the values of a scene only if the user sets the field.
-        Use True for fields that were introduced later, so that the file names of existing results
-        do not change.
+    omit_if_default : bool, default: False
+        If True, scenes of parts without the field do not list the field, and the keys of cells and
+        stored scenes omit the default value. Use True for every field that is added to rsfstudy
+        later, so that existing journals and files stay valid. The default value of such a field
+        must never change.
 
     Returns
     -------
@@ -270,7 +271,7 @@ def number(
     if rule not in CONDITION_BY_VALUE_RULE:
         raise InvalidValue("rule", rule, "is unknown", choices=CONDITION_BY_VALUE_RULE)
     about = {"symbol": symbol, "units": units, "long_name": long_name, "scale": scale}
-    metadata = {"about": about, "rule": rule, "remedy": remedy, "omit_if_none": omit_if_none}
+    metadata = {"about": about, "rule": rule, "remedy": remedy, "omit_if_default": omit_if_default}
     return field(default=default, metadata=metadata)
 
 

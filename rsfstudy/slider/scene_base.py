@@ -11,8 +11,8 @@ from rsfstudy.errors import InvalidValue
 from rsfstudy.quantities import HtmlTableMixin, Quantity
 from rsfstudy.slider.field_name_hints import hint_for_positional_argument
 from rsfstudy.slider.part_registry import (
-    FIELDS_OMITTED_IF_NONE,
-    PART_NAMES_OMITTED,
+    OMITTED_DEFAULTS,
+    SLOT_NAMES,
     SLOTS_WITH_PART_CHOSEN_BY_NAME,
     UserPart,
     add_scene_fields_to_signature,
@@ -38,6 +38,7 @@ _ATTRIBUTES_HIDDEN_FROM_DIR = frozenset(
         "friction_functions",
         "parameter_values",
         "friction_parameter_values",
+        "stored_fields",
         "with_segment",
         "quantities_with_values",
     }
@@ -120,30 +121,44 @@ class SceneBase(HtmlTableMixin):
             values[name] = getattr(self.parts, name).name
         for part in self.parts:
             values |= vars(part)
-        kept = (
-            n
-            for n in self.field_index.all_field_names
-            if n not in FIELDS_OMITTED_IF_NONE or values[n] is not None
-        )
         return {
-            name: values[name] for name in kept if values[name] != PART_NAMES_OMITTED.get(name, "")
+            name: values[name]
+            for name in self.field_index.all_field_names
+            if name not in OMITTED_DEFAULTS
+            or values[name] != (OMITTED_DEFAULTS[name] if name in SLOT_NAMES else None)
         }
 
-    def describe(self) -> dict[str, Any]:
-        """Return the fields and the history of a user-defined loading.
+    def stored_fields(self) -> dict[str, Any]:
+        """Return the fields that identify the scene in files and in journals.
 
         Returns
         -------
         dict of str to object
-            Values by field name. A protocol adds its segments in the format that ``protocol``
-            accepts, and a sampled history adds the digest of its samples.
+            Values by field name, without the default values of fields that were added to rsfstudy
+            later (see ``number``).
+        """
+        values = self.as_dict()
+        for name, default in OMITTED_DEFAULTS.items():
+            if name in values and values[name] == default:
+                del values[name]
+        return values
+
+    def describe(self) -> dict[str, Any]:
+        """Return the stored fields and the history of a user-defined loading.
+
+        Returns
+        -------
+        dict of str to object
+            Values by field name, as ``stored_fields`` returns them. A protocol adds its segments in
+            the format that ``protocol`` accepts, and a sampled history adds the digest of its
+            samples.
         """
         history = (
             self.parts.loading.describe()
             if "loading" in self.field_index.names_of_slots_chosen_by_name
             else {}
         )
-        return self.as_dict() | history
+        return self.stored_fields() | history
 
     @property
     def user_parts(self) -> tuple[UserPart, ...]:

@@ -12,27 +12,19 @@ from typing import TYPE_CHECKING
 from rsfstudy._lazy_exports import build_lazy_export_functions
 
 if TYPE_CHECKING:
-    from rsfstudy.storage.cell_journal import (
-        CellColumns,
-        CellJournal,
-        CellTimings,
-        OutputPacker,
-        StoredCellRow,
-        find_fingerprint_differences,
-        read_timings,
-    )
-    from rsfstudy.storage.comparison import (
-        Comparison,
-        compare_results,
-        compare_same_lattice,
-        find_cell_number,
-    )
+    from rsfstudy.storage.cell_columns import CellColumns, OutputPacker, StoredCellRow
+    from rsfstudy.storage.cell_journal import CellJournal, CellTimings, read_timings
+    from rsfstudy.storage.cell_numbers import find_cell_number
+    from rsfstudy.storage.comparison import Comparison, compare_results, compare_same_lattice
     from rsfstudy.storage.dataset_files import (
         convert_attributes_for_netcdf,
         read_dataset,
         write_dataset,
     )
     from rsfstudy.storage.dataset_scenes import scene_of_dataset
+    from rsfstudy.storage.declarations import build_scene_from_stored
+    from rsfstudy.storage.fingerprints import find_fingerprint_differences
+    from rsfstudy.storage.lattice_coordinates import LatticeCoordinates
     from rsfstudy.storage.lattice_datasets import assemble_dataset
     from rsfstudy.storage.rebuild_from_file import (
         find_primary_output,
@@ -40,8 +32,6 @@ if TYPE_CHECKING:
         study_of_dataset,
     )
     from rsfstudy.storage.schema import (
-        build_axis_from_stored,
-        build_scene_from_stored,
         check_contains_study_results,
         is_of_single_scene,
         read_declaration,
@@ -58,22 +48,14 @@ else:
     __getattr__, __dir__ = build_lazy_export_functions(
         __name__,
         {
-            "storage.comparison": (
-                "Comparison",
-                "compare_results",
-                "compare_same_lattice",
-                "find_cell_number",
-            ),
+            "storage.cell_numbers": ("find_cell_number",),
+            "storage.comparison": ("Comparison", "compare_results", "compare_same_lattice"),
             "storage.dataset_scenes": ("scene_of_dataset",),
-            "storage.cell_journal": (
-                "CellColumns",
-                "StoredCellRow",
-                "CellTimings",
-                "CellJournal",
-                "OutputPacker",
-                "find_fingerprint_differences",
-                "read_timings",
-            ),
+            "storage.cell_columns": ("CellColumns", "StoredCellRow", "OutputPacker"),
+            "storage.cell_journal": ("CellTimings", "CellJournal", "read_timings"),
+            "storage.declarations": ("build_scene_from_stored",),
+            "storage.fingerprints": ("find_fingerprint_differences",),
+            "storage.lattice_coordinates": ("LatticeCoordinates",),
             "storage.lattice_datasets": ("assemble_dataset",),
             "storage.rebuild_from_file": (
                 "find_primary_output",
@@ -81,8 +63,6 @@ else:
                 "study_of_dataset",
             ),
             "storage.schema": (
-                "build_axis_from_stored",
-                "build_scene_from_stored",
                 "check_contains_study_results",
                 "is_of_single_scene",
                 "read_declaration",
@@ -109,9 +89,9 @@ __all__ = [
     "CellTimings",
     "Comparison",
     "CellJournal",
+    "LatticeCoordinates",
     "OutputPacker",
     "assemble_dataset",
-    "build_axis_from_stored",
     "build_scene_from_stored",
     "check_contains_study_results",
     "check_store_does_not_exist",

@@ -5,7 +5,8 @@ that an interrupted run can be resumed. Only one run can use a journal at a time
 
 The key of a cell is a digest of the exact values of the scene fields and the measure fields. All
 other settings that affect the results form the fingerprint of the journal. A run rejects a journal
-with a different fingerprint, unless the only difference is a smaller work budget in the journal.
+with a different fingerprint (see ``fingerprints``), unless the only difference is a smaller work
+budget in the journal.
 """
 
 from __future__ import annotations
@@ -14,8 +15,6 @@ import contextlib
 import json
 import math
 import sqlite3
-import struct
-import zlib
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -24,12 +23,14 @@ from typing import Any
 import numpy as np
 
 from rsfstudy.errors import DataError, shorten_text
-from rsfstudy.measures import Measure, Outcome
 from rsfstudy.status import Status
-
-#: Row of the table ``cells``: key, name of the status, message, number of right-hand-side
-#: evaluations, wall time in s, packed outputs, and checksum.
-StoredCellRow = tuple[bytes, str, str, int, float, bytes, int]
+from rsfstudy.storage.cell_columns import (
+    CellColumns,
+    OutputPacker,
+    StoredCellRow,
+    compute_checksum,
+)
+from rsfstudy.storage.fingerprints import find_fingerprint_differences, merge_fingerprints
 
 #: Version of the journal format. Increment the version if the tables, the checksum or the
 #: definition of the cell key change.
@@ -50,127 +51,6 @@ _KEYS_PER_QUERY = 900
 #: Maximum time in s to wait until another run releases the journal.
 _LOCK_TIMEOUT = 5.0
 _UNUSABLE_JOURNAL_REMEDY = "Choose another --output, or start over with --fresh."
-
-
-class OutputPacker:
-    """Layout of the outputs of a measure in a row of float64 numbers.
-
-    Parameters
-    ----------
-    measure : Measure
-        Measure whose outputs are packed.
-
-    Attributes
-    ----------
-    shapes : dict of str to tuple of int
-        Shape of each output.
-    slices : dict of str to slice
-        Position of each output in the row.
-    packed_number_count : int
-        Length of the row.
-    """
-
-    def __init__(self, measure: Measure) -> None:
-        sizes = {name: len(values) for name, values in measure.inner_coordinates.items()}
-        self.shapes = {n: tuple(sizes[d] for d in dims) for n, dims in measure.variables.items()}
-        stops = np.cumsum([math.prod(shape) for shape in self.shapes.values()])
-        self.packed_number_count = int(stops[-1])
-        starts = [0, *stops[:-1]]
-        self.slices = {n: slice(*ends) for n, *ends in zip(self.shapes, starts, stops, strict=True)}
-
-        self._struct_format = "" if any(self.shapes.values()) else f"<{self.packed_number_count}d"
-
-    def pack_outputs(self, output_values: Mapping[str, Any]) -> bytes:
-        """Pack the outputs of a cell as bytes.
-
-        Parameters
-        ----------
-        output_values : mapping of str to float or ndarray
-            Outputs by name. Missing outputs become NaN.
-
-        Returns
-        -------
-        bytes
-            Little-endian float64 numbers.
-        """
-        if self._struct_format:
-            return struct.pack(
-                self._struct_format, *(output_values.get(name, math.nan) for name in self.shapes)
-            )
-        row = np.full(self.packed_number_count, np.nan, dtype="<f8")
-        for name, value in output_values.items():
-            row[self.slices[name]] = np.ravel(value)
-        return row.tobytes()
-
-    def pack_cell(self, cell_key: bytes, outcome: Outcome, wall_time: float) -> StoredCellRow:
-        """Pack the outcome of a cell as a row of the journal.
-
-        Parameters
-        ----------
-        cell_key : bytes
-            Key of the cell.
-        outcome : Outcome
-            Status, message and outputs of the cell.
-        wall_time : float
-            Wall time of the computation in s.
-
-        Returns
-        -------
-        StoredCellRow
-            Row of the journal, including the checksum.
-        """
-        numbers, work = self.pack_outputs(outcome.values), outcome.rhs_evaluations
-        row = (outcome.status.name, outcome.message, work, wall_time, numbers)
-        return (cell_key, *row, _compute_checksum(cell_key, *row))
-
-
-@dataclass(frozen=True)
-class CellColumns:
-    """Statuses, messages, costs and outputs of a group of cells.
-
-    Parameters
-    ----------
-    statuses : ndarray of int8, shape (n,)
-        Codes of the statuses (see ``Status``).
-    messages : ndarray of str, shape (n,)
-        Error messages and remarks.
-    rhs_evaluations : ndarray of int64, shape (n,)
-        Numbers of right-hand-side evaluations.
-    wall_times : ndarray of float, shape (n,)
-        Wall times in s. The wall time of a pending cell is NaN.
-    packed_outputs : ndarray of float, shape (n, m)
-        Outputs of each cell, in the layout of ``OutputPacker``.
-    """
-
-    statuses: np.ndarray
-    messages: np.ndarray
-    rhs_evaluations: np.ndarray
-    wall_times: np.ndarray
-    packed_outputs: np.ndarray
-
-    @classmethod
-    def build_pending_cells(cls, cell_count: int, packed_number_count: int) -> CellColumns:
-        """Build the columns of cells that are not computed yet.
-
-        Parameters
-        ----------
-        cell_count : int
-            Number of cells.
-        packed_number_count : int
-            Number of packed outputs per cell.
-
-        Returns
-        -------
-        CellColumns
-            Columns with the status ``PENDING`` and NaN outputs.
-        """
-        return cls(
-            np.full(cell_count, int(Status.PENDING), dtype=np.int8),
-            np.full(cell_count, "", dtype=object),
-            np.zeros(cell_count, dtype=np.int64),
-            np.full(cell_count, np.nan),
-            np.full((cell_count, packed_number_count), np.nan),
-        )
 
 
 class CellJournal:
@@ -219,7 +99,7 @@ class CellJournal:
         try:
             theirs = self._read_or_store_fingerprint(wanted)
             if theirs != wanted:
-                self._accept_journal_with_smaller_budget(theirs, ours)
+                self._accept_compatible_fingerprint(theirs, ours)
         except sqlite3.Error as error:
             self._db.close()
             raise self._build_unusable_journal_error(error) from error
@@ -253,23 +133,24 @@ class CellJournal:
                 self._db.execute("INSERT INTO fingerprint VALUES (?)", (run_fingerprint,))
         return run_fingerprint if row is None else row[0]
 
-    def _accept_journal_with_smaller_budget(
+    def _accept_compatible_fingerprint(
         self, stored_fingerprint: Any, run_fingerprint: Mapping[str, Any]
     ) -> None:
-        """Accept a journal with a smaller work budget, and reject other differences.
+        """Accept other modules of code or a smaller work budget, and reject other differences.
 
-        If the fingerprints differ only in the work budget and the new budget is larger, the method
-        stores the new fingerprint. The results in the journal remain valid because no result
-        depends on the budget. For any other difference, the method raises ``DataError``.
+        The results in the journal remain valid if the run uses more or fewer modules than the
+        journal, and if the new work budget is larger, because no result depends on the budget. The
+        method then stores the merged fingerprint. For any other difference, the method raises
+        ``DataError``.
         """
         try:
-            differ = find_fingerprint_differences(
-                dict(json.loads(stored_fingerprint)), run_fingerprint
-            )
-            if differ.keys() == {"budget"} and differ["budget"][0] < differ["budget"][1]:
+            stored = dict(json.loads(stored_fingerprint))
+            differ = find_fingerprint_differences(stored, run_fingerprint)
+            is_budget_raised = "budget" in differ and differ["budget"][0] < differ["budget"][1]
+            if not differ or (is_budget_raised and len(differ) == 1):
+                merged = json.dumps(merge_fingerprints(stored, run_fingerprint), sort_keys=True)
                 with self._db:
-                    wanted = json.dumps(run_fingerprint, sort_keys=True)
-                    self._db.execute("UPDATE fingerprint SET json = ?", (wanted,))
+                    self._db.execute("UPDATE fingerprint SET json = ?", (merged,))
                 return
             told = "; ".join(
                 f"{name}: {shorten_text(there, 70)} there, {shorten_text(now, 70)} now"
@@ -399,7 +280,7 @@ def _fill_cell_columns(
 
     If a row is damaged, the function raises a KeyError, OverflowError, TypeError or ValueError.
     """
-    if any(_compute_checksum(*known) != checksum for *known, checksum in stored_rows):
+    if any(compute_checksum(*known) != checksum for *known, checksum in stored_rows):
         raise ValueError("checksum")
     _keys, status, message, work, seconds, numbers, _checksums = zip(*stored_rows, strict=True)
     columns.statuses[cell_indices] = [Status[name] for name in status]
@@ -479,45 +360,3 @@ def _remove_journal(path: Path) -> None:
                 raise
     for file in (path, path.with_name(f"{path.name}-journal")):
         file.unlink(missing_ok=True)
-
-
-def _compute_checksum(
-    cell_key: bytes,
-    status: str,
-    message: str,
-    rhs_evaluations: int,
-    wall_time: float | None,
-    packed_outputs: bytes,
-) -> int:
-    """Compute the CRC-32 checksum of a row of the journal."""
-    known = math.nan if wall_time is None else wall_time
-    # repr escapes quotes, so that different strings cannot produce the same text.
-    text = f"{cell_key!r} {status!r} {message!r} {rhs_evaluations} {known!r} "
-    return zlib.crc32(packed_outputs, zlib.crc32(text.encode()))
-
-
-def find_fingerprint_differences(
-    first: Mapping[str, Any], second: Mapping[str, Any]
-) -> dict[str, tuple[Any, Any]]:
-    """Find the entries that differ between two fingerprints.
-
-    Both fingerprints are converted to JSON and back before the comparison, because a fingerprint
-    that was read from a file contains lists instead of tuples.
-
-    Parameters
-    ----------
-    first, second : mapping of str to object
-        Fingerprints to compare.
-
-    Returns
-    -------
-    dict of str to tuple of (object, object)
-        Each entry that differs, with its values in the first and in the second fingerprint. The
-        value of a missing entry is None.
-    """
-    first, second = (json.loads(json.dumps(fingerprint)) for fingerprint in (first, second))
-    return {
-        name: (first.get(name), second.get(name))
-        for name in sorted({*first, *second})
-        if first.get(name) != second.get(name)
-    }

@@ -2,7 +2,7 @@
 
 ``compare_same_lattice`` compares two datasets of the same study variable by variable.
 ``compare_results`` compares any two results datasets, including their declarations, versions and
-machines. ``find_cell_number`` finds a cell by its coordinates.
+machines.
 """
 
 from __future__ import annotations
@@ -19,9 +19,8 @@ import xarray as xr
 from rsfstudy._deprecation import add_former_member_names
 from rsfstudy.error_boundary import wrap_methods_in_error_boundary
 from rsfstudy.errors import InvalidValue
-from rsfstudy.formatting import format_list
 from rsfstudy.status import STATUS_LABELS, Status
-from rsfstudy.storage.cell_journal import find_fingerprint_differences
+from rsfstudy.storage.fingerprints import find_fingerprint_differences
 from rsfstudy.storage.rebuild_from_file import find_primary_output
 from rsfstudy.storage.schema import is_of_single_scene, read_provenance
 from rsfstudy.vocabulary import TIMING_VARIABLES
@@ -371,71 +370,3 @@ def _read_versions_and_machine(dataset: xr.Dataset) -> dict[str, Any]:
     for name in ("time", "command", "declared_in"):
         others.pop(name, None)
     return {**about["versions"], **decided, **others}
-
-
-# ---- one cell -----------------------------------------------------------------------------------
-
-
-def find_cell_number(dataset: xr.Dataset, coordinate_values: Mapping[str, Any]) -> int:
-    """Find the number of a cell from its coordinates.
-
-    Parameters
-    ----------
-    dataset : xarray.Dataset
-        Results of a study.
-    coordinate_values : mapping of str to object
-        Coordinate value for each dimension. Dimensions with a single point can be omitted. Each
-        number must agree with a point of the axis within a relative tolerance of 1e-5.
-
-    Returns
-    -------
-    int
-        Number of the cell in row-major order.
-
-    Raises
-    ------
-    InvalidValue
-        If a dimension is unknown or missing, or if a value is not a point of its axis.
-    """
-    status = dataset["status"]
-    for name in coordinate_values:
-        if name not in status.dims:
-            raise InvalidValue("cell", name, "is no axis", choices=[str(d) for d in status.dims])
-    index = []
-    for dimension in map(str, status.dims):
-        values = dataset[dimension].values
-        if dimension not in coordinate_values:
-            if values.size > 1:
-                rule = f"leaves {dimension} open"
-                remedy = (
-                    f"Name one value of each axis (--cell is repeated). {dimension} has "
-                    f"{format_list(values.tolist(), ', ')}."
-                )
-                raise InvalidValue("cell", dict(coordinate_values), rule, remedy=remedy)
-            index.append(0)
-            continue
-        number = _find_index_on_axis(values, coordinate_values[dimension])
-        if number is None:
-            rule = "is not on its axis"
-            raise InvalidValue(
-                dimension, coordinate_values[dimension], rule, choices=map(str, values)
-            )
-        index.append(number)
-    return int(np.ravel_multi_index(index, status.shape))
-
-
-def _find_index_on_axis(axis_values: np.ndarray, wanted_value: Any) -> int | None:
-    """Find the index of an equal label or of the nearest number on an axis.
-
-    The relative difference between the wanted number and the nearest number on the axis must be at
-    most 1e-5.
-    """
-    if axis_values.dtype.kind in "iuf":
-        try:
-            number = float({"true": 1.0, "false": 0.0}.get(str(wanted_value).lower(), wanted_value))
-        except (TypeError, ValueError):
-            return None
-        nearest = int(np.argmin(np.abs(axis_values - number)))
-        return nearest if np.isclose(axis_values[nearest], number, rtol=1e-5, atol=0.0) else None
-    places = np.flatnonzero(axis_values.astype(object).astype(str) == str(wanted_value))
-    return int(places[0]) if places.size else None

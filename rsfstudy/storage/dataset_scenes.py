@@ -18,8 +18,10 @@ from rsfstudy.slider import (
     normalise_field_value,
     protocol,
 )
-from rsfstudy.storage.lattice_datasets import build_lattice_coordinates
-from rsfstudy.storage.schema import build_scene_from_stored, invalid_part_error, read_scene_fields
+from rsfstudy.storage.declarations import build_scene_from_stored
+from rsfstudy.storage.lattice_coordinates import build_dimension_coordinates
+from rsfstudy.storage.plain_data import invalid_part_error
+from rsfstudy.storage.schema import read_scene_fields
 from rsfstudy.study import Study
 
 
@@ -69,14 +71,13 @@ def find_selected_cell_number(dataset: xr.Dataset, study: Study) -> int:
     InvalidValue
         If a coordinate has several values, or if its value is not on the axis of the study.
     """
-    ours = xr.Dataset(coords=build_lattice_coordinates(study))
     places = []
-    for name in study.dimensions:
+    for name, values in build_dimension_coordinates(study).items():
         given = dataset[name].values.ravel() if name in dataset.coords else np.array([])
         if given.size != 1:
             remedy = f"Select a cell first, as in dataset.isel({name}=0)."
             raise InvalidValue(name, given.tolist(), "leaves the cell open", remedy=remedy)
-        found = np.flatnonzero(ours[name].values == given[0])
+        found = np.flatnonzero(values == given[0])
         if not found.size:
             remedy = "Ask before you convert it to other units."
             raise InvalidValue(name, given[0], "is not on that axis of the study", remedy=remedy)

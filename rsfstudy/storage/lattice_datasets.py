@@ -1,7 +1,7 @@
 """Assembly of finished cells into a self-describing dataset.
 
-``assemble_dataset`` builds the variables, the coordinates and the root attributes. To write a Zarr
-store, the same functions are called for blocks of cells.
+``assemble_dataset`` builds the variables and the root attributes. To write a Zarr store, the same
+functions are called for blocks of cells. The coordinates are built in ``lattice_coordinates``.
 """
 
 from __future__ import annotations
@@ -14,19 +14,12 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from rsfstudy.axes import classify_axis_rows_by_fields_and_texts
-from rsfstudy.quantities import Quantity
-from rsfstudy.rig import DIMENSIONLESS_PREFIX
 from rsfstudy.status import Status
-from rsfstudy.storage import stored_loadings
-from rsfstudy.storage.cell_journal import CellColumns, OutputPacker
+from rsfstudy.storage.cell_columns import CellColumns, OutputPacker
+from rsfstudy.storage.lattice_coordinates import variable_attributes
 from rsfstudy.storage.schema import FILE_LAYOUT_VERSION
 from rsfstudy.study import Study
-from rsfstudy.vocabulary import (
-    FORMULAS_OF_DERIVED_COORDINATES,
-    find_coverage_content_type,
-    find_quantity,
-)
+from rsfstudy.vocabulary import find_coverage_content_type
 
 CF_AND_ACDD_CONVENTIONS = "CF-1.11, ACDD-1.3"
 _COMMENT_ON_DIMENSIONLESS_UNITS = (
@@ -48,7 +41,10 @@ _CREDIT_ATTRIBUTES_FROM_ENVIRONMENT = (
 
 
 def assemble_dataset(
-    study: Study, cell_columns: CellColumns, provenance: Mapping[str, Any]
+    study: Study,
+    coordinates: Mapping[Any, Any],
+    cell_columns: CellColumns,
+    provenance: Mapping[str, Any],
 ) -> xr.Dataset:
     """Assemble the dataset of a study.
 
@@ -56,6 +52,8 @@ def assemble_dataset(
     ----------
     study : Study
         Study whose cells are assembled.
+    coordinates : mapping of str to tuple or xarray.Variable
+        Coordinates of the lattice (see ``LatticeCoordinates``).
     cell_columns : CellColumns
         Columns of all cells, in row-major order.
     provenance : mapping of str to object
@@ -66,9 +64,7 @@ def assemble_dataset(
     xarray.Dataset
         Dataset with one value per cell and output, before any reductions.
     """
-    dataset = xr.Dataset(
-        build_lattice_variables(study, cell_columns, study.shape), build_lattice_coordinates(study)
-    )
+    dataset = xr.Dataset(build_lattice_variables(study, cell_columns, study.shape), coordinates)
     known = int((cell_columns.statuses != int(Status.PENDING)).sum())
     return dataset.assign_attrs(root_attributes(study, known, provenance))
 
@@ -101,7 +97,7 @@ def build_lattice_variables(
         values = cell_columns.packed_outputs[:, layout.slices[name]].reshape(
             block_shape + layout.shapes[name]
         )
-        described[name] = ((*dims, *inner), values, _variable_attributes(name, own))
+        described[name] = ((*dims, *inner), values, variable_attributes(name, own))
     kept = {
         "status": cell_columns.statuses,
         "rhs_evaluations": cell_columns.rhs_evaluations,
@@ -109,7 +105,7 @@ def build_lattice_variables(
         "message": cell_columns.messages,
     }
     for name, values in kept.items():
-        described[name] = (dims, values.reshape(block_shape), _variable_attributes(name, {}))
+        described[name] = (dims, values.reshape(block_shape), variable_attributes(name, {}))
     described["status"][2].update(
         flag_values=np.array([int(s) for s in Status], dtype=np.int8),
         flag_meanings=" ".join(s.label for s in Status),
@@ -121,126 +117,6 @@ def build_lattice_variables(
         companions = [n for n in (f"{name}_error", "status") if n in described and n != name]
         described[name][2]["ancillary_variables"] = " ".join(companions)
     return described
-
-
-def build_lattice_coordinates(study: Study) -> dict[Any, Any]:
-    """Build the coordinates of the lattice of a study.
-
-    The coordinates include the dimension coordinates, the fields that vary along each axis, and the
-    fixed scene fields as scalars. The coordinates also include the tables of user-defined loadings,
-    and the coordinates of array outputs of the measure.
-
-    Parameters
-    ----------
-    study : Study
-        Study that declares the lattice.
-
-    Returns
-    -------
-    dict of str to tuple or xarray.Variable
-        Coordinates by name, in a form that ``xarray.Dataset`` accepts.
-    """
-    strides = np.cumprod([1, *study.shape[::-1]])[::-1][1:]
-    coords: dict[Any, Any] = {}
-    own = study.quantities
-    sample = []
-    for axis, stride in zip(study.axes, strides, strict=True):
-        firsts = np.unique(
-            classify_axis_rows_by_fields_and_texts(axis.rows),
-            return_index=True,
-            return_inverse=True,
-        )[1:]
-        scenes = [study.scene(int(i * stride)).as_dict() for i in firsts[0]]
-        sample += scenes
-        if axis.labels is not None:
-            about = {"long_name": axis.dimension.replace("_", " ")}
-            coords[axis.dimension] = (axis.dimension, np.array(axis.labels, dtype=object), about)
-        elif axis.has_numbered_points:
-            about = {"units": "1", "long_name": f"number of the {axis.dimension.replace('_', ' ')}"}
-            about |= {"drawn": json.dumps(axis.sampling_info)} if axis.sampling_info else {}
-            coords[axis.dimension] = (axis.dimension, np.arange(len(axis), dtype=np.int32), about)
-        # An axis shows its own values, even if the scenes of its first cells do not use them.
-        fixed = [{**study.measure.plain_fields, **scene} for scene in scenes]
-        points = [{**fixed[n], **row} for n, row in zip(firsts[1], axis.rows, strict=True)]
-        for name in axis.fields:
-            varied = [point.get(name) for point in points]
-            coords[name] = (
-                axis.dimension,
-                _to_storable_array(varied),
-                _variable_attributes(name, own, _first_value_not_none(varied)),
-            )
-    for name, units in study.units.items():
-        of_axis = {key: v for key, v in coords[name][2].items() if key != "scale"}
-        coords[name] = (*coords[name][:2], of_axis | {"units": units})
-    for name, (dims, values) in (
-        study.scene_builder.build_scale_coordinates().items() if study.scene_builder else ()
-    ):
-        coords[name] = (
-            dims,
-            values,
-            _variable_attributes(name.removeprefix(DIMENSIONLESS_PREFIX), own),
-        )
-    for name in study.scene_fields:
-        present = {scene.get(name) for scene in sample} - {None}
-        if name not in {*coords, *study.measure.variables} and len(present) == 1:
-            value = present.pop()
-            coords[name] = (
-                (),
-                _to_storable_array([value])[0],
-                _variable_attributes(name, own, value),
-            )
-    for name, (source, formula) in FORMULAS_OF_DERIVED_COORDINATES.items():
-        if source in coords:
-            dims, values, _attrs = coords[source]
-            derived = [formula(value) for value in np.ravel(values).tolist()]
-            coords[name] = (
-                dims,
-                np.reshape(derived, np.shape(values)),
-                _variable_attributes(name, {}),
-            )
-    for name, values in study.measure.inner_coordinates.items():
-        coords[name] = (name, np.asarray(values), _variable_attributes(name, own))
-    return coords | stored_loadings.loading_variables(study.user_parts.values())
-
-
-def _to_storable_array(values: list[Any]) -> np.ndarray:
-    """Convert the values of a field to an array that NetCDF can store.
-
-    Strings become an object array and Boolean values become int8. All other values become floats,
-    and None becomes NaN.
-    """
-    if isinstance(_first_value_not_none(values), str):
-        return np.array([value or "" for value in values], dtype=object)
-    if isinstance(_first_value_not_none(values), bool) and None not in values:
-        return np.array(values, dtype=np.int8)
-    return np.array([np.nan if value is None else value for value in values], dtype=float)
-
-
-def _first_value_not_none(values: list[Any]) -> Any:
-    """Return the first value that is not None, or None if all values are None."""
-    return next((value for value in values if value is not None), None)
-
-
-def _variable_attributes(
-    variable_name: str, study_quantities: Mapping[str, Quantity], example_value: Any = None
-) -> dict[str, Any]:
-    """Build the attributes of a variable from the vocabulary or the study.
-
-    The argument ``example_value`` is one value of the variable. The type of this value determines
-    if the variable has units or flags.
-    """
-    about = find_quantity(variable_name, study_quantities)
-    attrs: dict[str, Any] = {"long_name": about.long_name}
-    if variable_name in study_quantities and about.symbol:
-        attrs["symbol"] = about.symbol  # Symbols of studies are not in the vocabulary.
-    if about.units and not isinstance(example_value, str | bool):
-        attrs["units"] = about.units
-    if about.scale:
-        attrs["scale"] = about.scale
-    attrs |= about.flag_attributes
-    if isinstance(example_value, bool):
-        attrs |= {"flag_values": np.array([0, 1], dtype=np.int8), "flag_meanings": "false true"}
-    return attrs
 
 
 def root_attributes(

@@ -8,35 +8,27 @@ declares the study.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import fields
 from pathlib import Path
-from types import ModuleType
-from typing import Any
 
 import msgspec
 import xarray as xr
 
-from rsfstudy import measures, reductions
-from rsfstudy.axes import Axis
 from rsfstudy.errors import DataError, InvalidValue, shorten_text
-from rsfstudy.measures import Measure
-from rsfstudy.reductions import Reduction
-from rsfstudy.rig import Rig
-from rsfstudy.slider import SLOTS, UserPart, replace_names_by_user_parts
+from rsfstudy.slider import SLOTS, UserPart
 from rsfstudy.storage import schema, stored_loadings
-from rsfstudy.storage.lattice_datasets import build_lattice_coordinates
-from rsfstudy.storage.schema import (
-    StoredAxis,
+from rsfstudy.storage.declarations import (
+    MISSING_STUDY_FILE_REMEDY,
     StoredDeclaration,
-    StoredMeasure,
-    StoredReduction,
-    build_dataclass_from_plain_data,
-    invalid_part_error,
+    build_measure,
+    build_reduction,
+    build_rig,
+    build_scene_from_stored,
+    find_user_part_missing_from_file,
 )
+from rsfstudy.storage.lattice_coordinates import build_dimension_coordinates
+from rsfstudy.storage.plain_data import invalid_part_error
 from rsfstudy.study import Study, load_study, study_names
 from rsfstudy.vocabulary import find_coverage_content_type
-
-_MISSING_STUDY_FILE_REMEDY = "Name the file that declares it: --study FILE (study=)."
 
 
 def rebuild_study(results: xr.Dataset, study_file: str | Path | None = None) -> Study:
@@ -69,25 +61,25 @@ def rebuild_study(results: xr.Dataset, study_file: str | Path | None = None) -> 
     if (
         study_file is None
         and declared.name in study_names()
-        and schema.find_user_part_missing_from_file(declared)
+        and find_user_part_missing_from_file(declared)
     ):
         study_file = declared.name
     for axis in declared.axes:
-        points = results.sizes.get(axis["dimension"])
-        declared_points = len(schema.build_axis_from_stored(axis))
+        points = results.sizes.get(axis.dimension)
+        declared_points = len(axis.build())
         if declared_points != points:
             rule = f"has {declared_points} points in the declaration, and {points} in the file"
-            raise invalid_part_error(axis["dimension"], rule)
+            raise invalid_part_error(axis.dimension, rule)
     held = stored_loadings.read_loadings(results)
     if study_file is None and depends_on_user_code(results):
         rule = "is a user's own, and code is never taken from a results file"
         remedy, named_in = (
-            _MISSING_STUDY_FILE_REMEDY,
+            MISSING_STUDY_FILE_REMEDY,
             schema.read_provenance(results)["declared_in"],
         )
         if named_in:
             remedy += f" It was {shorten_text(named_in)}."
-        name, value = schema.find_user_part_missing_from_file(declared, held) or (
+        name, value = find_user_part_missing_from_file(declared, held) or (
             "measure",
             declared.measure["name"],
         )
@@ -153,18 +145,17 @@ def depends_on_user_code(results: xr.Dataset) -> bool:
     held = stored_loadings.read_loadings(results)
     return (
         not held
-        or schema.find_user_part_missing_from_file(schema.read_declaration(results), held)
-        is not None
+        or find_user_part_missing_from_file(schema.read_declaration(results), held) is not None
     )
 
 
 def _check_axes(study: Study, results: xr.Dataset) -> None:
     """Check that the axes of the results match the declaration."""
-    ours, dims = xr.Dataset(coords=build_lattice_coordinates(study)), results["status"].dims
+    dims = results["status"].dims
     if dims != study.dimensions:
         raise invalid_part_error("status", f"lies along {dims}, not the axes of the declaration")
-    for name in study.dimensions:
-        if ours[name].values.tolist() != results[name].values.tolist():
+    for name, values in build_dimension_coordinates(study).items():
+        if values.tolist() != results[name].values.tolist():
             raise invalid_part_error(name, "is not that axis of the declaration")
 
 
@@ -199,11 +190,11 @@ def study_from_declaration(
     """
     parts = msgspec.structs.asdict(declaration)
     own = {**_collect_known_user_parts(study_with_user_code), **stored_loadings}
-    parts["base"] = schema.build_scene_from_stored(declaration.base, own)
+    parts["base"] = build_scene_from_stored(declaration.base, own)
     if study_with_user_code is None:
-        parts["measure"] = rebuild_measure(declaration.measure, "declaration.measure")
+        parts["measure"] = build_measure(declaration.measure, "declaration.measure")
         parts["reductions"] = [
-            _rebuild_reduction(described, f"declaration.reductions[{number}]")
+            build_reduction(described, f"declaration.reductions[{number}]")
             for number, described in enumerate(declaration.reductions)
         ]
     else:
@@ -213,10 +204,10 @@ def study_from_declaration(
         stated = {name: v for name, v in declaration.measure.items() if name in kind.plain_fields}
         parts["measure"] = kind.with_(**stated)
     try:
-        parts["axes"] = [_rebuild_axis(axis, own) for axis in declaration.axes]
+        parts["axes"] = [axis.build(own) for axis in declaration.axes]
         del parts["laboratory"]
         if declaration.laboratory is not None:
-            parts["rig"] = _rebuild_rig(declaration.laboratory)
+            parts["rig"] = build_rig(declaration.laboratory)
         return Study(**parts)
     except InvalidValue as error:
         raise invalid_part_error("declaration", f"makes no study ({error})") from error
@@ -226,95 +217,6 @@ def _collect_known_user_parts(study: Study | None) -> Mapping[str, UserPart]:
     """Return the user-defined parts of a study and of its files."""
     others = {name: part for slot in SLOTS for name, part in slot.user_parts.items()}
     return {} if study is None else {**others, **study.user_parts}
-
-
-def _rebuild_axis(plain_axis: StoredAxis, user_parts: Mapping[str, UserPart]) -> Axis:
-    """Build an axis, and replace the names of user-defined parts by the parts."""
-    named = schema.build_axis_from_stored(plain_axis)
-    rows = [replace_names_by_user_parts(row, user_parts) for row in named.rows]
-    return named.with_rows(rows, named.units, named.sampling_info)
-
-
-def _rebuild_rig(stated_quantities: Mapping[str, float]) -> Rig:
-    """Build a rig from its quantities."""
-    unknown = sorted(set(stated_quantities) - {field.name for field in fields(Rig)})
-    if unknown:
-        raise invalid_part_error(f"declaration.laboratory.{unknown[0]}", "is unknown")
-    return Rig(**stated_quantities)
-
-
-def rebuild_measure(plain_measure: StoredMeasure, path_in_file: str) -> Measure:
-    """Build a measure from its description.
-
-    Parameters
-    ----------
-    plain_measure : StoredMeasure
-        Description of the measure. The description of a nested measure has the key ``measure``.
-    path_in_file : str
-        Path of the description in the file, for error messages.
-
-    Returns
-    -------
-    Measure
-        Measure that the description defines.
-
-    Raises
-    ------
-    InvalidValue
-        If rsfstudy has no measure with this name.
-    DataError
-        If a field is missing, unknown or invalid.
-    """
-    values: dict[str, Any] = dict(plain_measure)
-    kind = _find_class_by_declared_name("measure", Measure, measures, values.pop("name"))
-    given = dict(kind.fields_from_description(values, path_in_file))
-    if isinstance(values.get("measure"), Mapping):
-        given["measure"] = rebuild_measure(values.pop("measure"), f"{path_in_file}.measure")
-    made: Measure = build_dataclass_from_plain_data(values, kind, path_in_file, **given)
-    return made
-
-
-def _rebuild_reduction(plain_reduction: StoredReduction, path_in_file: str) -> Reduction:
-    """Build a reduction from its description."""
-    values: dict[str, Any] = dict(plain_reduction)
-    if values["kind"] == "spread":  # Older files use this name.
-        values |= {"kind": "range", "over": values.pop("on", "")}
-    kind = _find_class_by_declared_name("reduction", Reduction, reductions, values.pop("kind"))
-    made: Reduction = build_dataclass_from_plain_data(values, kind, path_in_file)
-    return made
-
-
-def _find_class_by_declared_name(
-    declaration_key: str, base_class: Any, exporting_package: ModuleType, declared_name: str
-) -> Any:
-    """Find a class of rsfstudy by its name in declarations.
-
-    If the package that exports the classes has no class with this name, the function also searches
-    the modules of the named studies.
-    """
-    for exported in exporting_package.__all__:
-        getattr(exporting_package, exported)  # This loads the module of the class.
-    if declared_name not in _named_subclasses(base_class):
-        for study in study_names():
-            load_study(study)
-    kinds = _named_subclasses(base_class)
-    if declared_name not in kinds:
-        rule = "is not part of rsfstudy"
-        raise InvalidValue(
-            declaration_key, declared_name, rule, choices=kinds, remedy=_MISSING_STUDY_FILE_REMEDY
-        )
-    return kinds[declared_name]
-
-
-def _named_subclasses(base_class: Any) -> dict[str, Any]:
-    """Return the concrete subclasses in rsfstudy, by their names in files."""
-    found: dict[str, Any] = {}
-    for kind in base_class.__subclasses__():
-        found |= _named_subclasses(kind)
-        name = vars(kind).get("name") or vars(kind).get("kind")
-        if name and kind.__module__.partition(".")[0] == __name__.partition(".")[0]:
-            found[name] = kind
-    return found
 
 
 def find_primary_output(dataset: xr.Dataset) -> str | None:
@@ -343,7 +245,7 @@ def find_primary_output(dataset: xr.Dataset) -> str | None:
     ]
     try:
         described = schema.read_declaration(dataset).measure
-        stated = rebuild_measure(described, "declaration.measure").primary_output
+        stated = build_measure(described, "declaration.measure").primary_output
     except (DataError, InvalidValue):
         stated = ""
     return stated if stated in plain else next(iter(plain), None)

@@ -22,7 +22,7 @@ from rsfstudy.slider import (
     build_sampled_history_from_table,
     protocol,
 )
-from rsfstudy.storage.schema import invalid_part_error
+from rsfstudy.storage.plain_data import invalid_part_error
 
 #: For each kind of loading table, the name of a row and the description of the columns.
 _DESCRIPTION_OF_SAMPLE_ROWS = (

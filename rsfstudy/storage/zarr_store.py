@@ -20,10 +20,9 @@ import xarray as xr
 
 from rsfstudy.errors import DataError, InvalidValue
 from rsfstudy.status import Status
-from rsfstudy.storage.cell_journal import CellColumns, OutputPacker
+from rsfstudy.storage.cell_columns import CellColumns, OutputPacker
 from rsfstudy.storage.dataset_files import ZARR_OPEN_OPTIONS, open_zarr_store, write_store_digest
 from rsfstudy.storage.lattice_datasets import (
-    build_lattice_coordinates,
     build_lattice_variables,
     root_attributes,
 )
@@ -75,6 +74,7 @@ def check_store_does_not_exist(path: Path) -> None:
 
 def write_store(
     study: Study,
+    coordinates: Mapping[Any, Any],
     read_cells: ReadCellsFunction,
     provenance: Mapping[str, Any],
     apply_reductions: ReduceLatticeFunction,
@@ -86,6 +86,8 @@ def write_store(
     ----------
     study : Study
         Study whose results are written.
+    coordinates : mapping of str to tuple or xarray.Variable
+        Coordinates of the lattice.
     read_cells : callable
         Function that returns the ``CellColumns`` of a slice of cells, in row-major order.
     provenance : mapping of str to object
@@ -108,7 +110,7 @@ def write_store(
     beside = path.with_name(f".{path.name}.new")
     try:
         shutil.rmtree(beside, ignore_errors=True)
-        finished = _write_lattice(study, read_cells, beside)
+        finished = _write_lattice(study, coordinates, read_cells, beside)
         lattice = open_zarr_store(beside)
         results = apply_reductions(lattice)
         reductions = _convert_strings_to_object_dtype(results.drop_vars(list(lattice.variables)))
@@ -136,7 +138,9 @@ def _convert_strings_to_object_dtype(dataset: xr.Dataset) -> xr.Dataset:
     return dataset.assign(texts).set_coords([name for name in texts if name in dataset.coords])
 
 
-def _write_lattice(study: Study, read_cells: ReadCellsFunction, path: Path) -> int:
+def _write_lattice(
+    study: Study, coordinates: Mapping[Any, Any], read_cells: ReadCellsFunction, path: Path
+) -> int:
     """Write the variables of the lattice, and count the finished cells."""
     width, first, finished = (
         OutputPacker(study.measure).packed_number_count,
@@ -146,7 +150,7 @@ def _write_lattice(study: Study, read_cells: ReadCellsFunction, path: Path) -> i
     length, *within = study.shape
     row = math.prod(within)  # number of cells
     rows = min(length, max(1, _MAX_VALUES_PER_SLAB // (width * row)))
-    coords = _convert_strings_to_object_dtype(xr.Dataset(coords=build_lattice_coordinates(study)))
+    coords = _convert_strings_to_object_dtype(xr.Dataset(coords=coordinates))
     # The fill values are the values of pending cells, so a lost chunk is read as pending cells.
     pending = build_lattice_variables(
         study, CellColumns.build_pending_cells(1, width), (1,) * len(study.shape)

@@ -624,7 +624,7 @@ class Study:
             "title": self.title,
             "summary": self.summary,
             "version": self.version,
-            "base": self.base.as_dict(),
+            "base": self.base.stored_fields(),
             "axes": [axis.describe() for axis in self.axes],
             "measure": self.measure.describe(),
             "accuracy": asdict(self.accuracy),

@@ -13,9 +13,7 @@ that other users can write to are therefore neither read nor written.
 from __future__ import annotations
 
 import contextlib
-import dis
 import functools
-import hashlib
 import logging
 import os
 import shutil
@@ -25,7 +23,6 @@ import tempfile
 import time
 import types
 from collections.abc import Callable, Mapping, Sequence
-from enum import Enum
 from pathlib import Path
 from typing import Any
 
@@ -39,6 +36,7 @@ from numba.core.sigutils import normalize_signature
 
 from rsfstudy.motion.compiled.array_operations import COMPILED_REPLACEMENT_BY_PYTHON_FUNCTION
 from rsfstudy.motion.engines import compilation_log
+from rsfstudy.object_digest import ObjectDigest, global_names_read_by
 
 _CACHE_ENTRY_FILE_NAME = "motion.py"
 #: Modules whose code is not part of a digest. Instead of the code, the digest contains the version
@@ -87,77 +85,25 @@ def compute_code_digest(signature: Any, *functions: Callable[..., Any]) -> str:
     str
         Hexadecimal digest. The digest also depends on the compiler version and on the processor.
     """
-    content = _ContentDigest()
-    content.add_value((signature, functions))
     processor = llvmlite.binding.get_host_cpu_name(), str(llvmlite.binding.get_host_cpu_features())
-    content.add_value(
-        (
-            _CACHE_FORMAT_VERSION,
-            numba.__version__,
-            np.__version__,
-            str(config.CPU_NAME),
-            str(config.OPT),
-        )
+    options = [
+        (name, sorted(x) if isinstance(x, set) else x) for name, x in _COMPILER_OPTIONS.items()
+    ]
+    versions = _CACHE_FORMAT_VERSION, numba.__version__, np.__version__
+    settings = repr(
+        (signature, versions, str(config.CPU_NAME), str(config.OPT), processor, options)
     )
-    content.add_value(processor)
-    content.add_value(
-        [(name, sorted(x) if isinstance(x, set) else x) for name, x in _COMPILER_OPTIONS.items()]
-    )
-    return content.sha256_hash.hexdigest()[:32]
+    return _digest_functions(*functions).add(settings).hexdigest(32)
 
 
-class _ContentDigest:
-    """Digest of values that a compiler may treat as constants."""
+def _digest_functions(*functions: Callable[..., Any]) -> ObjectDigest:
+    """Digest functions, with the compiled replacements of the functions that they call."""
+    return ObjectDigest(_is_module_digested, _compiled_replacement_of).add(functions)
 
-    def __init__(self) -> None:
-        self.sha256_hash = hashlib.sha256()
-        self._function_numbers: dict[int, int] = {}
 
-    def add_value(self, value: Any) -> None:
-        """Add a value, and all values that it refers to, to the digest."""
-        if isinstance(value, types.FunctionType):
-            known = id(value) in self._function_numbers
-            number = self._function_numbers.setdefault(id(value), len(self._function_numbers))
-            self._add_text(f"function {number}")
-            if not known:
-                self._add_code(value.__code__, value.__globals__)
-                for cell in value.__closure__ or ():
-                    self.add_value(_compiled_replacement_of(cell.cell_contents))
-        elif isinstance(value, tuple | list | frozenset):
-            parts = sorted(value, key=repr) if isinstance(value, frozenset) else value
-            self._add_text(f"{len(value)} together")
-            for part in parts:
-                self.add_value(part)
-        elif isinstance(value, np.ndarray):
-            self._add_text(f"array {value.dtype} {value.shape}")
-            self.sha256_hash.update(value.tobytes())
-        elif isinstance(value, type):
-            members = list(value) if issubclass(value, Enum) else getattr(value, "_fields", ())
-            self._add_text(f"class {value.__qualname__} {members}")
-        else:
-            self._add_text(repr(value))
-
-    def _add_code(self, code: types.CodeType, global_values: Mapping[str, Any]) -> None:
-        """Add a code object, and the globals that it reads, to the digest."""
-        self.sha256_hash.update(code.co_code)
-        self.add_value(code.co_varnames)
-        for constant in code.co_consts:
-            if isinstance(constant, types.CodeType):
-                self._add_code(constant, global_values)
-            else:
-                self.add_value(constant)
-        for name in _global_names_read_by(code):
-            self._add_text(name)
-            value = _compiled_replacement_of(global_values.get(name))
-            if not isinstance(value, types.ModuleType):
-                self.add_value(value)
-            elif value.__name__.partition(".")[0] not in _PACKAGES_IDENTIFIED_BY_VERSION_ONLY:
-                # Numba treats the attributes of a module as constants.
-                self.add_value([getattr(value, read, None) for read in code.co_names])
-
-    def _add_text(self, text: str) -> None:
-        """Add a string and a separator to the digest."""
-        self.sha256_hash.update(text.encode() + b"\0")
+def _is_module_digested(module_name: str | None) -> bool:
+    """Return False for modules that are identified by their versions only."""
+    return (module_name or "").partition(".")[0] not in _PACKAGES_IDENTIFIED_BY_VERSION_ONLY
 
 
 def compile_function(function: Callable[..., Any], signature: Any) -> Any:
@@ -326,7 +272,7 @@ def _copy_with_compiled_globals(function: Any, cache_entry_path: str = "") -> An
     file of the copy.
     """
     named = {
-        name: function.__globals__.get(name) for name in _global_names_read_by(function.__code__)
+        name: function.__globals__.get(name) for name in global_names_read_by(function.__code__)
     }
     reached = {
         name: _jit_compile_callee(value) for name, value in named.items() if _is_function(value)
@@ -343,20 +289,8 @@ def _copy_with_compiled_globals(function: Any, cache_entry_path: str = "") -> An
     copy = types.FunctionType(
         code, {**function.__globals__, **reached}, function.__name__, None, cells or None
     )
-    content = _ContentDigest()
-    content.add_value(function)
-    copy.__qualname__ = f"{function.__name__}_{content.sha256_hash.hexdigest()[:32]}"
+    copy.__qualname__ = f"{function.__name__}_{_digest_functions(function).hexdigest(32)}"
     return copy
-
-
-@functools.cache
-def _global_names_read_by(code: types.CodeType) -> tuple[str, ...]:
-    """Return the names of the globals that a function reads.
-
-    The returned names do not include attribute names.
-    """
-    reads = (i.argval for i in dis.get_instructions(code) if i.opname == "LOAD_GLOBAL")
-    return tuple(dict.fromkeys(reads))
 
 
 def _is_function(value: Any) -> bool:

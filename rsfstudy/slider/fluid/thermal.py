@@ -113,7 +113,7 @@ class ThermalFluid(Fluid):
         "undrained pore pressure by a temperature rise of T_star",
         "sigma_*",
         rule=NON_NEGATIVE,
-        omit_if_none=True,
+        omit_if_default=True,
     )
     dilatancy: float = declare_dilatancy_field(0.0)
     drainage: float = declare_drainage_field()

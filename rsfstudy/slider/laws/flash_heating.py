@@ -135,7 +135,7 @@ class FlashHeatingLaw(Law):
         "weakening velocity of flash heating",
         "V_*",
         rule=POSITIVE,
-        omit_if_none=True,
+        omit_if_default=True,
     )
     weakened_friction: float = number(
         0.2,
@@ -143,7 +143,7 @@ class FlashHeatingLaw(Law):
         "1",
         "friction coefficient of weakened contacts",
         rule=NON_NEGATIVE,
-        omit_if_none=True,
+        omit_if_default=True,
     )
     weakening_exponent: float = number(
         8.0,
@@ -151,7 +151,7 @@ class FlashHeatingLaw(Law):
         "1",
         "sharpness of the transition to flash heating",
         rule=POSITIVE,
-        omit_if_none=True,
+        omit_if_default=True,
     )
 
     name = "flash_heating"

@@ -97,14 +97,14 @@ class OscillationBase(LoadingWithFinalLoadVelocity):
         "time at which the oscillation begins",
         "D_c/V_*",
         rule=NON_NEGATIVE,
-        omit_if_none=True,
+        omit_if_default=True,
     )
     oscillation_phase: float | None = number(
         None,
         r"$\phi_o$",
         "degree",
         "angle by which the oscillation is ahead of a sine where it begins",
-        omit_if_none=True,
+        omit_if_default=True,
     )
     oscillation_cycles: float | None = number(
         None,
@@ -113,7 +113,7 @@ class OscillationBase(LoadingWithFinalLoadVelocity):
         "number of cycles after which the oscillation ends",
         rule=POSITIVE,
         remedy="Leave it out for one that goes on for ever.",
-        omit_if_none=True,
+        omit_if_default=True,
     )
 
     of_pressure = False

@@ -50,7 +50,7 @@ class VelocityOscillation(_oscillation_base.OscillationBase):
         "1",
         "amplitude of an oscillation of load point velocity, over its mean",
         rule=NON_NEGATIVE,
-        omit_if_none=True,
+        omit_if_default=True,
     )
 
     name = "velocity_oscillation"

@@ -97,7 +97,7 @@ class ShearHeating(Temperature):
         "1",
         "temperature rise over T_star by slip of D_c at unit shear stress",
         rule=NON_NEGATIVE,
-        omit_if_none=True,
+        omit_if_default=True,
     )
     cooling: float = number(
         1.0,
@@ -107,7 +107,7 @@ class ShearHeating(Temperature):
         "V_*/D_c",
         rule=POSITIVE,
         remedy="Nearly adiabatic is a small number, and without cooling there is no steady state.",
-        omit_if_none=True,
+        omit_if_default=True,
     )
     direct_activation: float = number(
         0.0,
@@ -115,7 +115,7 @@ class ShearHeating(Temperature):
         "1",
         "activation term of the direct effect",
         rule=NON_NEGATIVE,
-        omit_if_none=True,
+        omit_if_default=True,
     )
     evolution_activation: float = number(
         0.0,
@@ -123,7 +123,7 @@ class ShearHeating(Temperature):
         "1",
         "activation term of the evolution effect",
         rule=NON_NEGATIVE,
-        omit_if_none=True,
+        omit_if_default=True,
     )
 
     name = "shear_heating"

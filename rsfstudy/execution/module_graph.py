@@ -1,0 +1,158 @@
+"""Import graph and code digests of the modules of rsfstudy.
+
+The results of a cell depend on the modules that the measure and the parts of the scene import,
+directly or indirectly. ``ModuleGraph`` finds these modules from the source files, without importing
+them, and computes one digest per module. Docstrings, comments and imports for type annotations do
+not affect a digest. A package that exports its names lazily is replaced by the modules that define
+the imported names.
+"""
+
+from __future__ import annotations
+
+import ast
+import dis
+import re
+from collections.abc import Iterable, Iterator, Mapping
+from functools import cached_property
+from types import CodeType
+
+from rsfstudy.object_digest import ObjectDigest
+
+_PACKAGE_NAME = __name__.partition(".")[0]
+_LAZY_EXPORT_FUNCTION = "build_lazy_export_functions"
+_TYPE_CHECKING_BRANCH = re.compile(rb"^(\s*if )TYPE_CHECKING:", re.MULTILINE)
+_DIGITS_PER_MODULE = 12
+
+
+class ModuleGraph:
+    """Import graph of source files.
+
+    Parameters
+    ----------
+    sources_by_path : mapping of str to bytes
+        Contents of the source files, by path relative to the package, such as
+        ``"slider/friction.py"``.
+    """
+
+    def __init__(self, sources_by_path: Mapping[str, bytes]) -> None:
+        self._modules = {
+            path.removesuffix(".py").removesuffix("/__init__").replace("/", "."): _Module(text)
+            for path, text in sources_by_path.items()
+        }
+
+    @property
+    def names(self) -> Iterable[str]:
+        """Names of the modules, relative to the package."""
+        return self._modules
+
+    @cached_property
+    def combined_digest(self) -> str:
+        """Digest of all modules together."""
+        return ObjectDigest(lambda _name: False).add(self.digests()).hexdigest()
+
+    def digests(self, roots: Iterable[str] | None = None) -> dict[str, str]:
+        """Compute the digests of all modules that some modules can reach.
+
+        Parameters
+        ----------
+        roots : iterable of str, optional
+            Full names of modules. Modules without source files are ignored. By default, the digests
+            of all modules are computed.
+
+        Returns
+        -------
+        dict of str to str
+            Digest of each module, by name relative to the package, such as ``"slider.friction"``.
+        """
+        reached = self._modules if roots is None else self._find_reachable_modules(roots)
+        return {module: self._modules[module].digest for module in sorted(reached)}
+
+    def _find_reachable_modules(self, roots: Iterable[str]) -> set[str]:
+        reached: set[str] = set()
+        found = {module for root in roots for module in self._modules_loaded_by(root, ())}
+        while found:
+            reached |= found
+            imports = [statement for module in found for statement in self._modules[module].imports]
+            found = {m for statement in imports for m in self._modules_loaded_by(*statement)}
+            found -= reached
+        return reached
+
+    def _modules_loaded_by(self, source: str, names: Iterable[str]) -> Iterator[str]:
+        """Yield the modules that ``from source import names`` or ``import source`` loads."""
+        path = source.removeprefix(_PACKAGE_NAME).removeprefix(".")
+        parts = path.split(".")
+        for package in (".".join(parts[:length]) for length in range(1, len(parts) + 1)):
+            if package in self._modules and self._modules[package].lazy_exports is None:
+                yield package
+        modules = [f"{path}.{name}".removeprefix(".") for name in names]
+        exports = self._modules[path].lazy_exports if path in self._modules else None
+        if exports is not None:
+            exported = {f"{path}.{name}": module for name, module in exports.items()}
+            modules = [exported.get(module, module) for module in modules]
+            # An unknown name may stand for any name, so all exports of the package are included.
+            if not modules or not all(module in self._modules for module in modules):
+                modules = [*exports.values()]
+        for module in modules:
+            if module in self._modules:
+                yield from self._modules_loaded_by(f"{_PACKAGE_NAME}.{module}", ())
+
+
+class _Module:
+    """Source file of a module."""
+
+    def __init__(self, source: bytes) -> None:
+        self._source = _TYPE_CHECKING_BRANCH.sub(rb"\1False:", source)
+
+    @cached_property
+    def _code(self) -> CodeType:
+        """Code of the module without docstrings and without imports for type annotations."""
+        return compile(self._source, "module", "exec", optimize=2, dont_inherit=True)
+
+    @cached_property
+    def digest(self) -> str:
+        """Digest of the code."""
+        return ObjectDigest(lambda _name: True).add(self._code).hexdigest(_DIGITS_PER_MODULE)
+
+    @cached_property
+    def imports(self) -> list[tuple[str, list[str]]]:
+        """Modules of the package that the module imports, with the imported names."""
+        return _find_imports(self._code)
+
+    @cached_property
+    def lazy_exports(self) -> Mapping[str, str] | None:
+        """Modules that define the exported names, or None unless the module exports lazily."""
+        if _LAZY_EXPORT_FUNCTION.encode() not in self._source:
+            return None
+        tables = (
+            ast.literal_eval(node.args[1])
+            for node in ast.walk(ast.parse(self._source))
+            if isinstance(node, ast.Call) and ast.unparse(node.func) == _LAZY_EXPORT_FUNCTION
+        )
+        return {
+            entry.split(" as ")[-1]: module
+            for table in tables
+            for module, names in table.items()
+            for entry in names
+        }
+
+
+def _find_imports(code: CodeType) -> list[tuple[str, list[str]]]:
+    """Find the modules of the package that the code imports, with the imported names.
+
+    A string that is the name of a module counts as an import, because it may be passed to
+    ``importlib.import_module``.
+    """
+    prefix = f"{_PACKAGE_NAME}."
+    found: list[tuple[str, list[str]]] = []
+    if any(f"{name}.".startswith(prefix) for name in code.co_names):
+        for instruction in dis.get_instructions(code):
+            if instruction.opname == "IMPORT_NAME":
+                found.append((instruction.argval, []))
+            elif instruction.opname == "IMPORT_FROM":
+                found[-1][1].append(instruction.argval)
+    for constant in code.co_consts:
+        if isinstance(constant, CodeType):
+            found += _find_imports(constant)
+        elif isinstance(constant, str):
+            found.append((constant, []))
+    return [(source, names) for source, names in found if f"{source}.".startswith(prefix)]

@@ -1,0 +1,265 @@
+"""Digest of Python objects and of the code that the objects use.
+
+A digest identifies functions, classes and data by their content. All code is digested as compiled
+code, so comments, docstrings and line numbers do not affect a digest. The digest of a function
+includes every object whose name the function uses. Equal code has equal digests in a study file, a
+script, a notebook and a worker process. Modules that are imported inside functions are not
+included.
+"""
+
+from __future__ import annotations
+
+import copy
+import dis
+import functools
+import hashlib
+import inspect
+import io
+import pickle
+import sys
+from collections.abc import Callable, Hashable, Iterable, Iterator, Mapping
+from types import CellType, CodeType, FunctionType, ModuleType
+from typing import Any, Self
+
+import numpy as np
+
+_TYPES_DIGESTED_BY_REPR = (int, float, complex, str, bytes, bool, type(None), type(Ellipsis))
+_INSTRUCTIONS_READING_GLOBALS = ("LOAD_GLOBAL", "LOAD_NAME", "LOAD_FROM_DICT_OR_GLOBALS")
+#: Functions by type of object. Each function returns the contents of a container or the function
+#: inside a wrapper.
+_GETTERS_OF_CONTAINER_PARTS: tuple[tuple[Any, Callable[[Any], Any]], ...] = (
+    (property, lambda value: (value.fget, value.fset)),
+    (functools.cached_property, lambda value: value.func),
+    (functools.partial, lambda value: (value.func, value.args, value.keywords)),
+    (classmethod | staticmethod, lambda value: value.__wrapped__),
+    (Mapping, lambda value: tuple(value.items())),
+    (list, tuple),
+)
+
+
+class ObjectDigest:
+    """SHA-256 digest of Python objects and of the code that the objects use.
+
+    Parameters
+    ----------
+    reads_module : callable
+        Function that takes the name of a module and returns True if the digest includes code of
+        the module. Classes and functions of other modules are identified by name only.
+    replace : callable, optional
+        Function that is applied to the values of global names and closures. The digest includes
+        the returned object instead of the value.
+    """
+
+    def __init__(
+        self,
+        reads_module: Callable[[str | None], bool],
+        replace: Callable[[Any], Any] = lambda value: value,
+    ) -> None:
+        self._reads_module, self._replace = reads_module, replace
+        self._sha256 = hashlib.sha256()
+        # The dictionary keeps the visited objects alive, so that no other object has the same id.
+        self._visited: dict[Hashable, tuple[int, Any]] = {}
+
+    def hexdigest(self, length: int = 16) -> str:
+        """Return the first digits of the digest.
+
+        Parameters
+        ----------
+        length : int, default: 16
+            Number of hexadecimal digits.
+
+        Returns
+        -------
+        str
+            Digest.
+        """
+        return self._sha256.hexdigest()[:length]
+
+    def add(self, value: Any, used_names: Iterable[str] = ()) -> Self:
+        """Add an object and all objects that it uses to the digest.
+
+        Parameters
+        ----------
+        value : object
+            Object to add.
+        used_names : iterable of str, optional
+            Names that the surrounding code uses. If the object is a module, only these members of
+            the module are added.
+
+        Returns
+        -------
+        ObjectDigest
+            The digest itself.
+        """
+        if isinstance(value, _TYPES_DIGESTED_BY_REPR):
+            self._add_texts(repr(value))
+        elif isinstance(value, ModuleType):
+            self._add_module(value, used_names)
+        elif isinstance(value, CodeType):
+            self._add_code(value)
+        elif isinstance(value, tuple):  # Equal tuples may or may not be the same object.
+            self._add_texts(f"{len(value)} together")
+            for part in value:
+                self.add(part, used_names)
+        elif self._is_first_visit(id(value), value):
+            self._add_unvisited_object(value, used_names)
+        return self
+
+    def _add_texts(self, *texts: str) -> None:
+        for text in texts:
+            self._sha256.update(text.encode(errors="surrogatepass") + b"\0")
+
+    def _is_first_visit(self, key: Hashable, value: Any) -> bool:
+        """Return True if an object is new, or else add the number of its first visit."""
+        if key in self._visited:
+            self._add_texts(f"object {self._visited[key][0]}")
+            return False
+        self._visited[key] = len(self._visited), value
+        return True
+
+    def _add_unvisited_object(self, value: Any, used_names: Iterable[str]) -> None:
+        if isinstance(value, FunctionType):
+            self._add_function(value)
+        elif isinstance(value, type):
+            self._add_class(value)
+        elif isinstance(value, set | frozenset):
+            self._add_texts(*sorted(map(repr, value)))
+        elif type(value) is np.ndarray and value.dtype.kind != "O":
+            self._add_texts(f"{value.dtype} {value.shape} {value.tobytes().hex()}")
+        elif getter := next(
+            (get for kind, get in _GETTERS_OF_CONTAINER_PARTS if isinstance(value, kind)), None
+        ):
+            self.add(getter(value), used_names)
+        elif hasattr(value, "__wrapped__"):  # The value is a cached function.
+            self.add(value.__wrapped__, used_names)
+        else:
+            self._add_class(type(value))
+            self._add_state_of_instance(value, used_names)
+
+    def _add_module(self, module: ModuleType, used_names: Iterable[str]) -> None:
+        """Add the used members of a module."""
+        if not self._reads_module(module.__name__):
+            self._add_texts(module.__name__)
+        elif self._is_first_visit((id(module), *used_names), module):
+            used = [name for name in used_names if name in vars(module)]
+            self.add(tuple(self._replace(vars(module)[name]) for name in used), used_names)
+
+    def _add_function(self, function: FunctionType) -> None:
+        self._add_texts(function.__qualname__)
+        if not self._reads_module(function.__module__):
+            return
+        self._add_code(function.__code__)
+        cells = [
+            self._replace(cell.cell_contents)
+            for cell in function.__closure__ or ()
+            if cell != CellType()
+        ]
+        names = tuple(_names_used_by_code(function.__code__))
+        self.add((function.__defaults__, function.__kwdefaults__, *cells), names)
+        for name in global_names_read_by(function.__code__):
+            if name in function.__globals__:
+                self._add_texts(name)
+                self.add(self._replace(function.__globals__[name]), names)
+
+    def _add_code(self, code: CodeType) -> None:
+        self._add_texts(code.co_name, code.co_code.hex(), *code.co_names, *code.co_varnames)
+        self.add(code.co_consts[_has_docstring_slot(code) :])
+
+    def _add_class(self, added_class: type) -> None:
+        self._add_texts(added_class.__qualname__)
+        if not self._reads_module(added_class.__module__):
+            return
+        self.add(added_class.__bases__)
+        for name, value in sorted(vars(added_class).items()):
+            if not _is_generated_class_member(name, value):
+                self._add_texts(name)
+                self.add(value)
+
+    def _add_state_of_instance(self, value: Any, used_names: Iterable[str]) -> None:
+        if self._reads_module(type(value).__module__):
+            self.add(_state_without_caches(value), used_names)
+            return
+        content = io.BytesIO()
+        try:
+            _PicklerWithoutCachedProperties(content, protocol=4).dump(value)
+        except Exception:  # Objects such as locks and files do not affect the results.
+            self._add_texts(type(value).__qualname__)
+        else:
+            self._add_texts(content.getvalue().hex())
+
+
+class _PicklerWithoutCachedProperties(pickle.Pickler):
+    """Pickler that omits the cached properties of all objects.
+
+    The cached properties do not affect the results, and may be present in one process but not in
+    another.
+    """
+
+    def reducer_override(self, value: Any) -> Any:
+        """Pickle a copy of the object without its cached properties."""
+        state = _state_without_caches(value)
+        if isinstance(value, type) or len(state) == len(getattr(value, "__dict__", ())):
+            return NotImplemented
+        bare = copy.copy(value)
+        vars(bare).clear()
+        vars(bare).update(state)
+        return bare.__reduce_ex__(4)
+
+
+def _state_without_caches(value: Any) -> dict[str, Any]:
+    """Return the attributes of an object without its cached properties."""
+    return {
+        name: part
+        for name, part in getattr(value, "__dict__", {}).items()
+        if not any(
+            isinstance(vars(kind).get(name), functools.cached_property)
+            for kind in type(value).__mro__
+        )
+    }
+
+
+def _has_docstring_slot(code: CodeType) -> bool:
+    """Return True if the first constant of a code object can be a docstring."""
+    if sys.version_info >= (3, 13):
+        return bool(code.co_flags & inspect.CO_HAS_DOCSTRING)
+    return bool(code.co_flags & inspect.CO_NEWLOCALS) and not code.co_name.startswith("<")
+
+
+def _is_generated_class_member(member_name: str, value: Any) -> bool:
+    """Return True for members that Python, dataclasses or msgspec generate.
+
+    Generated members do not affect the results.
+    """
+    if member_name == "_abc_impl" or member_name.startswith("__annot"):
+        return True
+    made = getattr(getattr(value, "__code__", None), "co_qualname", "").startswith("__create_fn__")
+    return made or (member_name.startswith("__") and not callable(value))
+
+
+def _names_used_by_code(code: CodeType) -> Iterator[str]:
+    """Yield the global and attribute names that a function and its nested functions use."""
+    yield from code.co_names
+    for constant in code.co_consts:
+        if isinstance(constant, CodeType):
+            yield from _names_used_by_code(constant)
+
+
+@functools.cache
+def global_names_read_by(code: CodeType) -> tuple[str, ...]:
+    """Return the names of the globals that a function and its nested functions read.
+
+    Parameters
+    ----------
+    code : code
+        Code of the function.
+
+    Returns
+    -------
+    tuple of str
+        Names without duplicates. Names of attributes are not included.
+    """
+    reads = [
+        i.argval for i in dis.get_instructions(code) if i.opname in _INSTRUCTIONS_READING_GLOBALS
+    ]
+    nested = (global_names_read_by(c) for c in code.co_consts if isinstance(c, CodeType))
+    return tuple(dict.fromkeys((*reads, *(name for names in nested for name in names))))

@@ -1,0 +1,77 @@
+"""Search for the cell of a lattice that has given coordinates."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+import xarray as xr
+
+from rsfstudy.errors import InvalidValue
+from rsfstudy.formatting import format_list
+
+
+def find_cell_number(dataset: xr.Dataset, coordinate_values: Mapping[str, Any]) -> int:
+    """Find the number of a cell from its coordinates.
+
+    Parameters
+    ----------
+    dataset : xarray.Dataset
+        Results of a study.
+    coordinate_values : mapping of str to object
+        Coordinate value for each dimension. Dimensions with a single point can be omitted. Each
+        number must agree with a point of the axis within a relative tolerance of 1e-5.
+
+    Returns
+    -------
+    int
+        Number of the cell in row-major order.
+
+    Raises
+    ------
+    InvalidValue
+        If a dimension is unknown or missing, or if a value is not a point of its axis.
+    """
+    status = dataset["status"]
+    for name in coordinate_values:
+        if name not in status.dims:
+            raise InvalidValue("cell", name, "is no axis", choices=[str(d) for d in status.dims])
+    index = []
+    for dimension in map(str, status.dims):
+        values = dataset[dimension].values
+        if dimension not in coordinate_values:
+            if values.size > 1:
+                rule = f"leaves {dimension} open"
+                remedy = (
+                    f"Name one value of each axis (--cell is repeated). {dimension} has "
+                    f"{format_list(values.tolist(), ', ')}."
+                )
+                raise InvalidValue("cell", dict(coordinate_values), rule, remedy=remedy)
+            index.append(0)
+            continue
+        number = _find_index_on_axis(values, coordinate_values[dimension])
+        if number is None:
+            rule = "is not on its axis"
+            raise InvalidValue(
+                dimension, coordinate_values[dimension], rule, choices=map(str, values)
+            )
+        index.append(number)
+    return int(np.ravel_multi_index(index, status.shape))
+
+
+def _find_index_on_axis(axis_values: np.ndarray, wanted_value: Any) -> int | None:
+    """Find the index of an equal label or of the nearest number on an axis.
+
+    The relative difference between the wanted number and the nearest number on the axis must be at
+    most 1e-5.
+    """
+    if axis_values.dtype.kind in "iuf":
+        try:
+            number = float({"true": 1.0, "false": 0.0}.get(str(wanted_value).lower(), wanted_value))
+        except (TypeError, ValueError):
+            return None
+        nearest = int(np.argmin(np.abs(axis_values - number)))
+        return nearest if np.isclose(axis_values[nearest], number, rtol=1e-5, atol=0.0) else None
+    places = np.flatnonzero(axis_values.astype(object).astype(str) == str(wanted_value))
+    return int(places[0]) if places.size else None

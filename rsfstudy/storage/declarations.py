@@ -1,0 +1,395 @@
+"""Schema of stored declarations: studies, axes, scenes, measures, reductions and claims.
+
+The structs describe the declaration of a study in a results file. The functions build the objects
+of a study from the structs. A missing entry is never replaced by a default value, because a default
+value could change the meaning of the study. No code is imported from a results file, so measures
+and reductions are found by their names among the classes of rsfstudy.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Mapping, Sequence
+from types import MappingProxyType, ModuleType
+from typing import Annotated, Any
+
+import msgspec
+
+from rsfstudy import measures, reductions
+from rsfstudy.axes import Axis
+from rsfstudy.errors import InvalidValue
+from rsfstudy.measures import Measure
+from rsfstudy.motion import Accuracy
+from rsfstudy.reductions import Reduction
+from rsfstudy.rig import Rig
+from rsfstudy.slider import (
+    BUILT_IN_PARTS,
+    OMITTED_DEFAULTS,
+    SLOTS,
+    Scene,
+    UserLoading,
+    UserPart,
+    field_names,
+    replace_names_by_user_parts,
+    scene_field_types,
+)
+from rsfstudy.storage.plain_data import (
+    build_from_plain_data,
+    call_with_fields,
+    convert_fields,
+    convert_plain_data,
+    invalid_part_error,
+)
+from rsfstudy.study import Claim, load_study, study_names
+
+MISSING_STUDY_FILE_REMEDY = "Name the file that declares it: --study FILE (study=)."
+#: Maximum number of claims of a study. Larger files would take minutes to check.
+_MAX_CLAIMS = 10_000
+#: Integer fields of measures and reductions. A larger number of points would not fit in memory.
+_Count = Annotated[int, msgspec.Meta(ge=-10_000_000, le=10_000_000)]
+#: Fields of a scene. User-defined parts are stored by their names.
+StoredScene = Mapping[str, float | str | bool | None]
+#: Default values of scene fields that are missing in older files. Fields that the parts of a scene
+#: lack must be None, so only the defaults of slots, which are names, are included.
+_DEFAULTS_OF_MISSING_FIELDS: Mapping[str, Any] = {
+    **{n: v if isinstance(v, str) else None for n, v in OMITTED_DEFAULTS.items()},
+    **{name: None for part in BUILT_IN_PARTS.values() for name in field_names(part)},
+    "fluid": "drained",
+}
+
+
+class StoredAxis(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """Axis of a lattice, as plain data.
+
+    Parameters
+    ----------
+    dimension : str
+        Name of the dimension.
+    values : sequence or mapping
+        List of values. For a zipped axis, mapping of point labels to field values. For a numbered
+        axis, mapping of field names to lists of values.
+    units : mapping of str to str, optional
+        Units of the fields.
+    drawn : mapping of str to object, optional
+        Description of the random sampling.
+    """
+
+    dimension: str
+    values: (
+        Sequence[float | str | bool]
+        | Mapping[str, Mapping[str, float | str | bool | None] | Sequence[float | str | bool]]
+    )
+    units: Mapping[str, str] | None = None
+    drawn: Mapping[str, Any] | None = None
+
+    def build(self, user_parts: Mapping[str, UserPart] = MappingProxyType({})) -> Axis:
+        """Build the axis.
+
+        Parameters
+        ----------
+        user_parts : mapping of str to UserPart, optional
+            User-defined parts by name. Other user-defined parts are represented by their names.
+
+        Returns
+        -------
+        Axis
+            Axis of a lattice.
+
+        Raises
+        ------
+        DataError
+            If the description is invalid.
+        """
+        try:
+            named = Axis(self.dimension, self.values, self.units, self.drawn)
+        except InvalidValue as error:
+            path = f"declaration.axes.{self.dimension}"
+            raise invalid_part_error(path, f"is refused ({error})") from error
+        if not user_parts:
+            return named
+        rows = [replace_names_by_user_parts(row, user_parts) for row in named.rows]
+        return named.with_rows(rows, named.units, named.sampling_info)
+
+
+class _StoredMeasure(msgspec.Struct):
+    """Entries that every measure has."""
+
+    name: str
+
+
+class _StoredReduction(msgspec.Struct):
+    """Entries that every reduction has."""
+
+    kind: str
+    name: str
+    of: str
+
+
+class StoredDeclaration(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """Declaration of the study, as stored in the attribute ``declaration``.
+
+    Parameters
+    ----------
+    name : str
+        Name of the study.
+    title : str
+        Title of the study.
+    summary : str
+        Summary of the study.
+    version : int
+        Version of the study.
+    base : mapping of str to object
+        Fields of the scene that all cells share.
+    axes : sequence of StoredAxis
+        Axes of the lattice.
+    measure : mapping of str to object
+        Name and fields of the measure.
+    accuracy : Accuracy
+        Accuracy of each cell.
+    reductions : sequence of mapping
+        Kind and fields of each reduction of the lattice.
+    claims : sequence of Claim
+        Published values to compare with the results.
+    plot : str
+        Name of the figure.
+    references : sequence of str
+        Literature references of the study.
+    overrides : mapping of str to object
+        Values that the user has overridden.
+    laboratory : mapping of str to float, optional
+        Quantities of the rig, if the study has a rig.
+    """
+
+    name: str
+    title: str
+    summary: str
+    version: int
+    base: StoredScene
+    axes: Sequence[StoredAxis]
+    measure: Mapping[str, Any]
+    accuracy: Any
+    reductions: Sequence[Mapping[str, Any]]
+    claims: Annotated[Sequence[Any], msgspec.Meta(max_length=_MAX_CLAIMS)]
+    plot: str
+    references: Sequence[str]
+    overrides: Mapping[str, Any]
+    laboratory: Mapping[str, float] | None = None
+
+
+def parse_declaration(plain_data: Any) -> StoredDeclaration:
+    """Convert plain data to a declaration.
+
+    Parameters
+    ----------
+    plain_data : dict
+        Declaration as plain data.
+
+    Returns
+    -------
+    StoredDeclaration
+        Declaration of the study.
+
+    Raises
+    ------
+    DataError
+        If an entry is missing, unknown or invalid.
+    """
+    declared = convert_plain_data(plain_data, StoredDeclaration, "declaration")
+    # Other fields of measures and reductions are checked when a study is built.
+    convert_plain_data(declared.measure, _StoredMeasure, "declaration.measure")
+    convert_plain_data(declared.reductions, list[_StoredReduction], "declaration.reductions")
+    made: StoredDeclaration = msgspec.structs.replace(
+        declared,
+        accuracy=build_from_plain_data(declared.accuracy, Accuracy, "declaration.accuracy"),
+        claims=[
+            build_from_plain_data(claim, Claim, f"declaration.claims[{number}]")
+            for number, claim in enumerate(declared.claims)
+        ],
+    )
+    return made
+
+
+def build_scene_from_stored(
+    stored_scene: StoredScene,
+    user_parts: Mapping[str, UserPart] = MappingProxyType({}),
+    path_in_file: str = "declaration.base",
+) -> Scene:
+    """Build a scene from plain data.
+
+    Parameters
+    ----------
+    stored_scene : mapping of str to object
+        Fields of the scene.
+    user_parts : mapping of str to UserPart, optional
+        User-defined parts by name.
+    path_in_file : str, default: "declaration.base"
+        Path of the scene in the file, for error messages.
+
+    Returns
+    -------
+    Scene
+        Scene with the stored fields.
+
+    Raises
+    ------
+    DataError
+        If a field is missing, unknown or invalid. The message contains the path of the field.
+    """
+    parts = [
+        part
+        for part in replace_names_by_user_parts(stored_scene, user_parts).values()
+        if isinstance(part, type | UserLoading)
+    ]
+    values = convert_fields(
+        {**_DEFAULTS_OF_MISSING_FIELDS, **stored_scene},
+        tuple(scene_field_types(parts).items()),
+        path_in_file,
+    )
+    scene: Scene = call_with_fields(
+        Scene, replace_names_by_user_parts(values, user_parts), path_in_file
+    )
+    return scene
+
+
+def find_user_part_missing_from_file(
+    declaration: StoredDeclaration, stored_loadings: Collection[str] = ()
+) -> tuple[str, str] | None:
+    """Find a user-defined part that the results file does not contain.
+
+    Parameters
+    ----------
+    declaration : StoredDeclaration
+        Declaration of the study.
+    stored_loadings : collection of str, optional
+        Names of the user-defined loadings that the file contains.
+
+    Returns
+    -------
+    tuple of (str, str) or None
+        Slot and name of the first missing part, or None if no part is missing.
+    """
+    rows: list[Mapping[str, Any]] = [declaration.base]
+    for axis in declaration.axes:
+        rows += axis.build().rows
+    for slot in SLOTS:
+        for name in {row.get(slot.name): None for row in rows}:
+            if isinstance(name, str) and name not in (*slot.built_in_parts, *stored_loadings):
+                return slot.name, name
+    return None
+
+
+def build_rig(quantities: Mapping[str, float]) -> Rig:
+    """Build a rig from its quantities.
+
+    Parameters
+    ----------
+    quantities : mapping of str to float
+        Quantities that have a value, in SI units.
+
+    Returns
+    -------
+    Rig
+        Rig of the study.
+
+    Raises
+    ------
+    DataError
+        If a quantity is unknown.
+    """
+    types = tuple((name, float) for name in Rig.__dataclass_fields__ if name in quantities)
+    return Rig(**convert_fields(quantities, types, "declaration.laboratory"))
+
+
+def build_measure(plain_measure: Mapping[str, Any], path_in_file: str) -> Measure:
+    """Build a measure from its description.
+
+    Parameters
+    ----------
+    plain_measure : mapping of str to object
+        Description of the measure. The description of a nested measure has the key ``measure``.
+    path_in_file : str
+        Path of the description in the file, for error messages.
+
+    Returns
+    -------
+    Measure
+        Measure that the description defines.
+
+    Raises
+    ------
+    InvalidValue
+        If rsfstudy has no measure with this name.
+    DataError
+        If a field is missing, unknown or invalid.
+    """
+    values: dict[str, Any] = dict(plain_measure)
+    kind = _find_class("measure", Measure, measures, values.pop("name"))
+    given = dict(kind.fields_from_description(values, path_in_file))
+    if isinstance(values.get("measure"), Mapping):
+        path = f"{path_in_file}.measure"
+        convert_plain_data(values["measure"], _StoredMeasure, path)
+        given["measure"] = build_measure(values.pop("measure"), path)
+    made: Measure = build_from_plain_data(values, kind, path_in_file, given, _Count)
+    return made
+
+
+def build_reduction(plain_reduction: Mapping[str, Any], path_in_file: str) -> Reduction:
+    """Build a reduction from its description.
+
+    Parameters
+    ----------
+    plain_reduction : mapping of str to object
+        Description of the reduction.
+    path_in_file : str
+        Path of the description in the file, for error messages.
+
+    Returns
+    -------
+    Reduction
+        Reduction that the description defines.
+
+    Raises
+    ------
+    InvalidValue
+        If rsfstudy has no reduction of this kind.
+    DataError
+        If a field is missing, unknown or invalid.
+    """
+    values: dict[str, Any] = dict(plain_reduction)
+    if values["kind"] == "spread":  # Older files use this name.
+        values |= {"kind": "range", "over": values.pop("on", "")}
+    kind = _find_class("reduction", Reduction, reductions, values.pop("kind"))
+    made: Reduction = build_from_plain_data(values, kind, path_in_file, integer_type=_Count)
+    return made
+
+
+def _find_class(
+    declaration_key: str, base_class: Any, exporting_package: ModuleType, declared_name: str
+) -> Any:
+    """Find a class of rsfstudy by its name in declarations.
+
+    If the package that exports the classes has no class with this name, the function also searches
+    the modules of the named studies.
+    """
+    for exported in exporting_package.__all__:
+        getattr(exporting_package, exported)  # This loads the module of the class.
+    if declared_name not in _named_subclasses(base_class):
+        for study in study_names():
+            load_study(study)
+    kinds = _named_subclasses(base_class)
+    if declared_name not in kinds:
+        rule = "is not part of rsfstudy"
+        raise InvalidValue(
+            declaration_key, declared_name, rule, choices=kinds, remedy=MISSING_STUDY_FILE_REMEDY
+        )
+    return kinds[declared_name]
+
+
+def _named_subclasses(base_class: Any) -> dict[str, Any]:
+    """Return the concrete subclasses in rsfstudy, by their names in files."""
+    found: dict[str, Any] = {}
+    for kind in base_class.__subclasses__():
+        found |= _named_subclasses(kind)
+        name = vars(kind).get("name") or vars(kind).get("kind")
+        if name and kind.__module__.partition(".")[0] == __name__.partition(".")[0]:
+            found[name] = kind
+    return found

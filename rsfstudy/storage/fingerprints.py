@@ -1,0 +1,83 @@
+"""Comparison of fingerprints, which contain the settings and the code that affect results.
+
+The entry ``physics`` of a fingerprint contains one code digest for each module of rsfstudy that the
+measure and the parts of the scenes can reach. Two fingerprints agree if all modules that both of
+them contain have the same code. For example, a longer axis of laws may add the modules of further
+laws. Older fingerprints contain one digest of all modules.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Mapping
+from typing import Any
+
+from rsfstudy.formatting import format_list
+
+#: Name of the entry that contains the code digests of modules.
+_MODULES = "physics"
+
+
+def find_fingerprint_differences(
+    first: Mapping[str, Any], second: Mapping[str, Any]
+) -> dict[str, tuple[Any, Any]]:
+    """Find the entries that differ between two fingerprints.
+
+    Both fingerprints are converted to JSON and back before the comparison, because a fingerprint
+    that was read from a file contains lists instead of tuples.
+
+    Parameters
+    ----------
+    first, second : mapping of str to object
+        Fingerprints to compare.
+
+    Returns
+    -------
+    dict of str to tuple of (object, object)
+        Each entry that differs, with its values in the first and in the second fingerprint. The
+        value of a missing entry is None. If the code of modules differs, the name of the entry
+        lists the modules, for example ``"physics (slider.friction)"``.
+    """
+    both: list[dict[str, Any]] = [json.loads(json.dumps(each)) for each in (first, second)]
+    codes = [each.get(_MODULES) for each in both]
+    for fingerprint, code, other in zip(both, codes, reversed(codes), strict=True):
+        if isinstance(code, dict) and isinstance(other, dict):
+            del fingerprint[_MODULES]
+            names = sorted(name for name in code.keys() & other if code[name] != other[name])
+            if names:
+                changed = {name: code[name] for name in names}
+                fingerprint[f"{_MODULES} ({format_list(names, ', ')})"] = _combine_digests(changed)
+        elif isinstance(code, dict):  # An older fingerprint contains one digest of all modules.
+            fingerprint[_MODULES] = _combine_digests(code)
+    first, second = both
+    return {
+        name: (first.get(name), second.get(name))
+        for name in sorted({*first, *second})
+        if first.get(name) != second.get(name)
+    }
+
+
+def merge_fingerprints(stored: Mapping[str, Any], current: Mapping[str, Any]) -> dict[str, Any]:
+    """Add the modules of a stored fingerprint to a fingerprint that agrees with it.
+
+    Parameters
+    ----------
+    stored, current : mapping of str to object
+        Fingerprints of the journal and of the run.
+
+    Returns
+    -------
+    dict of str to object
+        Fingerprint of the run, with the code digests of all modules in both fingerprints.
+    """
+    code, current_code = stored.get(_MODULES), current.get(_MODULES)
+    if not isinstance(code, dict) or not isinstance(current_code, dict):
+        return dict(current)
+    return {**current, _MODULES: {**code, **current_code}}
+
+
+def _combine_digests(digests_by_module: Mapping[str, str]) -> str:
+    """Combine the code digests of several modules into one digest."""
+    text = json.dumps(digests_by_module, sort_keys=True)
+    return hashlib.sha256(text.encode()).hexdigest()[:16]
