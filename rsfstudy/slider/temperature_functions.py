@@ -47,6 +47,8 @@ _MIN_NORMAL_STRESS, _MAX_NORMAL_STRESS = 1e-12, 1e12
 _NORMAL_STRESS_ITERATION_COUNT = 30
 #: Largest change of ln V between two points along the branch of steady sliding.
 _MAX_LOG_SLIP_RATE_CHANGE = 0.25
+#: Value of ln(V/V_*) below which slip does not heat the fault, to double precision.
+_MIN_HEATING_LOG_SLIP_RATE = -60.0
 
 
 class _Places(NamedTuple):
@@ -329,6 +331,7 @@ def steady_temperature_rise(scene: SceneView, log_slip_rate: float) -> float:
         psis = (*steady[:place], rise, *steady[place + 1 :])
         return float(functions.evolutions(x, psis, shift, math.exp(min(x, 0.0)), p)[place])
 
+    log_slip_rate = max(log_slip_rate, _MIN_HEATING_LOG_SLIP_RATE)
     count = max(1, math.ceil(abs(log_slip_rate) / _MAX_LOG_SLIP_RATE_CHANGE))
     rise, before = 0.0, 0.0
     for step in range(count + 1):
