@@ -65,7 +65,8 @@ def steady_sliding(scene: SceneView, log_slip_rate: float) -> SteadySliding | No
     Returns
     -------
     SteadySliding or None
-        Stresses and states. None if no frictional stress satisfies the friction relation.
+        Stresses and states. None if no frictional stress satisfies the friction relation, or if
+        the steady temperature is unknown.
 
     Notes
     -----
@@ -73,9 +74,8 @@ def steady_sliding(scene: SceneView, log_slip_rate: float) -> SteadySliding | No
     :math:`\mathrm{strength}(g) = a \ln(V/V_*) + \sum_i \Psi_i`. The spring stress is the sum of the
     frictional stress and the stress that radiation damping adds.
     """
-    friction = frictional_stress_for_friction(
-        scene, steady_friction_minus_reference(scene, log_slip_rate)
-    )
+    change = steady_friction_minus_reference(scene, log_slip_rate)
+    friction = None if math.isnan(change) else frictional_stress_for_friction(scene, change)
     if friction is None:
         return None
     spring_stress = friction + scene.dynamics.radiated_stress(log_slip_rate)
@@ -101,7 +101,8 @@ def steady_friction_minus_reference(scene: SceneView, log_slip_rate: float) -> f
     Returns
     -------
     float
-        Difference :math:`\mu_{ss} - \mu_*`.
+        Difference :math:`\mu_{ss} - \mu_*`. The result is NaN if the steady temperature is
+        unknown.
 
     Notes
     -----
@@ -254,13 +255,15 @@ def min_steady_log_slip_rate(scene: SceneView) -> float:
         return -math.inf
     if scene.parts.law.steady_states is None and not any(scene.parts.temperature.activation):
         return strongest / (scene.a - scene.b) if scene.b > scene.a else -math.inf
+
+    def excess(log_slip_rate: float) -> float:
+        change = steady_friction_minus_reference(scene, log_slip_rate)
+        # Without a steady temperature, the slip rate is too small.
+        return 1.0 if math.isnan(change) else change - strongest
+
     slower = -1.0
-    while steady_friction_minus_reference(scene, slower) <= strongest:
+    while excess(slower) <= 0.0:
         slower *= 2.0
         if slower < _MIN_LOG_SLIP_RATE:
             return -math.inf
-    return float(
-        brentq(
-            lambda x: steady_friction_minus_reference(scene, x) - strongest, slower, 0.0, xtol=1e-12
-        )
-    )
+    return float(brentq(excess, slower, 0.0, xtol=1e-12))

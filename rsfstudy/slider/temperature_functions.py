@@ -22,11 +22,9 @@ arguments that ``friction.FrictionFunctions`` describes.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
-from functools import cache
+from collections.abc import Callable, Mapping
+from functools import cache, partial
 from typing import Any, NamedTuple
-
-from scipy.optimize import newton
 
 from rsfstudy.slider.friction_relation import zero_normal_stress_excess
 from rsfstudy.slider.parameter_layout import LAW, MU_STAR, A, temperature_parameter_values
@@ -49,6 +47,9 @@ _NORMAL_STRESS_ITERATION_COUNT = 30
 _MAX_LOG_SLIP_RATE_CHANGE = 0.25
 #: Value of ln(V/V_*) below which slip does not heat the fault, to double precision.
 _MIN_HEATING_LOG_SLIP_RATE = -60.0
+#: Maximum number of secants in the search of a steady temperature, its relative tolerance, and the
+#: largest last step if rounding errors prevent that the tolerance is reached.
+_MAX_SECANT_COUNT, _ROOT_TOLERANCE, _STAGNATION_TOLERANCE = 30, 1e-14, 1e-10
 
 
 class _Places(NamedTuple):
@@ -325,7 +326,7 @@ def steady_temperature_rise(scene: SceneView, log_slip_rate: float) -> float:
     functions, p = scene.friction_functions, scene.friction_parameter_values
     place, activated = scene.parts.law.state_count, temperature_parameter_values(scene)[1]
 
-    def warming(rise: float, x: float) -> float:
+    def warming(x: float, rise: float) -> float:
         shift = -activated * inverse_temperature_change(rise)
         steady = functions.steady_states(x, shift, p)
         psis = (*steady[:place], rise, *steady[place + 1 :])
@@ -333,20 +334,36 @@ def steady_temperature_rise(scene: SceneView, log_slip_rate: float) -> float:
 
     log_slip_rate = max(log_slip_rate, _MIN_HEATING_LOG_SLIP_RATE)
     count = max(1, math.ceil(abs(log_slip_rate) / _MAX_LOG_SLIP_RATE_CHANGE))
+    # Without activation terms, only differences of temperature matter.
+    coldest = -1.0 if any(scene.parts.temperature.activation) else -math.inf
     rise, before = 0.0, 0.0
     for step in range(count + 1):
         x = log_slip_rate * step / count
         guess = 2.0 * rise - before if step > 1 else rise
         before = rise
-        if warming(guess, x) == 0.0:
-            rise = guess
-            continue
-        rise, solution = newton(
-            warming, guess, args=(x,), tol=1e-18, rtol=1e-13, full_output=True, disp=False
-        )
-        if not solution.converged or not -1.0 < rise < math.inf:
+        rise = _find_root_by_secants(partial(warming, x), guess)
+        if not coldest < rise < math.inf:
             return math.nan
-    return float(rise)
+    return rise
+
+
+def _find_root_by_secants(function: Callable[[float], float], guess: float) -> float:
+    """Find a root close to a guess, or return NaN."""
+    before, at = guess, guess + 1e-4 * (1.0 + abs(guess))
+    value_before, value = function(before), function(at)
+    if value_before == 0.0:
+        return before
+    step = math.inf
+    for _ in range(_MAX_SECANT_COUNT):
+        if value == value_before:
+            break
+        step = -value * (at - before) / (value - value_before)
+        before, value_before, at = at, value, at + step
+        if abs(step) <= _ROOT_TOLERANCE * abs(at):
+            return at
+        value = function(at)
+    # Rounding errors of the function may prevent further convergence.
+    return at if abs(step) <= _STAGNATION_TOLERANCE * (1.0 + abs(at)) else math.nan
 
 
 def thermal_friction_change(scene: SceneView, states: Numbers) -> float:
