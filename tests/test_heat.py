@@ -582,3 +582,28 @@ def test_error_estimates_cover_the_errors(effect):
         compared += [heat_estimates.compare_peak(fields, 1e-6, SCIPY)]
         compared = [pair for pair in compared if pair is not None]
     assert all(error <= estimate for error, estimate in compared)
+
+
+@pytest.mark.parametrize(
+    "effect", [HOT, {**pressurised(0.002, 0.1, 0.5), "pressurisation": 0.7}], ids=["hot", "wet"]
+)
+def test_a_held_load_point_needs_few_evaluations(effect):
+    """The temperature and the pressure of the future motion are bounded."""
+    scene = Scene(**{**COLD, "stiffness": 0.0065, **effect})
+    outcome = CriticalStep("displacement_step")(scene, Accuracy(1e-5))
+    assert outcome.status is Status.OK
+    assert outcome.rhs_evaluations < 20_000
+
+
+def test_the_temperature_stays_within_its_bounds():
+    fields = {**COLD, "stiffness": 0.0065, **HOT, "displacement_step": 1.5}
+    scene = Scene(**fields, load_velocity_ratio=0.0)
+    motion = rsfstudy.simulate(scene, duration=50.0, rtol=1e-7)
+    rises, stress = motion["temperature_rise"].values, motion["shear_stress"].values
+    fastest = 10.0 ** motion["log10_slip_rate"].values.max()
+    power, temperature = float(stress.max() * fastest), scene.parts.temperature
+    for start in (0, len(rises) // 2):
+        lowest, highest = temperature.rise_bounds(scene, float(rises[start]), power)
+        assert lowest <= rises[start:].min()
+        assert rises[start:].max() <= highest
+    assert rises.max() > 0.0 > rises.min()

@@ -135,6 +135,15 @@ class ThermalFluid(Fluid):
         """Function that returns the unknowns in steady sliding."""
         return steady_porosity_and_pressure if self.dilatancy else steady_pressure
 
+    def highest_pressure(self, log_slip_rate: float, states: Numbers) -> float:
+        """Compute an upper bound of the future pore pressure without heating.
+
+        See ``Fluid.highest_pressure``.
+        """
+        if not self.dilatancy:
+            return max(states[-1], 0.0)
+        return DilatantFluid.highest_pressure(self, log_slip_rate, states)  # type: ignore[arg-type]
+
     @property
     def pressurisation_factor(self) -> float:
         """Undrained pore pressure in sigma_* per unit of the temperature rise."""

@@ -17,6 +17,7 @@ and the offset :math:`u` of the state variable from its steady state increases b
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import ClassVar
 
@@ -27,6 +28,7 @@ from rsfstudy.slider.needed_quantities import (
     SLIP_RATE,
 )
 from rsfstudy.slider.parts import Function, Part, discover_parts
+from rsfstudy.slider.scene_view import SceneView
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -82,6 +84,25 @@ class Temperature(Part):
         The base class returns two zeros, because its friction does not depend on temperature.
         """
         return 0.0, 0.0
+
+    def rise_bounds(self, scene: SceneView, rise: float, power: float) -> tuple[float, float]:
+        r"""Compute bounds of the future temperature rise.
+
+        Parameters
+        ----------
+        scene : Scene
+            Scene that the temperature belongs to.
+        rise : float
+            Current temperature rise.
+        power : float
+            Upper bound of the product of shear stress and slip rate, in :math:`\sigma_* V_*`.
+
+        Returns
+        -------
+        lowest, highest : float
+            Bounds of the temperature rise. The base class returns infinite bounds.
+        """
+        return -math.inf, math.inf
 
 
 BUILT_IN_PARTS = discover_parts(__name__, __path__)

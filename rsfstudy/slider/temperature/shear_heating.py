@@ -156,6 +156,16 @@ class ShearHeating(Temperature):
         """
         return self.heating, self.cooling, self.heating * scene.mu_star
 
+    def rise_bounds(self, scene: SceneView, rise: float, power: float) -> tuple[float, float]:
+        """Compute bounds of the future temperature rise.
+
+        See ``Temperature.rise_bounds``. The temperature approaches the steady temperature of the
+        power, which lies between that without slip and that of the largest power.
+        """
+        over_cooling = self.heating / self.cooling
+        lowest = -over_cooling * scene.mu_star
+        return min(rise, lowest), max(rise, over_cooling * power + lowest)
+
     def check(self, scene: SceneView) -> None:
         """Check the activation terms and the temperature of the surroundings.
 
