@@ -16,6 +16,7 @@ from rsfstudy._deprecation import NEW_NAME_BY_OWNER_AND_FORMER_NAME, warn_rename
 if TYPE_CHECKING:
     from rsfstudy.api.event_catalogue import events as events
     from rsfstudy.api.fit_record import fit as fit
+    from rsfstudy.api.healing_tables import healing as healing
     from rsfstudy.api.html_report import report as report
     from rsfstudy.api.simulation import simulate as simulate
     from rsfstudy.api.single_scene import critical_step as critical_step
@@ -32,6 +33,7 @@ if TYPE_CHECKING:
     from rsfstudy.axes.axis import Axis as Axis
     from rsfstudy.motion.accuracy import Accuracy as Accuracy
     from rsfstudy.motion.integrator import Integrator as Integrator
+    from rsfstudy.plots._healing import plot_healing as plot_healing
     from rsfstudy.plots._motion import plot_motion as plot_motion
     from rsfstudy.rig.protocol_files import history as history
     from rsfstudy.rig.protocol_files import read_protocol as read_protocol
@@ -57,6 +59,7 @@ _LAZY_EXPORTS = {
     "rig.table_files": ("read_table",),
     "api.fit_record": ("fit",),
     "rig.protocol_files": ("history", "read_protocol"),
+    "plots._healing": ("plot_healing",),
     "plots._motion": ("plot_motion",),
     "study.study": ("Study",),
     "axes.axis": ("Axis",),
@@ -78,6 +81,7 @@ _LAZY_EXPORTS = {
     "api.simulation": ("simulate",),
     "api.single_scene": ("critical_step", "limit_cycle", "to_si"),
     "api.event_catalogue": ("events",),
+    "api.healing_tables": ("healing",),
 }
 _MODULE_BY_EXPORTED_NAME = {
     name: module for module, names in _LAZY_EXPORTS.items() for name in names

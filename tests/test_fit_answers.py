@@ -23,7 +23,7 @@ from synthetic_records import (
 import rsfstudy
 from rsfstudy import Scene
 from rsfstudy.fitting.load_point_noise import shift_steps_by_their_errors
-from rsfstudy.fitting.record import loading_history
+from rsfstudy.fitting.recorded_loading import loading_history
 from rsfstudy.fitting.window_model import LOADING_STEP_SHIFT_OVER_STANDARD_ERROR, WindowModel
 from rsfstudy.motion.accuracy import Accuracy
 from rsfstudy.motion.integrator import Integrator

@@ -212,6 +212,29 @@ def test_the_page_prints_what_the_command_does(tmp_path, monkeypatch):
             assert float(error) == pytest.approx(float(beside), rel=0.1)
 
 
+def test_the_page_shows_the_healing_of_its_record(tmp_path, monkeypatch):
+    block = (PAGES / "fits.md").read_text().split("<!-- healing command -->")[1]
+    command, told = re.findall(r"```(?:sh|text)\n(.*?)```", block, re.DOTALL)[:2]
+    shutil.copy(PAGES / "holds.csv", tmp_path)
+    monkeypatch.chdir(tmp_path)
+    ran = call_main(*shlex.split(command)[1:])
+    assert ran.returncode == 0, ran.stderr
+    assert re.sub(r"[\d.]+|─|\s", "", ran.stdout) == re.sub(r"[\d.]+|─|\s", "", told)
+    pairs = zip(NUMBER.findall(ran.stdout), NUMBER.findall(told), strict=True)
+    for (value, error), (said, beside) in pairs:
+        assert float(value) == pytest.approx(float(said), abs=0.1 * float(beside))
+        assert float(error) == pytest.approx(float(beside), rel=0.1)
+    assert (tmp_path / "healing.png").read_bytes().startswith(b"\x89PNG")
+
+
+def test_healing_of_a_record_without_holds(tmp_path, monkeypatch):
+    shutil.copy(PAGES / "step.csv", tmp_path)
+    monkeypatch.chdir(tmp_path)
+    ran = call_main("healing", "step.csv", "--normal-stress", "20 MPa")
+    assert ran.returncode == 2
+    assert "has no hold of the load point" in ran.stderr
+
+
 def test_the_page_says_how_good_its_fit_is(tmp_path, monkeypatch):
     monkeypatch.chdir(PAGES)
     record = rsfstudy.read_record("step.csv", normal_stress="20 MPa")

@@ -19,6 +19,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+import xarray as xr
 from faulty_study import faulty_study
 from study_runs import call_main, run_with_failures
 
@@ -329,6 +330,22 @@ def test_fit_and_its_file(tmp_path, monkeypatch):
     shown, again = output_of("show", "fit.nc")
     assert_documented(shown)
     assert (again, shown["kind"], shown["fits"]) == (status, "fit", found["fits"])
+
+
+def test_healing_and_its_file(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    shutil.copy(PAGES / "holds.csv", tmp_path)
+    found, status = output_of("healing", "holds.csv")
+    assert_documented(found)
+    table = xr.load_dataset("healing.nc")
+    assert (status, found["record"], len(found["holds"])) == (0, "holds", 5)
+    for number, hold in enumerate(found["holds"]):
+        assert hold["healing"] == table["healing"][number].item()
+        assert hold["healing_stderr"] == table["healing_stderr"][number].item()
+    assert found["healing_rate"] == table["healing_rate"].item()
+    # The exact slope and stiffness of the synthetic record.
+    assert abs(found["healing_rate"] - 0.02551) < 2.0 * found["healing_rate_stderr"]
+    assert abs(found["stiffness"] - 2.5e-3) < 2.0 * found["stiffness_stderr"]
 
 
 def test_show_a_motion_and_a_critical_step(tmp_path):

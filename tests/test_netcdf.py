@@ -17,7 +17,7 @@ from compliance_checker.cf import util as cfutil
 from compliance_checker.runner import CheckSuite, ComplianceChecker
 from scipy.stats import norm
 from study_runs import study_of
-from synthetic_records import synthetic_record
+from synthetic_records import SLIDE_HOLD_SLIDE, synthetic_record
 
 import rsfstudy
 from rsfstudy import Axis, Rig, Scene
@@ -89,6 +89,15 @@ def stick_slip() -> xr.Dataset:
     )
 
 
+def held_record() -> Record:
+    return synthetic_record(SLIDE_HOLD_SLIDE, seed=1)
+
+
+def held_motion() -> xr.Dataset:
+    scene = Scene(normal_stress="constant", hold_time=10.0, stiffness_ratio=10.0)
+    return rsfstudy.simulate(scene, duration=30.0, **QUICK)
+
+
 def rig_motion(**units) -> xr.Dataset:
     pulled = rsfstudy.history({"time": [0.0, 1.0, 2.0], "displacement": [0.0, 1.0, 5.0]})
     scene = RIG.scene(law="slowness", a=0.01, b_over_a=1.4, loading=pulled)
@@ -135,6 +144,10 @@ MADE = {
     ),
     "fit": lambda _: fit(),
     "DatasetAccessor.sample_parameters": lambda _: fit().rsf.sample_parameters(5),
+    "healing": lambda _: rsfstudy.healing(held_record()),
+    "DatasetAccessor.holds": lambda _: held_motion().rsf.holds(),
+    "Record.holds": lambda _: held_record().holds(),
+    "Record.stiffness": lambda _: held_record().stiffness(),
     "Record.to_dataset": lambda _: synthetic_record(seed=1).to_dataset(),
     "Record.steps": lambda _: synthetic_record(seed=1).steps(),
 }

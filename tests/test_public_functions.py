@@ -62,6 +62,10 @@ def place(tmp_path_factory) -> Path:
     scene = Scene(load_velocity_ratio=2.0, normal_stress="constant")
     motion = rsfstudy.simulate(scene, duration=0.1, rtol=1e-2, engine="compiled")
     motion.to_netcdf(place / "motion.nc")
+    holding = Scene(stiffness_ratio=10.0, hold_time=10.0, normal_stress="constant")
+    held = rsfstudy.simulate(holding, duration=30.0, rtol=1e-2, engine="compiled")
+    held.to_netcdf(place / "held.nc")
+    rsfstudy.healing(held).to_netcdf(place / "holds.nc")
     return place
 
 
@@ -82,6 +86,7 @@ def answered(ask) -> None:
     assert 0 < len(text) < 6000
 
 
+PAGES = Path(__file__).parent.parent / "studies" / "pages"
 FIT = (("laws", ["slip"]), ("free", ["a", "mu_star"]), ("noise", "white"), ("slip_distance", 10.0))
 
 
@@ -121,6 +126,8 @@ def calls(place: Path) -> dict[str, dict]:
         "rerun": {"file": place / "lattice.nc", **no_workers},
         "run": {"study": LATTICE, "output": None, **no_workers},
         "simulate": {"scene": scene, **quick},
+        "healing": {"record": xr.load_dataset(place / "held.nc")},
+        "plot_healing": {"table": xr.load_dataset(place / "holds.nc")},
         "plot_motion": {"motion": xr.load_dataset(place / "motion.nc")},
         "to_si": {"dataset": dataset, "normal_stress": 5e6, "slip_distance": 1e-5},
     }
@@ -295,6 +302,7 @@ def commands(place: Path) -> dict[str, list[str]]:
             *("--stiffness", "3e-3 /um", "--law", "slip", "--free", "a,mu_star"),
             *("--noise", "white", "--slip-distance", "10 um"),
         ],
+        "healing": [str(PAGES / "holds.csv")],
         "problems": ["referee"],
         "verify": [str(shipped_problem_files()[19].with_suffix(".csv"))],
     }

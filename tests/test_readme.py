@@ -67,7 +67,8 @@ def lay_record(folder: Path) -> None:
     pages = folder / "studies" / "pages"
     pages.mkdir(parents=True)
     for place in (folder, pages):
-        shutil.copy(ROOT / "studies" / "pages" / "step.csv", place)
+        for name in ("step.csv", "holds.csv"):
+            shutil.copy(ROOT / "studies" / "pages" / name, place)
 
 
 @pytest.mark.parametrize("number", range(len(BLOCKS)))
@@ -87,7 +88,7 @@ def test_python_runs_as_it_stands(number, tmp_path, tmp_path_factory, cluster, m
         _dataset, file = named_results("rate_step_boundary", tmp_path_factory)
         (tmp_path / "outputs").mkdir()
         shutil.copy(file, tmp_path / "outputs")
-    if "step.csv" in code:
+    if "step.csv" in code or "holds.csv" in code:
         lay_record(tmp_path)
     monkeypatch.setattr(rsfstudy, "run", functools.partial(rsfstudy.run, client=cluster))
     names = {"__name__": "block"}

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 import synthetic_records as synthetic
 
-from rsfstudy.fitting.record import stepwise_loading
+from rsfstudy.fitting.recorded_loading import stepwise_loading
 from rsfstudy.fitting.velocity_steps import detect_velocity_steps
 
 UP = ((0.0, 1.0), (60.0, 10.0))

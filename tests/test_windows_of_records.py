@@ -54,8 +54,7 @@ def test_correlated_noise_is_straight(rho: float) -> None:
     time = np.arange(400.0)
     for seed in range(30):
         friction = 0.6 + 1e-5 * time + synthetic.correlated_noise(len(time), rho, 1e-3, seed)
-        columns = {"time": time, "displacement": time, "friction": friction}
-        assert find_start_of_linear_friction(Record(columns, f"seed_{seed}"), 0.0, 400.0) == 0.0
+        assert find_start_of_linear_friction(time, friction, 0.0, 400.0) == 0.0
 
 
 def test_outliers_do_not_cut_the_window() -> None:
@@ -63,8 +62,7 @@ def test_outliers_do_not_cut_the_window() -> None:
     for seed in range(10):
         friction = 0.6 + 1e-5 * time + synthetic.correlated_noise(len(time), 0.5, 1e-4, seed)
         friction[[40, 97, 220]] += [0.02, -0.02, 0.02]
-        record = Record({"time": time, "displacement": time, "friction": friction}, f"seed_{seed}")
-        assert find_start_of_linear_friction(record, 0.0, 400.0) == 0.0
+        assert find_start_of_linear_friction(time, friction, 0.0, 400.0) == 0.0
 
 
 def test_stated_extents_that_are_cut_are_reported() -> None:

@@ -346,6 +346,38 @@ class DatasetAccessor:
         return find_motion_events(self._dataset, slip_rate, lambda: self.scene)
 
     @error_boundary
+    def holds(self) -> xr.Dataset:
+        """Measure frictional healing and relaxation in all holds of a motion.
+
+        Returns
+        -------
+        xarray.Dataset
+            Table with the dimension ``hold`` and the same variables as ``Record.holds`` of
+            ``rsfstudy.fitting.Record``, in the units of the motion. Instead of standard errors, the
+            table contains interpolation errors ``<name>_error``, which do not include the error of
+            the motion. If friction has no peak after a hold, ``peak_friction``, ``healing`` and
+            ``peak_displacement`` are NaN.
+
+        Raises
+        ------
+        DataError
+            If the dataset is not a motion.
+
+        Examples
+        --------
+        >>> from rsfstudy import Scene, simulate
+        >>> scene = Scene(normal_stress="constant", hold_time=1000, stiffness_ratio=10)
+        >>> holds = simulate(scene, duration=1100.0).rsf.holds()
+        >>> holds["healing"].values.round(4)
+        array([0.0554])
+        """
+        from rsfstudy.api.healing_tables import measure_motion_holds
+
+        if self._is_study:
+            raise DataError("the dataset is of a study: holds are measured in a motion")
+        return measure_motion_holds(self._dataset)
+
+    @error_boundary
     def slip_mode(self, stick_slip_from: Any) -> xr.DataArray:
         """Classify limit cycles by their peak slip rate.
 

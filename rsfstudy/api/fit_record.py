@@ -28,6 +28,7 @@ from rsfstudy.fitting import (
     LoadingStep,
     Record,
     check_free_parameters,
+    compute_weighted_mean,
     noise_variance,
     parameters_of_law,
 )
@@ -56,6 +57,8 @@ _EVOLUTION_EFFECT_PARAMETERS = ("b", "b1", "b2")
 _REMEDY_FOR_WRONG_STATE_PARAMETERS = (
     "One state has b; two states have b1, b2, slip_distance and slip_distance_2."
 )
+#: Value of the argument ``stiffness`` for a stiffness that is measured in the records.
+STIFFNESS_FROM_RECORD = "from record"
 #: Initial guess of the slip distance, as a fraction of the load point displacement after a step.
 _SLIP_DISTANCE_GUESS_OVER_DISPLACEMENT = 0.05
 #: Maximum value of the argument ``windows``.
@@ -170,9 +173,12 @@ def fit(
     stiffness : quantity, optional
         Stiffness of the machine. The argument is required if no rig is passed. The stiffness is a
         string in MPa/um, a string in 1/um such as "1.6e-3 1/um" (stiffness divided by normal
-        stress), or a number in 1/um. Stiffness in MPa/um is divided by the mean normal stress in
-        the window before each step. If ``free`` contains "stiffness", the argument is the initial
-        guess. In a joint fit, the stiffness in 1/um refers to the first window, and is scaled by
+        stress), or a number in 1/um. With "from record", the stiffness is measured in the locked
+        portions of the records (see ``Record.stiffness``), and the standard errors of the
+        parameters include the standard error of this stiffness. Stiffness in MPa/um is divided by
+        the mean normal stress in the window before each step. If ``free`` contains "stiffness", the
+        argument is the initial guess. In a joint fit, the stiffness in 1/um refers to the first
+        window, and is scaled by
         normal stress for the other windows.
     slip_distance : quantity, optional
         Initial guess of the slip distance, such as "10 um", or a number in um. The fit tries five
@@ -273,7 +279,7 @@ def fit(
     if "alpha" in free:
         _check_normal_stress_changes_for_alpha(records, loading, numbers)
         scene = {"normal_stress": "imposed", **scene}
-    ratio, machine = _initial_stiffness(rig, stiffness, free, records)
+    ratio, machine, stiffness_error = _initial_stiffness(rig, stiffness, free, records)
     if machine:
         _check_normal_stress_is_compressive(records, numbers)
         ratio = machine / FitWindow(records[0], numbers[0]).mean_normal_stress_before_step
@@ -294,6 +300,7 @@ def fit(
         filter=_describe_filter(averaging, low_pass),
         posterior=posterior,
         machine_stiffness=machine,
+        stiffness_relative_stderr=stiffness_error,
     )
     axes = [Axis("law", list(laws))]
     if len(records) > 1 and not together:
@@ -444,7 +451,7 @@ def _initial_stiffness(
     stated_stiffness: Any,
     free_parameters: Sequence[str],
     records: Sequence[Record],
-) -> tuple[float, float]:
+) -> tuple[float, float, float]:
     """Return the initial stiffness of the fit.
 
     A stiffness in MPa/um is returned as ``machine``, and a stiffness in 1/um as ``ratio``.
@@ -455,12 +462,16 @@ def _initial_stiffness(
         Stiffness divided by normal stress in 1/um. The ratio is 0 if ``machine`` is positive.
     machine : float
         Stiffness of the machine in Pa/um. The value is 0 if ``ratio`` is positive.
+    relative_stderr : float
+        Relative standard error of a stiffness that is measured in the records, or 0.
     """
+    if stated_stiffness == STIFFNESS_FROM_RECORD:
+        return _measure_stiffness(records)
     if stated_stiffness is None:
         if rig is not None and rig.stiffness is not None:
-            return 0.0, float(rig.stiffness * 1e-6)
+            return 0.0, float(rig.stiffness * 1e-6), 0.0
         if "stiffness" in free_parameters:
-            return 1e-3, 0.0
+            return 1e-3, 0.0, 0.0
         remedy = "Give --stiffness (stiffness=), as in '1.6e-3 /um', "
         remedy += "or look for it: --free (free=)."
         raise InvalidValue("stiffness", None, "is needed, and not stated", remedy=remedy)
@@ -476,13 +487,40 @@ def _initial_stiffness(
     if not found > 0.0:
         raise InvalidValue("stiffness", stated_stiffness, "must be positive")
     if over_stress:
-        return found, 0.0
+        return found, 0.0, 0.0
     for record in records:
         if "normal_stress" not in record.columns:
             remedy = "Give --normal-stress (normal_stress of read_record), or stiffness in 1/um."
             rule = f"needs a normal stress, and {record.name} has none"
             raise InvalidValue("stiffness", stated_stiffness, rule, remedy=remedy)
-    return 0.0, found
+    return 0.0, found, 0.0
+
+
+def _measure_stiffness(records: Sequence[Record]) -> tuple[float, float, float]:
+    """Measure the stiffness in the records.
+
+    Returns
+    -------
+    ratio, machine, relative_stderr : float
+        Stiffness in the format of ``_initial_stiffness``.
+
+    Raises
+    ------
+    InvalidValue
+        If the records have no portion in which the fault is locked.
+    """
+    stressed = all("normal_stress" in record.columns for record in records)
+    name = "machine_stiffness" if stressed else "stiffness"
+    tables = [record.stiffness() for record in records]
+    found = np.array([(float(of[name]), float(of[f"{name}_stderr"])) for of in tables])
+    found = found[np.isfinite(found).all(axis=1)]
+    if not len(found):
+        rule = "needs a portion of the record in which the fault is locked: the reloading after a "
+        rule += "hold, an unloading and reloading, or the initial loading"
+        remedy = "Pass the stiffness as a quantity, as in '1.6e-3 1/um', or fit it: --free (free=)."
+        raise InvalidValue("stiffness", STIFFNESS_FROM_RECORD, rule, remedy=remedy)
+    value, stderr = compute_weighted_mean(*found.T)
+    return (0.0, value, stderr / value) if stressed else (value, 0.0, stderr / value)
 
 
 def _check_normal_stress_is_compressive(

@@ -73,7 +73,7 @@ def find_motion_events(
         slip_rate = _EVENT_SLIP_RATE_OVER_LOAD_VELOCITY * max([1.0, *loads])
     if not 0.0 < slip_rate < math.inf:
         raise InvalidValue("slip_rate", slip_rate, "must be positive and finite, over V_*")
-    rows = _InterpolatedMotionRows(times, np.column_stack(rest), math.log10(slip_rate))
+    rows = InterpolatedMotionRows(times, np.column_stack(rest), math.log10(slip_rate))
     found = [rows.measure_event(*ends) for ends in rows.iterate_event_row_spans()]
     about = {name: motion[name].attrs for name in names}
     told = build_event_catalogue(found, about).assign_attrs(slip_rate_threshold=slip_rate)
@@ -84,7 +84,7 @@ def find_motion_events(
     return told
 
 
-class _InterpolatedMotionRows:
+class InterpolatedMotionRows:
     """Interpolation between the rows of a motion.
 
     Parameters
@@ -158,9 +158,9 @@ class _InterpolatedMotionRows:
             if last_row < end
             else self._read_time_and_slip_at_end_row(end)
         )
-        (rate, _, at_peak), (rate_error, _, peak_error) = self._find_extreme(peak, 0, 1.0)
-        (*_, before), (*_, before_error) = self._find_extreme(top, 2, 1.0)
-        (*_, after), (*_, after_error) = self._find_extreme(bottom, 2, -1.0)
+        (rate, _, at_peak), (rate_error, _, peak_error) = self.find_extreme(peak, 0, 1.0)
+        (*_, before), (*_, before_error) = self.find_extreme(top, 2, 1.0)
+        (*_, after), (*_, after_error) = self.find_extreme(bottom, 2, -1.0)
         cut = (first_row == 0 or highest == 0) + 2 * (last_row == end or lowest == end)
         return {
             "time": (begin, begun[0]),
@@ -228,10 +228,17 @@ class _InterpolatedMotionRows:
         """Return time and slip at the first or the last row, with errors of zero."""
         return np.array([self._times[row], self._values[row, 1]]), np.zeros(2)
 
-    def _find_extreme(self, row: int, column: int, sign: float) -> tuple[np.ndarray, np.ndarray]:
+    def find_extreme(self, row: int, column: int, sign: float) -> tuple[np.ndarray, np.ndarray]:
         """Find a maximum or a minimum of a column near a row.
 
-        The function finds a maximum if ``sign`` is positive, and a minimum if ``sign`` is negative.
+        Parameters
+        ----------
+        row : int
+            Row next to the extreme.
+        column : int
+            Column of the values.
+        sign : {1.0, -1.0}
+            1 for a maximum and -1 for a minimum.
 
         Returns
         -------

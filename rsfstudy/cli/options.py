@@ -367,3 +367,15 @@ rig_options = combine_option_decorators(
         for n, e in EXAMPLE_VALUES_OF_RIG_OPTIONS.items()
     )
 )
+
+columns_option = click.option(
+    "--columns",
+    metavar="NAME=HEADING,...",
+    help="Columns of the record, for example 'time=t (s),displacement=lp (um),friction=mu'. Other "
+    "quantities are shear_stress and normal_stress. Raw values can be scaled, for example "
+    "'lp (um) * 0.1 + 5'.  [default: recognised headings]",
+)
+normal_stress_option = click.option(
+    "--normal-stress",
+    help="Normal stress, for example '20 MPa', if the record has no such column.",
+)

@@ -19,7 +19,10 @@ if TYPE_CHECKING:
     from rsfstudy.fitting.fit_measure import Fit
     from rsfstudy.fitting.fit_validity_checks import describe_whiteness
     from rsfstudy.fitting.fit_window import FitWindow
+    from rsfstudy.fitting.hold_table import build_hold_table
+    from rsfstudy.fitting.holds import MAX_HOLD_OVER_SLIDING_VELOCITY
     from rsfstudy.fitting.joint_model import fitted_fields, split_window_number, strip_window_number
+    from rsfstudy.fitting.local_regression import compute_weighted_mean
     from rsfstudy.fitting.record import RECORD_COLUMNS, Record
     from rsfstudy.fitting.stress_drop_fits import EVENT_QUANTITIES, EventNumbers
     from rsfstudy.fitting.velocity_steps import LoadingStep, noise_variance
@@ -38,7 +41,10 @@ else:
             "fitting.drop_measurements": ("read_drops",),
             "fitting.filters": ("Filter", "LOW_PASS_ORDERS", "MEAN", "TRAILING_MEAN"),
             "fitting.fit_measure": ("Fit",),
+            "fitting.hold_table": ("build_hold_table",),
+            "fitting.holds": ("MAX_HOLD_OVER_SLIDING_VELOCITY",),
             "fitting.joint_model": ("fitted_fields", "split_window_number", "strip_window_number"),
+            "fitting.local_regression": ("compute_weighted_mean",),
             "fitting.record": ("RECORD_COLUMNS", "Record"),
             "fitting.stress_drop_fits": ("EVENT_QUANTITIES", "EventNumbers"),
             "fitting.fit_validity_checks": ("describe_whiteness",),
@@ -65,12 +71,15 @@ __all__ = [
     "LOW_PASS_ORDERS",
     "LoadingStep",
     "MEAN",
+    "MAX_HOLD_OVER_SLIDING_VELOCITY",
     "MIN_SAMPLES",
     "PARAMETERS",
     "RECORD_COLUMNS",
     "Record",
     "TRAILING_MEAN",
+    "build_hold_table",
     "check_free_parameters",
+    "compute_weighted_mean",
     "describe_whiteness",
     "fitted_fields",
     "noise_variance",

@@ -8,7 +8,7 @@ from scipy.linalg import cholesky_banded, solve_banded
 #: The first value is added to the diagonal of the correlation matrix, so that frequencies without
 #: noise do not receive an infinite weight in the fit. The second value is the largest number of
 #: rows within an averaging time.
-_UNAVERAGED_NOISE_VARIANCE_FRACTION, _MAX_ROWS_PER_AVERAGING_TIME = 0.002, 200
+_UNAVERAGED_NOISE_VARIANCE_FRACTION, MAX_ROWS_PER_AVERAGING_TIME = 0.002, 200
 
 
 class AveragedNoiseCorrelation:
@@ -38,7 +38,7 @@ class AveragedNoiseCorrelation:
     def __init__(self, time: np.ndarray, averaging_time: float) -> None:
         clock = np.concatenate([[0], np.cumsum(np.diff(time) <= 0.0)])
         band = [np.full(len(time), 1.0 + _UNAVERAGED_NOISE_VARIANCE_FRACTION)]
-        for lag in range(1, min(_MAX_ROWS_PER_AVERAGING_TIME, len(time) - 1)):
+        for lag in range(1, min(MAX_ROWS_PER_AVERAGING_TIME, len(time) - 1)):
             apart = np.abs(time[lag:] - time[:-lag]) / averaging_time
             overlap = np.where(clock[lag:] == clock[:-lag], np.maximum(1.0 - apart, 0.0), 0.0)
             if not overlap.any():

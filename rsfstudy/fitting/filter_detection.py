@@ -15,7 +15,10 @@ from collections.abc import Iterator
 import numpy as np
 
 from rsfstudy.fitting import noise as noises
-from rsfstudy.fitting.averaged_noise_correlation import apply_running_mean
+from rsfstudy.fitting.averaged_noise_correlation import (
+    MAX_ROWS_PER_AVERAGING_TIME,
+    apply_running_mean,
+)
 from rsfstudy.fitting.filters import LOW_PASS_ORDERS, Filter
 from rsfstudy.fitting.fit_solution import FitSolution, compute_aic
 
@@ -73,6 +76,8 @@ def detect_unspecified_filter(
     columns = np.column_stack([fit_solution.jacobian, delays, fit_solution.model_friction])
     free = len(fit_solution.coordinate_stderr)
 
+    shortest_interval = min(float(np.diff(time[rows]).min()) for rows in windows)
+
     def describe(kind: str, size: float) -> tuple[float, float]:
         """Return the AIC and the largest parameter change of a model with a filter.
 
@@ -85,6 +90,8 @@ def detect_unspecified_filter(
         left = fit_solution.residuals + columns[:, -1] - filtered[:, -1]
         jacobian, kept = filtered[:, :-1], fit_solution.noise_model.non_outlier_mask
         averaging = size if kind == "mean" else 0.0
+        if averaging > MAX_ROWS_PER_AVERAGING_TIME * shortest_interval:
+            return math.inf, 0.0
         moved = np.zeros(jacobian.shape[1])
         for _ in range(_NOISE_ESTIMATION_PASSES):
             guessed = left - jacobian @ moved

@@ -127,6 +127,9 @@ class Fit(Measure):
         Stiffness of the machine in Pa/um. The stiffness of each window is the machine stiffness
         divided by the normal stress before the step. If 0, all windows have the stiffness of the
         scene.
+    stiffness_relative_stderr : float, default: 0.0
+        Relative standard error of the stiffness. The standard errors of the parameters include this
+        error, unless the stiffness is a free parameter.
 
     Raises
     ------
@@ -195,6 +198,7 @@ class Fit(Measure):
     filter: str = ""
     posterior: int = 0
     machine_stiffness: float = 0.0
+    stiffness_relative_stderr: float = 0.0
     name: ClassVar[str] = "fit"
     typical_work = 250_000
     dimensions = (
@@ -410,6 +414,9 @@ class Fit(Measure):
         values = self._collect_output_values(found, np.concatenate(rows), model)
         values |= place
         values["window_stiffness"] = found.parameter_values["stiffness"]
+        values["window_stiffness_stderr"] = (
+            search.stiffness_relative_stderr * found.parameter_values["stiffness"]
+        )
         if len(windows) > 1:
             stresses = enumerate(windows, start=1)
             values |= {
@@ -489,7 +496,8 @@ class Fit(Measure):
                 }
         one_machine = self.machine_stiffness > 0.0 or "stiffness" in self.free
         model = JointModel(tuple(parts), compute_stiffness_factors(windows) if one_machine else ())
-        search = FitProblem(model, first, self.parameters, self.noise)
+        stderr = 0.0 if "stiffness" in self.free else self.stiffness_relative_stderr
+        search = FitProblem(model, first, self.parameters, self.noise, stderr)
         return search, search.solve()
 
     def find_validity_problems(self, problem: FitProblem, solution: FitSolution) -> tuple[str, ...]:

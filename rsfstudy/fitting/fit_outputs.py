@@ -30,6 +30,9 @@ _SCALAR_OUTPUTS = (
     Output("rows_fitted", "", "1", "number of rows in the window"),
     Output("normal_stress_before", r"$\sigma_*$", "Pa", "mean normal stress before the step"),
     Output("window_stiffness", "$k$", "um-1", "stiffness over normal stress before the step"),
+    Output(
+        "window_stiffness_stderr", "", "um-1", "standard error of the stiffness, if it is fixed"
+    ),
     *(
         Output(name, "", "1", f"{name} of parameters", dims=("parameter", "other_parameter"))
         for name in ("covariance", "correlation")

@@ -117,6 +117,8 @@ class FitProblem:
         Names of the free parameters.
     noise_model_name : str
         Noise model (see ``rsfstudy.fitting.noise.fit_noise``).
+    stiffness_relative_stderr : float, default: 0.0
+        Relative standard error of a fixed stiffness.
 
     Attributes
     ----------
@@ -134,7 +136,9 @@ class FitProblem:
         initial_values: ParameterValues,
         free_parameters: Sequence[str],
         noise_model_name: str,
+        stiffness_relative_stderr: float = 0.0,
     ) -> None:
+        self.stiffness_relative_stderr = stiffness_relative_stderr
         self.model, self.free_parameters, self.noise_model_name = (
             model,
             tuple(free_parameters),
@@ -417,6 +421,8 @@ class FitProblem:
         if moved_by.size and np.isfinite(inverse).all():
             shifts = inverse @ whitened[:, :-1].T @ noise.whiten_columns(moved_by)
             covariance = by_noise + shifts @ shifts.T
+        by_stiffness = self._covariance_by_stiffness(values, inverse, whitened, noise)
+        covariance = covariance + by_stiffness
         degrees = max(
             noise.degrees_of_freedom_of_slow_noise * free_of / count, _MIN_DEGREES_OF_FREEDOM
         )
@@ -436,6 +442,7 @@ class FitProblem:
             free_parameters=self.free_parameters,
             coordinate_covariance=covariance,
             noise_caused_covariance=by_noise,
+            stiffness_caused_covariance=by_stiffness,
             numerical_errors=dict(zip(self.free_parameters, errors.tolist(), strict=True)),
             noise_model=noise,
             noise_sd=size,
@@ -456,6 +463,20 @@ class FitProblem:
             ),
             friction_rounding_quantum=self.friction_rounding_quantum,
         )
+
+    def _covariance_by_stiffness(
+        self,
+        values: ParameterValues,
+        inverse_normal_matrix: np.ndarray,
+        whitened: np.ndarray,
+        noise: NoiseModel,
+    ) -> np.ndarray:
+        """Return the covariance due to the standard error of a fixed stiffness."""
+        if not (self.stiffness_relative_stderr and np.isfinite(inverse_normal_matrix).all()):
+            return np.zeros_like(inverse_normal_matrix)
+        by_stiffness = self.stiffness_relative_stderr * self.model.jacobian(values, ["stiffness"])
+        shifts = inverse_normal_matrix @ whitened[:, :-1].T @ noise.whiten_columns(by_stiffness)
+        return np.asarray(shifts @ shifts.T)
 
     def _compute_aic_without_steps(self, jacobian: np.ndarray, noise: NoiseModel) -> float:
         """Compute the AIC of a model without a response to the steps.

@@ -32,8 +32,10 @@ class FitSolution:
     coordinate_covariance : ndarray, shape (parameters, parameters)
         Covariance matrix of the coordinates of the free parameters.
     noise_caused_covariance : ndarray, shape (parameters, parameters)
-        Contribution of the friction noise to the covariance matrix. The rest of the covariance
-        matrix is due to noise in the load point displacement.
+        Contribution of the friction noise to the covariance matrix.
+    stiffness_caused_covariance : ndarray, shape (parameters, parameters)
+        Contribution of the standard error of a fixed stiffness. The rest of the covariance matrix
+        is due to noise in the load point displacement.
     numerical_errors : dict of {str: float}
         Numerical errors of the free parameters.
     noise_model : NoiseModel
@@ -68,6 +70,7 @@ class FitSolution:
     free_parameters: tuple[str, ...]
     coordinate_covariance: np.ndarray
     noise_caused_covariance: np.ndarray
+    stiffness_caused_covariance: np.ndarray
     numerical_errors: dict[str, float]
     noise_model: NoiseModel
     noise_sd: float

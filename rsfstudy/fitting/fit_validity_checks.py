@@ -214,9 +214,8 @@ def describe_load_point_noise(
         Remark, or an empty string if the displacement noise has little effect on the parameters.
     """
     if loading == "steps":
-        moved = np.diag(solution.coordinate_covariance) > 2.0 * np.diag(
-            solution.noise_caused_covariance
-        )
+        by_loading = solution.coordinate_covariance - solution.stiffness_caused_covariance
+        moved = np.diag(by_loading) > 2.0 * np.diag(solution.noise_caused_covariance)
         pairs = zip(solution.free_parameters, moved.tolist(), strict=True)
         names = ", ".join(n for n, most in pairs if most and strip_window_number(n) != "step_time")
         remedy = (

@@ -9,13 +9,19 @@ from __future__ import annotations
 import math
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 from scipy.ndimage import median_filter
 
 from rsfstudy.fitting.linear_friction_before_step import find_start_of_linear_friction
 from rsfstudy.fitting.load_point_noise import integrate_displacement, shift_steps_by_their_errors
-from rsfstudy.fitting.record import Record, find_steps_between, loading_history, stepwise_loading
+from rsfstudy.fitting.record import Record
+from rsfstudy.fitting.recorded_loading import (
+    find_steps_between,
+    loading_history,
+    stepwise_loading,
+)
 from rsfstudy.fitting.stress_steps import MIN_RELATIVE_NORMAL_STRESS_CHANGE
 from rsfstudy.fitting.velocity_steps import LoadingStep, noise_variance
 from rsfstudy.fitting.window_model import WindowModel, scene_to_parameters
@@ -199,7 +205,7 @@ class FitWindow:
 
     def _start_time(self, step: LoadingStep) -> float:
         """Return the time in s at which the window of a step begins."""
-        return find_start_of_linear_friction(
+        return _find_start_of_linear_friction(
             self.record, self._earliest_start_time(step), step.start
         )
 
@@ -373,6 +379,14 @@ class FitWindow:
                 "(loading=) row by row; alpha is then free or stated"
             )
             raise MotionStopped(Status.NOT_APPLICABLE, text)
+
+
+@lru_cache(maxsize=256)
+def _find_start_of_linear_friction(record: Record, start_time: float, end_time: float) -> float:
+    """Find the time from which friction of a record before a step is linear."""
+    return find_start_of_linear_friction(
+        record.time, record.columns["friction"], start_time, end_time
+    )
 
 
 def compute_stiffness_factors(windows: Sequence[FitWindow]) -> tuple[float, ...]:

@@ -3,12 +3,10 @@
 from __future__ import annotations
 
 import math
-from functools import lru_cache
 
 import numpy as np
 
 from rsfstudy.fitting.outliers import find_non_outlier_mask, find_rounding_quantum
-from rsfstudy.fitting.record import Record
 from rsfstudy.fitting.velocity_steps import CumulativeLineFitSums
 
 #: Limits for the amount of data. The first two values are the largest number of block averages of
@@ -31,8 +29,9 @@ _FRACTION_OF_ROWS_FOR_NOISE = 0.4
 _MAX_CORRELATION_OF_ROW_MEANS = 0.98
 
 
-@lru_cache(maxsize=256)
-def find_start_of_linear_friction(record: Record, start_time: float, end_time: float) -> float:
+def find_start_of_linear_friction(
+    record_time: np.ndarray, record_friction: np.ndarray, start_time: float, end_time: float
+) -> float:
     """Find the time from which friction before a step is linear.
 
     The earlier rows before a step are discarded if two conditions are met. First, two separate
@@ -44,8 +43,10 @@ def find_start_of_linear_friction(record: Record, start_time: float, end_time: f
 
     Parameters
     ----------
-    record : Record
-        Record with time and friction.
+    record_time : ndarray, shape (rows,)
+        Times of the record in s.
+    record_friction : ndarray, shape (rows,)
+        Recorded friction.
     start_time, end_time : float
         Start and end of the tested interval in s.
 
@@ -55,8 +56,8 @@ def find_start_of_linear_friction(record: Record, start_time: float, end_time: f
         Time in s at which the linear interval begins. The result is ``start_time`` if friction is
         linear in the whole interval.
     """
-    rows = np.flatnonzero((record.time >= start_time) & (record.time < end_time))
-    time, friction = record.time[rows], record.columns["friction"][rows]
+    rows = np.flatnonzero((record_time >= start_time) & (record_time < end_time))
+    time, friction = record_time[rows], record_friction[rows]
     kept = find_non_outlier_mask(friction, np.zeros(len(friction)), find_rounding_quantum(friction))
     if kept is not None:
         friction = np.interp(time, time[kept], friction[kept])

@@ -85,8 +85,9 @@ def integrate_displacement(
     Parameters
     ----------
     loading : ndarray, shape (segments, 4)
-        Segments of constant velocity (see ``rsfstudy.fitting.record.loading_history``). The
-        velocity of the first segment is also used before the first segment.
+        Segments of constant velocity (see
+        ``rsfstudy.fitting.recorded_loading.loading_history``). The velocity of the first segment is
+        also used before the first segment.
     time : ndarray, shape (rows,)
         Times in s.
     zero_displacement_time : float

@@ -1,8 +1,6 @@
-"""Laboratory records, with their load point steps and loading histories.
+"""Laboratory records, with their load point steps, holds and stiffness.
 
 A ``Record`` validates its columns, and detects the steps of load point velocity and normal stress.
-The function ``loading_history`` converts the steps, or the recorded rows, to the loading of a
-model.
 """
 
 from __future__ import annotations
@@ -15,11 +13,12 @@ from functools import cached_property
 
 import numpy as np
 import xarray as xr
-from scipy.optimize import isotonic_regression
 
 from rsfstudy._deprecation import accept_former_keyword_names, add_former_member_names
 from rsfstudy.error_boundary import wrap_methods_in_error_boundary
 from rsfstudy.errors import InvalidValue
+from rsfstudy.fitting.holds import measure_holds
+from rsfstudy.fitting.stiffness_portions import measure_stiffness
 from rsfstudy.fitting.stress_steps import (
     find_stress_steps,
     merge_stress_into_velocity_steps,
@@ -46,10 +45,6 @@ _STEP_COLUMNS = (
     Quantity("normal_stress_before", r"$\sigma$", "Pa", "normal stress before the step"),
     Quantity("normal_stress_after", r"$\sigma$", "Pa", "normal stress after the step"),
 )
-
-#: Number of constant-velocity segments that approximate a ramp of the load point velocity. The load
-#: point displacement is exact at the end of each segment.
-_CONSTANT_VELOCITY_SEGMENTS_PER_RAMP = 16
 
 
 @accept_former_keyword_names
@@ -244,6 +239,94 @@ class Record:
             xr.Dataset(data, steps, self._build_dataset_attributes("Detected steps"))
         )
 
+    def holds(self) -> xr.Dataset:
+        """Measure frictional healing and relaxation in all holds of the record.
+
+        A hold is an interval in which the load point is at rest, or slower than 1 % of the
+        velocities before and after.
+
+        Returns
+        -------
+        xarray.Dataset
+            Table with the dimension ``hold``. The variables are ``begins`` and ``duration`` in s,
+            ``velocity_before`` and ``velocity_after`` in um/s, ``friction_before``,
+            ``peak_friction``, ``healing``, ``relaxation``, and ``peak_displacement`` in um. For
+            each quantity from ``friction_before`` on, ``<name>_stderr`` is the standard error. The
+            scalar ``healing_rate`` is the increase of healing per decade of hold duration, and
+            ``healing_rate_stderr`` its standard error. ``trend`` is the trend of friction in 1/um
+            that is subtracted. If friction has no peak after a hold, or if the record has too few
+            rows, the values are NaN. The healing rate is NaN if the record contains fewer than two
+            hold durations.
+
+        See Also
+        --------
+        rsfstudy.measures.Healing : Healing and relaxation of a simulated slider.
+
+        Notes
+        -----
+        Healing is the peak friction on reloading minus the friction before the hold, and relaxation
+        is the friction at the end of the hold minus the friction before the hold, as in the measure
+        ``Healing``. The maximum of noisy samples is biased. The peak friction is therefore the
+        maximum of a polynomial of degree four, in the longest window in which a parabola describes
+        friction within the noise. The standard errors account for correlated noise, and for the
+        errors of the trend. The healing rate is the slope of an ordinary least-squares line of
+        healing against the decimal logarithm of the duration. If the scatter of healing about the
+        line exceeds the standard errors of healing, the scatter determines the standard error of
+        the healing rate.
+
+        Examples
+        --------
+        >>> import numpy as np
+        >>> from rsfstudy.fitting import Record
+        >>> time = np.arange(0.0, 100.0, 0.1)
+        >>> displacement = np.interp(time, [0.0, 30.0, 60.0, 100.0], [0.0, 300.0, 300.0, 700.0])
+        >>> friction = np.full(1000, 0.6)
+        >>> record = Record({"time": time, "displacement": displacement, "friction": friction})
+        >>> record.holds()["duration"].values.round(1)
+        array([30.])
+        """
+        table = measure_holds(
+            self.time, self.columns["displacement"], self.columns["friction"], self.loading_steps
+        )
+        return table.assign_attrs(self._build_dataset_attributes("Holds"))
+
+    def stiffness(self) -> xr.Dataset:
+        """Measure the stiffness of the machine in the locked portions of the record.
+
+        The fault is almost locked after the load point has started, stopped or reversed. The
+        stiffness is the slope of friction against load point displacement in these portions,
+        corrected for the slip of the fault.
+
+        Returns
+        -------
+        xarray.Dataset
+            Dataset with the scalars ``stiffness`` and ``stiffness_stderr`` in 1/um. Along the
+            dimension ``portion``, the dataset contains ``kind`` ("reloading", "unloading" or
+            "initial loading"), ``begins`` and ``ends`` in s, ``portion_stiffness`` and
+            ``portion_stiffness_stderr``. If the normal stress was recorded, the dataset also
+            contains ``machine_stiffness`` in Pa/um and the corresponding variables. If the record
+            has no locked portion, the stiffness is NaN.
+
+        See Also
+        --------
+        rsfstudy.fit : Fit a record. The argument ``stiffness="from record"`` uses this stiffness.
+
+        Notes
+        -----
+        The stiffness is the weighted mean of all portions. If the portions differ by more than
+        their standard errors, the standard error of the mean is enlarged accordingly. The initial
+        loading is used only if there are no other portions, because the slope may increase while
+        the sample settles.
+        """
+        table = measure_stiffness(
+            self.time,
+            self.columns["displacement"],
+            self.columns["friction"],
+            self.columns.get("normal_stress"),
+            self.loading_steps,
+        )
+        return table.assign_attrs(self._build_dataset_attributes("Stiffness"))
+
     def to_dataset(self) -> xr.Dataset:
         """Convert the record to a dataset.
 
@@ -284,156 +367,3 @@ def _parse_loading_step(step_fields: Sequence[float]) -> LoadingStep:
     if not begins <= ends or min(before, after) < 0.0 or min([1.0, *stresses]) <= 0.0:
         raise InvalidValue("step", tuple(numbers), rule)
     return step
-
-
-def loading_history(
-    record: Record, start_time: float, end_time: float, *, use_recorded_rows: bool
-) -> np.ndarray:
-    """Return the loading history of a record between two times.
-
-    Before the first segment of the loading history, the slider slides steadily. Its slip rate is
-    the load point velocity before the first step.
-
-    Parameters
-    ----------
-    record : Record
-        Record with the steps and the rows.
-    start_time, end_time : float
-        Times in s.
-    use_recorded_rows : bool
-        If True, each row of the record begins a segment. The recorded displacement is first
-        replaced by the closest sequence of displacements that never decreases. If False, the load
-        point velocity and the normal stress are constant between the steps, and change at a
-        constant rate during a step.
-
-    Returns
-    -------
-    ndarray, shape (segments, 4)
-        Segments with four columns: the start time in s, the load point velocity in um/s, the ratio
-        of the normal stress to the initial normal stress, and the rate of change of the normal
-        stress ratio in 1/s.
-
-    Raises
-    ------
-    InvalidValue
-        If ``use_recorded_rows`` is True and the record has no rows between the two times.
-    """
-    steps = find_steps_between(record, start_time, end_time)
-    if use_recorded_rows:
-        part, first = record.window(start_time, end_time), steps[0] if steps else None
-        if first is None:
-            return _build_loading_from_rows(part, 0.0, math.nan)
-        sliding = part.time < first.start
-        stress = part.columns.get("normal_stress", np.array([]))[: int(sliding.sum())]
-        return _build_loading_from_rows(
-            part, first.velocity_before, float(stress.mean()) if stress.size else math.nan
-        )
-    return stepwise_loading(start_time, steps)
-
-
-def find_steps_between(record: Record, start_time: float, end_time: float) -> list[LoadingStep]:
-    """Return the steps of a record between two times.
-
-    Parameters
-    ----------
-    record : Record
-        Record with the steps.
-    start_time, end_time : float
-        Times in s.
-
-    Returns
-    -------
-    list of LoadingStep
-        Steps that begin after ``start_time`` and end before ``end_time``.
-    """
-    return [
-        step for step in record.loading_steps if start_time < step.start and step.end < end_time
-    ]
-
-
-def stepwise_loading(start_time: float, steps: Sequence[LoadingStep]) -> np.ndarray:
-    """Return a loading history with constant loading between steps.
-
-    Parameters
-    ----------
-    start_time : float
-        Start of the first segment in s.
-    steps : sequence of LoadingStep
-        Steps in order of time.
-
-    Returns
-    -------
-    ndarray, shape (segments, 4)
-        Segments in the format of ``loading_history``.
-    """
-    pieces, level = [(start_time, steps[0].velocity_before if steps else 0.0, 1.0, 0.0)], 1.0
-    for step in steps:
-        lasts, rises = step.end - step.start, level * (step.stress_ratio - 1.0)
-        for part, speed in _velocity_profile(step):
-            at = step.start + part * lasts
-            pieces.append((float(at), float(speed), level + part * rises, rises / lasts))
-        level += rises
-        pieces.append((step.end, step.velocity_after, level, 0.0))
-    return np.array(pieces)
-
-
-def _velocity_profile(step: LoadingStep) -> list[tuple[float, float]]:
-    """Return the load point velocities during a step.
-
-    Returns
-    -------
-    list of (float, float)
-        Constant-velocity segments of the step. Each segment is a pair of two numbers. The first
-        number is the start of the segment as a fraction of the step duration. The second number is
-        the velocity in um/s. The list is empty if the step is immediate.
-    """
-    lasts = step.end - step.start
-    if not lasts > 0.0:
-        return []
-    if step.velocity_profile:
-        return [(begins / lasts, speed) for begins, speed in step.velocity_profile]
-    count = _CONSTANT_VELOCITY_SEGMENTS_PER_RAMP if step.changes_velocity else 1
-    parts = (np.arange(count) / count).tolist()
-    return [
-        (
-            p,
-            step.velocity_before
-            + (p + 0.5 / _CONSTANT_VELOCITY_SEGMENTS_PER_RAMP)
-            * (step.velocity_after - step.velocity_before),
-        )
-        for p in parts
-    ]
-
-
-def _build_loading_from_rows(
-    record: Record, initial_velocity: float, initial_normal_stress: float
-) -> np.ndarray:
-    """Return a loading history with one segment per row of the record.
-
-    Parameters
-    ----------
-    record : Record
-        Record with the rows of the loading history.
-    initial_velocity : float
-        Load point velocity of the first segment in um/s.
-    initial_normal_stress : float
-        Normal stress in Pa by which the recorded normal stress is divided. If NaN, the normal
-        stress of the first row is used.
-
-    Returns
-    -------
-    ndarray, shape (rows, 4)
-        Segments in the format of ``loading_history``.
-    """
-    lasts = np.diff(record.time)
-    moved = isotonic_regression(record.columns["displacement"]).x
-    table = np.zeros((len(record), 4))
-    table[:, 0], table[:, 2] = record.time, 1.0
-    table[:-1, 1] = np.diff(moved) / lasts
-    table[-1, 1], table[0, 1] = table[-2, 1], initial_velocity
-    if "normal_stress" in record.columns:
-        stress = record.columns["normal_stress"]
-        table[:, 2] = stress / (initial_normal_stress if initial_normal_stress > 0.0 else stress[0])
-        table[0, 2] = 1.0  # The simulated motion starts from steady sliding.
-        table[:-1, 3] = np.diff(table[:, 2]) / lasts
-    return table

@@ -94,6 +94,15 @@ class LoadingStep(NamedTuple):
     velocity_profile: tuple[tuple[float, float], ...] = ()
 
     @property
+    def middle(self) -> float:
+        """Time in s at which an immediate step would give the same displacement afterwards.
+
+        If a record has few rows before a step, the detected step may last longer than the actual
+        step. The middle of the detected step is then more accurate than its ends.
+        """
+        return 0.5 * (self.start + self.end)
+
+    @property
     def changes_velocity(self) -> bool:
         """True if the load point velocity changes."""
         return self.velocity_before != self.velocity_after

@@ -189,7 +189,7 @@ class WindowModel:
         Times of the rows in s, load point displacements since the first step in um, and recorded
         friction.
     loading_segments : ndarray, shape (segments, 4)
-        Loading history (see ``rsfstudy.fitting.record.loading_history``).
+        Loading history (see ``rsfstudy.fitting.recorded_loading.loading_history``).
     integrator : Integrator
         Integrator with the requested accuracy.
     loadings_with_shifted_steps : sequence of ndarray, optional

@@ -23,6 +23,7 @@ if TYPE_CHECKING:
         save_figure,
         write_image,
     )
+    from rsfstudy.plots._healing import plot_healing
     from rsfstudy.plots._motion import plot_motion
     from rsfstudy.plots._style import (
         add_grey_legend_entry,
@@ -46,6 +47,7 @@ else:
                 "save_figure",
                 "write_image",
             ),
+            "plots._healing": ("plot_healing",),
             "plots._motion": ("plot_motion",),
             "plots._style": (
                 "add_grey_legend_entry",
@@ -70,6 +72,7 @@ __all__ = [
     "format_number",
     "format_slope",
     "label_rows",
+    "plot_healing",
     "plot_motion",
     "render_figure",
     "save_figure",

@@ -19,6 +19,7 @@ if TYPE_CHECKING:
         format_notes_on_incomplete_results,
         format_status_counts,
     )
+    from rsfstudy.reporting.fit_summaries import format_with_error
     from rsfstudy.reporting.fit_tables import (
         all_fits_are_valid,
         fit_table,
@@ -26,6 +27,7 @@ if TYPE_CHECKING:
         list_fit_values,
         split_into_single_fits,
     )
+    from rsfstudy.reporting.hold_summaries import is_hold_table, summarise_holds
     from rsfstudy.reporting.lattice_tables import (
         summarise_study_as_text_lines,
     )
@@ -77,6 +79,8 @@ else:
                 "list_fit_values",
                 "split_into_single_fits",
             ),
+            "reporting.fit_summaries": ("format_with_error",),
+            "reporting.hold_summaries": ("is_hold_table", "summarise_holds"),
             "reporting.lattice_tables": ("summarise_study_as_text_lines",),
             "reporting.machine_readable": (
                 "build_contents_table",
@@ -129,12 +133,15 @@ __all__ = [
     "format_notes_on_incomplete_results",
     "format_number_or_dash",
     "format_status_counts",
+    "format_with_error",
     "is_fit",
+    "is_hold_table",
     "is_motion",
     "list_fit_values",
     "note_on_norms_near_load_velocity",
     "split_into_single_fits",
     "summarise_file_as_fields",
+    "summarise_holds",
     "summarise_study_as_fields",
     "summarise_study_as_text_lines",
     "summarise_verdicts",

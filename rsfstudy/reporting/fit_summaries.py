@@ -16,6 +16,7 @@ from rsfstudy.reporting.fit_tables import (
     record_and_step_of_fit,
     split_into_single_fits,
     status_label_of_fit,
+    stderr_of_fixed_stiffness,
 )
 from rsfstudy.reporting.tables import TextTable
 from rsfstudy.status import Status
@@ -48,7 +49,8 @@ def summarise_fits(dataset: xr.Dataset) -> Iterator[TextTable | str]:
     TextTable or str
         Parameter tables with up to three fits of the same step side by side. The tables are
         followed by remarks and a comparison of the laws. If there are several steps or records, a
-        final table has one row per fit.
+        final table has one row per fit, and a sentence replaces the tables of each step that was
+        not fitted.
     """
     places: dict[str, list[xr.Dataset]] = {}
     for one in split_into_single_fits(dataset):
@@ -56,7 +58,12 @@ def summarise_fits(dataset: xr.Dataset) -> Iterator[TextTable | str]:
         places.setdefault(where, []).append(one)
     measure: Any = read_declaration(dataset).measure
     together = ", ".join(f"step {step} of {record}" for record, step in measure.get("together", ()))
+    several, unfitted = len(places) > 1, []
     for where, fits in places.items():
+        if several and not any(np.isfinite(one["rows_fitted"].item()) for one in fits):
+            yield _describe_unfitted_step(where, fits)
+            unfitted.append(where)
+            continue
         if together:
             yield f"joint fit: {together}; the window of the first step is shown"
         for first in range(0, len(fits), _MAX_FITS_PER_TABLE):
@@ -64,10 +71,18 @@ def summarise_fits(dataset: xr.Dataset) -> Iterator[TextTable | str]:
         for one in fits:
             yield from _iterate_fit_remarks(one)
         yield from _compare_laws_of_fits(fits)
-    if len(places) > 1:
-        yield TextTable(
-            [_summary_row_of_fit(one) for fits in places.values() for one in fits], "All fits:"
-        )
+    fitted = [one for where, fits in places.items() if where not in unfitted for one in fits]
+    if several and fitted:
+        yield TextTable([_summary_row_of_fit(one) for one in fitted], "All fits:")
+
+
+def _describe_unfitted_step(place: str, fits: Sequence[xr.Dataset]) -> str:
+    """Return a sentence with the reason why no law was fitted to a step."""
+    reasons = {
+        str(one["message"].item()) or status_label_of_fit(one).replace("_", " "): None
+        for one in fits
+    }
+    return f"{place} is not fitted: {'; '.join(reasons)}"
 
 
 def _compare_laws_of_fits(fits: Sequence[xr.Dataset]) -> Iterator[str]:
@@ -115,7 +130,9 @@ def _build_parameter_column(fit: xr.Dataset) -> dict[str, str]:
         for name, n in parameter_headings(fit).items()
     }
     if "window_stiffness" in fit and "stiffness" not in fit["parameter"].values:
-        found["k" + _bracketed_units("stiffness")] = f"{fit['window_stiffness'].item():.6g}"
+        value, stderr = fit["window_stiffness"].item(), stderr_of_fixed_stiffness(fit)
+        text = format_with_error(value, stderr) if stderr else f"{value:.6g}"
+        found["k" + _bracketed_units("stiffness")] = text
     stresses = [f"{stress:.6g}" for stress in normal_stresses_in_mpa(fit).values()]
     if stresses:
         found["normal stress (MPa)"] = ", ".join(stresses)
@@ -171,17 +188,25 @@ def format_with_stderr(fit: xr.Dataset, parameter_name: str) -> str:
     str
         Formatted parameter. An asterisk marks a standard error that is not valid.
     """
-    text = _format_rounded_to_error(
-        fit[parameter_name].item(), fit[f"{parameter_name}_stderr"].item()
-    )
+    text = format_with_error(fit[parameter_name].item(), fit[f"{parameter_name}_stderr"].item())
     is_marked = " +- " in text and status_label_of_fit(fit) == Status.ERRORS_NOT_VALID.label
     return text + _MARK_OF_INVALID_STDERRS * is_marked
 
 
-def _format_rounded_to_error(value: float, error: float) -> str:
+def format_with_error(value: float, error: float) -> str:
     """Format a value with its standard error.
 
     The value and the error are rounded to two significant digits of the error.
+
+    Parameters
+    ----------
+    value, error : float
+        Value and standard error.
+
+    Returns
+    -------
+    str
+        Formatted value and error, or a dash if the value is not finite.
     """
     if not math.isfinite(value):
         return "-"

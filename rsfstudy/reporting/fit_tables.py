@@ -153,6 +153,8 @@ def fit_table(dataset: xr.Dataset) -> pd.DataFrame:
         row |= normal_stresses_in_mpa(one)
         if "window_stiffness" in one and "stiffness" not in one["parameter"].values:
             row["k"] = one["window_stiffness"].item()
+            if stderr := stderr_of_fixed_stiffness(one):
+                row["k_std"] = stderr
         row["window"] = f"{one['window_begins'].item():g} to {one['window_ends'].item():g}"
         row["R2"], row["criterion"] = one["r_squared"].item(), one["criterion"].item()
         row["p_value"], row["status"] = one["whiteness"].item(), status_label_of_fit(one)
@@ -226,6 +228,24 @@ def normal_stresses_in_mpa(fit: xr.Dataset) -> dict[str, float]:
     stresses = {n: fit[n].item() * 1e-6 for n in names or ["normal_stress_before"] if n in fit}
     known = {n: stress for n, stress in stresses.items() if math.isfinite(stress)}
     return {n.replace("_before", ""): stress for n, stress in known.items()}
+
+
+def stderr_of_fixed_stiffness(fit: xr.Dataset) -> float:
+    """Return the standard error of a stiffness that is not fitted.
+
+    Parameters
+    ----------
+    fit : xarray.Dataset
+        Dataset with a single fit.
+
+    Returns
+    -------
+    float
+        Standard error in 1/um, or 0 if the stiffness is exact.
+    """
+    if "window_stiffness_stderr" not in fit:
+        return 0.0
+    return float(np.nan_to_num(fit["window_stiffness_stderr"].item()))
 
 
 def status_label_of_fit(fit: xr.Dataset) -> str:

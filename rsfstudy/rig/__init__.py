@@ -31,6 +31,7 @@ if TYPE_CHECKING:
         read_si_scales,
         slip_rate_from_log,
     )
+    from rsfstudy.rig.record_files import read_record
     from rsfstudy.rig.rig import Rig
     from rsfstudy.rig.rig_quantities import (
         RATIO_FIELD_BY_DIMENSIONAL_NAME,
@@ -60,6 +61,7 @@ else:
                 "in_display_units",
                 "is_stiffness_over_normal_stress",
             ),
+            "rig.record_files": ("read_record",),
             "rig.rig": ("Rig",),
             "rig.rig_scenes": (
                 "LatticeScenesOnRig",
@@ -117,6 +119,7 @@ __all__ = [
     "make_axis_with_units",
     "parse_number",
     "convert_scene_and_axes_to_rig",
+    "read_record",
     "read_si_scales",
     "read_table",
     "slip_rate_from_log",

@@ -134,7 +134,7 @@ def _make_quantity_option(
 @_make_quantity_option(
     "--stiffness",
     "Stiffness divided by normal stress, for example '1.6e-3 /um', or stiffness, for example "
-    "'0.03 MPa/um'.",
+    "'0.03 MPa/um', or 'from record' to measure the stiffness in the record.",
 )
 @_make_quantity_option("--slip-distance", "Initial guess of D_c, for example '10 um'.")
 @_make_comma_list_option(
@@ -234,6 +234,7 @@ def fit(given: options.CommandOptions) -> int:
     that are not valid, and 2 for wrong usage. Otherwise the exit status is 0, even if a parameter
     is not identified.
     """
+    from rsfstudy.api import STIFFNESS_FROM_RECORD
     from rsfstudy.cli.assignment_parsing import parse_column_assignments
     from rsfstudy.cli.data_files import check_output_may_be_replaced
     from rsfstudy.reporting import is_fit
@@ -241,7 +242,9 @@ def fit(given: options.CommandOptions) -> int:
     data = given.output.with_suffix(".nc")
     check_output_may_be_replaced(data, is_fit, "fit")
     columns = parse_column_assignments(given.columns)
-    about = {"normal_stress": given.normal_stress, "stiffness": given.stiffness}
+    about = {"normal_stress": given.normal_stress}
+    if given.stiffness != STIFFNESS_FROM_RECORD:
+        about["stiffness"] = given.stiffness
     records = [rsfstudy.read_record(path, columns, **about) for path in given.records]
     if not given.as_json:
         for record in records:

@@ -1,0 +1,122 @@
+"""Command ``rsfstudy healing``."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+import rsfstudy
+from rsfstudy.cli import options
+from rsfstudy.cli.command_group import Command
+from rsfstudy.cli.printing import print_line, print_pieces
+from rsfstudy.cli.results import EXIT_STATUS_FAILED, EXIT_STATUS_OK, CommandResult, output_result
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+    from rsfstudy.fitting import Record
+
+
+@dataclass(frozen=True)
+class HealingResult(CommandResult):
+    """Healing in the holds of a record.
+
+    Parameters
+    ----------
+    record : Record
+        Record of the holds.
+    table : xarray.Dataset
+        Table of the holds.
+    stiffness : xarray.Dataset
+        Stiffness that is measured in the record.
+    files : sequence of Path
+        Figure and data file.
+    """
+
+    record: Record
+    table: xr.Dataset
+    stiffness: xr.Dataset
+    files: Sequence[Path]
+
+    @property
+    def exit_status(self) -> int:
+        """Failure if no hold has a peak of friction on reloading."""
+        has_peak = bool(self.table["healing"].notnull().any())
+        return EXIT_STATUS_OK if has_peak else EXIT_STATUS_FAILED
+
+    def json_fields(self) -> dict[str, Any]:
+        """Return the fields of the JSON output."""
+        per_hold = [str(name) for name in self.table.variables if self.table[name].dims]
+        return {
+            "record": self.record.name,
+            "rows": len(self.record),
+            "holds": [
+                {name: self.table[name][number].item() for name in per_hold}
+                for number in range(self.table.sizes["hold"])
+            ],
+            **{str(n): of.item() for n, of in self.table.data_vars.items() if not of.dims},
+            **{n: self.stiffness[n].item() for n in ("stiffness", "stiffness_stderr")},
+            "files": self.files,
+        }
+
+
+@click.command(cls=Command)
+@click.argument("record", type=options.FilePath())
+@options.columns_option
+@options.normal_stress_option
+@click.option(
+    "--stiffness",
+    help="Stiffness, for example '0.03 MPa/um', if the record has fault slip instead of load point "
+    "displacement.",
+)
+@options.make_image_option(
+    "--output",
+    Path("healing.png"),
+    "Path of the figure. The data are written to a NetCDF file next to the figure.",
+)
+@options.json_option
+def healing(given: options.CommandOptions) -> int:
+    """Measure frictional healing in the holds of RECORD.
+
+    The command prints one row per hold with its duration, the friction before the hold, the peak
+    friction on reloading, healing and relaxation. The standard errors include the correlation of
+    the noise. The healing rate is the increase of healing per decade of hold duration. The command
+    also prints the stiffness of the machine, and writes a figure and a data file.
+
+    The exit status is 1 if no hold has a peak of friction on reloading, and 2 for wrong usage.
+    Otherwise the exit status is 0.
+    """
+    from rsfstudy.cli.assignment_parsing import parse_column_assignments
+    from rsfstudy.cli.data_files import check_output_may_be_replaced
+    from rsfstudy.cli.figure_files import write_figure
+    from rsfstudy.execution import provenance_attributes
+    from rsfstudy.reporting import is_hold_table
+    from rsfstudy.storage import write_dataset
+
+    data = given.output.with_suffix(".nc")
+    check_output_may_be_replaced(data, is_hold_table, "table of holds")
+    columns = parse_column_assignments(given.columns)
+    about = {"normal_stress": given.normal_stress, "stiffness": given.stiffness}
+    record = rsfstudy.read_record(given.record, columns, **about)
+    table = rsfstudy.healing(record).assign_attrs(provenance_attributes(given.command_line))
+    write_dataset(table, data)
+    write_figure(rsfstudy.plot_healing(table, record), given.output)
+    result = HealingResult(record, table, record.stiffness(), [given.output, data])
+    return output_result(result, _print_healing, given.as_json)
+
+
+def _print_healing(result: HealingResult) -> None:
+    """Print the table of holds, the healing rate and the stiffness."""
+    from rsfstudy.reporting import format_with_error, summarise_holds
+
+    print_line(f"{result.record.name}: {len(result.record):,} rows")
+    print_pieces(summarise_holds(result.table))
+    value, stderr = (result.stiffness[n].item() for n in ("stiffness", "stiffness_stderr"))
+    if math.isfinite(value):
+        print_line(f"stiffness over normal stress: {format_with_error(value, stderr)} 1/um")
+    print_line(f"wrote {' and '.join(map(str, result.files))}", soft_wrap=True)

@@ -1,0 +1,373 @@
+r"""Frictional healing and relaxation in the holds of a record.
+
+A hold is an interval in which the load point is at rest between sliding and reloading. Let
+:math:`\mu_0` be the friction before the hold, :math:`\mu_h` the friction at the end of the hold,
+and :math:`\mu_p` the peak friction after reloading. As in the measure ``Healing``, relaxation is
+:math:`\mu_h - \mu_0`, and healing is :math:`\mu_p - \mu_0`.
+
+The three frictions are estimated jointly by generalised least squares with correlated noise.
+:math:`\mu_0` is the mean of the straight portion before the hold, :math:`\mu_h` is the end of a
+polynomial in the logarithm of the hold time, and :math:`\mu_p` is the maximum of a polynomial in
+time. The common linear trend of friction with load point displacement is subtracted.
+"""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections.abc import Iterator, Sequence
+from functools import cached_property
+from typing import NamedTuple
+
+import numpy as np
+import xarray as xr
+from numpy.polynomial import polynomial
+from scipy.linalg import block_diag
+from scipy.ndimage import median_filter
+
+from rsfstudy.fitting.friction_trend import MIN_ROWS, fit_trend, select_steady_rows
+from rsfstudy.fitting.hold_table import build_hold_table
+from rsfstudy.fitting.local_regression import (
+    LinearFit,
+    choose_polynomial_window,
+    find_polynomial_maximum,
+    fit_linear_model,
+    normalise,
+)
+from rsfstudy.fitting.velocity_steps import LoadingStep, noise_variance
+
+#: The load point is at rest if its velocity is at most this fraction of the velocities before and
+#: after the hold.
+MAX_HOLD_OVER_SLIDING_VELOCITY = 0.01
+#: Friction has peaked if it has fallen by this number of standard deviations of the noise below its
+#: running maximum. The running median of the second number of rows removes spikes.
+_MIN_FALL_AFTER_PEAK_SIGMAS, _RUNNING_MEDIAN_ROWS = 6.0, 5
+#: Half widths of the windows around a peak in rows, and number of rows of the windows at the end of
+#: a hold.
+_PEAK_HALF_WIDTHS = tuple(np.unique(np.rint(3.0 * 1.25 ** np.arange(50)).astype(int)).tolist())
+_HOLD_END_ROWS = tuple(np.unique(np.rint(6.0 * 1.4 ** np.arange(40)).astype(int)).tolist())
+#: Degrees of the polynomials that the windows are tested with, and degrees of the polynomials that
+#: the estimates use.
+_PEAK_DEGREES, _HOLD_END_DEGREES = (2, 4), (1, 2)
+#: Number of times that the window of a peak is centred on the peak.
+_PEAK_CENTRING_PASSES = 4
+#: The noise is estimated from rows before the hold whose sampling interval differs from the
+#: interval after the hold by at most this factor. If there are too few such rows, the noise is
+#: estimated from the second half of the rows after the hold.
+_MAX_SAMPLING_INTERVAL_RATIO = 2.0
+
+
+class Hold(NamedTuple):
+    """Hold of the load point, with the times of its windows.
+
+    Parameters
+    ----------
+    rows_before : ndarray of int
+        Rows of steady sliding before the hold.
+    stop : LoadingStep
+        Step at which the load point stops.
+    reload : LoadingStep
+        Step at which the load point starts again.
+    window_end : float
+        Time in s of the next step, or of the end of the record.
+    """
+
+    rows_before: np.ndarray
+    stop: LoadingStep
+    reload: LoadingStep
+    window_end: float
+
+    @property
+    def exact_quantities(self) -> tuple[float, float, float, float]:
+        """Begin and duration of the hold in s, and velocities before and after in um/s."""
+        duration = self.reload.middle - self.stop.middle
+        return self.stop.middle, duration, self.stop.velocity_before, self.reload.velocity_after
+
+
+class Estimate(NamedTuple):
+    """Estimate of a quantity from the coefficients of a linear model.
+
+    Parameters
+    ----------
+    value : float
+        Value of the quantity.
+    weights : ndarray, shape (parameters,)
+        Derivatives of the quantity with respect to the coefficients.
+    other_variance : float, default: 0.0
+        Variance that the covariance matrix of the coefficients does not include.
+    trend_derivative : float, default: 0.0
+        Derivative of the quantity with respect to the trend.
+    """
+
+    value: float
+    weights: np.ndarray
+    other_variance: float = 0.0
+    trend_derivative: float = 0.0
+
+    def minus(self, other: Estimate) -> Estimate:
+        """Return the difference of two estimates."""
+        return Estimate(
+            self.value - other.value,
+            self.weights - other.weights,
+            self.other_variance + other.other_variance,
+            self.trend_derivative - other.trend_derivative,
+        )
+
+
+def find_holds(time: np.ndarray, friction: np.ndarray, steps: Sequence[LoadingStep]) -> list[Hold]:
+    """Find the holds in the steps of a record.
+
+    Parameters
+    ----------
+    time, friction : ndarray, shape (rows,)
+        Times in s and friction.
+    steps : sequence of LoadingStep
+        Steps of the record in order of time.
+
+    Returns
+    -------
+    list of Hold
+        Holds in order of time.
+    """
+    found = []
+    for number, (stop, reload) in enumerate(itertools.pairwise(steps)):
+        sliding = min(stop.velocity_before, reload.velocity_after)
+        if not abs(stop.velocity_after) <= MAX_HOLD_OVER_SLIDING_VELOCITY * sliding:
+            continue
+        first = steps[number - 1].end if number else time[0]
+        rows = select_steady_rows(time, friction, float(first), stop.start)
+        ends = steps[number + 2].start if number + 2 < len(steps) else time[-1]
+        found.append(Hold(rows, stop, reload, float(ends)))
+    return found
+
+
+def measure_holds(
+    time: np.ndarray,
+    displacement: np.ndarray,
+    friction: np.ndarray,
+    steps: Sequence[LoadingStep],
+) -> xr.Dataset:
+    """Measure healing and relaxation in all holds of a record.
+
+    Parameters
+    ----------
+    time, displacement, friction : ndarray, shape (rows,)
+        Times in s, load point displacements in um, and friction.
+    steps : sequence of LoadingStep
+        Steps of the record in order of time.
+
+    Returns
+    -------
+    xarray.Dataset
+        Table of holds (see ``Record.holds``).
+    """
+    moves = [step for step in steps if step.changes_velocity]
+    holds = find_holds(time, friction, moves)
+    trend, trend_stderr = fit_trend(time, friction, moves)
+    guard = noise_variance(time, displacement) if holds and len(time) > 2 else 0.0
+    results = [HoldFit(time, friction, hold, trend, guard).measure() for hold in holds]
+    # The rows are holds, and the columns are the quantities that have errors.
+    values, errors, slopes = (np.array([of[n] for of in results]).reshape(-1, 5) for n in range(3))
+    by_trend = trend_stderr * slopes
+    of_healing = np.diag(errors[:, 2] ** 2) + np.outer(by_trend[:, 2], by_trend[:, 2])
+    exact = np.array([hold.exact_quantities for hold in holds]).reshape(-1, 4)
+    table = build_hold_table(exact, values, np.hypot(errors, by_trend), of_healing)
+    words = "trend of friction that is subtracted"
+    table["trend"] = (), trend, {"long_name": words, "units": "um-1"}
+    words = f"standard error of the {words}"
+    table["trend_stderr"] = (), trend_stderr, {"long_name": words, "units": "um-1"}
+    return table
+
+
+class HoldFit:
+    """Fit of friction before, during and after a hold.
+
+    Parameters
+    ----------
+    time, friction : ndarray, shape (rows,)
+        Times in s and friction of the record.
+    hold : Hold
+        Hold to measure.
+    trend : float
+        Trend of friction with load point displacement in 1/um.
+    displacement_variance : float
+        Noise variance of the load point displacement in um^2.
+    """
+
+    def __init__(
+        self,
+        time: np.ndarray,
+        friction: np.ndarray,
+        hold: Hold,
+        trend: float,
+        displacement_variance: float,
+    ) -> None:
+        self.time, self.hold, self.displacement_variance = time, hold, displacement_variance
+        late = np.maximum(time - hold.reload.middle, 0.0)
+        early = np.minimum(time - hold.stop.middle, 0.0)
+        #: Load point displacement relative to the displacement of the hold.
+        self.moved = hold.stop.velocity_before * early + hold.reload.velocity_after * late
+        self.level = friction - trend * self.moved
+        self.rows_after = np.flatnonzero((time > hold.reload.middle) & (time < hold.window_end))
+
+    def measure(self) -> tuple[list[float], list[float], list[float]]:
+        """Estimate the frictions of the hold.
+
+        Returns
+        -------
+        values : list of float
+            Friction before the hold, peak friction, healing, relaxation, and peak displacement in
+            um. Values that cannot be determined are NaN.
+        stderrs : list of float
+            Standard errors of the values, without the error of the trend.
+        trend_derivatives : list of float
+            Derivatives of the values with respect to the trend.
+        """
+        before, time = self.hold.rows_before, self.time
+        if not len(before):
+            return [math.nan] * 5, [math.nan] * 5, [0.0] * 5
+        held, (peak, is_adequate) = self._choose_rows_of_hold_end(), self._choose_rows_of_peak()
+        parts = [(before, np.ones((len(before), 1)))]
+        if len(held):
+            parts.append((held, polynomial.polyvander(self._hold_coordinate(held), 2)))
+        if len(peak):
+            parts.append((peak, polynomial.polyvander(normalise(time[peak]), _PEAK_DEGREES[1])))
+        rows = np.concatenate([of for of, _columns in parts])
+        clock = np.concatenate([time[of] - time[of[0]] for of, _columns in parts])
+        columns = block_diag(*(columns for _of, columns in parts))
+        found = fit_linear_model(clock, self.level[rows], columns)
+        unknown = Estimate(math.nan, np.zeros(columns.shape[1]), math.nan)
+        weights = np.eye(columns.shape[1])
+        first = Estimate(
+            float(found.coefficients[0]), weights[0], 0.0, -float(self.moved[before].mean())
+        )
+        end = unknown
+        if len(held):  # The coordinate of the end of the hold is 1.
+            weights_of_end = weights[1 : 2 + _HOLD_END_DEGREES[1]].sum(axis=0)
+            end = Estimate(float(weights_of_end @ found.coefficients), weights_of_end)
+        top, distance = unknown, unknown
+        if len(peak):
+            top, distance = self._estimate_peak(found, peak, is_adequate) or (unknown, unknown)
+        estimates = first, top, top.minus(first), end.minus(first), distance
+        variances = (e.weights @ found.covariance @ e.weights + e.other_variance for e in estimates)
+        return (
+            [estimate.value for estimate in estimates],
+            [math.sqrt(variance) for variance in variances],
+            [estimate.trend_derivative for estimate in estimates],
+        )
+
+    @cached_property
+    def _reference(self) -> LinearFit:
+        """Fit of rows without a peak, whose noise is used to select windows."""
+        rows, after = self.hold.rows_before, self.rows_after
+        if len(after) > 1:
+            gaps = np.gradient(self.time)
+            ratio = gaps[rows] / float(np.median(gaps[after]))
+            alike = np.abs(np.log(ratio)) < math.log(_MAX_SAMPLING_INTERVAL_RATIO)
+            if alike.sum() >= MIN_ROWS:
+                rows = rows[alike]
+            elif len(after) >= 2 * MIN_ROWS:
+                rows = after[len(after) // 2 :]
+        u = normalise(self.time[rows])
+        return fit_linear_model(self.time[rows], self.level[rows], np.vander(u, 3), quick=True)
+
+    def _hold_coordinate(self, rows: np.ndarray) -> np.ndarray:
+        """Return the logarithm of the hold time, mapped to 1 at the end of the hold."""
+        times = np.append(self.time[rows], self.hold.reload.middle)
+        logs = np.log(times - self.hold.stop.middle)
+        return normalise(logs)[:-1]
+
+    def _choose_rows_of_hold_end(self) -> np.ndarray:
+        """Return the rows of the window at the end of the hold.
+
+        Rows that are closer to the ends of the hold than the error of the step times are left out.
+        """
+        time, begins, ends = self.time, self.hold.stop.end, self.hold.reload.start
+        rows = np.flatnonzero((time > begins) & (time < ends))
+        if len(rows) < 2:
+            return rows[:0]
+        gap = float(np.median(np.diff(time[rows])))
+        speed = self.hold.reload.velocity_after
+        guard = 0.5 * gap + math.cbrt(self.displacement_variance * gap / speed**2)
+        rows = rows[(time[rows] > begins + guard) & (time[rows] < ends - guard)]
+        windows = (rows[-count:] for count in _HOLD_END_ROWS if count <= len(rows))
+        logs = np.log(np.maximum(time - self.hold.stop.middle, 1e-300))
+        degree = _HOLD_END_DEGREES[0]
+        return choose_polynomial_window(windows, logs, self.level, degree, self._reference)[0]
+
+    def _choose_rows_of_peak(self) -> tuple[np.ndarray, bool]:
+        """Return the rows of the window around the peak of friction.
+
+        The array of rows is empty if friction has no peak. The second value is True if a parabola
+        describes friction in the window.
+        """
+        after, level = self.rows_after, self.level
+        chosen, is_adequate = after[:0], False
+        if len(after) < 2 * _PEAK_HALF_WIDTHS[0] + 1:
+            return chosen, is_adequate
+        smooth = median_filter(level[after], _RUNNING_MEDIAN_ROWS, mode="nearest")
+        sd = max(float(np.std(level[self.hold.rows_before])), self._reference.noise_sd)
+        fallen = np.maximum.accumulate(smooth) - smooth > _MIN_FALL_AFTER_PEAK_SIGMAS * sd
+        if not fallen.any():
+            return chosen, is_adequate
+        centre = int(np.argmax(smooth[: int(np.argmax(fallen))]))
+        for _ in range(_PEAK_CENTRING_PASSES):
+            windows = _iterate_peak_windows(after, centre)
+            chosen, is_adequate = choose_polynomial_window(
+                windows, self.time, level, _PEAK_DEGREES[0], self._reference
+            )
+            if not len(chosen):
+                break
+            u = normalise(self.time[chosen])
+            at = find_polynomial_maximum(polynomial.polyfit(u, level[chosen], _PEAK_DEGREES[0]))
+            if not math.isfinite(at):
+                break
+            before, centre = centre, int(np.argmin(np.abs(u - at)) + chosen[0] - after[0])
+            if centre == before:
+                break
+        return chosen, is_adequate
+
+    def _estimate_peak(
+        self, found: LinearFit, rows: np.ndarray, is_adequate: bool
+    ) -> tuple[Estimate, Estimate] | None:
+        """Estimate the peak friction and the peak displacement.
+
+        The result is None if the polynomial has no maximum.
+        """
+        first = len(found.coefficients) - _PEAK_DEGREES[1] - 1
+        coefficients, covariance = found.coefficients[first:], found.covariance[first:, first:]
+        at = find_polynomial_maximum(coefficients)
+        if not math.isfinite(at):
+            return None
+        powers = np.arange(_PEAK_DEGREES[1] + 1)
+        of_value = at**powers
+        of_slope = powers * np.append(0.0, of_value[:-1])
+        curvature = -float(polynomial.polyval(at, polynomial.polyder(coefficients, 2)))
+        value = float(of_value @ coefficients)
+        # The position of the maximum has an error, so the maximum is too high by this difference.
+        excess = 0.5 * float(of_slope @ covariance @ of_slope) / curvature
+        misfit = 0.0
+        if not is_adequate:
+            u = normalise(self.time[rows])
+            fewer = polynomial.polyfit(u, self.level[rows], _PEAK_DEGREES[0])
+            low = find_polynomial_maximum(fewer)
+            misfit = float(polynomial.polyval(low if math.isfinite(low) else at, fewer)) - value
+        half = 0.5 * float(self.time[rows[-1]] - self.time[rows[0]])
+        speed, when = self.hold.reload.velocity_after, self.time[rows[0]] + (at + 1.0) * half
+        distance = speed * float(when - self.hold.reload.middle)
+        padding = np.zeros(first)
+        by_slope = speed * half * of_slope / curvature
+        return (
+            Estimate(
+                value - excess, np.append(padding, of_value), excess**2 + misfit**2, -distance
+            ),
+            Estimate(distance, np.append(padding, by_slope)),
+        )
+
+
+def _iterate_peak_windows(rows: np.ndarray, centre: int) -> Iterator[np.ndarray]:
+    """Iterate over windows of rows around a centre, from short to long."""
+    for half in _PEAK_HALF_WIDTHS:
+        if centre < half or centre + half >= len(rows):
+            return
+        yield rows[centre - half : centre + half + 1]

@@ -1,0 +1,134 @@
+"""Figure of frictional healing in a slide-hold-slide test."""
+
+from __future__ import annotations
+
+import math
+from functools import partial
+
+import numpy as np
+import xarray as xr
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from rsfstudy.error_boundary import error_boundary
+from rsfstudy.errors import DataError
+from rsfstudy.fitting import Record
+from rsfstudy.plots._axes import set_log_scale
+from rsfstudy.plots._figures import NotebookFigure
+from rsfstudy.plots._style import (
+    add_legend,
+    add_panel_letters,
+    cycle_style,
+    enlarge_for_legends,
+    figure_size,
+    finalize_layout,
+    style_context,
+)
+
+#: Height of a panel in mm, and largest number of rows of a record that are drawn.
+_PANEL_HEIGHT_MM, _MAX_DRAWN_ROWS = 60.0, 20_000
+#: Half length of the error bars, in standard errors.
+_ERROR_BAR_STDERRS = 2.0
+
+
+@partial(error_boundary, is_called_internally=True)
+def plot_healing(table: xr.Dataset, record: Record | None = None) -> Figure:
+    """Plot healing and relaxation against the duration of holds.
+
+    Parameters
+    ----------
+    table : xarray.Dataset
+        Table of holds, as returned by ``rsfstudy.healing``, ``Record.holds`` or
+        ``dataset.rsf.holds()``. The required variables are ``duration``, ``healing`` and
+        ``relaxation`` along ``hold``, their errors, and the scalars ``healing_rate``,
+        ``healing_rate_stderr`` and ``healing_intercept``.
+    record : Record, optional
+        Record of the holds. The first panel shows its friction with the values before each hold and
+        at each peak. By default, the figure has no such panel.
+
+    Returns
+    -------
+    matplotlib.figure.Figure
+        Figure with one or two panels. Error bars show two standard errors.
+
+    Raises
+    ------
+    DataError
+        If the dataset is not a table of holds, or if it contains no holds.
+
+    Examples
+    --------
+    >>> from rsfstudy import Scene, plot_healing, simulate
+    >>> scene = Scene(normal_stress="constant", hold_time=1000, stiffness_ratio=10)
+    >>> figure = plot_healing(simulate(scene, duration=1100.0).rsf.holds())
+    >>> len(figure.axes)
+    1
+    """
+    if not {"healing", "duration", "healing_rate"} <= set(table.variables):
+        raise DataError("the dataset is no table of holds. Pass the result of rsfstudy.healing.")
+    if not table.sizes["hold"]:
+        raise DataError("the table has no holds, and there is nothing to draw.")
+    count = 1 if record is None else 2
+    with style_context():
+        figure = NotebookFigure(
+            figsize=figure_size(count, 1, _PANEL_HEIGHT_MM), layout="constrained"
+        )
+        panels = figure.subplots(1, count, squeeze=False)[0].tolist()
+        if record is not None:
+            _draw_record(table, record, panels[0])
+        _draw_healing(table, panels[-1])
+        if count > 1:
+            add_panel_letters(panels)
+        enlarge_for_legends(figure, [panels])
+        finalize_layout(figure)
+    return figure
+
+
+def _draw_record(table: xr.Dataset, record: Record, axes: Axes) -> None:
+    """Draw friction against load point displacement, with the measured frictions."""
+    moved, friction = record.columns["displacement"], record.columns["friction"]
+    thinned = slice(None, None, max(1, len(record) // _MAX_DRAWN_ROWS))
+    axes.plot(moved[thinned], friction[thinned], ".", color="0.7", markersize=1.5, label="record")
+    stops = np.interp(table["begins"], record.time, moved)
+    starts = np.interp(table["begins"] + table["duration"], record.time, moved)
+    trend = float(table.get("trend", 0.0))
+    peaks = table["peak_friction"] + trend * table["peak_displacement"]
+    for x, y, marker, name in (
+        (stops, table["friction_before"], "v", "friction before the hold"),
+        (starts + table["peak_displacement"].values, peaks, "^", "peak friction"),
+    ):
+        axes.plot(x, y, marker, color=cycle_style(marker == "^")["color"], label=name)
+    axes.set_xlabel(r"Load point displacement ($\mu$m)")
+    axes.set_ylabel(r"Friction coefficient, $\mu$")
+    add_legend(axes, 2)
+
+
+def _draw_healing(table: xr.Dataset, axes: Axes) -> None:
+    """Draw healing and relaxation against the duration of the holds."""
+    duration = table["duration"].values
+    for number, (name, label, sign) in enumerate(
+        (
+            ("healing", r"healing, $\Delta\mu$", 1.0),
+            ("relaxation", r"relaxation, $-\Delta\mu_c$", -1.0),
+        )
+    ):
+        suffix = "stderr" if f"{name}_stderr" in table else "error"
+        error = table[f"{name}_{suffix}"].values
+        axes.errorbar(
+            duration, sign * table[name].values, _ERROR_BAR_STDERRS * error, fmt="os"[number],
+            color=cycle_style(number)["color"], markersize=3.5, label=label,
+        )  # fmt: skip
+    rate, stderr, level = (
+        float(table[n]) for n in ("healing_rate", "healing_rate_stderr", "healing_intercept")
+    )
+    if math.isfinite(rate):
+        ends = np.array([duration.min(), duration.max()])
+        label = rf"{rate:.3g} $\pm$ {stderr:.2g} per decade"
+        axes.plot(ends, level + rate * np.log10(ends), label=label, **cycle_style(0))
+    if duration.min() < duration.max():
+        set_log_scale(axes, "x")
+    units = table["duration"].attrs
+    unit = "$D_c/V_*$" if "scale" in units else units.get("units", "s")
+    axes.set_xlabel(f"Duration of the hold ({unit})")
+    axes.set_ylabel("Change of friction")
+    add_legend(axes, 2)

@@ -1,0 +1,65 @@
+"""Tables of frictional healing that commands print."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+
+import numpy as np
+import xarray as xr
+
+from rsfstudy.reporting.fit_summaries import format_with_error
+from rsfstudy.reporting.tables import TextTable
+
+#: Headings of the quantities in the table that are printed with and without their errors.
+_HEADINGS_WITHOUT_ERROR = {"friction_before": "mu_0", "peak_friction": "peak"}
+_HEADINGS_WITH_ERROR = {"healing": "healing", "relaxation": "relaxation"}
+
+
+def is_hold_table(dataset: xr.Dataset) -> bool:
+    """Return True if a dataset is a table of holds.
+
+    Parameters
+    ----------
+    dataset : xarray.Dataset
+        Dataset to check.
+
+    Returns
+    -------
+    bool
+        True if the dataset contains the healing of holds.
+    """
+    return "hold" in dataset.dims and {"healing", "healing_rate"} <= set(dataset.variables)
+
+
+def summarise_holds(table: xr.Dataset) -> Iterator[TextTable | str]:
+    """Yield a table of the holds, and sentences about the healing rate.
+
+    Parameters
+    ----------
+    table : xarray.Dataset
+        Table of holds, as returned by ``rsfstudy.healing``.
+
+    Yields
+    ------
+    TextTable or str
+        Table with one row per hold, followed by the healing rate and remarks.
+    """
+    rows = []
+    for number in range(table.sizes["hold"]):
+        hold = table.isel(hold=number)
+        suffix = "stderr" if "healing_stderr" in hold else "error"
+        row = {"hold": f"{hold['hold'].item()}", "lasts (s)": f"{hold['duration'].item():.5g}"}
+        for name, heading in _HEADINGS_WITHOUT_ERROR.items():
+            row[heading] = f"{hold[name].item():.5f}".replace("nan", "-")
+        for name, heading in _HEADINGS_WITH_ERROR.items():
+            row[heading] = format_with_error(hold[name].item(), hold[f"{name}_{suffix}"].item())
+        rows.append(row)
+    yield TextTable(rows)
+    rate, stderr = (table[name].item() for name in ("healing_rate", "healing_rate_stderr"))
+    if math.isfinite(rate):
+        yield f"healing rate: {format_with_error(rate, stderr)} per decade of hold duration"
+    else:
+        yield "healing rate: unknown, because fewer than two hold durations have a peak of friction"
+    if peakless := (np.flatnonzero(np.isnan(table["healing"].values)) + 1).tolist():
+        yield f"no peak of friction on reloading after hold {', '.join(map(str, peakless))}"
