@@ -22,7 +22,13 @@ import rsfstudy
 from rsfstudy import Scene
 from rsfstudy.errors import InvalidValue
 from rsfstudy.execution.cell_plan import compute_cell_key
-from rsfstudy.measures import CriticalStep, LimitCycle, RigidResponse, StepResponse
+from rsfstudy.measures import (
+    CriticalStep,
+    LimitCycle,
+    LinearStability,
+    RigidResponse,
+    StepResponse,
+)
 from rsfstudy.motion.accuracy import Accuracy
 from rsfstudy.motion.engines import COMPILED, SCIPY
 from rsfstudy.parts import LAW, Law, NormalStress, Temperature, number
@@ -607,3 +613,62 @@ def test_the_temperature_stays_within_its_bounds():
         assert lowest <= rises[start:].min()
         assert rises[start:].max() <= highest
     assert rises.max() > 0.0 > rises.min()
+
+
+# ---- rigs ----------------------------------------------------------------------------------------
+
+RIG = {
+    "normal_stress": "25 MPa", "slip_distance": "10 um", "reference_velocity": "1 um/s",
+    "thermal_diffusivity": "1.1 mm^2/s", "heat_capacity": "2.4 MJ/m^3/K",
+    "shear_zone_width": "0.1 mm", "reference_temperature": "295 K",
+}  # fmt: skip
+
+
+def test_a_rig_determines_the_fields_of_heat():
+    rig = rsfstudy.Rig(
+        **RIG, stiffness="0.05 MPa/um", heat_loss_width="0.5 mm", pressurisation_factor="139 kPa/K",
+        direct_activation_energy="89 kJ/mol", evolution_activation_energy="50e3 J/mol",
+    )  # fmt: skip
+    scene = rig.scene(a=0.01, b_over_a=1.5, drainage="0.3 1/s")
+    known = {
+        "heating": 25e6 * 1e-5 / (2.4e6 * 1e-4 * 295.0),
+        "cooling": 1.1e-6 / 0.5e-3**2 * 10.0,
+        "direct_activation": 89e3 / (8.31446261815324 * 295.0),
+        "evolution_activation": 50e3 / (8.31446261815324 * 295.0),
+        "pressurisation": 139e3 * 295.0 / 25e6,
+        "drainage": 3.0,
+    }
+    for name, value in known.items():
+        assert getattr(scene, name) == pytest.approx(value, rel=1e-14), name
+    assert (scene.temperature, scene.fluid) == ("shear_heating", "thermal")
+    cold = rig.scene(temperature="isothermal", a=0.01, b_over_a=1.5)
+    assert (cold.temperature, cold.fluid, cold.heating) == ("isothermal", "drained", None)
+    flash = rig.scene(law="flash_heating", b_over_a=1.5, weakening_velocity="0.1 m/s")
+    assert flash.weakening_velocity_ratio == pytest.approx(1e5, rel=1e-14)
+
+
+def test_a_rig_needs_all_quantities_of_shear_heating():
+    incomplete = {n: v for n, v in RIG.items() if n != "shear_zone_width"}
+    with pytest.raises(InvalidValue, match="needs shear_zone_width"):
+        rsfstudy.Rig(**incomplete)
+    with pytest.raises(InvalidValue, match="units of another kind"):
+        rsfstudy.Rig(**{**RIG, "heat_capacity": "2.4 MJ/m^3"})
+
+
+@pytest.mark.parametrize("temperature", ["shear_heating", "isothermal"])
+def test_axes_of_thermal_quantities(temperature):
+    """The heating of each cell follows from the quantities of its rig."""
+    rig = rsfstudy.Rig(**RIG, stiffness="0.05 MPa/um")
+    study = rsfstudy.Study(
+        name="widths",
+        title="Width of the shear zone",
+        rig=rig,
+        base=rig.scene(a=0.01, b_over_a=1.5, temperature=temperature),
+        axes=[rig.axis("shear_zone_width", ["0.1 mm", "1 mm"])],
+        measure=LinearStability(),
+    )
+    heating = [study.cell(n).scene.heating for n in range(2)]
+    if temperature == "isothermal":
+        assert heating == [None, None]
+    else:
+        assert heating == pytest.approx([250.0 / (240.0 * 295.0), 25.0 / (240.0 * 295.0)])
