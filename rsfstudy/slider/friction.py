@@ -141,7 +141,7 @@ def build_friction_functions(scene: SceneView) -> FrictionFunctions:
         evolutions=evolutions,
         steady_states=steady_states,
         state_sum=state_functions.build_sum_function(law_states),
-        state_variable=state_functions.state_variable_at_constant_temperature,
+        state_variable=state_functions.isothermal_state_variable,
         state_contribution=state_functions.build_state_contribution_function(
             law_states, derivatives if source.unknowns else None
         ),

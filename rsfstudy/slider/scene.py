@@ -72,8 +72,8 @@ class Scene(SceneQuantities):
         pressure is measured from the pressure of the surroundings, which is also its initial value.
         A history of pore pressure changes the pressure of the surroundings.
     temperature : str or type, default: "isothermal"
-        Temperature of the fault. "isothermal" is constant temperature. With "shear_heating", the
-        work of the shear stress heats the fault. A user-defined class is also accepted.
+        Temperature. "isothermal" is constant temperature. With "shear_heating", the work of the
+        shear stress heats the fault. A user-defined class is also accepted.
     a : float, default: 0.0145
         Direct effect parameter.
     mu_star : float, default: 0.76
@@ -197,14 +197,11 @@ class Scene(SceneQuantities):
     displacement_between_steps : float, default: 20.0
         Load point displacement between successive velocity steps in :math:`D_c`.
     heating : float, default: 1e-3
-        Temperature rise over :math:`T_*`, the absolute temperature of steady sliding at
-        :math:`V_*`, by a slip of :math:`D_c` at unit shear stress.
+        Relative rise of absolute temperature by a slip of :math:`D_c` at unit shear stress.
     cooling : float, default: 1.0
         Cooling rate :math:`c_{th} D_c/V_*` of a fault with shear heating.
-    direct_activation : float, default: 0.0
-        Activation term :math:`Q_a/(R T_*)` of the direct effect.
-    evolution_activation : float, default: 0.0
-        Activation term :math:`Q_b/(R T_*)` of the evolution effect.
+    direct_activation, evolution_activation : float, default: 0.0
+        Activation terms :math:`Q/(R T_*)` of the direct effect and of the evolution effect.
     dynamics : type, optional
         User-defined class of dynamics. By default the fields ``inertia`` and ``radiation_damping``
         select the dynamics, and motion is quasi-static if neither is set.

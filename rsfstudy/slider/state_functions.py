@@ -91,7 +91,7 @@ def find_law_functions(law: LawBase) -> tuple[Function, Function]:
     )
 
 
-def state_variable_at_constant_temperature(difference: float, psis: Numbers, p: Numbers) -> float:
+def isothermal_state_variable(difference: float, psis: Numbers, p: Numbers) -> float:
     r"""Return the state variable at constant temperature.
 
     Parameters
