@@ -66,11 +66,10 @@ class Scene(SceneQuantities):
         driving stress that is inclined at the angle ``phi``. A user-defined class is also accepted.
     fluid : str or type, default: "drained"
         Pore fluid. "drained" is constant pore pressure. With "dilatant", pore pressure falls when
-        the slip rate increases, because the pores open. With "thermal", pore pressure rises when
-        the fault heats up. A user-defined class is also accepted.
-        Stress is normalised by the effective normal stress of steady sliding at :math:`V_*`. Pore
-        pressure is measured from the pressure of the surroundings, which is also its initial value.
-        A history of pore pressure changes the pressure of the surroundings.
+        the slip rate increases. With "thermal", pore pressure rises when the fault heats up. A
+        user-defined class is also accepted. Stress is normalised by the effective normal stress of
+        steady sliding at :math:`V_*`. Pore pressure is measured from the pressure of the
+        surroundings, which is also its initial value and which a history of pore pressure changes.
     temperature : str or type, default: "isothermal"
         Temperature. "isothermal" is constant temperature. With "shear_heating", the work of the
         shear stress heats the fault. A user-defined class is also accepted.
