@@ -99,8 +99,8 @@ class Temperature(Part):
 
         Returns
         -------
-        lowest, highest : float
-            Bounds of the temperature rise. The base class returns infinite bounds.
+        tuple of (float, float)
+            Lower and upper bound of the temperature rise. The base class returns infinite bounds.
         """
         return -math.inf, math.inf
 
