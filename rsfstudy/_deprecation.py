@@ -64,7 +64,7 @@ NEW_NAME_BY_OWNER_AND_FORMER_NAME: Mapping[str, Mapping[str, str]] = {
     "rsfstudy.rig.table_files": {
         "Selected": "ColumnSpec",
     },
-    "rsfstudy.rig.table_files:Column": {
+    "rsfstudy.rig.columns:Column": {
         "number": "column_number",
         "lines": "line_numbers",
         "place": "location",
@@ -319,7 +319,7 @@ NEW_NAME_BY_OWNER_AND_FORMER_NAME: Mapping[str, Mapping[str, str]] = {
         "work": "evaluation_count",
         "evaluations": "evaluation_count",
     },
-    "rsfstudy.motion.motion_driver:PythonMotionState": {
+    "rsfstudy.motion.python_backend:PythonMotionState": {
         "lasts": "end_time",
         "taken": "step_length",
         "finer": "step_limit_factor",
@@ -581,7 +581,7 @@ def accept_former_keyword_names(function_or_class: DecoratedFunction) -> Decorat
     @functools.wraps(wrapped)
     def wrapper(*args: Any, **keywords: Any) -> Any:
         # The function dataclasses.replace passes the current values under the new names.
-        for former in table.keys() & keywords.keys():
+        for former in table.keys() & keywords.keys() if keywords else ():
             warn_renamed(former, table[former], f"{function_or_class.__name__}()")
             keywords[table[former]] = keywords.pop(former)
         return wrapped(*args, **keywords)

@@ -237,10 +237,18 @@ def _unknown_keyword_error(
 def _is_called_from_rsfstudy() -> bool:
     """Return True if the caller is a module of rsfstudy other than the command line."""
     frame = sys._getframe(2)
-    while frame.f_back and frame.f_globals.get("__name__") in _MODULES_SKIPPED_WHEN_FINDING_CALLER:
+    while (
+        name := frame.f_globals.get("__name__")
+    ) in _MODULES_SKIPPED_WHEN_FINDING_CALLER and frame.f_back:
         frame = frame.f_back
-    module = str(frame.f_globals.get("__name__"))
-    return module.startswith("rsfstudy.") and not module.startswith("rsfstudy.cli.")
+    return _is_internal_module(name)
+
+
+@functools.cache
+def _is_internal_module(module_name: str | None) -> bool:
+    """Return True if a module belongs to rsfstudy, but not to the command line."""
+    name = str(module_name)
+    return name.startswith("rsfstudy.") and not name.startswith("rsfstudy.cli.")
 
 
 def _failed_call_error(

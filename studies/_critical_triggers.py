@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from typing import ClassVar
 
 from rsfstudy import Scene
-from rsfstudy.critical_steps.motion_after_step import is_linearly_stable
+from rsfstudy.critical_steps.stability_after_step import is_linearly_stable
 from rsfstudy.measures import CriticalStep, Measure, Outcome, Output, Status
 from rsfstudy.motion import Integrator
 from rsfstudy.slider import effective_friction

@@ -53,6 +53,26 @@ def test_columns_that_are_mistaken_are_told() -> None:
         fitted(GOOD | {"displacement": friction, "friction": moved})
 
 
+def test_slip_that_is_given_as_load_point_displacement_is_told() -> None:
+    """The same column is accepted if it is named slip."""
+    slip = GOOD["displacement"] - (GOOD["friction"] - GOOD["friction"][0]) / 3e-3
+    with pytest.raises(InvalidValue, match="is the slip of the fault at step 1.* 'slip=HEADING"):
+        fitted(GOOD | {"displacement": slip})
+    named = {"time": GOOD["time"], "slip": slip, "friction": GOOD["friction"]}
+    record = rsfstudy.read_record(named, stiffness=3e-3)
+    offset = GOOD["friction"][0] / 3e-3
+    np.testing.assert_allclose(record.columns["displacement"], GOOD["displacement"] + offset)
+
+
+def test_filters_of_a_record_are_filters_of_its_fit() -> None:
+    record = rsfstudy.read_record(GOOD, filter="mean 1 s")
+    with pytest.raises(InvalidValue, match="filter = 'mean 2.0': follows another filter. Leave"):
+        fitted(record, averaging="2 s")
+    other = rsfstudy.read_record(GOOD, name="other")
+    with pytest.raises(InvalidValue, match="filter = ..mean 1.0..: differs between the records"):
+        rsfstudy.fit([record, other], stiffness=3e-3, laws=["slip"])
+
+
 SHORT = columns(15)
 NOISE = 0.6 + 1e-4 * np.random.default_rng(1).standard_normal(ROWS)
 

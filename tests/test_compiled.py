@@ -327,6 +327,6 @@ def by_module(y, rates, p, result):
 
 def test_a_number_of_another_module_counts_too(monkeypatch):
     monkeypatch.setattr(known, "NUMBER", 2.0)
-    before = compile_cache.compute_code_digest(by_module)
+    before = compile_cache.compute_code_digest(None, by_module)
     monkeypatch.setattr(known, "NUMBER", 3.0)
-    assert compile_cache.compute_code_digest(by_module) != before
+    assert compile_cache.compute_code_digest(None, by_module) != before

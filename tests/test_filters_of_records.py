@@ -94,6 +94,16 @@ def test_a_stated_filter_gives_the_truth_back(text: str, options: dict[str, str]
         assert abs(synthetic.deviation_in_stderrs(found, name, EXACT_PARAMETERS[name])) < 3.5, name
 
 
+@pytest.mark.parametrize("text", ["mean 0.8 s", "butterworth_2 2 Hz"])
+def test_a_filter_of_reading_is_applied_to_the_model(text: str) -> None:
+    record = rsfstudy.read_record(filtered("", 3e-4, 1), filter=text, begin="2 s", thin=2)
+    found = rsfstudy.fit(record, **FIT_OPTIONS | LAW).squeeze()
+    assert found.status.item() == Status.OK, found.message.item()
+    for name in ("a", "b", "slip_distance"):
+        assert abs(synthetic.deviation_in_stderrs(found, name, EXACT_PARAMETERS[name])) < 3.5, name
+    assert f"friction filtered by {text}; record: one of every 2 rows" in found.attrs["processing"]
+
+
 @pytest.mark.parametrize(
     ("text", "message"),
     [

@@ -131,7 +131,7 @@ def test_units_of_a_rig(tmp_path):
          "time": ("n", 10.0 * record["time"], {"units": "s"})}
     )  # fmt: skip
     np.testing.assert_allclose(history(dataset, rig).sample_table, known.sample_table, atol=1e-11)
-    with pytest.raises(InvalidValue, match="time = 'time': has no units"):
+    with pytest.raises(InvalidValue, match="heading = 'time': states no units"):
         history(dataset.assign(time=("n", record["time"])), rig)
     with pytest.raises(InvalidValue, match="units = .*: need the scales of a rig for"):
         history(dataset)
@@ -204,7 +204,7 @@ def test_the_command_line_follows_files(tmp_path, monkeypatch):
         assert motion.rsf.scene.parts.loading == history(wave(20), name="record")
     status, said = run_command(["simulate", "--set", "loading=absent.csv"])
     assert status == 1
-    assert "absent.csv: cannot be read as CSV" in said
+    assert "there is no file absent.csv" in said
 
 
 def test_the_files_that_ship_are_followed():

@@ -307,6 +307,19 @@ def test_compare_of_other_statuses(place, tmp_path):
     assert cell["second"] == rsfstudy.measures.Status(4).label
 
 
+def test_events(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    time = np.arange(2000.0)
+    noise = np.random.default_rng(0).normal(scale=0.01, size=2000)
+    table = np.column_stack([time, 5.0 + 0.002 * (time % 500.0) + noise])
+    np.savetxt("run.csv", table, delimiter=",", header="Time (s),Shear stress (MPa)")
+    found, status = output_of("events", "run.csv")
+    assert_documented(found)
+    assert status == 0
+    drops = [event["static_stress_drop"] for event in found["records"][0]["events"]]
+    assert drops == rsfstudy.events("run.csv")["static_stress_drop"].values.tolist()
+
+
 def test_fit_and_its_file(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     shutil.copy(PAGES / "step.csv", tmp_path)

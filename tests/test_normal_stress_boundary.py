@@ -16,11 +16,11 @@ from rsfstudy.named_studies._critical_triggers import Triggers
 from rsfstudy import Scene
 from rsfstudy.critical_steps import critical_step
 from rsfstudy.critical_steps.critical_step import CriticalStep
-from rsfstudy.critical_steps.motion_after_step import (
+from rsfstudy.critical_steps.motion_after_step import motion_reaches_norm
+from rsfstudy.critical_steps.stability_after_step import (
     has_frictional_damping_only,
     is_neutrally_stable,
     may_have_closed_orbits,
-    motion_reaches_norm,
 )
 from rsfstudy.motion.accuracy import Accuracy
 from rsfstudy.motion.integrator import Integrator

@@ -302,6 +302,7 @@ def commands(place: Path) -> dict[str, list[str]]:
             *("--stiffness", "3e-3 /um", "--law", "slip", "--free", "a,mu_star"),
             *("--noise", "white", "--slip-distance", "10 um"),
         ],
+        "events": [str(place / "record.csv")],
         "healing": [str(PAGES / "holds.csv")],
         "problems": ["referee"],
         "verify": [str(shipped_problem_files()[19].with_suffix(".csv"))],

@@ -363,7 +363,7 @@ def test_what_is_no_answer_is_refused(spoil, error, tmp_path):
 def test_files_and_problems_that_are_not_there_are_said_so():
     """Missing files and unknown problems have different exit statuses."""
     ran = call_main("verify", "nowhere.csv", "--problem", "1", "--columns", "time=t (s)")
-    assert (ran.returncode, "cannot be read" in ran.stderr) == (1, True)
+    assert (ran.returncode, "there is no file nowhere.csv" in ran.stderr) == (1, True)
     ran = call_main("verify", "nowhere.csv")
     assert (ran.returncode, "problem = 'no': is none" in ran.stderr) == (2, True)
 

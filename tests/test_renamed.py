@@ -26,7 +26,7 @@ from rsfstudy.fitting.record import Record
 from rsfstudy.measures import Measure, Outcome
 from rsfstudy.motion import array_layout
 from rsfstudy.motion.events import maximum
-from rsfstudy.motion.motion_driver import PythonMotionState
+from rsfstudy.motion.python_backend import PythonMotionState
 from rsfstudy.quantities import Output
 from rsfstudy.reductions import Reduction
 from rsfstudy.slider.laws import LawBase

@@ -11,6 +11,7 @@ from rsfstudy import Scene
 from rsfstudy.errors import InvalidValue
 from rsfstudy.limit_cycles.limit_cycle import LimitCycle
 from rsfstudy.measure_base.settling_checks import steady_sliding_is_linearly_stable
+from rsfstudy.motion import segment_chains
 from rsfstudy.motion.accuracy import Accuracy
 from rsfstudy.motion.engines import COMPILED, PYTHON, SCIPY
 from rsfstudy.motion.events import EventKind, approach_to_steady_state, rise
@@ -105,24 +106,46 @@ def test_a_passive_unknown_does_not_end_a_damped_oscillation(engine):
     assert passive.values["peak_log10_slip_rate"] == pytest.approx(peaks, abs=1e-3)
 
 
-def test_no_motion_settles_where_small_changes_grow():
+def events_until_third_rise(scene, *settling):
+    """Return the events of a motion until ln V has exceeded ln V_0 three times."""
+    asked = (*settling, rise("log_slip_rate", scene.log_load_velocity))
+    events = []
+    for event in Integrator(Accuracy(1e-4)).follow(scene, asked):
+        events.append(event)
+        if sum(each.kind is EventKind.RISE for each in events) == 3:
+            break
+    return [(event.kind, event.point, event.evaluation_count) for event in events]
+
+
+@pytest.mark.parametrize("terminal", [False, True])
+def test_no_motion_settles_where_small_changes_grow(terminal):
     """A motion around unstable steady sliding does not settle.
 
-    The distance from steady sliding falls far below the level after each rupture.
+    The distance from steady sliding falls far below the level after each rupture. The motion and
+    its work are the same as without the settling event.
     """
-    scene, accuracy = Scene(**CYCLES, fluid=Dissipation), Accuracy(1e-4)
+    scene = Scene(**CYCLES, fluid=Dissipation)
     growth = largest_linear_growth_rate(scene, scene.log_load_velocity)
     assert growth is not None
     assert growth.is_positive
-    asked, kinds = (
-        (approach_to_steady_state(0.5), rise("log_slip_rate", scene.log_load_velocity)),
-        [],
-    )
-    for event in Integrator(accuracy).follow(scene, asked):
-        kinds.append(event.kind)
-        if kinds.count(EventKind.RISE) == 3:
-            break
-    assert EventKind.SETTLED not in kinds
+    events = events_until_third_rise(scene, approach_to_steady_state(0.5, terminal=terminal))
+    assert EventKind.SETTLED not in [kind for kind, _point, _count in events]
+    assert events == events_until_third_rise(scene)
+
+
+@pytest.mark.parametrize(("fluid", "level"), [("drained", 1e-3), (Dissipation, 0.5)])
+def test_stability_is_computed_at_the_first_settling_event(fluid, level, monkeypatch):
+    """The growth rate is not computed for a motion that never approaches steady sliding."""
+    scenes = []
+
+    def growth_rate(scene, log_slip_rate):
+        scenes.append(scene)
+        return largest_linear_growth_rate(scene, log_slip_rate)
+
+    monkeypatch.setattr(segment_chains, "largest_linear_growth_rate", growth_rate)
+    scene = Scene(**CYCLES, fluid=fluid)
+    events_until_third_rise(scene, approach_to_steady_state(level))
+    assert bool(scenes) == (fluid is Dissipation)
 
 
 def test_an_excluded_unknown_is_left_out_of_the_distance():

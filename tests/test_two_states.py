@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from rsfstudy import Scene, simulate
-from rsfstudy.critical_steps import motion_after_step
+from rsfstudy.critical_steps import motion_after_step, stability_after_step
 from rsfstudy.critical_steps.critical_step import CriticalStep
 from rsfstudy.critical_steps.triggered import Triggered
 from rsfstudy.limit_cycles.limit_cycle import LimitCycle
@@ -149,8 +149,8 @@ def test_growth_confirms_a_threshold_close_to_another(mass):
 )
 def test_below_a_window_of_instability_motions_settle(ratio, margin):
     scene = Scene(law="two_slip_states", stiffness_ratio=ratio, load_velocity_ratio=1.2, **WINDOW)
-    assert motion_after_step.stability_margin(scene) == pytest.approx(margin, rel=1e-9)
-    assert motion_after_step.is_linearly_stable(scene) is (margin > 0.0)
+    assert stability_after_step.stability_margin(scene) == pytest.approx(margin, rel=1e-9)
+    assert stability_after_step.is_linearly_stable(scene) is (margin > 0.0)
     if ratio == 0.2:
         assert LimitCycle(phases=2)(scene, Accuracy(1e-4)).status is Status.NO_LIMIT_CYCLE
         small = motion_after_step.motion_reaches_norm(scene, Integrator(Accuracy(1e-4, 2_000_000)))

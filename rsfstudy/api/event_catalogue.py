@@ -5,12 +5,12 @@ from __future__ import annotations
 import math
 import warnings
 from collections.abc import Mapping, Sequence
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 import xarray as xr
 
+from rsfstudy.api.stress_records import StressRecord, read_stress_record
 from rsfstudy.error_boundary import error_boundary, find_stacklevel_of_user_code
 from rsfstudy.errors import InvalidValue, NoResultWarning
 from rsfstudy.execution import provenance_attributes
@@ -19,11 +19,10 @@ from rsfstudy.fitting import (
     MIN_SAMPLES,
     Detection,
     EventNumbers,
-    Record,
     read_drops,
 )
 from rsfstudy.netcdf_encoding import copy_with_cf_encoding
-from rsfstudy.rig import compute_conversion_factor, convert_to_si, read_table
+from rsfstudy.rig import ReadingOptions, compute_conversion_factor, convert_to_si
 
 #: Mapping from the scale of a quantity to a variable of the record. The quantity has the units of
 #: this variable.
@@ -115,13 +114,16 @@ def _build_unit_attributes(
 
 @error_boundary
 def events(
-    record: xr.Dataset | Record | str | Path | None = None,
+    record: Any = None,
+    columns: Mapping[str, Any] | None = None,
     *,
     time: Any = None,
     displacement: Any = None,
     shear_stress: Any = None,
+    normal_stress: Any = None,
     stiffness: Any = None,
     sign: int | None = None,
+    **reading: Any,
 ) -> xr.Dataset:
     """Detect drops of shear stress in a laboratory record.
 
@@ -130,14 +132,20 @@ def events(
 
     Parameters
     ----------
-    record : xarray.Dataset, Record, str or Path, optional
-        Dataset with the variables ``time``, ``shear_stress`` and, if measured, ``displacement``. A
-        path refers to a CSV file with columns of these names and units in the first line (see
-        ``rsfstudy.read_table``). The shear stress of a Record (see ``rsfstudy.read_record``) is the
-        product of friction and normal stress, or friction if the record has no normal stress.
+    record : str, Path, mapping, pandas.DataFrame, xarray.Dataset or Record, optional
+        Path of a file, or an object in memory, as in `read_record`. The record needs shear stress
+        or friction, and time or displacement. The shear stress of a Record is the product of
+        friction and normal stress, or friction if the record has no normal stress.
+    columns : mapping of str to str or tuple, optional
+        Heading and units of the columns ``time``, ``displacement``, ``slip`` (of the fault),
+        ``shear_stress``, ``friction`` and ``normal_stress``, as in `read_record`. By default,
+        common headings are recognised.
     time, displacement, shear_stress : array_like of shape (n,), optional
         Arrays to use instead of ``record``. If an array has the attribute ``units``, the results
         have the same units. Otherwise, the results have no attribute ``units``.
+    normal_stress : quantity, optional
+        Normal stress by which friction is multiplied, for example "20 MPa", if the record contains
+        friction, and neither shear stress nor normal stress.
     stiffness : quantity, optional
         Stiffness between the fault and the point at which displacement is measured. The stiffness
         is a change of shear stress divided by a change of displacement. The value is a string such
@@ -149,20 +157,26 @@ def events(
         Sign that shear stress in the direction of slip has in the record. Shear stress is
         multiplied by the sign, so that shear stress falls during events. The default is -1 if all
         samples of shear stress are negative, and 1 otherwise.
+    **reading : object
+        Options ``decimal``, ``sheet``, ``area``, ``rows``, ``begin``, ``end``, ``thin`` and
+        ``filter`` of `read_record`. The filter is applied to shear stress.
 
     Returns
     -------
     xarray.Dataset
         Variables along the dimension ``event``, in the units of the record. ``time`` is the
-        beginning of the event. The other variables are ``duration``, ``interval`` (time since the
-        previous event), ``stress_before``, ``stress_after``, ``static_stress_drop`` and ``cut`` (0
-        for complete events, 1 if the record begins within the event, 2 if the record ends within
-        the event, 3 if both apply). If displacement is known, the dataset also has ``slip``,
+        beginning of the event. If the record has no time, ``displacement`` is the displacement at
+        the beginning of the event, and ``duration`` and ``interval`` are displacements. The other
+        variables are ``duration``, ``interval`` (time since the previous event),
+        ``stress_before``, ``stress_after``, ``static_stress_drop`` and ``cut`` (0 for complete
+        events, 1 if the record begins within the event, 2 if the record ends within the event, 3 if
+        both apply). If time and displacement are known, the dataset also has ``slip``,
         ``peak_slip_rate`` between neighbouring samples, and ``dynamic_stress_drop``. Quantities
         that are not larger than the noise are NaN. For each variable, ``<name>_error`` is the half
         width of a 95 % confidence interval. The scalar ``noise`` is the standard deviation of the
         noise, and ``smallest_drop`` is the smallest drop that can be detected. The attribute
-        ``sign_of_shear_stress`` contains the sign that was used.
+        ``sign_of_shear_stress`` contains the sign that was used, and the attribute ``processing``
+        the selection of rows and the filter.
 
     Raises
     ------
@@ -220,17 +234,15 @@ def events(
     >>> catalogue["static_stress_drop"].values.round(1)
     array([0.5, 0.5, 0.5])
     """
-    given = {"time": time, "displacement": displacement, "shear_stress": shear_stress}
-    if isinstance(record, str | Path):
-        table = {n: of for n, of in read_table(record).items() if n in given}
-        record = xr.Dataset({n: (n, of.values, {"units": of.units}) for n, of in table.items()})
-    if isinstance(record, Record):
-        record = _record_to_dataset(record)
-    if record is not None:
-        if not hasattr(record, "data_vars"):
-            remedy = "Pass a Dataset, a Record, the path of a CSV file, or arrays by name."
-            raise InvalidValue("record", record, "is no record of stress", remedy=remedy)
-        given = {name: record.get(name) for name in given}
+    options = ReadingOptions.parse("events", reading)
+    if record is None:
+        given = {"time": time, "displacement": displacement, "shear_stress": shear_stress}
+        read = StressRecord(given)
+    else:
+        read = read_stress_record(record, columns, normal_stress, options)
+    given = dict(read.variables)
+    if not read.has_time:
+        given = given | {"time": given["displacement"], "displacement": None}
     times, stress = (_check_record_samples(name, given[name]) for name in ("time", "shear_stress"))
     moved = given["displacement"]
     moves = None if moved is None else _check_record_samples("displacement", moved)
@@ -240,7 +252,11 @@ def events(
             raise InvalidValue(name, len(samples), rule)
     if not (np.diff(times) > 0.0).all():
         late = int(np.argmax(np.diff(times) <= 0.0)) + 1
-        raise InvalidValue("time", times[late], f"must increase, and does not at sample {late}")
+        rule = f"must increase, and does not at sample {late}"
+        if read.has_time:
+            raise InvalidValue("time", times[late], rule)
+        remedy = "A record without time needs a displacement that increases. Try thin=10."
+        raise InvalidValue("displacement", times[late], rule, remedy=remedy)
     direction = _find_stress_sign(stress, sign)
     stress = direction * stress
     about = {name: dict(getattr(values, "attrs", {})) for name, values in given.items()}
@@ -248,7 +264,9 @@ def events(
         if moves is None:
             raise InvalidValue("stiffness", stiffness, "needs the displacement of the load point")
         moves = moves - stress / _parse_stiffness(stiffness, about)
-    rows, detection, is_slip = read_drops(times, stress, moves, check_slip=stiffness is None)
+    rows, detection, is_slip = read_drops(
+        times, stress, moves, check_slip=stiffness is None and not read.is_slip
+    )
     for row in rows if not is_slip else ():
         row[0].update(dict.fromkeys(_QUANTITIES_REQUIRING_DISPLACEMENT, (math.nan, math.nan)))
     dataset = build_event_catalogue(rows, about | {"slip": about["displacement"]})
@@ -270,6 +288,10 @@ def events(
     words = "smallest drop of shear stress that is missed once in 1,000 records"
     dataset["smallest_drop"] = ((), detection.detectable_drop, {"long_name": words, **units})
     dataset.attrs["sign_of_shear_stress"] = int(direction)
+    if read.processing:
+        dataset.attrs["processing"] = "; ".join(read.processing)
+    if not read.has_time:
+        dataset = _name_displacement(dataset)
     if not rows and (text := _warn_if_stress_falls_without_drop(detection)):
         dataset.attrs["comment"] = text
     return dataset
@@ -312,23 +334,17 @@ def _check_record_samples(variable_name: str, values: Any) -> np.ndarray:
     return samples
 
 
-def _record_to_dataset(record: Record) -> xr.Dataset:
-    """Return time, displacement and shear stress of a record as a dataset.
-
-    Shear stress is in MPa. If the record has no normal stress, friction is returned in place of
-    shear stress.
-    """
-    columns = record.columns
-    if "normal_stress" in columns:
-        stress, units = 1e-6 * columns["friction"] * columns["normal_stress"], "MPa"
-    else:
-        stress, units = columns["friction"], "1"
-    data = {
-        "time": ("sample", record.time, {"units": "s"}),
-        "displacement": ("sample", columns["displacement"], {"units": "um"}),
-        "shear_stress": ("sample", stress, {"units": units}),
+def _name_displacement(dataset: xr.Dataset) -> xr.Dataset:
+    """Rename the times of a catalogue whose record contains displacement in place of time."""
+    words = {
+        "time": "displacement at which the event begins",
+        "duration": "displacement during the event",
+        "interval": "displacement since the event before began",
     }
-    return xr.Dataset(data)
+    for name, text in words.items():
+        dataset[name].attrs["long_name"] = text
+        dataset[f"{name}_error"].attrs["long_name"] = f"error estimate of {text}"
+    return dataset.rename({"time": "displacement", "time_error": "displacement_error"})
 
 
 def _find_stress_sign(stress: np.ndarray, stated_sign: int | None) -> float:

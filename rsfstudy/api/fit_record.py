@@ -6,7 +6,6 @@ The main function is ``fit``. The function checks the arguments, builds a study 
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from numbers import Real
@@ -16,6 +15,12 @@ import numpy as np
 import xarray as xr
 
 from rsfstudy.api import study_runs
+from rsfstudy.api.record_checks import (
+    check_displacement_is_not_slip,
+    check_displacement_was_not_reset,
+    check_normal_stress_changes_for_alpha,
+    check_step_can_be_fitted,
+)
 from rsfstudy.axes import Axis
 from rsfstudy.defaults import FIT_EVALUATION_BUDGET as BUDGET
 from rsfstudy.error_boundary import error_boundary
@@ -25,11 +30,9 @@ from rsfstudy.fitting import (
     MEAN,
     TRAILING_MEAN,
     FitWindow,
-    LoadingStep,
     Record,
     check_free_parameters,
     compute_weighted_mean,
-    noise_variance,
     parameters_of_law,
 )
 from rsfstudy.measures import Fit
@@ -63,15 +66,6 @@ STIFFNESS_FROM_RECORD = "from record"
 _SLIP_DISTANCE_GUESS_OVER_DISPLACEMENT = 0.05
 #: Maximum value of the argument ``windows``.
 _MAX_FIT_WINDOW_COUNT = 1000
-#: A decrease of the load point displacement between two rows is a reset to zero if the decrease
-#: exceeds three limits: a multiple of the noise of displacement, a multiple of the changes between
-#: the neighbouring rows, and a fraction of the range of displacement. The noise is estimated only
-#: if the record has more than 20 rows.
-(
-    _MIN_DISPLACEMENT_RESET_OVER_NOISE,
-    _MIN_DISPLACEMENT_RESET_OVER_EXTENT,
-    _MIN_ROWS_FOR_NOISE_ESTIMATE,
-) = 10.0, 0.01, 20
 #: Length of the shortest window of a fit, as a fraction of the load point displacement after a
 #: step.
 _MIN_WINDOW_LENGTH_OVER_FULL_LENGTH = 0.5
@@ -158,7 +152,8 @@ def fit(
     averaging : quantity, optional
         Time over which the data logger averaged friction around each row, such as "1 s", or a
         number in s. Use "trailing 1 s" if the average ends at the row. The same average is applied
-        to the model. By default, the fit assumes that friction was not averaged.
+        to the model. By default, the fit applies the filter with which `read_record` filtered the
+        record, or assumes that friction was not averaged.
     low_pass : str, optional
         Low-pass filter that was applied to friction, with its corner frequency: "first_order 2 Hz",
         "butterworth_2 2 Hz" or "butterworth_4 2 Hz". The same filter is applied to the model. By
@@ -277,12 +272,14 @@ def fit(
     if "alpha" in scene:
         scene = {"normal_stress": "imposed", **scene}
     if "alpha" in free:
-        _check_normal_stress_changes_for_alpha(records, loading, numbers)
+        check_normal_stress_changes_for_alpha(records, loading, numbers)
         scene = {"normal_stress": "imposed", **scene}
     ratio, machine, stiffness_error = _initial_stiffness(rig, stiffness, free, records)
     if machine:
         _check_normal_stress_is_compressive(records, numbers)
         ratio = machine / FitWindow(records[0], numbers[0]).mean_normal_stress_before_step
+    if "stiffness" not in free:
+        check_displacement_is_not_slip(records, numbers, ratio, machine)
     first = _initial_scene(laws, scene, ratio * guess)
     sought = _free_parameters(free, laws, first)
     there = tuple((one.name, n) for one in records for n in numbers if n <= len(one.loading_steps))
@@ -297,7 +294,7 @@ def fit(
         after=_to_micrometres("after", after),
         noise=noise,
         loading=loading,
-        filter=_describe_filter(averaging, low_pass),
+        filter=_find_common_filter(records, _describe_filter(averaging, low_pass)),
         posterior=posterior,
         machine_stiffness=machine,
         stiffness_relative_stderr=stiffness_error,
@@ -329,9 +326,11 @@ def fit(
         plot="fits",
         accuracy=Accuracy(rtol, budget, engine=chosen),
     )
-    return study_runs.run(
+    fits = study_runs.run(
         study, workers=workers, output=None, progress=False, keep_going=True, command=command
     )
+    processing = [f"{one.name}: {text}" for one in records for text in one.processing]
+    return fits.assign_attrs({"processing": "; ".join(processing)} if processing else {})
 
 
 def _select_step_numbers(records: Sequence[Record], steps: Sequence[int]) -> tuple[int, ...]:
@@ -346,7 +345,7 @@ def _select_step_numbers(records: Sequence[Record], steps: Sequence[int]) -> tup
         move forward.
     """
     for record in records:
-        _check_displacement_was_not_reset(record)
+        check_displacement_was_not_reset(record)
     count = max(len(one.loading_steps) for one in records)
     if not count:
         remedy = "State them: record.with_steps([(begins, ends, before, after)])."
@@ -359,76 +358,8 @@ def _select_step_numbers(records: Sequence[Record], steps: Sequence[int]) -> tup
             raise InvalidValue("steps", number, rule)
         for record in records:
             for step in record.loading_steps[number - 1 : number]:
-                _check_step_can_be_fitted(record, number, step)
+                check_step_can_be_fitted(record, number, step)
     return numbers
-
-
-def _check_displacement_was_not_reset(record: Record) -> None:
-    """Raise ``InvalidValue`` if the load point displacement was reset to zero.
-
-    A reset appears as a large decrease of displacement between two successive rows.
-    """
-    time, moved = record.time, record.columns["displacement"]
-    jumps = np.diff(moved)
-    row = int(np.argmin(jumps))
-    noise = (
-        math.sqrt(noise_variance(time, moved)) if len(time) > _MIN_ROWS_FOR_NOISE_ESTIMATE else 0.0
-    )
-    beside = np.abs(np.delete(jumps[max(row - 5, 0) : row + 6], min(row, 5))).max(initial=0.0)
-    back = -float(jumps[row]) > max(
-        _MIN_DISPLACEMENT_RESET_OVER_NOISE * beside,
-        _MIN_DISPLACEMENT_RESET_OVER_NOISE * noise,
-        _MIN_DISPLACEMENT_RESET_OVER_EXTENT * np.ptp(moved),
-    )
-    if record.specified_steps is None and back:
-        rule = f"falls back between two rows at {time[row + 1]:g} s in {record.name}, as a load "
-        rule += "point does that is set to zero again"
-        remedy = f"Fit its parts, as in record.window({time[0]:g}, {time[row]:g}), or add the "
-        remedy += "offset to the later rows."
-        raise InvalidValue("displacement", f"{jumps[row]:.4g} um", rule, remedy=remedy)
-
-
-def _check_step_can_be_fitted(record: Record, step_number: int, step: LoadingStep) -> None:
-    """Raise ``InvalidValue`` if a step cannot be fitted.
-
-    A step cannot be fitted if it is outside the record, or if the load point does not move forward.
-    """
-    time, moved = record.time, record.columns["displacement"]
-    if not time[0] < step.start <= step.end < time[-1]:
-        rule = f"is stated outside of {record.name}, {time[0]:g} to {time[-1]:g} s"
-        remedy = "State steps in s, by the clock of the record: record.with_steps([...])."
-        raise InvalidValue(f"step {step_number}", tuple(step), rule, remedy=remedy)
-    if min(step.velocity_before, step.velocity_after) < 0.0 or not moved[-1] > np.interp(
-        step.end, time, moved
-    ):
-        told = (
-            f"{step.velocity_before:.4g} um/s before step {step_number}, "
-            f"{step.velocity_after:.4g} um/s after it"
-        )
-        rule = "must grow: a load point moves forward"
-        remedy = "Reverse its sign, or say which column is which: --columns (columns=)."
-        raise InvalidValue("displacement", told, rule, remedy=remedy)
-
-
-def _check_normal_stress_changes_for_alpha(
-    records: Sequence[Record], loading_kind: str, step_numbers: Sequence[int]
-) -> None:
-    """Raise ``InvalidValue`` if ``alpha`` cannot be fitted.
-
-    The parameter ``alpha`` cannot be fitted at constant normal stress.
-    """
-    for record in records:
-        stress = record.columns.get("normal_stress", np.zeros(1))
-        steps = [
-            record.loading_steps[n - 1] for n in step_numbers if n <= len(record.loading_steps)
-        ]
-        by_steps = loading_kind == "steps" and any(step.stress_ratio != 1.0 for step in steps)
-        if not by_steps and not (loading_kind == "recorded" and np.ptp(stress) > 0.0):
-            rule = "needs a normal stress that changes: "
-            rule += f"that of {record.name} has no step among those that are fitted"
-            remedy = "Leave alpha out, name a step of normal stress (steps=), or follow the "
-            remedy += "recorded normal stress with --loading recorded (loading=)."
-            raise InvalidValue("free", "alpha", rule, remedy=remedy)
 
 
 def _guess_slip_distance(
@@ -627,6 +558,23 @@ def _describe_filter(averaging: Any, low_pass: str) -> str:
     else:
         return ""
     return f"{kind} {seconds!r}"
+
+
+def _find_common_filter(records: Sequence[Record], stated_filter: str) -> str:
+    """Return the filter that was applied to the friction of all records.
+
+    A filter that was applied while a record was read is part of the record.
+    """
+    filters = {record.filter for record in records if record.filter}
+    if not filters:
+        return stated_filter
+    if stated_filter:
+        remedy = "Leave averaging= and low_pass= out, or read the record without filter=."
+        raise InvalidValue("filter", stated_filter, "follows another filter", remedy=remedy)
+    if len({record.filter for record in records}) > 1:
+        remedy = "Read all records with the same filter=, or fit them separately."
+        raise InvalidValue("filter", sorted(filters), "differs between the records", remedy=remedy)
+    return filters.pop()
 
 
 def _to_micrometres(argument_name: str, value: Any) -> float:

@@ -11,9 +11,9 @@ from dataclasses import MISSING, fields
 from pathlib import Path
 from typing import Any
 
-from rsfstudy import Rig, Study, history, read_protocol, read_table
+from rsfstudy import Rig, Study, history, read_protocol
 from rsfstudy.errors import InvalidValue
-from rsfstudy.rig import RIG_QUANTITIES, expand_range, parse_number
+from rsfstudy.rig import RIG_QUANTITIES, expand_range, has_time_column, parse_number
 from rsfstudy.slider import UserLoading
 
 _FLAG_VALUE_BY_WORD = {"true": True, "yes": True, "false": False, "no": False}
@@ -115,8 +115,8 @@ def read_loading_file(path: Path, rig: Rig | None) -> UserLoading:
     Parameters
     ----------
     path : Path
-        CSV file. A table with the column ``time`` is a record of the load point. Any other table is
-        a protocol.
+        File. A table with a column of times is a record of the load point. Any other table is a
+        protocol.
     rig : Rig or None
         Rig that defines the units of the file.
 
@@ -125,7 +125,7 @@ def read_loading_file(path: Path, rig: Rig | None) -> UserLoading:
     UserLoading
         Loading. The name of the loading is the name of the file.
     """
-    read = history if "time" in read_table(path) else read_protocol
+    read = history if has_time_column(path) else read_protocol
     return read(path, rig, name=path.stem)
 
 

@@ -372,7 +372,8 @@ columns_option = click.option(
     "--columns",
     metavar="NAME=HEADING,...",
     help="Columns of the record, for example 'time=t (s),displacement=lp (um),friction=mu'. Other "
-    "quantities are shear_stress and normal_stress. Raw values can be scaled, for example "
+    "quantities are slip, shear_stress and normal_stress. Columns can be selected by number, "
+    "for example 'time=1 (s)'. Raw values can be scaled, for example "
     "'lp (um) * 0.1 + 5'.  [default: recognised headings]",
 )
 normal_stress_option = click.option(

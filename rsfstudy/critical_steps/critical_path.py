@@ -25,7 +25,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator, Sequence
-from functools import cache
+from functools import cache, lru_cache
 from typing import Any, NamedTuple
 
 from rsfstudy.motion import (
@@ -199,16 +199,8 @@ class CriticalPath(NamedTuple):
             Start of the path. The result is None if the path touches the instability norm from
             above, or if no start is found.
         """
-        above = rise(
-            "log_slip_rate",
-            self.log_slip_rate_at_instability_norm + _LOG_RATE_OFFSET_ABOVE_INSTABILITY_NORM,
-            terminal=True,
-            may_defer=True,
-        )
-        lost = fall("log_slip_rate", _MIN_LOG_SLIP_RATE, terminal=True, may_defer=True)
         specs = (
-            above,
-            lost,
+            *_end_events_of_path_search(self.log_slip_rate_at_instability_norm),
             rise(*crossing_quantity_and_level),
             fall(*crossing_quantity_and_level),
         )
@@ -347,6 +339,16 @@ class CriticalPath(NamedTuple):
             if fallen:
                 yield event
             fallen = fallen or event.kind is EventKind.FALL
+
+
+@lru_cache(maxsize=256)
+def _end_events_of_path_search(log_slip_rate_at_norm: float) -> tuple[EventSpecification, ...]:
+    """Return the events at which the search for the start of a path is abandoned."""
+    above_norm = log_slip_rate_at_norm + _LOG_RATE_OFFSET_ABOVE_INSTABILITY_NORM
+    return (
+        rise("log_slip_rate", above_norm, terminal=True, may_defer=True),
+        fall("log_slip_rate", _MIN_LOG_SLIP_RATE, terminal=True, may_defer=True),
+    )
 
 
 @cache

@@ -13,9 +13,9 @@ from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, replace
 
 from rsfstudy.critical_steps.critical_path import CriticalPath
-from rsfstudy.critical_steps.motion_after_step import stability_margin
 from rsfstudy.critical_steps.shooting_steps import LOCAL_TOLERANCE_OF_FIRST_ROOT, StepFamily
 from rsfstudy.critical_steps.slow_manifold_accuracy import slow_manifold_relative_error
+from rsfstudy.critical_steps.stability_after_step import stability_margin
 from rsfstudy.motion import MIN_LOCAL_TOLERANCE, Integrator
 
 #: Minimum error estimate of a critical step, divided by the requested relative accuracy. The

@@ -21,7 +21,7 @@ from typing import Any, ClassVar
 
 from scipy.optimize import toms748
 
-from rsfstudy.critical_steps import motion_after_step
+from rsfstudy.critical_steps import motion_after_step, stability_after_step
 from rsfstudy.critical_steps.critical_path_solution import (
     CriticalStepSizeEstimate,
     find_boundary_by_critical_path,
@@ -230,13 +230,13 @@ class CriticalStep(Measure):
             rate = 0.0 if self.of == "load_velocity_ratio" else steps.scene.load_velocity
             return outcome_if_norm_is_below_load_velocity(scene, rate)
         below = (
-            not motion_after_step.may_have_closed_orbits(scene)
-            or motion_after_step.stiffness_ratio_after_step(scene) < 1.0
+            not stability_after_step.may_have_closed_orbits(scene)
+            or stability_after_step.stiffness_ratio_after_step(scene) < 1.0
         )
         if (
             below
-            and motion_after_step.has_frictional_damping_only(scene)
-            and motion_after_step.is_neutrally_stable(
+            and stability_after_step.has_frictional_damping_only(scene)
+            and stability_after_step.is_neutrally_stable(
                 steps.scene_with_step(steps.max_size), integrator.result_tolerance(10.0)
             )
         ):

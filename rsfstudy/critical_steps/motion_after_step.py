@@ -16,10 +16,14 @@ from rsfstudy.critical_steps.monotone_approach_to_load_rate import (
     rises_monotonically_to_load_rate,
 )
 from rsfstudy.critical_steps.slow_manifold_accuracy import inertia_matters_below_norm
+from rsfstudy.critical_steps.stability_after_step import (
+    SteadySlidingWithMargin,
+    may_have_closed_orbits,
+    steady_sliding_with_margin,
+)
 from rsfstudy.motion import (
     EventKind,
     Integrator,
-    MotionStopped,
     approach_to_steady_state,
     initial_point,
     maximum,
@@ -27,22 +31,8 @@ from rsfstudy.motion import (
     rise,
     slow_manifold_point,
 )
-from rsfstudy.slider import (
-    RUPTURE_REGIME,
-    MotionPoint,
-    Scene,
-    SteadySliding,
-    critical_stiffness,
-    equations_without_mass,
-    linear_growth_rates,
-    steady_sliding,
-)
-from rsfstudy.status import Status
+from rsfstudy.slider import RUPTURE_REGIME, MotionPoint, Scene, equations_without_mass
 
-#: Smallest significant difference from neutral stability. The limit applies to the relative
-#: difference between the stiffness and the critical stiffness, and to the decay rate per D_c of
-#: slip.
-_NEUTRAL_STABILITY_MARGIN = 1e-9
 #: Largest amplitude of ln V for which linear theory predicts the growth of oscillations.
 _MAX_LINEAR_LOG_RATE_AMPLITUDE = 0.05
 #: Ratio of the size of the next orbit to the size of the present orbit if oscillations grow slowly,
@@ -50,7 +40,6 @@ _MAX_LINEAR_LOG_RATE_AMPLITUDE = 0.05
 #: between the two sizes may be missed. The ratio is reduced if the next orbit would exceed the
 #: instability norm.
 _LEAP_FACTOR, _MIN_LEAP_FACTOR = 1.3, 1.002
-
 #: Number of successive equal peaks after which a motion with several states is considered periodic.
 #: Close to an unstable limit cycle, the peaks would not remain equal.
 _REQUIRED_EQUAL_PEAKS_IN_A_ROW = 4
@@ -60,25 +49,8 @@ _ASSUMED_LOG_RATE_OVERSHOOT_OF_NORM = 1.0
 #: A motion has settled if its distance from steady sliding is less than this fraction of the
 #: largest distance from steady sliding during the motion.
 _SETTLING_TOLERANCE_OVER_MAX_DISTANCE = 1e-3
-
 _SLIP_RATE_PEAK_EVENT = maximum("log_slip_rate")
-
-
-@dataclass(frozen=True)
-class _SteadySlidingWithMargin(SteadySliding):
-    """Steady sliding at the load point velocity, and its stability margin.
-
-    At constant normal stress and critical stiffness, steady sliding is neutrally stable and every
-    orbit is closed. Gu et al. (1984) show this for the slip law, and Ranjith and Rice (1999) for
-    the slowness law. If steady sliding is neutrally stable, only numerical errors change the height
-    of the peaks.
-    """
-
-    stability_margin: float
-
-    @property
-    def is_stable(self) -> bool:
-        return self.stability_margin >= -_NEUTRAL_STABILITY_MARGIN
+_SETTLING_EVENT = approach_to_steady_state(_SETTLING_TOLERANCE_OVER_MAX_DISTANCE)
 
 
 @dataclass(frozen=True)
@@ -162,7 +134,7 @@ def compute_excess_over_instability_norm(scene: Scene, integrator: Integrator) -
     """
     if scene.log_load_velocity == -math.inf:
         return compute_peak_excess_over_instability_norm(scene, integrator)
-    steady = _steady_sliding_with_margin(scene)
+    steady = steady_sliding_with_margin(scene)
     norm, heavy = scene.log_instability_rate, inertia_matters_below_norm(scene, integrator)
     if (
         may_have_closed_orbits(scene)
@@ -178,142 +150,6 @@ def compute_excess_over_instability_norm(scene: Scene, integrator: Integrator) -
         reached = _slow_orbit_grows_to_norm(scene, steady, at, integrator, with_inertia=heavy)
     excess = _compute_peak_excess_of_orbit_over_norm(first, norm, with_inertia=heavy)
     return max(excess, 1e-12) if reached else min(excess, -1e-12)
-
-
-def has_frictional_damping_only(scene: Scene) -> bool:
-    """Return True if friction is the only source of damping.
-
-    The effective normal stress must also be constant, except for sudden changes by the loading.
-
-    Parameters
-    ----------
-    scene : Scene
-        Scene to test.
-
-    Returns
-    -------
-    bool
-        False if shear stress or pore pressure changes the effective normal stress, if the
-        temperature changes, or if waves radiate stress.
-    """
-    parts = scene.parts
-    varies = parts.normal_stress.depends_on_shear_stress or parts.fluid.effects
-    return not (varies or parts.temperature.unknowns) and not scene.dynamics.radiated_stress_slope(
-        0.0
-    )
-
-
-def may_have_closed_orbits(scene: Scene) -> bool:
-    """Return True if every orbit is closed at the critical stiffness.
-
-    Parameters
-    ----------
-    scene : Scene
-        Scene to test.
-
-    Returns
-    -------
-    bool
-        True if the law has closed orbits and friction is the only source of damping.
-    """
-    law = scene.parts.law
-    return (
-        law.has_closed_orbits and not law.depends_on_stress and has_frictional_damping_only(scene)
-    )
-
-
-def stiffness_ratio_after_step(scene: Scene) -> float:
-    """Return the stiffness ratio k/k_cr after a step.
-
-    If friction is the only source of damping, the critical stiffness at V_* is proportional to
-    normal stress.
-
-    Parameters
-    ----------
-    scene : Scene
-        Scene with the step.
-
-    Returns
-    -------
-    float
-        Ratio of the stiffness to the critical stiffness at V_* and at the normal stress after the
-        step.
-    """
-    return scene.stiffness_ratio / (1.0 + scene.imposed_normal_stress)
-
-
-def is_neutrally_stable(scene: Scene, tolerance: float) -> bool:
-    """Return True if growth and decay of perturbations are indistinguishable.
-
-    The stiffness must be close to the critical stiffness, both at V_* and at the load point
-    velocity. If friction is the only source of damping, the critical stiffness does not depend on
-    slip rate under most laws.
-
-    Parameters
-    ----------
-    scene : Scene
-        Scene with the step.
-    tolerance : float
-        Maximum relative difference from the critical stiffness.
-
-    Returns
-    -------
-    bool
-        True if growth and decay are indistinguishable. The result is False if the load point is
-        held. The result is also False if the stiffness is exactly critical and all orbits are
-        closed. In both cases, the stability of steady sliding is known without integration.
-    """
-    off = abs(stiffness_ratio_after_step(scene) - 1.0)
-    known = scene.log_load_velocity == -math.inf or (off == 0.0 and may_have_closed_orbits(scene))
-    close = has_frictional_damping_only(scene) and off < tolerance and not known
-    return close and abs(stability_margin(scene)) < tolerance
-
-
-def is_linearly_stable(scene: Scene) -> bool:
-    """Return True if steady sliding at the load point velocity is stable.
-
-    Parameters
-    ----------
-    scene : Scene
-        Scene with the load point velocity.
-
-    Returns
-    -------
-    bool
-        True if small perturbations do not grow, or if the load point is held.
-    """
-    return stability_margin(scene) >= -_NEUTRAL_STABILITY_MARGIN
-
-
-def stability_margin(scene: Scene) -> float:
-    """Compute the stability margin of steady sliding.
-
-    The margin is the relative excess of the stiffness over the critical stiffness at the load point
-    velocity.
-
-    Parameters
-    ----------
-    scene : Scene
-        Scene with the load point velocity.
-
-    Returns
-    -------
-    float
-        Margin :math:`k/k_{cr}(V_0) - 1`. The margin is infinite if steady sliding is stable at
-        every stiffness or if the load point is held. If steady sliding with several states is
-        stable below the critical stiffness, the margin is the absolute value of
-        :math:`k/k_{cr}(V_0) - 1`.
-
-    References
-    ----------
-    Rice, J. R., & Ruina, A. L. (1983). Stability of steady frictional slipping. J. Appl. Mech., 50,
-    343-349.
-    """
-    return (
-        math.inf
-        if scene.log_load_velocity == -math.inf
-        else _steady_sliding_with_margin(scene).stability_margin
-    )
 
 
 def _max_log_slip_rate_of_closed_orbit(scene: Scene, integrator: Integrator) -> float:
@@ -358,7 +194,7 @@ def _orbit_touching_norm_shrinks(scene: Scene, integrator: Integrator) -> bool:
 
 def _slow_orbit_grows_to_norm(
     scene: Scene,
-    steady_state: _SteadySlidingWithMargin,
+    steady_state: SteadySlidingWithMargin,
     start_point: MotionPoint,
     integrator: Integrator,
     *,
@@ -396,7 +232,7 @@ def _slow_orbit_grows_to_norm(
 
 def _follow_one_orbit(
     scene: Scene,
-    steady_state: _SteadySlidingWithMargin,
+    steady_state: SteadySlidingWithMargin,
     start_point: MotionPoint | None,
     integrator: Integrator,
     *,
@@ -407,17 +243,11 @@ def _follow_one_orbit(
     The integration also ends if the orbit grows too slowly to decide the outcome.
     """
     norm = scene.log_instability_rate
-    specs = (
-        [_SLIP_RATE_PEAK_EVENT]
-        if with_inertia
-        else [_SLIP_RATE_PEAK_EVENT, rise("log_slip_rate", norm)]
-    )
-    levels = build_events_testing_monotone_rise(scene) if steady_state.is_stable else []
-    specs += (
-        [approach_to_steady_state(_SETTLING_TOLERANCE_OVER_MAX_DISTANCE), *levels]
-        if steady_state.is_stable
-        else []
-    )
+    levels = build_events_testing_monotone_rise(scene)
+    if levels and not steady_state.is_stable:
+        levels = []
+    reaches_norm = [] if with_inertia else [rise("log_slip_rate", norm)]
+    specs = [_SLIP_RATE_PEAK_EVENT, *reaches_norm, _SETTLING_EVENT, *levels]
     planar, repeating = (
         scene.state_count == 1,
         _CycleRepetitionDetector(scene, steady_state, integrator),
@@ -443,7 +273,7 @@ def _follow_one_orbit(
             return _OrbitOutcome(
                 (*peaks, norm + _ASSUMED_LOG_RATE_OVERSHOOT_OF_NORM), reached_norm=True
             )
-        elif event.kind is EventKind.SETTLED:
+        elif event.kind is EventKind.SETTLED and steady_state.is_stable:
             return _OrbitOutcome(tuple(peaks), reached_norm=False, initial_log_slip_rate=at_start)
         elif event.kind is EventKind.MAXIMUM:
             peaks.append(top)
@@ -471,7 +301,7 @@ class _CycleRepetitionDetector:
     """
 
     def __init__(
-        self, scene: Scene, steady_state: _SteadySlidingWithMargin, integrator: Integrator
+        self, scene: Scene, steady_state: SteadySlidingWithMargin, integrator: Integrator
     ) -> None:
         self._steady, self._tolerance = steady_state, 30.0 * integrator.local_tolerance * scene.a
         self._previous, self._repeat_count = (math.inf,) * (1 + scene.state_count), 0
@@ -503,7 +333,7 @@ class _CycleRepetitionDetector:
 
 
 def _peaks_have_stopped_growing(
-    peaks: Sequence[float], steady_state: _SteadySlidingWithMargin, integrator: Integrator
+    peaks: Sequence[float], steady_state: SteadySlidingWithMargin, integrator: Integrator
 ) -> bool:
     """Return True if the last peak is not higher than the previous peak.
 
@@ -531,45 +361,4 @@ def _compute_peak_excess_of_orbit_over_norm(
         return orbit.log_slip_rate_peaks[1] - orbit.log_slip_rate_peaks[0]
     return (
         orbit.log_slip_rate_peaks[0] - log_slip_rate_at_norm if orbit.log_slip_rate_peaks else -1.0
-    )
-
-
-def _steady_sliding_with_margin(scene: Scene) -> _SteadySlidingWithMargin:
-    """Compute steady sliding at the load point velocity of the scene.
-
-    Raises
-    ------
-    MotionStopped
-        If sliding cannot be steady at the load point velocity.
-    """
-    load = scene.log_load_velocity
-    sliding = steady_sliding(scene, load)
-    if sliding is None:
-        raise MotionStopped(
-            Status.NO_STEADY_STATE,
-            f"no steady state exists at V_0/V_* = {math.exp(load):.3g}: phi < atan(mu_ss)",
-        )
-    law = scene.parts.law
-    at_every_rate = may_have_closed_orbits(scene) and law.scale_free and not law.regularised
-    if at_every_rate and not scene.has_mass and not scene.parts.loading.unknowns:
-        margin = stiffness_ratio_after_step(scene) - 1.0
-    else:
-        critical = critical_stiffness(scene, load)
-        margin = scene.stiffness / critical - 1.0 if critical > 0.0 else math.inf
-    if (
-        margin < -_NEUTRAL_STABILITY_MARGIN
-        and scene.state_count > 1
-        and _is_stable_to_small_perturbations(scene)
-    ):
-        margin = -margin
-    return _SteadySlidingWithMargin(**vars(sliding), stability_margin=margin)
-
-
-def _is_stable_to_small_perturbations(scene: Scene) -> bool:
-    """Return True if small perturbations of steady sliding decay.
-
-    With several states, perturbations may decay below the critical stiffness.
-    """
-    return bool(
-        linear_growth_rates(scene, scene.log_load_velocity)[0].real < -_NEUTRAL_STABILITY_MARGIN
     )

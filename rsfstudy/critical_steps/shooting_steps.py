@@ -17,7 +17,7 @@ import numpy as np
 from scipy.optimize import brentq
 
 from rsfstudy.critical_steps.critical_path import CriticalPath
-from rsfstudy.critical_steps.motion_after_step import is_linearly_stable
+from rsfstudy.critical_steps.stability_after_step import is_linearly_stable
 from rsfstudy.motion import Integrator
 from rsfstudy.slider import Scene, quasi_static_log_slip_rate
 
@@ -66,6 +66,8 @@ class StepFamily:
         search, and the largest size does not exceed the smallest size.
     """
 
+    #: Name of the scene field that contains the step.
+    stepped_field: ClassVar[str]
     #: Name of the critical step in the results.
     critical_output_name: ClassVar[str]
     #: Names of additional results for the critical step.
@@ -75,6 +77,7 @@ class StepFamily:
 
     def __init__(self, scene: Scene, sign: int) -> None:
         self.scene, self.sign = scene, sign
+        self._scenes_by_step_size: dict[float, Scene] = {}
         self.max_size = self._compute_max_size() * (1.0 - 1e-9)
         self.min_size = min(MIN_STEP_SIZE, _MIN_SIZE_FRACTION * self.max_size)
 
@@ -89,9 +92,14 @@ class StepFamily:
         Returns
         -------
         Scene
-            Scene with the step.
+            Scene with the step. Repeated calls for the same size return the same scene.
         """
-        raise TypeError(f"{type(self).__name__} steps nothing")
+        scene = self._scenes_by_step_size.get(step_size)
+        if scene is None:
+            value = self.step_size_to_field_value(step_size)
+            scene = self.scene.with_(**{self.stepped_field: value})
+            self._scenes_by_step_size[step_size] = scene
+        return scene
 
     def step_size_to_field_value(self, step_size: float) -> float:
         """Return the value of the scene field for a step of a given size.

@@ -11,12 +11,7 @@ import numpy as np
 from scipy.optimize import brentq
 
 from rsfstudy.critical_steps.critical_path import CriticalPath
-from rsfstudy.critical_steps.motion_after_step import (
-    is_linearly_stable,
-    may_have_closed_orbits,
-    motion_reaches_norm,
-    stability_margin,
-)
+from rsfstudy.critical_steps.motion_after_step import motion_reaches_norm
 from rsfstudy.critical_steps.shooting_steps import (
     LOCAL_TOLERANCE_OF_FIRST_ROOT,
     LOG_RATE_EXTENSION_OF_MAX_STEP_FOR_INERTIA,
@@ -25,6 +20,11 @@ from rsfstudy.critical_steps.shooting_steps import (
     ShootingStepFamily,
     StepFamily,
     slip_lag_due_to_inertia,
+)
+from rsfstudy.critical_steps.stability_after_step import (
+    is_linearly_stable,
+    may_have_closed_orbits,
+    stability_margin,
 )
 from rsfstudy.motion import Integrator, MotionStopped, slow_manifold_point
 from rsfstudy.slider import (
@@ -66,15 +66,9 @@ class LoadVelocityStepFamily(ShootingStepFamily):
         Direction of the steps, 1 for upward and -1 for downward.
     """
 
+    stepped_field = "load_velocity_ratio"
     critical_output_name = "critical_velocity_ratio"
     sign_of_triggering_steps = 1
-
-    def scene_with_step(self, step_size: float) -> Scene:
-        """Return the scene with a step of a given size.
-
-        See ``StepFamily.scene_with_step``.
-        """
-        return self.scene.with_(load_velocity_ratio=self.step_size_to_field_value(step_size))
 
     def build_critical_path_factory(
         self, integrator: Integrator
@@ -141,6 +135,7 @@ class DisplacementStepFamily(StepFamily):
         Direction of the steps, 1 for upward and -1 for downward.
     """
 
+    stepped_field = "displacement_step"
     critical_output_name = "critical_displacement"
     extra_output_names = ("slip_rate_after_step", "slip_rate_after_closed_form_step")
 
@@ -148,13 +143,6 @@ class DisplacementStepFamily(StepFamily):
         if scene.load_velocity_ratio is None:
             scene = scene.with_(load_velocity_ratio=0.0)
         super().__init__(scene, sign)
-
-    def scene_with_step(self, step_size: float) -> Scene:
-        """Return the scene with a step of a given size.
-
-        See ``StepFamily.scene_with_step``.
-        """
-        return self.scene.with_(displacement_step=self.step_size_to_field_value(step_size))
 
     def step_size_to_field_value(self, step_size: float) -> float:
         """Return the displacement of a step of a given size, in units of D_c.
@@ -276,6 +264,7 @@ class NormalStressStepFamily(ShootingStepFamily):
         Direction of the steps, 1 for upward and -1 for downward.
     """
 
+    stepped_field = "normal_stress_step"
     critical_output_name = "critical_normal_stress_step"
     sign_of_triggering_steps = -1
     extra_output_names = ("slip_rate_after_step",)
@@ -288,13 +277,6 @@ class NormalStressStepFamily(ShootingStepFamily):
         super().__init__(scene, sign)
         # The change of ln V is larger than the size by a factor of mu_*/a.
         self.min_size = min(self.min_size, MIN_STEP_SIZE * scene.a / scene.mu_star)
-
-    def scene_with_step(self, step_size: float) -> Scene:
-        """Return the scene with a step of a given size.
-
-        See ``StepFamily.scene_with_step``.
-        """
-        return self.scene.with_(normal_stress_step=self.step_size_to_field_value(step_size))
 
     def step_size_to_field_value(self, step_size: float) -> float:
         """Return the change of normal stress of a step, in units of sigma_*.

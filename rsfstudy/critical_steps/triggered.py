@@ -10,7 +10,8 @@ from rsfstudy.critical_steps.loading_checks import (
     check_loading_is_single_step,
     outcome_if_norm_is_below_load_velocity,
 )
-from rsfstudy.critical_steps.motion_after_step import is_neutrally_stable, motion_reaches_norm
+from rsfstudy.critical_steps.motion_after_step import motion_reaches_norm
+from rsfstudy.critical_steps.stability_after_step import is_neutrally_stable
 from rsfstudy.error_boundary import wrap_methods_in_error_boundary
 from rsfstudy.measure_base import Measure, Outcome
 from rsfstudy.motion import Integrator

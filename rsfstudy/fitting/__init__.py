@@ -15,13 +15,14 @@ from rsfstudy._lazy_exports import build_lazy_export_functions
 if TYPE_CHECKING:
     from rsfstudy.fitting.drop_detection import MIN_SAMPLES, Detection
     from rsfstudy.fitting.drop_measurements import read_drops
-    from rsfstudy.fitting.filters import LOW_PASS_ORDERS, MEAN, TRAILING_MEAN, Filter
+    from rsfstudy.fitting.filters import FILTER_KINDS, LOW_PASS_ORDERS, MEAN, TRAILING_MEAN, Filter
     from rsfstudy.fitting.fit_measure import Fit
     from rsfstudy.fitting.fit_validity_checks import describe_whiteness
     from rsfstudy.fitting.fit_window import FitWindow
     from rsfstudy.fitting.hold_table import build_hold_table
     from rsfstudy.fitting.holds import MAX_HOLD_OVER_SLIDING_VELOCITY
     from rsfstudy.fitting.joint_model import fitted_fields, split_window_number, strip_window_number
+    from rsfstudy.fitting.load_point_check import displacement_is_slip
     from rsfstudy.fitting.local_regression import compute_weighted_mean
     from rsfstudy.fitting.record import RECORD_COLUMNS, Record
     from rsfstudy.fitting.stress_drop_fits import EVENT_QUANTITIES, EventNumbers
@@ -39,11 +40,18 @@ else:
         {
             "fitting.drop_detection": ("Detection", "MIN_SAMPLES"),
             "fitting.drop_measurements": ("read_drops",),
-            "fitting.filters": ("Filter", "LOW_PASS_ORDERS", "MEAN", "TRAILING_MEAN"),
+            "fitting.filters": (
+                "FILTER_KINDS",
+                "Filter",
+                "LOW_PASS_ORDERS",
+                "MEAN",
+                "TRAILING_MEAN",
+            ),
             "fitting.fit_measure": ("Fit",),
             "fitting.hold_table": ("build_hold_table",),
             "fitting.holds": ("MAX_HOLD_OVER_SLIDING_VELOCITY",),
             "fitting.joint_model": ("fitted_fields", "split_window_number", "strip_window_number"),
+            "fitting.load_point_check": ("displacement_is_slip",),
             "fitting.local_regression": ("compute_weighted_mean",),
             "fitting.record": ("RECORD_COLUMNS", "Record"),
             "fitting.stress_drop_fits": ("EVENT_QUANTITIES", "EventNumbers"),
@@ -64,6 +72,7 @@ __all__ = [
     "Detection",
     "EVENT_QUANTITIES",
     "EventNumbers",
+    "FILTER_KINDS",
     "Filter",
     "Fit",
     "FitWindow",
@@ -81,6 +90,7 @@ __all__ = [
     "check_free_parameters",
     "compute_weighted_mean",
     "describe_whiteness",
+    "displacement_is_slip",
     "fitted_fields",
     "noise_variance",
     "parameters_of_law",

@@ -73,11 +73,11 @@ class AveragedNoiseCorrelation:
 
 
 def apply_running_mean(
-    time: np.ndarray, sample_columns: np.ndarray, averaging_time: float
+    time: np.ndarray, sample_columns: np.ndarray, averaging_time: float, centre: float = 0.0
 ) -> np.ndarray:
     """Compute the running mean of each column of an array.
 
-    The averaging time is centred at each row. The function interpolates the columns linearly
+    The function interpolates the columns linearly
     between the rows, and assumes that they are constant before the first row and after the last
     row.
 
@@ -89,6 +89,8 @@ def apply_running_mean(
         Array whose columns are averaged.
     averaging_time : float
         Averaging time in s.
+    centre : float, default: 0.0
+        Time in s from a row to the centre of its averaging time.
 
     Returns
     -------
@@ -101,6 +103,6 @@ def apply_running_mean(
     sums = np.concatenate([np.zeros((1, sample_columns.shape[1])), np.cumsum(pieces, axis=0)])
     ends = [
         np.column_stack([np.interp(time + side, at, column) for column in sums.T])
-        for side in (0.5 * averaging_time, -0.5 * averaging_time)
+        for side in (centre + 0.5 * averaging_time, centre - 0.5 * averaging_time)
     ]
     return np.asarray((ends[0] - ends[1]) / averaging_time)

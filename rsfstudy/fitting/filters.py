@@ -14,6 +14,7 @@ import numpy as np
 from scipy.signal import butter, sosfilt, sosfilt_zi
 
 from rsfstudy.errors import InvalidValue
+from rsfstudy.fitting.averaged_noise_correlation import apply_running_mean
 
 #: Names of a running mean centred at each row, and of a running mean that ends at each row.
 MEAN, TRAILING_MEAN = "mean", "trailing_mean"
@@ -31,6 +32,9 @@ FILTER_KINDS = (MEAN, TRAILING_MEAN, *LOW_PASS_ORDERS)
     _FILTER_SETTLING_PERIODS,
     _MAX_FILTER_GRID_POINTS,
 ) = 8, 60, 3.0, 400_000
+#: Settings for filtering recorded rows by a low-pass filter: the smallest number of points per
+#: period of the corner frequency, and the largest number of points.
+_ROW_POINTS_PER_CORNER_PERIOD, _MAX_ROW_POINTS = 20, 20_000_000
 
 
 @dataclass(frozen=True)
@@ -143,6 +147,81 @@ class Filter:
         # Friction is assumed to be constant before the first row.
         begin = sosfilt_zi(sections) * samples[0]
         return np.asarray(np.interp(time, at, sosfilt(sections, samples, zi=begin)[0]))
+
+    def complete_rows(self, time: np.ndarray) -> slice:
+        """Return the rows whose averaging time lies within the record.
+
+        Parameters
+        ----------
+        time : ndarray, shape (rows,)
+            Times of the rows in s.
+
+        Returns
+        -------
+        slice
+            Rows with a complete running mean. For low-pass filters, all rows.
+
+        Raises
+        ------
+        InvalidValue
+            If no row has a complete averaging time.
+        """
+        if self.kind in LOW_PASS_ORDERS:
+            return slice(0, len(time))
+        before, after = self._averaging_times()
+        first = int(np.searchsorted(time, time[0] + before))
+        last = int(np.searchsorted(time, time[-1] - after, side="right"))
+        if first >= last:
+            rule = f"averages over more than the record, {time[-1] - time[0]:g} s"
+            raise InvalidValue("filter", f"{self.kind} {self.size:g} s", rule)
+        return slice(first, last)
+
+    def filter_rows(self, time: np.ndarray, values: np.ndarray) -> np.ndarray:
+        """Apply the filter to recorded rows.
+
+        Parameters
+        ----------
+        time : ndarray, shape (rows,)
+            Times of the rows in s, in increasing order.
+        values : ndarray, shape (rows,)
+            Recorded values. The values are linear between the rows.
+
+        Returns
+        -------
+        ndarray, shape (rows,)
+            Filtered values. Running means are correct in `complete_rows`.
+
+        Raises
+        ------
+        InvalidValue
+            If a low-pass filter passes all frequencies that the rows resolve, or needs too many
+            points.
+        """
+        if self.kind not in LOW_PASS_ORDERS:
+            centre = 0.0 if self.kind == MEAN else -0.5 * self.size
+            # The deviations from the mean have smaller rounding errors.
+            level = values.mean()
+            deviations = (values - level)[:, None]
+            return np.asarray(level + apply_running_mean(time, deviations, self.size, centre)[:, 0])
+        interval = float(np.median(np.diff(time)))
+        about = f"{self.kind} {self.size:g} Hz"
+        if not self.size * interval < 0.5:
+            rule = f"passes all frequencies below {0.5 / interval:g} Hz, which the rows resolve"
+            raise InvalidValue("filter", about, rule, remedy="Lower the corner frequency.")
+        step = interval / max(math.ceil(_ROW_POINTS_PER_CORNER_PERIOD * self.size * interval), 1)
+        if not (time[-1] - time[0]) / step < _MAX_ROW_POINTS:
+            rule = f"needs more than {_MAX_ROW_POINTS:,} points, because sampling is uneven"
+            raise InvalidValue("filter", about, rule, remedy="Use a running mean: 'mean 1 s'.")
+        at = np.arange(time[0], time[-1] + step, step)
+        samples = np.interp(at, time, values)
+        sections = butter(LOW_PASS_ORDERS[self.kind], self.size, fs=1.0 / step, output="sos")
+        # The values are assumed to be constant before the first row.
+        begin = sosfilt_zi(sections) * samples[0]
+        return np.asarray(np.interp(time, at, sosfilt(sections, samples, zi=begin)[0]))
+
+    def _averaging_times(self) -> tuple[float, float]:
+        """Return the averaging times in s before and after a row."""
+        return (0.5 * self.size, 0.5 * self.size) if self.kind == MEAN else (self.size, 0.0)
 
     def _running_mean_time_offsets(self, time: np.ndarray) -> np.ndarray:
         """Return the time offsets of the points in a running mean.

@@ -63,6 +63,11 @@ class Record:
         Name of the record in results. The name must be a valid Python identifier.
     specified_steps : tuple of LoadingStep, optional
         Steps that replace the detected steps. By default, the steps are detected.
+    processing : tuple of str, optional
+        Descriptions of the selections and filters that were applied to the rows.
+    filter : str, default: ""
+        Filter that was applied to friction, in the form of ``Filter.parse``. A fit applies the same
+        filter to the model.
 
     Raises
     ------
@@ -91,6 +96,8 @@ class Record:
     columns: dict[str, np.ndarray]
     name: str = "record"
     specified_steps: tuple[LoadingStep, ...] | None = None
+    processing: tuple[str, ...] = ()
+    filter: str = ""
 
     def __post_init__(self) -> None:
         """Validate the name and the columns."""
@@ -346,7 +353,8 @@ class Record:
 
     def _build_dataset_attributes(self, title: str) -> dict[str, str]:
         """Return the global attributes of the dataset."""
-        return {"title": f"{title}: {self.name}", "Conventions": "CF-1.11"}
+        about = {"title": f"{title}: {self.name}", "Conventions": "CF-1.11"}
+        return about | ({"processing": "; ".join(self.processing)} if self.processing else {})
 
 
 def _parse_loading_step(step_fields: Sequence[float]) -> LoadingStep:

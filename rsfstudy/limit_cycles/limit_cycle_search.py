@@ -244,9 +244,8 @@ class LimitCycleSearch:
         The cycles have converged if the derivatives of the return map predict a sufficiently small
         change of the next cycle, or if the last two cycles agree.
         """
-        allowed = [
-            self._integrator.result_tolerance(0.3) * abs(number) for number in self._image[2:]
-        ]
+        tolerance = self._integrator.result_tolerance(0.3)
+        allowed = [tolerance * abs(number) for number in self._image[2:]]
         if (
             self._has_derivatives
             and self._contraction_ratio_per_cycle < _MAX_CONTRACTION

@@ -3,7 +3,7 @@
 The module defines the fields of the motion state and the columns of the tables. A kink is a
 boundary between two loading segments at which the loading rate changes and the stress does not
 jump. The fields of ``MOTION_STATE_DTYPE`` are written by the following functions. Functions without
-a module name belong to ``motion_loop``.
+a module name belong to ``motion_loop``, ``regime_starts`` or ``step_ends``.
 
 ========================================  =====================================================
 Fields                                    Written by
@@ -42,11 +42,11 @@ steps                                     step_integration.take_step
 evaluations_slow, evaluations_fast        workspace.count_evaluations, steppers.scipy
 jacobians                                 steppers.scipy
 target_time                               truncate_step_at_end_of_regime_or_segment,
-                                          step_events.record_requested_samples
+                                          step_samples.record_requested_samples
 event_rows, recorded_rows                 step_events.append_event_row,
-                                          step_events.append_recorded_row,
+                                          step_samples.append_recorded_row,
                                           advance_motion (set to 0 in each call)
-samples_taken                             step_events.record_requested_samples
+samples_taken                             step_samples.record_requested_samples
 must_report                               integrate_one_regime (at a kink), advance_motion (cleared)
 termination, final_normal_stress          is_step_end_valid (if may_terminate is set)
 ========================================  =====================================================

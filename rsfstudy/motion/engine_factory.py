@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import importlib
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from functools import cache
 from typing import TYPE_CHECKING, Any
 
@@ -41,7 +41,7 @@ def check_engine_is_usable(name: str) -> None:
 
 
 def create_stepper(
-    engine_name: str, equations_by_regime: Any, method_by_regime: Mapping[str, str]
+    engine_name: str, equations_by_regime: Iterable[Any], method_by_regime: Mapping[str, str]
 ) -> Any:
     """Create the stepper of a motion.
 
@@ -49,8 +49,8 @@ def create_stepper(
     ----------
     engine_name : str
         Name of the engine.
-    equations_by_regime : tuple of Equations
-        Equations of each regime.
+    equations_by_regime : iterable of Equations
+        Equations of each regime. The compiled engine does not iterate over them.
     method_by_regime : mapping of str to str
         Name of the SciPy solver for each regime.
 
@@ -72,7 +72,7 @@ def create_stepper(
     )
     if stepper is None:
         raise unknown_engine_error(engine_name)
-    return stepper(equations_by_regime, method_by_regime)
+    return stepper(tuple(equations_by_regime), method_by_regime)
 
 
 @cache

@@ -203,9 +203,9 @@ def _specify_quantity_event(
     kind: EventKind, quantity: str, level: float = 0.0, *, terminal: bool, may_defer: bool
 ) -> EventSpecification:
     """Create an event specification, and accept former names of quantities."""
-    return EventSpecification(
-        kind, translate_former_member_name(MotionPoint, quantity), level, terminal, may_defer
-    )
+    if quantity not in MotionPoint._fields:
+        quantity = translate_former_member_name(MotionPoint, quantity)
+    return EventSpecification(kind, quantity, level, terminal, may_defer)
 
 
 @accept_former_keyword_names

@@ -19,6 +19,7 @@ from rsfstudy.motion.motion_driver import MotionDriver, get_motion_driver
 from rsfstudy.motion.recording import Recording
 from rsfstudy.motion.regime_switching import compute_switch_thresholds, inertia_matters_at
 from rsfstudy.motion.segment_chains import (
+    drop_settling_if_unstable,
     find_remaining_segment_chains,
     iterate_segment_start_events,
     list_segment_chains,
@@ -32,12 +33,7 @@ from rsfstudy.parts import (
     SEGMENT_END,
     SEGMENT_LOG_VELOCITY,
 )
-from rsfstudy.slider import (
-    Equations,
-    MotionPoint,
-    Numbers,
-    Scene,
-)
+from rsfstudy.slider import Equations, MotionPoint, Numbers, Scene
 
 
 @wrap_methods_in_error_boundary
@@ -372,6 +368,7 @@ class Integrator:
                 if acting.parts.loading.has_load_point_unknown
                 else None,
             )
+            motion = drop_settling_if_unstable(scene, motion)
             if before is None and end == math.inf:  # The motion consists of a single chain.
                 yield from motion
                 return

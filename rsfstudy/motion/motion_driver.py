@@ -9,20 +9,17 @@ compiled loop (``compiled.numba_backend.NumbaBackend``).
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
-from functools import lru_cache, partial
-from types import SimpleNamespace
+from collections.abc import Iterable, Iterator, Sequence
 from typing import Any
 
 import numpy as np
 
-from rsfstudy._deprecation import add_former_member_names
 from rsfstudy.motion import array_layout, workspace
 from rsfstudy.motion.engine_factory import create_stepper, import_compiled_engine
 from rsfstudy.motion.engines import COMPILED
-from rsfstudy.motion.events import Event, EventKind, EventSpecification
-from rsfstudy.motion.in_place_functions import build_in_place_functions
-from rsfstudy.motion.motion_loop import advance_motion
+from rsfstudy.motion.event_spec_table import pack_event_specifications, pack_point
+from rsfstudy.motion.events import Event, EventSpecification
+from rsfstudy.motion.python_backend import PythonBackend
 from rsfstudy.motion.recording import (
     FIRST_STATE_COLUMN,
     SAMPLES_PER_STEP,
@@ -34,7 +31,6 @@ from rsfstudy.motion.regime_switching import (
     SwitchThresholds,
     build_termination_error,
 )
-from rsfstudy.motion.step_events import BEFORE_JUMP, NO_EVENT, find_jump_side_of_event
 from rsfstudy.motion.work_meter import (
     MIN_LOCAL_TOLERANCE,
     TOLERANCE_FOR_SPECIFIED_MAX_STEP_LENGTHS,
@@ -55,178 +51,11 @@ from rsfstudy.status import Status
 
 #: Minimum number of rows of the event table, and number of rows of the recording table.
 _MIN_EVENT_ROWS, _RECORDING_ROWS = 64, 4096
-_EVENT_KIND_CODES = {
-    kind: array_layout.__dict__[kind.name]
-    for kind in EventKind
-    if kind.name in array_layout.__dict__
-}
-#: Array column of each attribute of ``MotionPoint``. The empty name is mapped to the first column.
-_POINT_COLUMN_BY_QUANTITY = {
-    name: column for column, name in enumerate(MotionPoint._fields[:-1])
-} | {"": 0}
-#: Kinds of events that are reported without a request. The negative event codes are indices from
-#: the end of this list.
-_KINDS_AND_SPECS_OF_UNREQUESTED_EVENTS = [
-    (k, None)
-    for k in (
-        EventKind.SEGMENT,
-        EventKind.SAMPLED,
-        EventKind.END,
-        EventKind.REGIME,
-        EventKind.START,
-    )
-]
 #: Constructor of named tuples that takes half the time of a normal constructor call.
 _make_named_tuple_without_checks = tuple.__new__
 _STEP_TOO_SHORT_TEXT = "a step would be shorter than the spacing of numbers around the clock"
 _EMPTY_RECORDING_TABLES = array_layout.RECORD_NEVER, np.empty(0), np.empty((0, FIRST_STATE_COLUMN))
 _EMPTY_KINK_TABLE_AND_ZERO_COUNT = np.empty((0, SEGMENT_STRESS_FALL + 1)), 0
-
-
-class PythonBackend:
-    """Backend that runs the event loop in plain Python.
-
-    The class ``compiled.numba_backend.NumbaBackend`` has the same methods.
-    """
-
-    def initial_state_values(self, field_values: tuple[tuple[str, float], ...]) -> dict[str, float]:
-        """Return the initial values of all fields of the motion state.
-
-        Parameters
-        ----------
-        field_values : tuple of (str, float)
-            Names and values of the fields with nonzero initial values.
-
-        Returns
-        -------
-        dict of str to float
-            Initial values.
-        """
-        return {
-            **dict.fromkeys(array_layout.MOTION_STATE_DTYPE.names or (), 0),
-            **dict(field_values),
-        }
-
-    def create_motion_state(
-        self, initial_state: dict[str, float], call_arguments: tuple[float, ...]
-    ) -> PythonMotionState:
-        """Create the state of a motion.
-
-        Parameters
-        ----------
-        initial_state : dict of str to float
-            Initial values of the fields, from ``initial_state_values``.
-        call_arguments : tuple of float
-            Values of the fields in ``array_layout.MOTION_STATE_FIELDS_SET_BY_CALLER``.
-
-        Returns
-        -------
-        PythonMotionState
-            State of the motion.
-        """
-        called = zip(array_layout.MOTION_STATE_FIELDS_SET_BY_CALLER, call_arguments, strict=True)
-        return PythonMotionState(**{**initial_state, **dict(called)})
-
-    def build_function_table(self, equations_by_regime: tuple[Equations, ...]) -> np.ndarray:
-        """Build the function table of the event loop.
-
-        Parameters
-        ----------
-        equations_by_regime : tuple of Equations
-            Equations of the slow manifold. If the scene has inertia, the second item contains the
-            inertial equations of motion in ruptures.
-
-        Returns
-        -------
-        ndarray of shape (2, FUNCTIONS_PER_REGIME)
-            Functions that fill arrays, one row per regime. Both rows of the table contain the force
-            balance function of the slow manifold.
-        """
-        rows = np.zeros((2, array_layout.FUNCTION_COUNT_PER_REGIME), dtype=object)
-        for row, system in zip(rows, equations_by_regime, strict=False):
-            row[:] = build_in_place_functions(system)
-        rows[array_layout.FAST_REGIME, -1] = rows[array_layout.SLOW_REGIME, -1]
-        return rows
-
-    def as_loop_arguments(self, *arrays: np.ndarray) -> Sequence[memoryview]:
-        """Convert arrays to arguments of the event loop.
-
-        Parameters
-        ----------
-        *arrays : ndarray
-            Arrays that the loop reads or fills.
-
-        Returns
-        -------
-        list of memoryview
-            Memory views of the arrays. In Python, reading items of a memory view is faster than
-            reading items of an array.
-        """
-        return [memoryview(array) for array in arrays]  # type: ignore[arg-type]
-
-    def as_loop_parameters(self, parameters: Sequence[float]) -> Any:
-        """Convert the parameters of a scene to an argument of the event loop.
-
-        Parameters
-        ----------
-        parameters : sequence of float
-            Parameters of the scene.
-
-        Returns
-        -------
-        list of float
-            Copy of the parameters.
-        """
-        return list(parameters)
-
-    def get_loop_function(self) -> Any:
-        """Return the event loop.
-
-        Returns
-        -------
-        callable
-            The function ``motion_loop.advance_motion``.
-        """
-        return advance_motion
-
-
-@partial(add_former_member_names, writable=True)
-class PythonMotionState(SimpleNamespace):
-    """State of a motion as a Python object with the fields of ``MOTION_STATE_DTYPE``."""
-
-    @property
-    def memory(self) -> list[PythonMotionState]:
-        """Argument ``motion_memory`` of the event loop."""
-        return [self]
-
-    def work_and_row_counters(self) -> tuple[int, ...]:
-        """Return the counters of evaluations, steps and table rows.
-
-        Returns
-        -------
-        tuple of int
-            Right-hand side evaluations in the slow and in the fast regime, steps, event rows,
-            recorded rows and Jacobians.
-        """
-        return (
-            *(self.evaluations_slow, self.evaluations_fast, self.steps),
-            *(self.event_rows, self.recorded_rows, self.jacobians),
-        )
-
-    def get_state_field(self, field_name: str) -> float:
-        """Return the value of a field of the motion state.
-
-        Parameters
-        ----------
-        field_name : str
-            Name of the field.
-
-        Returns
-        -------
-        float
-            Value of the field.
-        """
-        return float(getattr(self, field_name))
 
 
 class MotionDriver:
@@ -350,7 +179,8 @@ class MotionDriver:
         MotionStopped
             If the motion cannot continue or exceeds the budget.
         """
-        machine, states, systems, numbers = self._backend, self._states, self._equations, self._p
+        machine, states, numbers = self._backend, self._states, self._p
+        systems: Iterable[Equations] = self._equations
         before, turns = numbers, len(kinks_and_reported_count[0])
         if isinstance(start_point_or_unknowns, MotionPoint):
             start_point_or_unknowns = (
@@ -363,7 +193,7 @@ class MotionDriver:
             )
             y, last, stress = (
                 np.empty(2 * self._unknowns),
-                _pack_point(start_point_or_unknowns),
+                pack_point(start_point_or_unknowns),
                 start_point_or_unknowns.spring_stress,
             )
         else:  # The second half of the array holds the derivatives.
@@ -374,13 +204,13 @@ class MotionDriver:
             )
         if parameters is not None or turns:  # The loop changes the parameters at kinks.
             before = numbers = machine.as_loop_parameters(
-                systems[0].parameters if parameters is None else parameters
+                self._equations[0].parameters if parameters is None else parameters
             )
             if turns:
                 before = machine.as_loop_parameters(numbers)
-            systems = tuple(system._replace(parameters=numbers) for system in systems)
+            systems = (system._replace(parameters=numbers) for system in self._equations)
         tolerance = max(tolerance, MIN_LOCAL_TOLERANCE)
-        records, samples, rows = _prepare_recording_tables(recording, systems[0], states)
+        records, samples, rows = _prepare_recording_tables(recording, self._equations[0], states)
         state = machine.create_motion_state(
             self._initial_values,
             (
@@ -393,7 +223,7 @@ class MotionDriver:
                 *(records, turns, kinks_and_reported_count[1]),
             ),
         )
-        asked, meanings = _pack_event_specifications(tuple(event_specs))
+        asked, meanings = pack_event_specifications(tuple(event_specs))
         stepper = create_stepper(self._engine, systems, self._methods)
         columns = array_layout.EVENT_POINT + array_layout.FIRST_STATE + states
         events = np.empty((max(_MIN_EVENT_ROWS, 2 * len(event_specs) + 4), columns))
@@ -499,68 +329,6 @@ def _prepare_recording_tables(
         samples,
         rows,
     )
-
-
-def find_events_at_jump(
-    point_before: MotionPoint,
-    parameters_before: Numbers,
-    point_after: MotionPoint,
-    parameters_after: Numbers,
-    event_specs: Sequence[EventSpecification],
-) -> Iterator[tuple[EventSpecification, MotionPoint]]:
-    """Yield the requested events that occur at a jump between two points.
-
-    Parameters
-    ----------
-    point_before, point_after : MotionPoint
-        Points immediately before and after the jump.
-    parameters_before, parameters_after : tuple of float
-        Parameters of the scene before and after the jump.
-    event_specs : sequence of EventSpecification
-        Requested events.
-
-    Yields
-    ------
-    specification : EventSpecification
-        Specification of the event.
-    point : MotionPoint
-        Point at which the event is reported, either ``point_before`` or ``point_after``.
-    """
-    last, first = _pack_point(point_before).tolist(), _pack_point(point_after).tolist()
-    table = (
-        _pack_event_specifications(tuple(event_specs))[0]
-        .reshape(-1, len(array_layout.EVENT_SPECIFICATION_COLUMNS))
-        .tolist()
-    )
-    for spec, row in zip(event_specs, table, strict=True):
-        where = find_jump_side_of_event(row, last, parameters_before, first, parameters_after)
-        if where != NO_EVENT:
-            yield spec, point_before if where == BEFORE_JUMP else point_after
-
-
-@lru_cache(maxsize=256)
-def _pack_event_specifications(
-    event_specs: tuple[EventSpecification, ...],
-) -> tuple[np.ndarray, list[tuple[EventKind, EventSpecification | None]]]:
-    """Return the table of event specifications, and the event for each event code."""
-    meanings = [
-        *((spec.kind, spec) for spec in event_specs),
-        *_KINDS_AND_SPECS_OF_UNREQUESTED_EVENTS,
-    ]
-    asked = np.zeros((len(event_specs), len(array_layout.EVENT_SPECIFICATION_COLUMNS)))
-    for row, spec in zip(asked, event_specs, strict=True):
-        row[array_layout.SPEC_KIND], row[array_layout.SPEC_QUANTITY] = (
-            _EVENT_KIND_CODES[spec.kind],
-            _POINT_COLUMN_BY_QUANTITY[spec.quantity],
-        )
-        row[array_layout.SPEC_LEVEL], row[array_layout.SPEC_TERMINAL] = spec.level, spec.terminal
-        row[array_layout.SPEC_MAY_DEFER] = spec.may_defer
-    return asked.ravel(), meanings
-
-
-def _pack_point(point: MotionPoint) -> np.ndarray:
-    """Convert a ``MotionPoint`` to an array with the columns of the event loop."""
-    return np.array((*point[:-1], *point.psis))
 
 
 def _motion_stopped_error(

@@ -21,15 +21,19 @@ functions are called in the following order::
         start_next_segment             after the end of a loading segment
         enter_initial_regime           after the end of a loading segment
 
+The functions that start regimes and segments are in ``regime_starts``. The functions that take,
+end, record and search a step are in ``step_integration``, ``step_ends``, ``step_samples`` and
+``step_events``.
+
 The header of ``array_layout`` lists the functions that write each field of ``motion``. The class
 ``Workspace`` describes the arrays of a regime, and the header of ``workspace`` lists the functions
 that write these arrays. Steppers only take integration steps. With all steppers, the event loop
 detects and locates the events.
 
-The code of this module is limited to Python features that Numba can compile. To debug a rupture,
+The code of these modules is limited to Python features that Numba can compile. To debug a rupture,
 simulate a scene with ``inertia=True`` and ``engine="scipy"``. To debug the stages of an integration
 step, use ``engine="python"`` instead. Set a breakpoint in
-``truncate_step_at_end_of_regime_or_segment`` with the condition ``motion.regime == 1``
+``step_ends.truncate_step_at_end_of_regime_or_segment`` with the condition ``motion.regime == 1``
 (``FAST_REGIME``). The debugger then stops once in every step of the rupture. The arrays
 ``workspace.point_at_begin`` and ``workspace.point_at_end`` contain the points of the motion at both
 ends of the step. The array columns are numbered by ``array_layout.LOG_SLIP_RATE`` and the following
@@ -47,22 +51,16 @@ from rsfstudy.motion.array_layout import (
     EVENT_SPECIFICATION_COLUMNS,
     FAST_REGIME,
     FIRST_STATE,
-    FRICTIONAL_STRESS,
-    FUNCTION_COUNT_PER_REGIME,
     INVALID_STEP,
     KINK_CODE,
     LOG_SLIP_RATE,
-    LOG_SLIP_RATE_GROWTH,
     MOTION_ENDED,
-    NORMAL_STRESS_RATIO,
     PAUSED,
-    RECORD_WITHIN_STEPS,
     REGIME_CODE,
     REGIME_ENDED,
     SAMPLED_CODE,
     SEGMENT_ENDED,
     SLOW_REGIME,
-    SPRING_STRESS,
     START_CODE,
     STEP_TAKEN_CODE,
     TERMINATED,
@@ -74,60 +72,31 @@ from rsfstudy.motion.array_operations import (
     evaluate_function_into_array,
 )
 from rsfstudy.motion.recording import SAMPLES_PER_STEP
-from rsfstudy.motion.regime_switching import (
-    CONTINUES,
-    SwitchThresholds,
-    compute_margin_to_termination,
-    find_termination_status,
-    is_slip_slow_enough_for_slow_manifold,
-    should_switch_back_to_slow_manifold,
-    starts_on_slow_manifold,
+from rsfstudy.motion.regime_starts import (
+    enter_initial_regime,
+    set_unknowns_of_regime,
+    start_next_segment,
+)
+from rsfstudy.motion.regime_switching import CONTINUES, SwitchThresholds
+from rsfstudy.motion.step_conditions import has_deferrable_event
+from rsfstudy.motion.step_ends import (
+    has_rupture_regime_ended,
+    is_step_end_valid,
+    truncate_step_at_end_of_regime_or_segment,
 )
 from rsfstudy.motion.step_events import (
-    SWITCH_CONDITION,
-    TERMINATION_CONDITION,
-    TIME_CONDITION,
     append_events_in_step,
     append_start_events,
     append_step_end_event,
-    compute_excess_over_switch_threshold,
-    has_deferrable_event,
-    is_step_recorded,
-    locate_sign_change,
-    record_regime_start,
-    record_step,
-    slip_since_start,
 )
 from rsfstudy.motion.step_integration import (
     halve_step_until_dense_output_is_accurate,
     take_step,
-    time_at_step_begin,
     time_at_step_end,
-    time_since_regime_start,
-    truncate_step_at_clock,
 )
-from rsfstudy.motion.steppers import begin_regime, retake_step
+from rsfstudy.motion.step_samples import is_step_recorded, record_regime_start, record_step
+from rsfstudy.motion.steppers import begin_regime
 from rsfstudy.motion.workspace import create_workspace
-from rsfstudy.parts import (
-    BOUNDARY_PRESSURE_RATE,
-    LAW,
-    LOAD_VELOCITY,
-    LOADING,
-    LOG_LOAD_VELOCITY,
-    SEGMENT_END,
-    SEGMENT_LOG_VELOCITY,
-    SEGMENT_START,
-    SEGMENT_STRESS_FALL,
-    SEGMENT_STRESS_RATE,
-    SEGMENT_VELOCITY,
-)
-
-#: Number of iterations that correct the end of the last step of a loading segment.
-CORRECTION_COUNT_OF_SEGMENT_END_CLOCK = 2
-#: Change of ln V_0 between two loading segments above which the stepper selects a new initial step
-#: size. The path length depends on V + V_0, so the step size of the previous segment would be
-#: rejected several times.
-MAX_LOG_LOAD_RATE_CHANGE_KEEPING_STEP_SIZE = 3.0
 
 
 def advance_motion(
@@ -259,128 +228,6 @@ def are_tables_full(motion, event_spec_count, event_table, recording_table):
     )
 
 
-def start_next_segment(motion, workspace, last_point, kinks, recording_table):
-    """Replace the loading parameters by the parameters of the next segment.
-
-    Parameters
-    ----------
-    motion : record
-        State of the motion.
-    workspace : Workspace
-        Arrays of the regime at the end of the previous segment.
-    last_point : array of shape (FIRST_STATE + states,)
-        Output array for the last point of the previous segment.
-    kinks : array of shape (segments, 6)
-        Rows of the segment table for the loading segments after the first segment.
-    recording_table : array of shape (rows, FIRST_STATE_COLUMN + states)
-        Output table of recorded samples.
-    """
-    n, p, relief = (
-        len(kinks) - motion.kinks_ahead,
-        workspace.parameters,
-        FIRST_STATE + motion.states - 1 - motion.unknowns_behind_fluid,
-    )
-    copy_values(workspace.point_at_end, last_point, FIRST_STATE + motion.states)
-    motion.slip = slip_since_start(
-        motion, motion.end, motion.end_time, last_point[SPRING_STRESS], p
-    )
-    motion.spring_stress, motion.time, motion.regime_start_time = (
-        last_point[SPRING_STRESS],
-        kinks[n, SEGMENT_START],
-        0.0,
-    )
-    motion.end_time = kinks[n, SEGMENT_END] - kinks[n, SEGMENT_START]
-    motion.pending_start, motion.kinks_ahead = KINK_CODE, motion.kinks_ahead - 1
-    # The located end of a segment has a rounding error.
-    if motion.recording_mode == RECORD_WITHIN_STEPS:
-        recording_table[motion.recorded_rows - 1, 0] = motion.time
-    copy_values(p, workspace.parameters_before, LAW)
-    # The step size remains valid unless the load point velocity changes strongly.
-    if (
-        not abs(kinks[n, SEGMENT_LOG_VELOCITY] - p[LOG_LOAD_VELOCITY])
-        < MAX_LOG_LOAD_RATE_CHANGE_KEEPING_STEP_SIZE
-    ):
-        motion.next_step_length = 0.0
-    p[LOAD_VELOCITY], p[LOG_LOAD_VELOCITY] = (
-        kinks[n, SEGMENT_VELOCITY],
-        kinks[n, SEGMENT_LOG_VELOCITY],
-    )
-    if not math.isnan(kinks[n, SEGMENT_STRESS_RATE]):
-        p[BOUNDARY_PRESSURE_RATE if motion.unknowns_behind_fluid else LOADING] = kinks[
-            n, SEGMENT_STRESS_RATE
-        ]
-        last_point[relief] = kinks[n, SEGMENT_STRESS_FALL]
-
-
-def enter_initial_regime(
-    motion, y, last_point, functions, slow_manifold_values, switch_thresholds, parameters
-):
-    """Choose the regime at the initial point, and set the unknowns of this regime.
-
-    Parameters
-    ----------
-    motion : record
-        State of the motion.
-    y : array of shape (2 * unknowns,)
-        Output array of the unknowns.
-    last_point : array of shape (FIRST_STATE + states,)
-        Initial point of the motion or of the loading segment.
-    functions : array of shape (2, FUNCTION_COUNT_PER_REGIME)
-        Function table with one row per regime.
-    slow_manifold_values : array
-        Memory for ln(V/V_*) and friction on the slow manifold.
-    switch_thresholds : SwitchThresholds
-        Thresholds for changes between the regimes.
-    parameters : array
-        Parameters of the scene.
-    """
-    motion.starts_at_point, motion.regime = 0, SLOW_REGIME
-    set_unknowns_of_regime(motion, y, last_point)
-    if motion.has_mass:
-        evaluate_function_into_array(
-            functions[SLOW_REGIME, FUNCTION_COUNT_PER_REGIME - 1],
-            y,
-            y,
-            parameters,
-            slow_manifold_values,
-        )
-        if not starts_on_slow_manifold(
-            last_point[LOG_SLIP_RATE],
-            slow_manifold_values[0],
-            last_point[SPRING_STRESS] - slow_manifold_values[1],
-            switch_thresholds,
-        ):
-            motion.regime = FAST_REGIME
-            set_unknowns_of_regime(motion, y, last_point)
-
-
-def set_unknowns_of_regime(motion, y, last_point):
-    """Set the unknowns of a regime from the last point of the previous regime.
-
-    A change of regime does not change spring stress, states and time. If the new regime is the slow
-    manifold, ln V and friction may jump, because they are computed from spring stress and states.
-
-    Parameters
-    ----------
-    motion : record
-        State of the motion.
-    y : array of shape (2 * unknowns,)
-        Output array of the unknowns.
-    last_point : array of shape (FIRST_STATE + states,)
-        Last point of the previous regime.
-    """
-    y[0] = last_point[SPRING_STRESS]
-    if motion.regime == FAST_REGIME:
-        y[1], y[2] = last_point[LOG_SLIP_RATE], last_point[FRICTIONAL_STRESS]
-        for i in range(1, motion.states):
-            y[2 + i] = last_point[FIRST_STATE + i]
-        y[2 + motion.states] = 0.0
-    else:
-        for i in range(motion.states):
-            y[1 + i] = last_point[FIRST_STATE + i]
-        y[1 + motion.states] = 0.0
-
-
 def integrate_one_regime(
     motion, workspace, last_point, requested_samples, event_table, recording_table
 ):
@@ -482,165 +329,6 @@ def integrate_one_regime(
                 workspace.unknown_count,
             )
             return PAUSED
-
-
-def is_step_end_valid(motion, workspace):
-    """Return True if the motion is valid during at least part of the step.
-
-    If the motion terminates within the step, the function truncates the step at the time of
-    termination.
-
-    Parameters
-    ----------
-    motion : record
-        State of the motion.
-    workspace : Workspace
-        Arrays of the regime.
-
-    Returns
-    -------
-    bool
-        False if the motion is already invalid at the beginning of the step.
-    """
-    columns, velocity = workspace.point_at_end, workspace.parameters[LOAD_VELOCITY]
-    motion.final_normal_stress = columns[NORMAL_STRESS_RATIO]
-    motion.termination = find_termination_status(
-        columns[LOG_SLIP_RATE], motion.final_normal_stress, velocity
-    )
-    if motion.termination == CONTINUES:
-        return True
-    at_begin = compute_margin_to_termination(
-        workspace.point_at_begin[LOG_SLIP_RATE],
-        workspace.point_at_begin[NORMAL_STRESS_RATIO],
-        velocity,
-    )
-    at_end = compute_margin_to_termination(
-        columns[LOG_SLIP_RATE], columns[NORMAL_STRESS_RATIO], velocity
-    )
-    if at_begin <= 0.0:
-        return False
-    truncate_step_at_clock(
-        motion,
-        workspace,
-        locate_sign_change(TERMINATION_CONDITION, at_begin, at_end, motion, workspace),
-    )
-    return True
-
-
-def truncate_step_at_end_of_regime_or_segment(motion, workspace):
-    """Truncate the step at the end of the regime or of the loading segment.
-
-    Parameters
-    ----------
-    motion : record
-        State of the motion.
-    workspace : Workspace
-        Arrays of the regime.
-
-    Returns
-    -------
-    leaves_regime : bool
-        True if the motion must leave the slow manifold.
-    is_over : bool
-        True if the loading segment ends in this step.
-    """
-    before, after = (
-        compute_excess_over_switch_threshold(motion, workspace, workspace.point_at_begin),
-        compute_excess_over_switch_threshold(motion, workspace, workspace.point_at_end),
-    )
-    leaves = after >= 0.0 > before
-    if leaves:
-        truncate_step_at_clock(
-            motion,
-            workspace,
-            locate_sign_change(SWITCH_CONDITION, before, after, motion, workspace),
-        )
-    if motion.time_per_step > 0.0 and motion.end == motion.clock + motion.step_length:
-        return leaves, True
-    over = time_at_step_end(motion, workspace) >= motion.end_time
-    if over:
-        motion.target_time = motion.end_time
-        at_begin = time_at_step_begin(motion, workspace) - motion.end_time
-        at_end = time_at_step_end(motion, workspace) - motion.end_time
-        end_step_at_end_time(
-            motion,
-            workspace,
-            locate_sign_change(TIME_CONDITION, at_begin, at_end, motion, workspace),
-        )
-    return leaves, over
-
-
-def end_step_at_end_time(motion, workspace, clock):
-    """Repeat the step so that it ends at the end time of the segment.
-
-    If stability limits the step size, dense output is much less accurate than the end of the step.
-    The function therefore uses the time between the end of the step and the end of the segment to
-    correct its estimate, and repeats the step.
-
-    Parameters
-    ----------
-    motion : record
-        State of the motion.
-    workspace : Workspace
-        Arrays of the regime.
-    clock : float
-        Estimate of the independent variable at the end time, from dense output.
-    """
-    for _ in range(CORRECTION_COUNT_OF_SEGMENT_END_CLOCK):
-        retake_step(motion, workspace, clock)
-        late = time_at_step_end(motion, workspace) - motion.end_time
-        clock -= late / time_since_regime_start(motion, workspace, workspace.rates_at_end)
-    evaluate_function_into_array(
-        workspace.functions.fill_point,
-        workspace.y_end,
-        workspace.rates_at_end,
-        workspace.parameters,
-        workspace.point_at_end,
-    )
-
-
-def has_rupture_regime_ended(motion, workspace):
-    """Return True if the motion can return to the slow manifold.
-
-    If the slip rate is small enough, the function evaluates the slow manifold at the spring stress
-    and the states at the end of the step.
-
-    Parameters
-    ----------
-    motion : record
-        State of the motion.
-    workspace : Workspace
-        Arrays of the regime.
-
-    Returns
-    -------
-    bool
-        True if the motion is in a rupture, and if the slip rate and the inertia effect are small
-        enough for the slow manifold. See ``regime_switching.should_switch_back_to_slow_manifold``.
-    """
-    if motion.regime == SLOW_REGIME or not is_slip_slow_enough_for_slow_manifold(
-        workspace.point_at_end[LOG_SLIP_RATE], workspace.switch_thresholds
-    ):
-        return False
-    columns, below = workspace.point_at_end, workspace.point_within
-    workspace.y_within[0] = columns[SPRING_STRESS]
-    for i in range(motion.states):
-        workspace.y_within[1 + i] = columns[FIRST_STATE + i]
-    evaluate_function_into_array(
-        workspace.functions.fill_balance,
-        workspace.y_within,
-        workspace.y_within,
-        workspace.parameters,
-        below,
-    )
-    missing = columns[SPRING_STRESS] - below[1]
-    return should_switch_back_to_slow_manifold(
-        columns[LOG_SLIP_RATE],
-        columns[LOG_SLIP_RATE_GROWTH],
-        below[0],
-        missing,
-        workspace.switch_thresholds,
-    )
 
 
 def advance_to_step_end(motion, workspace):

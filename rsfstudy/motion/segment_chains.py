@@ -7,9 +7,9 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
+from rsfstudy.motion.event_spec_table import find_events_at_jump
 from rsfstudy.motion.events import Event, EventKind, EventSpecification
 from rsfstudy.motion.initial_points import point_after_loading_jump
-from rsfstudy.motion.motion_driver import find_events_at_jump
 from rsfstudy.parts import SEGMENT_END, SEGMENT_START
 from rsfstudy.slider import (
     SINGLE_ENDLESS_SEGMENT_TABLE,
@@ -146,7 +146,8 @@ def select_event_specs(
     """Select the requested events that can occur in a segment chain.
 
     The motion can settle only in the last chain. Settling events are omitted if the load point
-    oscillates, or if steady sliding is unstable.
+    oscillates. Terminal settling events are also omitted if steady sliding is unstable, because
+    they would end the motion. See ``drop_settling_if_unstable`` for other settling events.
 
     Parameters
     ----------
@@ -164,20 +165,40 @@ def select_event_specs(
     sequence of EventSpecification
         Events to detect.
     """
+    settling = [spec for spec in event_specs if spec.kind is EventKind.SETTLED]
     may_settle = is_last_chain and not chain_scene.parts.loading.unknowns
-    if may_settle and _steady_sliding_may_be_stable(scene, event_specs):
+    if may_settle and any(spec.terminal for spec in settling):
+        may_settle = not _is_steady_sliding_unstable(scene)
+    if may_settle or not settling:
         return event_specs
-    return [spec for spec in event_specs if spec.kind is not EventKind.SETTLED]
+    return [spec for spec in event_specs if spec not in settling]
 
 
-def _steady_sliding_may_be_stable(scene: Scene, event_specs: Sequence[EventSpecification]) -> bool:
-    """Return False if steady sliding is unstable in the last loading segment.
+def drop_settling_if_unstable(scene: Scene, motion: Iterator[Event]) -> Iterator[Event]:
+    """Yield the events of a motion, without settling events at unstable steady sliding.
 
-    The growth rate of small perturbations is computed only if a settling event is requested.
+    The stability is computed at the first settling event, because most motions have none.
+
+    Parameters
+    ----------
+    scene : Scene
+        Scene of the motion.
+    motion : iterator of Event
+        Events of the motion.
+
+    Yields
+    ------
+    Event
+        Events of the motion. Settling events are omitted if steady sliding is unstable.
     """
-    if scene.log_load_velocity == -math.inf or all(
-        spec.kind is not EventKind.SETTLED for spec in event_specs
-    ):
-        return True
+    for event in motion:
+        if event.kind is not EventKind.SETTLED or not _is_steady_sliding_unstable(scene):
+            yield event
+
+
+def _is_steady_sliding_unstable(scene: Scene) -> bool:
+    """Return True if perturbations of steady sliding grow in the last loading segment."""
+    if scene.log_load_velocity == -math.inf:
+        return False
     growth = largest_linear_growth_rate(scene.segment_scene(-1), scene.log_load_velocity)
-    return growth is None or not growth.is_positive
+    return growth is not None and growth.is_positive

@@ -27,7 +27,7 @@ from rsfstudy.motion.steppers import (
     step_to_segment_end,
 )
 from rsfstudy.motion.workspace import count_evaluations, evaluate_rates_by_step_clock
-from rsfstudy.parts import LOG_LOAD_VELOCITY
+from rsfstudy.parts import LOAD_VELOCITY, LOG_LOAD_VELOCITY, STIFFNESS
 
 #: Constants of ``halve_step_until_dense_output_is_accurate``. ``MAX_SLOPE_ERROR`` limits the error
 #: of the derivative of dense output, multiplied by the step size and divided by the local
@@ -95,6 +95,38 @@ def time_at_step_end(motion, workspace):
         Time in D_c/V_*, or NaN if time is not an unknown.
     """
     return motion.regime_start_time + time_since_regime_start(motion, workspace, workspace.y_end)
+
+
+def slip_since_start(motion, clock, time, spring_stress, parameters):
+    r"""Compute the slip since the start of the motion.
+
+    Slip is the independent variable of a rigid slider. For other sliders, slip is computed from the
+    spring stress :math:`f = f_0 + K (V_0 t - \delta)`.
+
+    Parameters
+    ----------
+    motion : record
+        State of the motion.
+    clock : float
+        Independent variable at the point.
+    time : float
+        Time since the start of the loading segment, in D_c/V_*.
+    spring_stress : float
+        Spring stress at the point, in sigma_*.
+    parameters : array
+        Parameters of the scene.
+
+    Returns
+    -------
+    float
+        Slip in D_c.
+    """
+    if motion.slip_is_clock:
+        return clock
+    return motion.slip + (
+        parameters[LOAD_VELOCITY] * time
+        - (spring_stress - motion.spring_stress) / parameters[STIFFNESS]
+    )
 
 
 def take_step(motion, workspace):

@@ -2,7 +2,7 @@
 
 ``motion_loop.advance_motion`` creates a workspace for each regime, and steppers receive it as an
 argument. The arrays are written by the following functions. Functions without a module name belong
-to ``motion_loop``.
+to ``motion_loop``, ``regime_starts`` or ``step_ends``.
 
 =========================================  ====================================================
 Arrays                                     Written by

@@ -19,6 +19,7 @@ if TYPE_CHECKING:
         format_notes_on_incomplete_results,
         format_status_counts,
     )
+    from rsfstudy.reporting.event_tables import build_record_events_pieces, list_record_events
     from rsfstudy.reporting.fit_summaries import format_with_error
     from rsfstudy.reporting.fit_tables import (
         all_fits_are_valid,
@@ -72,6 +73,7 @@ else:
                 "format_notes_on_incomplete_results",
                 "format_status_counts",
             ),
+            "reporting.event_tables": ("build_record_events_pieces", "list_record_events"),
             "reporting.fit_tables": (
                 "all_fits_are_valid",
                 "fit_table",
@@ -117,6 +119,8 @@ __all__ = [
     "TextTable",
     "all_fits_are_valid",
     "build_contents_table",
+    "build_record_events_pieces",
+    "list_record_events",
     "build_frame_of_cells",
     "build_motion_tables_and_sentences",
     "build_reduction_tables_and_sentences",

@@ -19,6 +19,8 @@ if TYPE_CHECKING:
         convert_values_to_units,
         make_axis_with_units,
     )
+    from rsfstudy.rig.column_reading import ColumnsOfSource, ReadingOptions, read_columns
+    from rsfstudy.rig.columns import Column
     from rsfstudy.rig.dataset_scales import (
         DIMENSIONLESS_PREFIX,
         DISPLAY_BASE_UNITS,
@@ -31,6 +33,7 @@ if TYPE_CHECKING:
         read_si_scales,
         slip_rate_from_log,
     )
+    from rsfstudy.rig.ranges import expand_range
     from rsfstudy.rig.record_files import read_record
     from rsfstudy.rig.rig import Rig
     from rsfstudy.rig.rig_quantities import (
@@ -44,13 +47,13 @@ if TYPE_CHECKING:
         convert_scene_and_axes_to_rig,
         replace_rig_quantity,
     )
-    from rsfstudy.rig.table_files import Column, read_table
+    from rsfstudy.rig.table_files import read_table
     from rsfstudy.rig.units import (
         compute_conversion_factor,
         convert_to_si,
-        expand_range,
         parse_number,
     )
+    from rsfstudy.rig.usual_headings import UsableColumns, has_time_column
 else:
     __getattr__, __dir__ = build_lazy_export_functions(
         __name__,
@@ -61,6 +64,7 @@ else:
                 "in_display_units",
                 "is_stiffness_over_normal_stress",
             ),
+            "rig.ranges": ("expand_range",),
             "rig.record_files": ("read_record",),
             "rig.rig": ("Rig",),
             "rig.rig_scenes": (
@@ -80,16 +84,18 @@ else:
                 "slip_rate_from_log",
                 "find_scale_of_variable",
             ),
-            "rig.table_files": ("Column", "read_table"),
+            "rig.columns": ("Column",),
+            "rig.column_reading": ("ColumnsOfSource", "ReadingOptions", "read_columns"),
+            "rig.table_files": ("read_table",),
             "rig.axes_with_units": (
                 "axis_name_and_units",
                 "convert_axis_to_stated_units",
                 "convert_values_to_units",
                 "make_axis_with_units",
             ),
+            "rig.usual_headings": ("UsableColumns", "has_time_column"),
             "rig.units": (
                 "convert_to_si",
-                "expand_range",
                 "parse_number",
                 "compute_conversion_factor",
             ),
@@ -98,11 +104,14 @@ else:
 
 __all__ = [
     "Column",
+    "ColumnsOfSource",
     "DIMENSIONLESS_PREFIX",
     "DISPLAY_BASE_UNITS",
     "RATIO_FIELD_BY_DIMENSIONAL_NAME",
     "RIG_QUANTITIES",
+    "ReadingOptions",
     "Rig",
+    "UsableColumns",
     "LatticeScenesOnRig",
     "NAME_OF_SCALES_ATTRIBUTE",
     "axis_name_and_units",
@@ -113,12 +122,14 @@ __all__ = [
     "convert_values_to_units",
     "convert_to_dimensional_name",
     "expand_range",
+    "has_time_column",
     "has_units_unexpected_by_its_figures",
     "in_display_units",
     "is_stiffness_over_normal_stress",
     "make_axis_with_units",
     "parse_number",
     "convert_scene_and_axes_to_rig",
+    "read_columns",
     "read_record",
     "read_si_scales",
     "read_table",

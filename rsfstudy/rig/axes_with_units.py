@@ -13,6 +13,7 @@ from rsfstudy.axes import Axis, AxisRow, fields_of_axis_point, to_plain_value
 from rsfstudy.errors import InvalidValue
 from rsfstudy.formatting import is_sequence_of_axis_values
 from rsfstudy.quantities import is_variable_name
+from rsfstudy.rig.ranges import expand_range
 from rsfstudy.rig.rig_quantities import (
     AXIS_NAME_BY_RIG_NAME,
     RATIO_FIELD_BY_DIMENSIONAL_NAME,
@@ -25,7 +26,6 @@ from rsfstudy.rig.rig_quantities import (
 from rsfstudy.rig.units import (
     compute_conversion_factor,
     convert_to_si_as_fraction,
-    expand_range,
     split_number_and_units,
 )
 

@@ -15,8 +15,11 @@ import numpy as np
 from rsfstudy._deprecation import accept_former_keyword_names
 from rsfstudy.error_boundary import error_boundary
 from rsfstudy.errors import InvalidValue
+from rsfstudy.rig.column_reading import ReadingOptions, read_columns
+from rsfstudy.rig.columns import Column
 from rsfstudy.rig.rig import SLIDER_UNITS_OF_SEGMENT_FIELDS, Rig
-from rsfstudy.rig.table_files import Column, read_table, select_columns_of_arrays
+from rsfstudy.rig.table_files import read_table
+from rsfstudy.rig.usual_headings import UsableColumns
 from rsfstudy.slider import (
     MIN_SEGMENT_DURATION,
     SEGMENT_MAPPING_KEYS,
@@ -41,6 +44,7 @@ def history(
     *,
     columns: Mapping[str, Any] | None = None,
     name: str = "history",
+    **reading: Any,
 ) -> SampledHistory:
     """Create a loading history from sampled data.
 
@@ -48,23 +52,26 @@ def history(
 
     Parameters
     ----------
-    record : mapping, xarray.Dataset, str or Path
-        Arrays by name, a dataset, or the path of a CSV file whose first line contains the names and
-        the units of the columns (see `read_table`). The column ``time`` is required. The column
-        ``displacement`` or ``velocity`` describes the load point. If both columns are missing, the
-        load point moves at :math:`V_*`. The optional column ``normal_stress`` contains the normal
-        stress. The optional column ``pore_pressure`` contains the pore pressure minus the pore
-        pressure before the record.
+    record : mapping, pandas.DataFrame, xarray.Dataset, Record, str or Path
+        Arrays by name, a dataset, a record, or the path of a file in any format that `read_record`
+        reads. The column ``time`` is required. The column ``displacement`` or ``velocity``
+        describes the load point. If both columns are missing, the load point moves at :math:`V_*`.
+        The optional column ``normal_stress`` contains the normal stress. The optional column
+        ``pore_pressure`` contains the pore pressure minus the pore pressure before the record.
+        Other columns are ignored.
     rig : Rig, optional
         Rig for the conversion of units. By default, all data are dimensionless: times in
         ``D_c/V_*``, displacements in ``D_c``, velocities in ``V_*`` and stresses in ``sigma_*``.
     columns : mapping of str to (str, str) or str, optional
         Heading and units of each column, for example ``{"time": ("t", "s")}`` or ``{"time": "t
-        (s)"}``. By default, the heading of a column is its name. Arrays are in SI units if you pass
-        a rig, and dimensionless otherwise. The units of dataset variables are read from their
-        attribute ``units``.
+        (s)"}``. By default, columns are recognised by common headings, as in `read_record`. Arrays
+        are in SI units if you pass a rig, and dimensionless otherwise. The units of dataset
+        variables are read from their attribute ``units``.
     name : str, default: "history"
         Name of the history in results.
+    **reading : object
+        Options ``decimal``, ``sheet``, ``area``, ``rows``, ``begin``, ``end`` and ``thin`` of
+        `read_record`.
 
     Returns
     -------
@@ -112,10 +119,7 @@ def history(
     >>> round(rsfstudy.Scene(loading=loading).load_velocity, 9)
     2.0
     """
-    found = _read_columns_of_record(record, columns, rig)
-    for key in found:
-        if key not in _SLIDER_UNITS_OF_RECORD_COLUMNS:
-            raise InvalidValue("column", key, "is unknown", choices=_SLIDER_UNITS_OF_RECORD_COLUMNS)
+    found = _read_history_columns(record, columns, rig, ReadingOptions.parse("history", reading))
     if "time" not in found or len(found) == 1:
         remedy = 'State "time" and what was sampled, as in {"time": ..., "displacement": ...}.'
         raise InvalidValue("record", [*found], "tells no history", remedy=remedy)
@@ -126,8 +130,6 @@ def history(
     if len(sizes) > 1 or min(sizes) < 2:
         rule = f"has columns of {sorted(sizes)} samples: all must have as many, 2 at least"
         raise InvalidValue("record", [*found], rule)
-    for key, column in found.items():
-        column.check_values(key, ~np.isfinite(column.values), "must be a finite number")
     values = {
         key: _convert_column_to_slider_units(key, column, rig) for key, column in found.items()
     }
@@ -148,29 +150,23 @@ def history(
     )
 
 
-def _read_columns_of_record(
-    record: Any, columns: Mapping[str, Any] | None, rig: Rig | None
+def _read_history_columns(
+    record: Any, columns: Mapping[str, Any] | None, rig: Rig | None, options: ReadingOptions
 ) -> dict[str, Column]:
-    """Read the columns of arrays, a dataset or a file."""
-    if isinstance(record, str | Path):
-        return read_table(record, columns)
-    is_dataset = hasattr(record, "data_vars")
-    if not is_dataset and not isinstance(record, Mapping):
-        remedy = 'Give {"time": ..., "displacement": ...}, a Dataset, or the path of a CSV file.'
-        raise InvalidValue("record", record, "is no record", remedy=remedy)
-    if columns is None:  # A dataset may contain other variables.
-        names = (
-            [n for n in record.variables if n in _SLIDER_UNITS_OF_RECORD_COLUMNS]
-            if is_dataset
-            else [*record]
-        )
-        columns = {str(name): str(name) for name in names}
-    found = select_columns_of_arrays(record, columns)
-    for key, column in found.items():
-        if is_dataset and rig is not None and not column.units:
-            remedy = "Set its attribute units."
-            raise InvalidValue(key, columns[key], "has no units", remedy=remedy)
-    return found
+    """Read the columns of a source that describe a loading history."""
+    if options.filter:
+        remedy = "Filter the columns before you pass them as arrays."
+        raise InvalidValue("filter", options.filter, "is not for a loading history", remedy=remedy)
+    usable = UsableColumns((*_SLIDER_UNITS_OF_RECORD_COLUMNS,))
+    found = read_columns(record, columns, usable, options).columns
+    for name, column in found.items():
+        if rig is not None and hasattr(record, "data_vars") and not column.units:
+            raise InvalidValue(name, name, "has no units", remedy="Set its attribute units.")
+    thinned = slice(None, None, options.thin)
+    return {
+        name: of._replace(values=of.values[thinned], line_numbers=of.line_numbers[thinned])
+        for name, of in found.items()
+    }
 
 
 def _convert_column_to_slider_units(
@@ -222,7 +218,9 @@ def _load_point_velocity(
 
 @accept_former_keyword_names
 @error_boundary
-def read_protocol(path: str | Path, rig: Rig | None = None, name: str = "protocol") -> Protocol:
+def read_protocol(
+    path: str | Path, rig: Rig | None = None, name: str = "protocol", *, decimal: str = "."
+) -> Protocol:
     r"""Read a loading protocol from a CSV file.
 
     Parameters
@@ -238,6 +236,8 @@ def read_protocol(path: str | Path, rig: Rig | None = None, name: str = "protoco
         units ``V_*``, ``D_c``, ``D_c/V_*`` and ``sigma_*``.
     name : str, default: "protocol"
         Name of the protocol in results.
+    decimal : {".", ","}, default: "."
+        Decimal separator of the file.
 
     Returns
     -------
@@ -262,7 +262,7 @@ def read_protocol(path: str | Path, rig: Rig | None = None, name: str = "protoco
     >>> test.duration
     12.0
     """
-    columns = read_table(path)
+    columns = read_table(path, decimal=decimal)
     for key in columns:
         if key not in SEGMENT_MAPPING_KEYS:
             raise InvalidValue("column", key, "is unknown", choices=SEGMENT_MAPPING_KEYS)

@@ -11,7 +11,7 @@ from __future__ import annotations
 import importlib
 import math
 import re
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping
 from fractions import Fraction
 from typing import Any
 
@@ -43,8 +43,10 @@ _SI_FACTOR_AND_EXPONENTS_BY_UNIT: Mapping[str, tuple[str | int, tuple[int, ...]]
     **dict.fromkeys(("um", "\u00b5m", "\u03bcm", "micron", "microns"), ("1e-6", _LENGTH_EXPONENTS)),
     "nm": ("1e-9", _LENGTH_EXPONENTS),
     "ms": ("1e-3", _TIME_EXPONENTS),
-    "s": (1, _TIME_EXPONENTS),
+    **dict.fromkeys(("s", "sec", "seconds"), (1, _TIME_EXPONENTS)),
     "min": (60, _TIME_EXPONENTS),
+    "Hz": (1, (0, 0, -1)),
+    "kHz": ("1e3", (0, 0, -1)),
     "h": (3600, _TIME_EXPONENTS),
     "day": (86400, _TIME_EXPONENTS),
     "year": (31557600, _TIME_EXPONENTS),
@@ -70,11 +72,6 @@ _UNIT_WITH_SIGNED_POWER_PATTERN = re.compile(rf"(/?)\s*{_UNIT_WITH_POWER_PATTERN
 _UNIT_PATTERN = re.compile(
     rf"(?:1(?=\s*/)|{_UNIT_WITH_POWER_PATTERN}(?:(?:\s*[*.\u00b7]\s*|\s+){_UNIT_WITH_POWER_PATTERN})*)?(?:\s*/\s*{_UNIT_WITH_POWER_PATTERN})*"
 )
-_RANGE_SYNTAX_RULE = "must read start:stop:count, two finite numbers and a count"
-_LOG_RANGE_SYNTAX_REMEDY = (
-    "For logarithmic spacing write start:stop:count:log, as in hold_time=1:1e5:30:log."
-)
-_MAX_POINTS_OF_RANGE = 1_000_000
 #: Maximum number of characters of a quantity. The limit is necessary because the time for matching
 #: a pattern increases with the square of the length of the string.
 _MAX_QUANTITY_TEXT_LENGTH = 200
@@ -114,55 +111,6 @@ def split_number_and_units(text: str) -> tuple[float | None, str]:
     """
     match = _NUMBER_PATTERN.match(text.strip())
     return (float(match[0]), text.strip()[match.end() :].strip()) if match else (None, "")
-
-
-def expand_range(argument_name: str, text: str, range_text: str) -> list[float] | list[str]:
-    """Expand a range such as "1:100:20:log" to a list of numbers.
-
-    Parameters
-    ----------
-    argument_name : str
-        Name of the argument for error messages.
-    text : str
-        Complete argument, which error messages quote.
-    range_text : str
-        Range as ``first:last:count`` or ``first:last:count:log``, optionally followed by units.
-
-    Returns
-    -------
-    list of float or list of str
-        Numbers, or strings with units if the range has units.
-
-    Raises
-    ------
-    InvalidValue
-        If the string is not a range.
-    """
-    *before, last = range_text.split(":")
-    last, _, units = last.strip().partition(" ")
-    found = _expand_range_of_numbers(argument_name, text, [*before, last])
-    return [f"{number!r} {units.strip()}" for number in found] if units.strip() else found
-
-
-def _expand_range_of_numbers(
-    argument_name: str, text: str, range_parts: Sequence[str]
-) -> list[float]:
-    spacing = range_parts[3].strip().lower() if len(range_parts) == 4 else ""
-    first, last, points = map(
-        parse_number, range_parts[:3] if len(range_parts) in (3, 4) else ["", "", ""]
-    )
-    if first is None or last is None or points is None or spacing not in ("", "log"):
-        raise InvalidValue(argument_name, text, _RANGE_SYNTAX_RULE, remedy=_LOG_RANGE_SYNTAX_REMEDY)
-    finite = math.isfinite(first) and math.isfinite(last)
-    if not finite or points not in range(1, _MAX_POINTS_OF_RANGE + 1):
-        raise InvalidValue(
-            argument_name, text, f"{_RANGE_SYNTAX_RULE}, from 1 to {_MAX_POINTS_OF_RANGE:,}"
-        )
-    if spacing and min(first, last) <= 0.0:
-        remedy = "Leave :log out, or start above 0."
-        raise InvalidValue(argument_name, text, "has no logarithm of 0 or less", remedy=remedy)
-    laid = np.geomspace if spacing else np.linspace
-    return [float(x) for x in laid(first, last, int(points))]
 
 
 def convert_to_si(quantity_name: str, value: Any, units: str) -> float:
@@ -398,3 +346,23 @@ def _convert_pint_quantity(quantity_name: str, value: Any, quantity: Any, units:
     except Exception as error:
         raise _incompatible_units_error(quantity_name, value, units) from error
     return to_plain_value(quantity_name, magnitude)
+
+
+def find_size_of_units(units: str) -> SiFactorAndExponents | None:
+    """Return the conversion factor and the kind of units that need no pint.
+
+    Parameters
+    ----------
+    units : str
+        Product or quotient of units, such as "MPa" or "um/s".
+
+    Returns
+    -------
+    (Fraction, (int, int, int)) or None
+        Conversion factor to SI units, and the exponents of kilogram, metre and second. The value is
+        None if the string is not a product or quotient of known units.
+    """
+    powers = _parse_unit_powers(units) if 0 < len(units) <= _MAX_QUANTITY_TEXT_LENGTH else None
+    if not powers or not all(name in _KNOWN_UNITS for name, _power in powers):
+        return None
+    return _multiply_known_units(powers)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from typing import NamedTuple, cast
+from typing import NamedTuple
 
 from rsfstudy.slider.friction import build_friction_relation, compute_steady_states
 from rsfstudy.slider.parts import Numbers
@@ -109,10 +109,18 @@ def compute_state_evolution_derivatives(
         1.0 + max(abs(x) / y for x, y in zip(arguments, units, strict=True))
     )
     for place, (scale, unit) in enumerate(zip(scales, units, strict=True)):
+        # Finite differences with half the step size share half of their arguments.
+        known = dict[float, Numbers]()
 
-        def evolve(change: float, place: int = place) -> Numbers:
-            x, shift, *psis = (y + change * (n == place) for n, y in enumerate(arguments))
-            return cast(Numbers, evolutions(x, tuple(psis), shift, 1.0, p))
+        def evolve(
+            change: float, place: int = place, known: dict[float, Numbers] = known
+        ) -> Numbers:
+            if change not in known:
+                changed = [*arguments]
+                changed[place] += change
+                x, shift, *psis = changed
+                known[change] = evolutions(x, tuple(psis), shift, 1.0, p)
+            return known[change]
 
         derivatives, error = _differentiate_at_zero(
             evolve, _MAX_DIFFERENCE_STEP_OVER_SCALE * scale, rounding * unit
@@ -167,14 +175,13 @@ def _central_differences_at_zero(
         For each component, the largest ratio of a function value to the magnitude of the argument
         of the function. The rounding errors of the derivatives are proportional to this ratio.
     """
-    slopes = [0.0] * len(function(0.0))
-    sizes = slopes
+    slopes = [0.0] * len(function(step))
+    sizes = [*slopes]
     for number, weight in _FINITE_DIFFERENCE_WEIGHTS:
-        ahead, behind = function(number * step), function(-number * step)
-        changes = zip(slopes, ahead, behind, strict=True)
-        slopes = [slope + weight * (more - less) / step for slope, more, less in changes]
-        values, away = zip(sizes, ahead, behind, strict=True), number * step
-        sizes = [max(size, abs(more) / away, abs(less) / away) for size, more, less in values]
+        away = number * step
+        for i, (more, less) in enumerate(zip(function(away), function(-away), strict=True)):
+            slopes[i] += weight * (more - less) / step
+            sizes[i] = max(sizes[i], abs(more) / away, abs(less) / away)
     return slopes, sizes
 
 

@@ -385,9 +385,12 @@ def collect_parameter_values(part: Part, scene: SceneView) -> Numbers:
     tuple of float
         Parameters of the part. Fields without a value are NaN.
     """
-    values = (getattr(part, name) for name in _fields_appended_to_parameter_values(type(part)))  # type: ignore[arg-type]
-    others = (math.nan if value is None else float(value) for value in values)
-    return (*part.parameter_values(scene), *others)
+    own = tuple(part.parameter_values(scene))
+    appended = _fields_appended_to_parameter_values(type(part))  # type: ignore[arg-type]
+    if not appended:
+        return own
+    values = [getattr(part, name) for name in appended]
+    return (*own, *[math.nan if value is None else float(value) for value in values])
 
 
 def part_field_quantities(part_class: type[Part]) -> list[Quantity]:

@@ -17,6 +17,7 @@ import argparse
 import collections
 import contextlib
 import functools
+import gzip
 import io
 import json
 import random
@@ -34,6 +35,7 @@ import numpy as np
 import xarray as xr
 from file_mutations import damage_bytes, hostile_dataset, hostile_text
 from forked_calls import call_in_child
+from scipy.io import savemat
 
 import rsfstudy
 from rsfstudy.errors import RsfStudyError
@@ -216,6 +218,9 @@ _COMMAND_READERS = tuple(
                   ("export", "{0}", "--csv", "--output", "{1}/out.csv"), ("report", "{1}"),
                   ("compare", "{0}", "{1}/whole.nc"))
 )  # fmt: skip
+_READ_MATLAB = _reading(
+    rsfstudy.read_record, columns={"time": "t (s)", "displacement": "x (um)", "friction": "mu"}
+)
 KINDS = {
     "small.nc": Kind(
         "results",
@@ -252,6 +257,10 @@ KINDS = {
             ),
         ),
         (damage, retype),
+    ),
+    "record.mat": Kind("matlab", (_READ_MATLAB, rsfstudy.events, rsfstudy.history), (damage,)),
+    "record.csv.gz": Kind(
+        "gzip", (_reading(rsfstudy.read_record, normal_stress="5 MPa"), rsfstudy.events), (damage,)
     ),
     "protocol.csv": Kind(
         "protocol",
@@ -295,6 +304,8 @@ def write_valid_files(place: Path) -> dict[str, Any]:
     rows = [f"{t:.1f},{x:.3f},{s:.6f}" for t, x, s in zip(time, moved, stress, strict=True)]
     header = "time (s),displacement (um),shear_stress (MPa)"
     (place / "record.csv").write_text("\n".join([header, *rows]))
+    (place / "record.csv.gz").write_bytes(gzip.compress((place / "record.csv").read_bytes()))
+    savemat(place / "record.mat", {"t": time, "exp": {"x": moved, "mu": stress}}, appendmat=False)
     (place / "record.dat").write_bytes(_xlook(np.full(600, 0.2), moved, stress))
     (place / "protocol.csv").write_text("velocity (um/s),duration (s)\n1,10\n10,20\n0,5\n")
     shutil.copy(problem_files.shipped_problem_files()[1], place / "problem.toml")

@@ -29,6 +29,7 @@ MODULE_BY_COMMAND = {
     "export": "export",
     "simulate": "simulate",
     "fit": "fit",
+    "events": "events",
     "healing": "healing",
     "problems": "problems",
     "verify": "verify",

@@ -14,6 +14,11 @@ from rsfstudy.cli import options
 from rsfstudy.cli.command_group import Command
 from rsfstudy.cli.options import DecoratedFunction
 from rsfstudy.cli.printing import print_line, print_pieces
+from rsfstudy.cli.record_options import (
+    collect_reading_options,
+    make_quantity_option,
+    reading_options,
+)
 from rsfstudy.cli.results import EXIT_STATUS_FAILED, EXIT_STATUS_OK, CommandResult, output_result
 from rsfstudy.defaults import FIT_EVALUATION_BUDGET
 from rsfstudy.errors import InvalidValue
@@ -67,6 +72,7 @@ class RecordFits(CommandResult):
                 {
                     "record": record.name,
                     "rows": len(record),
+                    "processing": record.processing,
                     "steps": [_step_to_json(*step) for step in enumerate(record.loading_steps, 1)],
                 }
                 for record in self.records
@@ -89,15 +95,6 @@ def _split_commas(
     return tuple(part.strip() for part in (text or "").split(",") if part.strip())
 
 
-def _parse_number_or_text(
-    _context: click.Context, _option: click.Parameter, text: str | None
-) -> Any:
-    """Convert the value of an option to a number if it has no units."""
-    from rsfstudy.cli.assignment_parsing import parse_number_or_text
-
-    return None if text is None else parse_number_or_text(text)
-
-
 def _make_comma_list_option(
     *option_names: str, help_text: str, default: str | None = None, metavar: str = "TEXT"
 ) -> Callable[[DecoratedFunction], DecoratedFunction]:
@@ -107,36 +104,15 @@ def _make_comma_list_option(
     )
 
 
-def _make_quantity_option(
-    option_name: str, help_text: str, default: str | None = None
-) -> Callable[[DecoratedFunction], DecoratedFunction]:
-    """Create an option for a number with units.
-
-    The help text of the option describes the default.
-    """
-    about: dict[str, Any] = {"default": default, "show_default": False, "help": help_text}
-    return click.option(option_name, callback=_parse_number_or_text, **about)
-
-
 @click.command(cls=Command)
 @click.argument("records", nargs=-1, required=True, type=options.FilePath())
-@click.option(
-    "--columns",
-    metavar="NAME=HEADING,...",
-    help="Columns of the record, for example 'time=t (s),displacement=lp (um),friction=mu'. Other "
-    "quantities are shear_stress and normal_stress. Raw values can be scaled, for example "
-    "'lp (um) * 0.1 + 5'.  [default: recognised headings]",
-)
-@click.option(
-    "--normal-stress",
-    help="Normal stress, for example '20 MPa', if the record has no such column.",
-)
-@_make_quantity_option(
+@reading_options
+@make_quantity_option(
     "--stiffness",
     "Stiffness divided by normal stress, for example '1.6e-3 /um', or stiffness, for example "
     "'0.03 MPa/um', or 'from record' to measure the stiffness in the record.",
 )
-@_make_quantity_option("--slip-distance", "Initial guess of D_c, for example '10 um'.")
+@make_quantity_option("--slip-distance", "Initial guess of D_c, for example '10 um'.")
 @_make_comma_list_option(
     "--law",
     "laws",
@@ -157,13 +133,13 @@ def _make_quantity_option(
     is_flag=True,
     help="Fit the steps of all RECORDS jointly, with common values of a, b and D_c.",
 )
-@_make_quantity_option(
+@make_quantity_option(
     "--before",
     "Load point displacement of the fit window before a step.  [default: half the displacement "
     "since the previous step]",
     "0 um",
 )
-@_make_quantity_option(
+@make_quantity_option(
     "--after",
     "Load point displacement of the fit window after a step, for example '250 um'.  [default: up "
     "to the next step]",
@@ -186,7 +162,7 @@ def _make_quantity_option(
     default="steps",
     help="Load point history: ideal velocity steps, or the recorded displacement.",
 )
-@_make_quantity_option(
+@make_quantity_option(
     "--averaging",
     "Averaging time of the data logger, for example '1 s', or 'trailing 1 s' if the averaging "
     "window ends at the time of the row.  [default: no averaging]",
@@ -235,17 +211,15 @@ def fit(given: options.CommandOptions) -> int:
     is not identified.
     """
     from rsfstudy.api import STIFFNESS_FROM_RECORD
-    from rsfstudy.cli.assignment_parsing import parse_column_assignments
     from rsfstudy.cli.data_files import check_output_may_be_replaced
     from rsfstudy.reporting import is_fit
 
     data = given.output.with_suffix(".nc")
     check_output_may_be_replaced(data, is_fit, "fit")
-    columns = parse_column_assignments(given.columns)
-    about = {"normal_stress": given.normal_stress}
+    about = collect_reading_options(given)
     if given.stiffness != STIFFNESS_FROM_RECORD:
         about["stiffness"] = given.stiffness
-    records = [rsfstudy.read_record(path, columns, **about) for path in given.records]
+    records = [rsfstudy.read_record(path, **about) for path in given.records]
     if not given.as_json:
         for record in records:
             _print_steps(record)

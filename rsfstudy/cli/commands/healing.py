@@ -14,6 +14,7 @@ import rsfstudy
 from rsfstudy.cli import options
 from rsfstudy.cli.command_group import Command
 from rsfstudy.cli.printing import print_line, print_pieces
+from rsfstudy.cli.record_options import collect_reading_options, reading_options
 from rsfstudy.cli.results import EXIT_STATUS_FAILED, EXIT_STATUS_OK, CommandResult, output_result
 
 if TYPE_CHECKING:
@@ -67,8 +68,7 @@ class HealingResult(CommandResult):
 
 @click.command(cls=Command)
 @click.argument("record", type=options.FilePath())
-@options.columns_option
-@options.normal_stress_option
+@reading_options
 @click.option(
     "--stiffness",
     help="Stiffness, for example '0.03 MPa/um', if the record has fault slip instead of load point "
@@ -91,7 +91,6 @@ def healing(given: options.CommandOptions) -> int:
     The exit status is 1 if no hold has a peak of friction on reloading, and 2 for wrong usage.
     Otherwise the exit status is 0.
     """
-    from rsfstudy.cli.assignment_parsing import parse_column_assignments
     from rsfstudy.cli.data_files import check_output_may_be_replaced
     from rsfstudy.cli.figure_files import write_figure
     from rsfstudy.execution import provenance_attributes
@@ -100,9 +99,8 @@ def healing(given: options.CommandOptions) -> int:
 
     data = given.output.with_suffix(".nc")
     check_output_may_be_replaced(data, is_hold_table, "table of holds")
-    columns = parse_column_assignments(given.columns)
-    about = {"normal_stress": given.normal_stress, "stiffness": given.stiffness}
-    record = rsfstudy.read_record(given.record, columns, **about)
+    about = {"stiffness": given.stiffness, **collect_reading_options(given)}
+    record = rsfstudy.read_record(given.record, **about)
     table = rsfstudy.healing(record).assign_attrs(provenance_attributes(given.command_line))
     write_dataset(table, data)
     write_figure(rsfstudy.plot_healing(table, record), given.output)

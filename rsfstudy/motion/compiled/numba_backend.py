@@ -51,13 +51,13 @@ atexit.register(gc.freeze)
 class NumbaBackend:
     """Backend that runs the compiled event loop.
 
-    The methods are documented in ``motion_driver.PythonBackend``.
+    The methods are documented in ``python_backend.PythonBackend``.
     """
 
     def initial_state_values(self, field_values: tuple[tuple[str, float], ...]) -> bytes:
         """Return the initial values of all motion state fields as bytes.
 
-        See ``motion_driver.PythonBackend.initial_state_values``.
+        See ``python_backend.PythonBackend.initial_state_values``.
 
         Parameters
         ----------
@@ -76,7 +76,7 @@ class NumbaBackend:
     ) -> NumbaMotionState:
         """Create the state of a motion.
 
-        See ``motion_driver.PythonBackend.create_motion_state``.
+        See ``python_backend.PythonBackend.create_motion_state``.
 
         Parameters
         ----------
@@ -95,7 +95,7 @@ class NumbaBackend:
     def build_function_table(self, equations_by_regime: tuple[Equations, ...]) -> np.ndarray:
         """Build the table of function addresses.
 
-        See ``motion_driver.PythonBackend.build_function_table``.
+        See ``python_backend.PythonBackend.build_function_table``.
 
         Parameters
         ----------
@@ -113,7 +113,7 @@ class NumbaBackend:
     def as_loop_arguments(self, *arrays: np.ndarray) -> Sequence[np.ndarray]:
         """Return the arrays unchanged.
 
-        See ``motion_driver.PythonBackend.as_loop_arguments``.
+        See ``python_backend.PythonBackend.as_loop_arguments``.
 
         Parameters
         ----------
@@ -130,7 +130,7 @@ class NumbaBackend:
     def as_loop_parameters(self, parameters: Sequence[float]) -> Any:
         """Convert the parameters of a scene to an array.
 
-        See ``motion_driver.PythonBackend.as_loop_parameters``.
+        See ``python_backend.PythonBackend.as_loop_parameters``.
 
         Parameters
         ----------
@@ -147,7 +147,7 @@ class NumbaBackend:
     def get_loop_function(self) -> Any:
         """Return the compiled event loop.
 
-        See ``motion_driver.PythonBackend``.
+        See ``python_backend.PythonBackend``.
         """
         return get_compiled_loop()
 

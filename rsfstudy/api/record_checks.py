@@ -1,0 +1,163 @@
+"""Checks of records before a fit."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+
+from rsfstudy.errors import InvalidValue
+from rsfstudy.fitting import LoadingStep, Record, displacement_is_slip, noise_variance
+
+#: A decrease of the load point displacement between two rows is a reset to zero if the decrease
+#: exceeds three limits: a multiple of the noise of displacement, a multiple of the changes between
+#: the neighbouring rows, and a fraction of the range of displacement. The noise is estimated only
+#: if the record has more than 20 rows.
+(
+    _MIN_DISPLACEMENT_RESET_OVER_NOISE,
+    _MIN_DISPLACEMENT_RESET_OVER_EXTENT,
+    _MIN_ROWS_FOR_NOISE_ESTIMATE,
+) = 10.0, 0.01, 20
+
+
+def check_displacement_was_not_reset(record: Record) -> None:
+    """Raise an error if the load point displacement was reset to zero.
+
+    A reset appears as a large decrease of displacement between two successive rows.
+
+    Parameters
+    ----------
+    record : Record
+        Record to check.
+
+    Raises
+    ------
+    InvalidValue
+        If the displacement was reset, and the steps of the record were not specified by the user.
+    """
+    time, moved = record.time, record.columns["displacement"]
+    jumps = np.diff(moved)
+    row = int(np.argmin(jumps))
+    noise = (
+        math.sqrt(noise_variance(time, moved)) if len(time) > _MIN_ROWS_FOR_NOISE_ESTIMATE else 0.0
+    )
+    beside = np.abs(np.delete(jumps[max(row - 5, 0) : row + 6], min(row, 5))).max(initial=0.0)
+    back = -float(jumps[row]) > max(
+        _MIN_DISPLACEMENT_RESET_OVER_NOISE * beside,
+        _MIN_DISPLACEMENT_RESET_OVER_NOISE * noise,
+        _MIN_DISPLACEMENT_RESET_OVER_EXTENT * np.ptp(moved),
+    )
+    if record.specified_steps is None and back:
+        rule = f"falls back between two rows at {time[row + 1]:g} s in {record.name}, as a load "
+        rule += "point does that is set to zero again"
+        remedy = f"Fit its parts, as in record.window({time[0]:g}, {time[row]:g}) or by reading "
+        remedy += f"begin='{time[row + 1]:g} s' (--begin), or add the offset to the later rows."
+        raise InvalidValue("displacement", f"{jumps[row]:.4g} um", rule, remedy=remedy)
+
+
+def check_displacement_is_not_slip(
+    records: Sequence[Record], step_numbers: Sequence[int], ratio: float, machine: float
+) -> None:
+    """Raise an error if the displacement of a record is the slip of the fault.
+
+    Parameters
+    ----------
+    records : sequence of Record
+        Records to check.
+    step_numbers : sequence of int
+        Numbers of the steps to fit.
+    ratio, machine : float
+        Stiffness divided by normal stress in 1/um, and stiffness in Pa/um. One of the values is 0.
+
+    Raises
+    ------
+    InvalidValue
+        If the displacement is slip, because the sum of displacement and elastic shortening moves at
+        constant velocities.
+    """
+    for record in records:
+        stress = record.columns["friction"]
+        shortening = (
+            stress * record.columns["normal_stress"] / machine if machine else stress / ratio
+        )
+        ends = [-math.inf, *(step.end for step in record.loading_steps)]
+        begins = [*(step.start for step in record.loading_steps[1:]), math.inf, math.inf]
+        for number in step_numbers:
+            if number > len(record.loading_steps):
+                continue
+            rows = (record.time >= ends[number - 1]) & (record.time <= begins[number - 1])
+            moved = record.columns["displacement"][rows]
+            if displacement_is_slip(record.time[rows], moved, shortening[rows]):
+                rule = f"is the slip of the fault at step {number}, because displacement plus "
+                rule += "friction over stiffness moves at constant velocities, as a load point does"
+                remedy = "Name the column slip: --columns 'slip=HEADING (um)' (columns=), and pass "
+                remedy += "the stiffness to read_record, too."
+                raise InvalidValue("displacement", record.name, rule, remedy=remedy)
+
+
+def check_step_can_be_fitted(record: Record, step_number: int, step: LoadingStep) -> None:
+    """Raise an error if a step cannot be fitted.
+
+    Parameters
+    ----------
+    record : Record
+        Record with the step.
+    step_number : int
+        Number of the step, for error messages.
+    step : LoadingStep
+        Step to check.
+
+    Raises
+    ------
+    InvalidValue
+        If the step is outside the record, or if the load point does not move forward.
+    """
+    time, moved = record.time, record.columns["displacement"]
+    if not time[0] < step.start <= step.end < time[-1]:
+        rule = f"is stated outside of {record.name}, {time[0]:g} to {time[-1]:g} s"
+        remedy = "State steps in s, by the clock of the record: record.with_steps([...])."
+        raise InvalidValue(f"step {step_number}", tuple(step), rule, remedy=remedy)
+    if min(step.velocity_before, step.velocity_after) < 0.0 or not moved[-1] > np.interp(
+        step.end, time, moved
+    ):
+        told = (
+            f"{step.velocity_before:.4g} um/s before step {step_number}, "
+            f"{step.velocity_after:.4g} um/s after it"
+        )
+        rule = "must grow: a load point moves forward"
+        remedy = "Reverse its sign, or say which column is which: --columns (columns=)."
+        raise InvalidValue("displacement", told, rule, remedy=remedy)
+
+
+def check_normal_stress_changes_for_alpha(
+    records: Sequence[Record], loading_kind: str, step_numbers: Sequence[int]
+) -> None:
+    """Raise an error if ``alpha`` cannot be fitted.
+
+    Parameters
+    ----------
+    records : sequence of Record
+        Records to fit.
+    loading_kind : {"steps", "recorded"}
+        Loading of the model.
+    step_numbers : sequence of int
+        Numbers of the steps to fit.
+
+    Raises
+    ------
+    InvalidValue
+        If the normal stress is constant.
+    """
+    for record in records:
+        stress = record.columns.get("normal_stress", np.zeros(1))
+        steps = [
+            record.loading_steps[n - 1] for n in step_numbers if n <= len(record.loading_steps)
+        ]
+        by_steps = loading_kind == "steps" and any(step.stress_ratio != 1.0 for step in steps)
+        if not by_steps and not (loading_kind == "recorded" and np.ptp(stress) > 0.0):
+            rule = "needs a normal stress that changes: "
+            rule += f"that of {record.name} has no step among those that are fitted"
+            remedy = "Leave alpha out, name a step of normal stress (steps=), or follow the "
+            remedy += "recorded normal stress with --loading recorded (loading=)."
+            raise InvalidValue("free", "alpha", rule, remedy=remedy)

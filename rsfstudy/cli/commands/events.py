@@ -1,0 +1,93 @@
+"""Command ``rsfstudy events``."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+import rsfstudy
+from rsfstudy.cli import options
+from rsfstudy.cli.command_group import Command
+from rsfstudy.cli.printing import print_line, print_pieces
+from rsfstudy.cli.record_options import (
+    collect_reading_options,
+    make_quantity_option,
+    reading_options,
+)
+from rsfstudy.cli.results import EXIT_STATUS_OK, CommandResult, output_result
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+
+@dataclass(frozen=True)
+class RecordEvents(CommandResult):
+    """Stress drops in records.
+
+    Parameters
+    ----------
+    files : sequence of Path
+        Files of the records.
+    catalogues : sequence of xarray.Dataset
+        Stress drops in each record.
+    """
+
+    files: Sequence[Path]
+    catalogues: Sequence[xr.Dataset]
+
+    @property
+    def exit_status(self) -> int:
+        """Success, even if a record has no events."""
+        return EXIT_STATUS_OK
+
+    def json_fields(self) -> dict[str, Any]:
+        """Return the fields of the JSON output."""
+        from rsfstudy.reporting import list_record_events
+
+        pairs = zip(self.files, self.catalogues, strict=True)
+        return {"records": [{"file": file, **list_record_events(of)} for file, of in pairs]}
+
+
+@click.command(cls=Command)
+@click.argument("records", nargs=-1, required=True, type=options.FilePath())
+@reading_options
+@make_quantity_option(
+    "--stiffness",
+    "Stiffness between the fault and the point at which displacement is measured, for example "
+    "'0.05 MPa/um', or inf if displacement is the slip of the fault.",
+)
+@click.option(
+    "--sign",
+    type=click.Choice(["1", "-1"]),
+    help="Sign of shear stress in the direction of sliding.  [default: -1 if all samples are "
+    "negative, otherwise 1]",
+)
+@options.json_option
+def events(given: options.CommandOptions) -> int:
+    """Detect drops of shear stress in RECORDS.
+
+    A record needs shear stress or friction, and time or displacement. The command prints a table of
+    the drops with their times, durations, intervals and sizes, and the smallest drop that can be
+    detected. With --json, all quantities are printed with their errors.
+    """
+    reading = collect_reading_options(given)
+    sign = None if given.sign is None else int(given.sign)
+    catalogues = [
+        rsfstudy.events(path, stiffness=given.stiffness, sign=sign, **reading)
+        for path in given.records
+    ]
+    return output_result(RecordEvents(given.records, catalogues), _print_events, given.as_json)
+
+
+def _print_events(result: RecordEvents) -> None:
+    """Print a table of the drops in each record."""
+    from rsfstudy.reporting import build_record_events_pieces
+
+    for file, catalogue in zip(result.files, result.catalogues, strict=True):
+        if len(result.files) > 1:
+            print_line(str(file), style="bold", soft_wrap=True)
+        print_pieces(build_record_events_pieces(catalogue))

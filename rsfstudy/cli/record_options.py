@@ -1,0 +1,136 @@
+"""Options of the commands that read laboratory records."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import click
+
+from rsfstudy.cli.options import (
+    CommandOptions,
+    DecoratedFunction,
+    columns_option,
+    combine_option_decorators,
+    normal_stress_option,
+)
+from rsfstudy.errors import InvalidValue
+
+#: Options that are passed unchanged to the functions that read records.
+_OPTIONS_PASSED_UNCHANGED = ("decimal", "sheet", "area", "begin", "end", "thin", "filter")
+
+
+def _parse_number_or_text(
+    _context: click.Context, _option: click.Parameter, text: str | None
+) -> Any:
+    """Convert the value of an option to a number if it has no units."""
+    from rsfstudy.cli.assignment_parsing import parse_number_or_text
+
+    return None if text is None else parse_number_or_text(text)
+
+
+def make_quantity_option(
+    option_name: str, help_text: str, default: str | None = None
+) -> Callable[[DecoratedFunction], DecoratedFunction]:
+    """Create an option for a number with units.
+
+    Parameters
+    ----------
+    option_name : str
+        Name of the option with leading hyphens.
+    help_text : str
+        Help text, which describes the default.
+    default : str, optional
+        Default value.
+
+    Returns
+    -------
+    callable
+        Decorator for a command.
+    """
+    about: dict[str, Any] = {"default": default, "show_default": False, "help": help_text}
+    return click.option(option_name, callback=_parse_number_or_text, **about)
+
+
+reading_options = combine_option_decorators(
+    columns_option,
+    normal_stress_option,
+    click.option(
+        "--decimal",
+        type=click.Choice([".", ","]),
+        default=".",
+        help="Decimal separator of a text file.",
+    ),
+    click.option(
+        "--sheet",
+        default="",
+        show_default=False,
+        help="Sheet of a workbook, or group of a TDMS file.  [default: first]",
+    ),
+    click.option(
+        "--area", help="Area of the fault, for example '25 cm2', by which forces are divided."
+    ),
+    click.option(
+        "--rows",
+        metavar="FIRST,LAST",
+        help="Numbers of the first and the last row to read, counted from 1.  [default: all]",
+    ),
+    make_quantity_option(
+        "--begin",
+        "Time or load point displacement of the first row, for example '100 s' or '2 mm'.",
+    ),
+    make_quantity_option("--end", "Time or load point displacement of the last row."),
+    click.option(
+        "--thin",
+        type=click.IntRange(1),
+        metavar="N",
+        default=1,
+        show_default=False,
+        help="Keep one of every N rows, after the filter.  [default: all]",
+    ),
+    click.option(
+        "--filter",
+        default="",
+        show_default=False,
+        help="Filter that is applied to friction or stress: mean, trailing_mean, first_order, "
+        "butterworth_2 or butterworth_4 with its size, for example 'mean 1 s' or 'butterworth_2 2 "
+        "Hz'. A fit applies the same filter to the model.  [default: no filter]",
+    ),
+)
+
+
+def collect_reading_options(given: CommandOptions) -> dict[str, Any]:
+    """Return the keyword arguments of the functions that read records.
+
+    Parameters
+    ----------
+    given : CommandOptions
+        Options of the command.
+
+    Returns
+    -------
+    dict of str to object
+        Keyword arguments of ``read_record`` and ``events``.
+
+    Raises
+    ------
+    InvalidValue
+        If the option ``--columns`` or ``--rows`` cannot be parsed.
+    """
+    from rsfstudy.cli.assignment_parsing import parse_column_assignments
+
+    return {
+        "columns": parse_column_assignments(given.columns),
+        "normal_stress": given.normal_stress,
+        "rows": None if given.rows is None else _parse_rows(given.rows),
+        **given.collect_option_values(*_OPTIONS_PASSED_UNCHANGED),
+    }
+
+
+def _parse_rows(text: str) -> tuple[int, ...]:
+    """Convert the value of the option ``--rows``."""
+    numbers = [part.strip() for part in text.split(",")]
+    if not all(number.isdecimal() and len(number) < 16 for number in numbers):
+        rule = "must be the numbers of the first and the last row, for example 100,4000"
+        raise InvalidValue("--rows", text, rule)
+    return tuple(map(int, numbers))

@@ -1,0 +1,71 @@
+"""Check that a displacement is the load point displacement, and not the slip of the fault."""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy.optimize import minimize_scalar
+
+#: Maximum number of rows that are compared, and number of times at which the velocity may change.
+_MAX_ROWS, _TRIAL_TIMES = 400, 40
+#: The displacement is slip if the squared residuals of slip plus elastic shortening are smaller
+#: than the squared residuals of displacement by this factor.
+_MAX_RATIO_OF_SQUARES = 0.1
+
+
+def displacement_is_slip(
+    time: np.ndarray, displacement: np.ndarray, shortening: np.ndarray
+) -> bool:
+    """Return True if a displacement is the slip of the fault.
+
+    A load point moves at a constant velocity before and after a velocity step. If the displacement
+    is the slip of the fault, slip plus the elastic shortening of the machine moves at constant
+    velocities, and the displacement itself does not.
+
+    Parameters
+    ----------
+    time, displacement : ndarray, shape (rows,)
+        Times and displacements between the steps before and after a velocity step.
+    shortening : ndarray, shape (rows,)
+        Elastic shortening of the machine: shear stress divided by stiffness, in the units of the
+        displacement.
+
+    Returns
+    -------
+    bool
+        True if the sum of displacement and shortening fits two straight lines much better than the
+        displacement does.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from rsfstudy.fitting import displacement_is_slip
+    >>> time = np.arange(0.0, 100.0)
+    >>> load_point = np.where(time < 50.0, time, 50.0 + 10.0 * (time - 50.0))
+    >>> shortening = 300.0 + 10.0 * np.where(time < 50.0, 0.0, np.exp(-(time - 50.0) / 5.0))
+    >>> displacement_is_slip(time, load_point, shortening)
+    False
+    >>> displacement_is_slip(time, load_point - shortening, shortening)
+    True
+    """
+    every = -(-len(time) // _MAX_ROWS)
+    time, displacement, shortening = (of[::every] for of in (time, displacement, shortening))
+    if len(time) < _TRIAL_TIMES:
+        return False
+    alone = _squares_of_two_lines(time, displacement)
+    return _squares_of_two_lines(time, displacement + shortening) < _MAX_RATIO_OF_SQUARES * alone
+
+
+def _squares_of_two_lines(time: np.ndarray, values: np.ndarray) -> float:
+    """Return the least sum of squared residuals of two connected straight lines."""
+    scaled = (time - time[0]) / (time[-1] - time[0])
+    centred = values - values.mean()
+
+    def squares(bend: float) -> float:
+        lines = np.column_stack([np.ones_like(scaled), scaled, np.maximum(scaled - bend, 0.0)])
+        best = np.linalg.lstsq(lines, centred)[0]
+        return float(((centred - lines @ best) ** 2).sum())
+
+    trials = np.linspace(0.0, 1.0, _TRIAL_TIMES + 2)
+    best = 1 + int(np.argmin([squares(bend) for bend in trials[1:-1]]))
+    found = minimize_scalar(squares, bounds=(trials[best - 1], trials[best + 1]), method="bounded")
+    return float(found.fun)

@@ -1,0 +1,121 @@
+"""Table of event specifications that the event loop reads."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from functools import lru_cache
+
+import numpy as np
+
+from rsfstudy.motion import array_layout
+from rsfstudy.motion.events import EventKind, EventSpecification
+from rsfstudy.motion.step_events import BEFORE_JUMP, NO_EVENT, find_jump_side_of_event
+from rsfstudy.slider import MotionPoint, Numbers
+
+_EVENT_KIND_CODES = {
+    kind: array_layout.__dict__[kind.name]
+    for kind in EventKind
+    if kind.name in array_layout.__dict__
+}
+#: Array column of each attribute of ``MotionPoint``. The empty name is mapped to the first column.
+_POINT_COLUMN_BY_QUANTITY = {
+    name: column for column, name in enumerate(MotionPoint._fields[:-1])
+} | {"": 0}
+#: Kinds of events that are reported without a request. The negative event codes are indices from
+#: the end of this list.
+_KINDS_AND_SPECS_OF_UNREQUESTED_EVENTS = [
+    (k, None)
+    for k in (
+        EventKind.SEGMENT,
+        EventKind.SAMPLED,
+        EventKind.END,
+        EventKind.REGIME,
+        EventKind.START,
+    )
+]
+
+
+def find_events_at_jump(
+    point_before: MotionPoint,
+    parameters_before: Numbers,
+    point_after: MotionPoint,
+    parameters_after: Numbers,
+    event_specs: Sequence[EventSpecification],
+) -> Iterator[tuple[EventSpecification, MotionPoint]]:
+    """Yield the requested events that occur at a jump between two points.
+
+    Parameters
+    ----------
+    point_before, point_after : MotionPoint
+        Points immediately before and after the jump.
+    parameters_before, parameters_after : tuple of float
+        Parameters of the scene before and after the jump.
+    event_specs : sequence of EventSpecification
+        Requested events.
+
+    Yields
+    ------
+    specification : EventSpecification
+        Specification of the event.
+    point : MotionPoint
+        Point at which the event is reported, either ``point_before`` or ``point_after``.
+    """
+    last, first = pack_point(point_before).tolist(), pack_point(point_after).tolist()
+    table = (
+        pack_event_specifications(tuple(event_specs))[0]
+        .reshape(-1, len(array_layout.EVENT_SPECIFICATION_COLUMNS))
+        .tolist()
+    )
+    for spec, row in zip(event_specs, table, strict=True):
+        where = find_jump_side_of_event(row, last, parameters_before, first, parameters_after)
+        if where != NO_EVENT:
+            yield spec, point_before if where == BEFORE_JUMP else point_after
+
+
+@lru_cache(maxsize=256)
+def pack_event_specifications(
+    event_specs: tuple[EventSpecification, ...],
+) -> tuple[np.ndarray, list[tuple[EventKind, EventSpecification | None]]]:
+    """Convert event specifications to the table of the event loop.
+
+    Parameters
+    ----------
+    event_specs : tuple of EventSpecification
+        Requested events.
+
+    Returns
+    -------
+    table : ndarray of shape (specifications * 7,)
+        Rows of the table. The columns are ``array_layout.EVENT_SPECIFICATION_COLUMNS``.
+    events_by_code : list of (EventKind, EventSpecification or None)
+        Kind and specification of the events for each event code of the loop.
+    """
+    meanings = [
+        *((spec.kind, spec) for spec in event_specs),
+        *_KINDS_AND_SPECS_OF_UNREQUESTED_EVENTS,
+    ]
+    asked = np.zeros((len(event_specs), len(array_layout.EVENT_SPECIFICATION_COLUMNS)))
+    for row, spec in zip(asked, event_specs, strict=True):
+        row[array_layout.SPEC_KIND], row[array_layout.SPEC_QUANTITY] = (
+            _EVENT_KIND_CODES[spec.kind],
+            _POINT_COLUMN_BY_QUANTITY[spec.quantity],
+        )
+        row[array_layout.SPEC_LEVEL], row[array_layout.SPEC_TERMINAL] = spec.level, spec.terminal
+        row[array_layout.SPEC_MAY_DEFER] = spec.may_defer
+    return asked.ravel(), meanings
+
+
+def pack_point(point: MotionPoint) -> np.ndarray:
+    """Convert a ``MotionPoint`` to an array with the columns of the event loop.
+
+    Parameters
+    ----------
+    point : MotionPoint
+        Point of the motion.
+
+    Returns
+    -------
+    ndarray of shape (FIRST_STATE + states,)
+        Columns of the point.
+    """
+    return np.array((*point[:-1], *point.psis))

@@ -1,0 +1,154 @@
+"""Common part of all functions that read records: options, columns and rows.
+
+`read_columns` reads the columns that a question can use from a source in any format.
+"""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Mapping
+from dataclasses import dataclass, fields
+from typing import Any, NamedTuple
+
+from rsfstudy.errors import CallError, InvalidValue, shorten_text
+from rsfstudy.rig.columns import Column
+from rsfstudy.rig.readers import read_source
+from rsfstudy.rig.readers.source import Table
+from rsfstudy.rig.row_selection import RowSelection
+from rsfstudy.rig.units import compute_conversion_factor, convert_to_si, find_size_of_units
+from rsfstudy.rig.usual_headings import UsableColumns, check_finite, read_selected_columns
+
+#: Exponents of kilogram, metre and second in the units of force.
+_EXPONENTS_OF_FORCE = (1, 1, -2)
+#: Columns that may contain a force instead of a stress.
+_STRESS_COLUMNS = ("shear_stress", "normal_stress")
+
+
+@dataclass(frozen=True)
+class ReadingOptions(RowSelection):
+    """Options of reading that all functions for records share.
+
+    The other options are described in `RowSelection`.
+
+    Parameters
+    ----------
+    decimal : {".", ","}, default: "."
+        Decimal separator of a text file.
+    sheet : str, default: ""
+        Sheet of a workbook, or group of a TDMS file. By default, the first one is read.
+    area : quantity, optional
+        Area of the fault, such as "25 cm2". Forces are divided by the area.
+    """
+
+    decimal: str = "."
+    sheet: str = ""
+    area: Any = None
+
+    @classmethod
+    def parse(cls, function_name: str, keywords: Mapping[str, Any]) -> ReadingOptions:
+        """Create the options from the keywords of a function.
+
+        Parameters
+        ----------
+        function_name : str
+            Name of the function for error messages.
+        keywords : mapping of str to object
+            Options by name.
+
+        Returns
+        -------
+        ReadingOptions
+            Validated options.
+
+        Raises
+        ------
+        CallError
+            If a keyword is unknown.
+        InvalidValue
+            If a value is invalid.
+        """
+        known = [field.name for field in fields(cls)]
+        for name in keywords:
+            if name not in known:
+                close = difflib.get_close_matches(shorten_text(name), known, n=1)
+                hint = "".join(f" Did you mean {each!r}?" for each in close)
+                raise CallError(
+                    f"{function_name}() has no parameter {shorten_text(name)!r}.{hint} The options "
+                    f"of reading are {', '.join(known)}."
+                )
+        return cls(**keywords)
+
+
+class ColumnsOfSource(NamedTuple):
+    """Columns that a question can use.
+
+    Parameters
+    ----------
+    columns : dict of str to Column
+        Columns by name, with their units. All values are finite.
+    table : Table
+        Table from which the columns were read.
+    processing : list of str
+        Descriptions of the selection of rows.
+    """
+
+    columns: dict[str, Column]
+    table: Table
+    processing: list[str]
+
+
+def read_columns(
+    source: Any,
+    selected_columns: Mapping[str, Any] | None,
+    usable: UsableColumns,
+    options: ReadingOptions,
+) -> ColumnsOfSource:
+    """Read the columns of a source that a question can use.
+
+    Parameters
+    ----------
+    source : str, Path, mapping, pandas.DataFrame, xarray.Dataset or Record
+        Path of a file in any known format, or object that contains the columns.
+    selected_columns : mapping of str to str or tuple, or None
+        Heading and units of columns by name.
+    usable : UsableColumns
+        Columns that the question can use.
+    options : ReadingOptions
+        Options of reading.
+
+    Returns
+    -------
+    ColumnsOfSource
+        Columns with the selected rows.
+
+    Raises
+    ------
+    DataError
+        If the file cannot be read.
+    InvalidValue
+        If a column is unknown or has no units, or if a value is not a finite number.
+    """
+    table = read_source(source, decimal=options.decimal, sheet=options.sheet)
+    found = read_selected_columns(table, selected_columns, usable)
+    found = {name: _convert_force(name, column, options.area) for name, column in found.items()}
+    processing: list[str] = []
+    if found:
+        found, processing = options.cut(found)
+    check_finite(found)
+    return ColumnsOfSource(found, table, processing)
+
+
+def _convert_force(name: str, column: Column, area: Any) -> Column:
+    """Divide a force by the area of the fault."""
+    size = find_size_of_units(column.units)
+    if name not in _STRESS_COLUMNS or size is None or size[1] != _EXPONENTS_OF_FORCE:
+        return column
+    if area is None:
+        rule = "is a force, and stress is force over area"
+        remedy = "Pass the area of the fault: area='25 cm2' (--area '25 cm2')."
+        raise InvalidValue(name, f"in {column.units}", rule, remedy=remedy)
+    square_metres = convert_to_si("area", area, "m2")
+    if not square_metres > 0.0:
+        raise InvalidValue("area", area, "must be positive")
+    newtons = float(compute_conversion_factor(name, column.units, "kg m s-2"))
+    return column._replace(values=column.values * (newtons / square_metres), units="Pa")

@@ -1,0 +1,218 @@
+"""Columns of tables, and selections of columns.
+
+A selection of a column contains the heading of the column, its units, a scale and an offset.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Collection, Iterable, Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from rsfstudy._deprecation import add_former_member_names
+from rsfstudy.errors import InvalidValue
+
+#: Header of a table in the examples of error messages.
+EXAMPLE_OF_TABLE_HEADER = "velocity (um/s), distance (um), a (1)"
+_NUMBER_PATTERN = r"\s*((?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*"
+#: Pattern of a heading that is followed by a scale and an offset.
+_HEADING_WITH_SCALE_AND_OFFSET_PATTERN = re.compile(
+    rf"(.*\S)\s*\*\s*(-?){_NUMBER_PATTERN}(?:([-+]){_NUMBER_PATTERN})?"
+)
+#: Pattern of a heading with optional units in brackets.
+HEADING_PATTERN = re.compile(r"\s*([^(\[]+?)\s*(?:[(\[]([^)\]]*)[)\]])?\s*")
+#: Maximum length of a heading. The limit is necessary because the time for matching a pattern
+#: increases with the square of the length of the heading.
+_MAX_HEADING_LENGTH = 200
+
+
+class ColumnSpec(NamedTuple):
+    """Selection of a column in a file.
+
+    Parameters
+    ----------
+    heading : str
+        Heading of the column.
+    units : str, default: ""
+        Units of the column.
+    scale : float, default: 1.0
+        Factor by which raw numbers are multiplied.
+    offset : float, default: 0.0
+        Number to add to each value after the multiplication by ``scale``.
+    """
+
+    heading: str
+    units: str = ""
+    scale: float = 1.0
+    offset: float = 0.0
+
+
+def check_heading_length(heading: str) -> None:
+    """Raise an error if a heading is too long to be parsed.
+
+    Parameters
+    ----------
+    heading : str
+        Heading to check.
+
+    Raises
+    ------
+    InvalidValue
+        If the heading is too long.
+    """
+    if len(heading) > _MAX_HEADING_LENGTH:
+        rule = f"must have at most {_MAX_HEADING_LENGTH} characters (it has {len(heading):,})"
+        raise InvalidValue(
+            "heading", heading, rule, remedy=f"Write it as in {EXAMPLE_OF_TABLE_HEADER}."
+        )
+
+
+def check_heading_lengths(headings: Iterable[str], file_description: str) -> None:
+    """Check the length of all headings of a file.
+
+    Parameters
+    ----------
+    headings : iterable of str
+        Headings in the order of the columns.
+    file_description : str
+        Name of the file for error messages.
+
+    Raises
+    ------
+    InvalidValue
+        If a heading is too long. The error message contains the number of the column.
+    """
+    for column, heading in enumerate(headings, start=1):
+        try:
+            check_heading_length(heading)
+        except InvalidValue as error:
+            raise error.with_location(f"{file_description}, column {column}") from error
+
+
+def _parse_column_spec_given_as_list(column_choice: Any) -> ColumnSpec:
+    """Parse a column selection with heading, units, scale and offset."""
+    rule = "must be a heading, or a list of a heading, its units, a scale and an offset"
+    remedy = "Write ('Time (s)', 's', 0.001), for example."
+    wrong = InvalidValue("column", column_choice, rule, remedy=remedy)
+    column_choice = (
+        column_choice.tolist() if isinstance(column_choice, np.ndarray) else column_choice
+    )
+    if not isinstance(column_choice, Sequence) or not 1 <= len(column_choice) <= len(
+        ColumnSpec._fields
+    ):
+        raise wrong
+    heading, units, *numbers = (*column_choice, "")[: max(2, len(column_choice))]
+    # Columns of xlook files may be selected by their numbers.
+    if not isinstance(heading, str | int) or not isinstance(units, str):
+        raise wrong
+    check_heading_length(str(heading))
+    try:
+        return ColumnSpec(str(heading), units, *map(float, numbers))
+    except (TypeError, ValueError, OverflowError) as error:
+        raise wrong from error
+
+
+def parse_column_spec(column_choice: Any, headings: Collection[str]) -> ColumnSpec:
+    """Parse the selection of a column.
+
+    Parameters
+    ----------
+    column_choice : str or sequence
+        A sequence of heading, units, scale and offset, or a string such as ``lp (um) * 0.1 + 5``.
+        The units in brackets are optional, even if the heading in the file contains units.
+    headings : collection of str
+        Headings of the file.
+
+    Returns
+    -------
+    ColumnSpec
+        Selected column.
+
+    Raises
+    ------
+    InvalidValue
+        If the selection has another type, or if the heading is too long.
+    """
+    if not isinstance(column_choice, str):
+        return _parse_column_spec_given_as_list(column_choice)
+    check_heading_length(column_choice)
+    raw = (
+        None
+        if column_choice in headings
+        else _HEADING_WITH_SCALE_AND_OFFSET_PATTERN.fullmatch(column_choice)
+    )
+    scale, offset = 1.0, 0.0
+    if raw:
+        column_choice, scale = raw[1], float(raw[2] + raw[3])
+        offset = float((raw[4] or "") + (raw[5] or "0"))
+    match = HEADING_PATTERN.fullmatch(column_choice)
+    units = (match[2] or "").strip() if match else ""
+    heading = column_choice if column_choice in headings or not match else match[1]
+    return ColumnSpec(heading, units, scale, offset)
+
+
+@add_former_member_names
+class Column(NamedTuple):
+    """Column of a table.
+
+    Parameters
+    ----------
+    values : ndarray
+        Values of the column, as an array of shape (rows,). Empty fields are NaN.
+    units : str
+        Units of the values.
+    column_number : int, default: 0
+        Number of the column in the file, counted from 1.
+    line_numbers : ndarray, optional
+        Line number of each value in the file.
+    path : str, default: ""
+        Path of the file. The string is empty if the column does not come from a file.
+    """
+
+    values: np.ndarray
+    units: str
+    column_number: int = 0
+    line_numbers: np.ndarray = np.empty(0, dtype=int)
+    path: str = ""
+
+    def location(self, row: int) -> str:
+        """Return the location of a value for error messages.
+
+        Parameters
+        ----------
+        row : int
+            Index of the value.
+
+        Returns
+        -------
+        str
+            File, line and column of the value, or the number of the sample.
+        """
+        if not self.path:
+            return f"sample {row + 1}"
+        return f"{self.path}, line {self.line_numbers[row]}, column {self.column_number}"
+
+    def check_values(self, quantity_name: str, invalid_mask: np.ndarray, rule: str) -> None:
+        """Raise an error for the first invalid value.
+
+        Parameters
+        ----------
+        quantity_name : str
+            Name of the quantity.
+        invalid_mask : ndarray of bool
+            True for each invalid value.
+        rule : str
+            Rule that the values must satisfy.
+
+        Raises
+        ------
+        InvalidValue
+            If a value is invalid. The error message contains the location of the value.
+        """
+        if invalid_mask.any():
+            row = int(np.argmax(invalid_mask))
+            raise InvalidValue(quantity_name, float(self.values[row]), rule).with_location(
+                self.location(row)
+            )

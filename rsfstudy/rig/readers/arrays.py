@@ -1,0 +1,204 @@
+"""Readers of arrays in memory, and of NetCDF files."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Hashable, Mapping
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pandas as pd
+import xarray as xr
+
+from rsfstudy.errors import DataError, InvalidValue
+from rsfstudy.fitting import RECORD_COLUMNS, Record
+from rsfstudy.rig.columns import Column
+from rsfstudy.rig.readers.source import Source, Table, merge_headings_with_units
+
+_NETCDF_SIGNATURES = (b"CDF\x01", b"CDF\x02", b"CDF\x05", b"\x89HDF\r\n\x1a\n")
+
+
+def is_arrays(source: Source) -> bool:
+    """Return True if the source is a mapping of arrays or a DataFrame.
+
+    Parameters
+    ----------
+    source : Source
+        Source.
+
+    Returns
+    -------
+    bool
+        True if the source is a mapping or a DataFrame.
+    """
+    return isinstance(source.origin, Mapping | pd.DataFrame) and not is_dataset(source)
+
+
+def read_arrays(source: Source) -> Table:
+    """Build a table of a mapping of arrays or of a DataFrame.
+
+    Parameters
+    ----------
+    source : Source
+        Arrays by heading. If no heading contains units, the arrays have the default units.
+
+    Returns
+    -------
+    Table
+        Table of the arrays.
+    """
+    keys = [*source.origin]
+    headings = [*map(str, keys)]
+    has_units = any("(" in heading or "[" in heading for heading in headings)
+    table = _build_table(source.origin, keys, headings)
+    return replace(table, default_units=not has_units, has_only_columns=not has_units)
+
+
+def is_dataset(source: Source) -> bool:
+    """Return True if the source is an xarray Dataset.
+
+    Parameters
+    ----------
+    source : Source
+        Source.
+
+    Returns
+    -------
+    bool
+        True if the source is a Dataset.
+    """
+    return isinstance(source.origin, xr.Dataset)
+
+
+def read_dataset(source: Source) -> Table:
+    """Build a table of the variables and coordinates of an xarray Dataset.
+
+    Parameters
+    ----------
+    source : Source
+        Dataset. The units of variables are read from their attribute ``units``.
+
+    Returns
+    -------
+    Table
+        Table of the variables with one dimension.
+    """
+    return _build_table_of_dataset(source.origin)
+
+
+def is_netcdf(source: Source) -> bool:
+    """Return True if the file is a NetCDF file.
+
+    Parameters
+    ----------
+    source : Source
+        File.
+
+    Returns
+    -------
+    bool
+        True if the file is a NetCDF file or another HDF5 file.
+    """
+    return source.signature.startswith(_NETCDF_SIGNATURES)
+
+
+def read_netcdf(source: Source) -> Table:
+    """Read the variables of a NetCDF file.
+
+    Parameters
+    ----------
+    source : Source
+        NetCDF file.
+
+    Returns
+    -------
+    Table
+        Table of the variables with one dimension.
+
+    Raises
+    ------
+    DataError
+        If the file is damaged, or if the file is compressed.
+    """
+    if source.content is not None:
+        raise DataError(f"{source.origin}: is a compressed NetCDF file. Decompress the file first.")
+    try:
+        with xr.open_dataset(source.path, engine="netcdf4", decode_times=False) as dataset:
+            loaded = dataset.load()
+    except Exception as error:  # The library raises errors of many types.
+        raise DataError(f"{source.origin}: cannot be read as NetCDF ({error})") from error
+    return _build_table_of_dataset(loaded)
+
+
+def is_record(source: Source) -> bool:
+    """Return True if the source is a ``Record``.
+
+    Parameters
+    ----------
+    source : Source
+        Source.
+
+    Returns
+    -------
+    bool
+        True if the source is a record.
+    """
+    return isinstance(source.origin, Record)
+
+
+def read_columns_of_record(source: Source) -> Table:
+    """Build a table of the columns of a ``Record``.
+
+    Parameters
+    ----------
+    source : Source
+        Record.
+
+    Returns
+    -------
+    Table
+        Table of the columns, whose headings contain their units.
+    """
+    columns = source.origin.columns
+    units = {about.name: about.units for about in RECORD_COLUMNS}
+    headings = merge_headings_with_units([*columns], [units.get(name, "") for name in columns])
+    return _build_table(columns, [*columns], headings)
+
+
+def _build_table_of_dataset(dataset: xr.Dataset) -> Table:
+    names: list[Hashable] = [name for name, of in dataset.variables.items() if of.ndim == 1]
+    units = [str(dataset[name].attrs.get("units", "")) for name in names]
+    table = _build_table(dataset, names, merge_headings_with_units([*map(str, names)], units))
+    return replace(table, default_units=not any(units))
+
+
+def _build_table(source: Any, keys: list[Any], headings: list[str]) -> Table:
+    """Build a table whose columns are the values of a mapping."""
+
+    def load(index: int, quantity_name: str) -> Column:
+        values, units = _to_floats_and_units(quantity_name, source[keys[index]])
+        if values.ndim != 1:
+            raise InvalidValue(quantity_name, values.shape, "must lie along one dimension")
+        return Column(values, units)
+
+    return Table(headings, "record", load)
+
+
+def _to_floats_and_units(column_name: str, values: Any) -> tuple[np.ndarray, str]:
+    """Convert an array to floats, and return the units that its type implies.
+
+    Masked values become NaN. Times are converted to seconds. Dates are converted to seconds since
+    the first date.
+    """
+    kind = getattr(getattr(values, "dtype", None), "kind", "")
+    if kind == "c":
+        raise InvalidValue(column_name, values.dtype.name, "must be real numbers")
+    if kind not in ("m", "M"):
+        try:
+            return np.ma.asarray(values, dtype=float).filled(math.nan), ""
+        except (TypeError, ValueError, OverflowError) as error:
+            raise InvalidValue(column_name, values, "must be a list of numbers") from error
+    times = np.asarray(values, dtype=f"{'datetime' if kind == 'M' else 'timedelta'}64[ns]")
+    first = times[:1] if times.ndim else times
+    return (times - first if kind == "M" else times) / np.timedelta64(1, "s"), "s"

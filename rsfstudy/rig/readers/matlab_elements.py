@@ -1,0 +1,137 @@
+"""Numeric arrays in MATLAB files of versions 5 to 7.
+
+The functions check all lengths. ``scipy.io.loadmat`` would read the same files, but a damaged file
+can crash the interpreter there.
+"""
+
+from __future__ import annotations
+
+import math
+import zlib
+from collections.abc import Iterator
+from typing import NamedTuple
+
+import numpy as np
+
+#: Types of numbers by the type code of a data element.
+_NUMBER_TYPES = {
+    1: "i1", 2: "u1", 3: "i2", 4: "u2", 5: "i4", 6: "u4", 7: "f4", 9: "f8", 12: "i8", 13: "u8",
+}  # fmt: skip
+_MATRIX, _COMPRESSED = 14, 15
+#: Class codes of structures and of numeric arrays.
+_STRUCTURE, _NUMERIC_CLASSES = 2, range(6, 16)
+_HEADER_BYTES, _TAG_BYTES = 128, 8
+#: Limits of nested structures and of decompressed bytes.
+_MAX_DEPTH, _MAX_DECOMPRESSED_BYTES = 4, 2**31
+
+
+class _Element(NamedTuple):
+    """Data element with its type code and its bytes."""
+
+    code: int
+    content: bytes
+
+
+def read_numeric_arrays(data: bytes) -> dict[str, np.ndarray]:
+    """Read the real numeric arrays of a MATLAB file.
+
+    Parameters
+    ----------
+    data : bytes
+        Bytes of a MATLAB file of version 5, 6 or 7.
+
+    Returns
+    -------
+    dict of str to ndarray
+        Arrays by the names of their variables. Fields of structures have names such as
+        ``data.time``. Other variables are left out.
+
+    Raises
+    ------
+    ValueError
+        If the file is damaged.
+    """
+    order = {b"IM": "<", b"MI": ">"}.get(data[_HEADER_BYTES - 2 : _HEADER_BYTES])
+    if order is None:
+        raise ValueError("the header does not state the byte order")
+    found: dict[str, np.ndarray] = {}
+    for element in _split_elements(data[_HEADER_BYTES:], order):
+        if element.code == _COMPRESSED:
+            for inner in _split_elements(_decompress(element.content), order):
+                found |= _read_matrix(inner, order, "")
+        else:
+            found |= _read_matrix(element, order, "")
+    return found
+
+
+def _decompress(content: bytes) -> bytes:
+    decompressor = zlib.decompressobj()
+    try:
+        found = decompressor.decompress(content, _MAX_DECOMPRESSED_BYTES)
+    except zlib.error as error:
+        raise ValueError(f"a variable cannot be decompressed: {error}") from error
+    if decompressor.unconsumed_tail:
+        raise ValueError("a variable is too large after decompression")
+    return found
+
+
+def _split_elements(data: bytes, order: str) -> Iterator[_Element]:
+    """Yield the data elements in a sequence of bytes.
+
+    The end of the last element need not be padded.
+    """
+    start = 0
+    while start + _TAG_BYTES <= len(data):
+        first, size = (int(n) for n in np.frombuffer(data, f"{order}u4", 2, start))
+        if first >> 16:  # Small elements contain type, size and data in eight bytes.
+            code, size = first & 0xFFFF, first >> 16
+            content, end = data[start + 4 : start + 4 + size], start + _TAG_BYTES
+        else:
+            code, end = first, start + _TAG_BYTES + size
+            content = data[start + _TAG_BYTES : end]
+            if code != _COMPRESSED:
+                end += -size % _TAG_BYTES
+        if len(content) != size:
+            raise ValueError("a variable ends beyond the end of the file")
+        yield _Element(code, content)
+        start = end
+
+
+def _read_matrix(element: _Element, order: str, prefix: str) -> dict[str, np.ndarray]:
+    """Read a numeric array, or the numeric arrays in the fields of a structure."""
+    if element.code != _MATRIX:
+        return {}
+    parts = [*_split_elements(element.content, order)]
+    if len(parts) < 3 or len(parts[0].content) < _TAG_BYTES or len(parts[1].content) % 4:
+        return {}
+    kind = int(np.frombuffer(parts[0].content, f"{order}u4", 1)[0]) & 0xFF
+    shape = tuple(int(n) for n in np.frombuffer(parts[1].content, f"{order}i4"))
+    name = prefix + parts[2].content.decode("ascii", "replace")
+    if kind in _NUMERIC_CLASSES and len(parts) == 4 and parts[3].code in _NUMBER_TYPES:
+        numbers = np.dtype(f"{order}{_NUMBER_TYPES[parts[3].code]}")
+        size = math.prod(shape) * numbers.itemsize
+        if min(shape, default=-1) < 0 or len(parts[3].content) != size:
+            raise ValueError(f"the variable {name!r} does not have the stated size")
+        return {name: np.frombuffer(parts[3].content, numbers).reshape(shape, order="F")}
+    if kind == _STRUCTURE and math.prod(shape) == 1 and name.count(".") < _MAX_DEPTH:
+        return _read_structure(parts, order, name)
+    return {}
+
+
+def _read_structure(parts: list[_Element], order: str, name: str) -> dict[str, np.ndarray]:
+    """Read the numeric arrays in the fields of a structure.
+
+    The elements are flags, dimensions, name, length of field names, field names, and fields.
+    """
+    if len(parts) < 5 or len(parts[3].content) < 4:
+        raise ValueError(f"the structure {name!r} has no fields")
+    length = int(np.frombuffer(parts[3].content, f"{order}i4", 1)[0])
+    texts = parts[4].content
+    if length < 1 or len(texts) // length != len(parts) - 5:
+        raise ValueError(f"the structure {name!r} does not have the stated fields")
+    found: dict[str, np.ndarray] = {}
+    for number, field in enumerate(parts[5:]):
+        text = texts[number * length : (number + 1) * length].split(b"\0")[0]
+        # The name of the matrix in a field is empty.
+        found |= _read_matrix(field, order, f"{name}.{text.decode('ascii', 'replace')}")
+    return found

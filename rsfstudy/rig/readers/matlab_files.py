@@ -1,0 +1,119 @@
+"""Reader of MATLAB files."""
+
+from __future__ import annotations
+
+import importlib
+import io
+from collections.abc import Iterator, Mapping
+from typing import Any
+
+import numpy as np
+
+from rsfstudy.errors import DataError, InvalidValue
+from rsfstudy.rig.readers.matlab_elements import read_numeric_arrays
+from rsfstudy.rig.readers.missing_libraries import missing_library_error
+from rsfstudy.rig.readers.source import Source, Table, build_table_of_arrays
+
+_SIGNATURE_5, _SIGNATURE_7_3 = b"MATLAB 5.0", b"MATLAB 7.3"
+#: Maximum number of nested structures, and of columns of a matrix.
+_MAX_DEPTH, _MAX_COLUMNS = 4, 200
+
+
+def is_matlab(source: Source) -> bool:
+    """Return True if the file is a MATLAB file of version 5 to 7.3.
+
+    Parameters
+    ----------
+    source : Source
+        File.
+
+    Returns
+    -------
+    bool
+        True if the file is a MATLAB file.
+    """
+    return source.signature.startswith((_SIGNATURE_5, _SIGNATURE_7_3))
+
+
+def read_matlab(source: Source) -> Table:
+    """Read the numeric arrays of a MATLAB file.
+
+    The columns of the table are the vectors and the columns of matrices. The headings are the names
+    of the variables. Fields of structures have headings such as ``data.time``.
+
+    Parameters
+    ----------
+    source : Source
+        MATLAB file.
+
+    Returns
+    -------
+    Table
+        Columns of the longest length that several arrays have.
+
+    Raises
+    ------
+    DataError
+        If the file is damaged, or if h5py is needed and not installed.
+    InvalidValue
+        If the file contains no numeric arrays.
+    """
+    data = source.read_bytes()
+    is_hdf5 = source.signature.startswith(_SIGNATURE_7_3)
+    try:
+        variables = _read_version_7_3(data) if is_hdf5 else read_numeric_arrays(data)
+    except ImportError as error:
+        raise missing_library_error(source, "a MATLAB file of v7.3", "hdf5", "h5py") from error
+    except Exception as error:  # Damaged files cause errors of many types.
+        raise DataError(f"{source.origin}: cannot be read as a MATLAB file ({error})") from error
+    columns = dict(_flatten(variables))
+    sizes = [len(array) for array in columns.values()]
+    size = max(sizes, key=lambda n: (sizes.count(n), n), default=0)
+    names = [name for name, array in columns.items() if len(array) == size]
+    if not names:
+        rule = "contains no vectors of numbers"
+        raise InvalidValue("record", str(source.origin), rule, remedy="Save one vector per column.")
+    names_of_fields = [name.rpartition(".")[2] for name in names]
+    unique = [
+        field if names_of_fields.count(field) == 1 else name
+        for field, name in zip(names_of_fields, names, strict=True)
+    ]
+    return build_table_of_arrays(unique, [columns[name] for name in names], str(source.origin))
+
+
+def _read_version_7_3(data: bytes) -> dict[str, Any]:
+    h5py = importlib.import_module("h5py")
+
+    def convert(group: Any, depth: int) -> dict[str, Any]:
+        found: dict[str, Any] = {}
+        for name, item in group.items():
+            if name.startswith("#"):  # MATLAB stores referenced objects in this group.
+                continue
+            if isinstance(item, h5py.Group):
+                if depth < _MAX_DEPTH:
+                    found[name] = convert(item, depth + 1)
+            elif item.dtype.kind in "fiu" and item.attrs.get("MATLAB_class", b"") != b"char":
+                # HDF5 stores the dimensions in reverse order.
+                found[name] = np.asarray(item).T
+        return found
+
+    with h5py.File(io.BytesIO(data), "r") as file:
+        return convert(file, 0)
+
+
+def _flatten(variables: Mapping[str, Any], prefix: str = "") -> Iterator[tuple[str, np.ndarray]]:
+    """Yield the numeric vectors of nested structures with their names."""
+    for name, value in variables.items():
+        if isinstance(value, Mapping):
+            if prefix.count(".") < _MAX_DEPTH:
+                yield from _flatten(value, f"{prefix}{name}.")
+            continue
+        array = np.asarray(value)
+        if array.dtype.kind not in "fiu" or array.size < 2:
+            continue
+        array = array.squeeze()
+        if array.ndim == 1:
+            yield f"{prefix}{name}", array
+        elif array.ndim == 2 and array.shape[1] <= _MAX_COLUMNS:
+            for number, column in enumerate(array.T, start=1):
+                yield f"{prefix}{name}_{number}", column

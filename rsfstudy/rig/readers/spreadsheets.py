@@ -1,0 +1,157 @@
+"""Reader of Excel and OpenDocument workbooks."""
+
+from __future__ import annotations
+
+import importlib.util
+import io
+import math
+import zipfile
+from typing import Any
+
+import numpy as np
+import pandas as pd
+
+from rsfstudy.errors import DataError, InvalidValue
+from rsfstudy.rig.columns import EXAMPLE_OF_TABLE_HEADER, Column
+from rsfstudy.rig.readers.missing_libraries import missing_library_error
+from rsfstudy.rig.readers.source import Source, Table
+from rsfstudy.rig.readers.text_layout import detect_layout
+from rsfstudy.rig.units import parse_number
+
+_ZIP_SIGNATURE, _OLE_SIGNATURE = b"PK\x03\x04", b"\xd0\xcf\x11\xe0\xa1\xb1\x1a\xe1"
+#: Files that a zip archive contains if it is a workbook.
+_FILES_OF_WORKBOOKS = ("xl/workbook.xml", "xl/workbook.bin", "content.xml")
+#: Libraries that read workbooks, with the name of the engine of pandas.
+_ENGINES = {"python_calamine": "calamine", "openpyxl": "openpyxl"}
+#: Endings of the names of workbooks. A damaged archive is recognised by its name.
+_ENDINGS_OF_WORKBOOKS = (".xlsx", ".xlsm", ".xlsb", ".ods")
+#: Maximum number of bytes of an unpacked workbook.
+_MAX_UNPACKED_BYTES = 2**31
+#: Number of rows in which the header is detected.
+_ROWS_OF_HEAD = 1000
+#: Character that separates the cells of a row for the detection of the header.
+_MARK = "\t"
+
+
+def is_workbook(source: Source) -> bool:
+    """Return True if the file is a workbook.
+
+    Parameters
+    ----------
+    source : Source
+        File.
+
+    Returns
+    -------
+    bool
+        True if the file is an Excel or OpenDocument workbook.
+    """
+    if source.signature.startswith(_OLE_SIGNATURE):
+        return True
+    if not source.signature.startswith(_ZIP_SIGNATURE):
+        return False
+    files = [name for name, _size in _list_archive(source)]
+    return bool({*files} & {*_FILES_OF_WORKBOOKS}) or (
+        not files and source.path.suffix.lower() in _ENDINGS_OF_WORKBOOKS
+    )
+
+
+def read_workbook(source: Source) -> Table:
+    """Read a table from a sheet of a workbook.
+
+    Parameters
+    ----------
+    source : Source
+        Workbook. By default, the first sheet is read.
+
+    Returns
+    -------
+    Table
+        Columns of the sheet.
+
+    Raises
+    ------
+    DataError
+        If no library for workbooks is installed, or if the file is damaged.
+    InvalidValue
+        If the workbook has no sheet of the given name.
+    """
+    engines = [engine for library, engine in _ENGINES.items() if importlib.util.find_spec(library)]
+    if not engines:
+        raise missing_library_error(source, "an Excel workbook", "excel", "python-calamine")
+    if sum(size for _name, size in _list_archive(source)) > _MAX_UNPACKED_BYTES:
+        raise DataError(f"{source.origin}: unpacks to more than {_MAX_UNPACKED_BYTES:,} bytes")
+    try:
+        engine: Any = engines[0]
+        book = pd.ExcelFile(io.BytesIO(source.read_bytes()), engine=engine)
+    except Exception as error:  # The libraries raise errors of many types.
+        raise DataError(f"{source.origin}: cannot be read as a workbook ({error})") from error
+    with book:
+        names = [*map(str, book.sheet_names)]
+        if source.sheet and source.sheet not in names:
+            raise InvalidValue("sheet", source.sheet, "is not in the workbook", choices=names)
+        sheet = source.sheet or names[0]
+        try:
+            cells = pd.read_excel(book, sheet_name=sheet, header=None)
+        except Exception as error:
+            raise DataError(f"{source.origin}: cannot read sheet {sheet!r} ({error})") from error
+    return _build_table_of_cells(cells, f"{source.origin}, sheet {sheet!r}", source.decimal)
+
+
+def _list_archive(source: Source) -> list[tuple[str, int]]:
+    """Return the names and the unpacked sizes of the files in a zip archive.
+
+    The list is empty if the file is no zip archive, or is damaged.
+    """
+    if not source.signature.startswith(_ZIP_SIGNATURE):
+        return []
+    try:
+        with zipfile.ZipFile(io.BytesIO(source.read_bytes())) as archive:
+            return [(file.filename, file.file_size) for file in archive.infolist()]
+    except (zipfile.BadZipFile, OSError, ValueError, NotImplementedError):
+        return []
+
+
+def _build_table_of_cells(cells: pd.DataFrame, name: str, decimal: str) -> Table:
+    """Detect the header in the cells of a sheet, and build a table of the cells below it."""
+    cells = cells.dropna(axis="columns", how="all")
+    numbers = cells.columns.to_numpy() + 1
+    lines = [
+        _MARK.join("" if cell is None or cell != cell else _one_line(cell) for cell in row)
+        for row in cells.head(_ROWS_OF_HEAD).itertuples(index=False)
+    ]
+    layout = detect_layout([f"sep={_MARK}", *lines], decimal)
+    if not layout.headings:
+        remedy = f"Its first row reads, for instance, {EXAMPLE_OF_TABLE_HEADER}."
+        raise InvalidValue("table", name, "has no header", remedy=remedy)
+    # The line with the separator comes before the cells.
+    body = cells.iloc[layout.body_line - 2 :]
+    body = body[~body.isna().all(axis="columns")]
+    rows = body.index.to_numpy() + 1
+
+    def load(index: int, quantity_name: str) -> Column:
+        column = Column(np.empty(0), "", int(numbers[index]), rows, name)
+        values = body.iloc[:, index]
+        if values.dtype.kind in "fiu":
+            return column._replace(values=values.to_numpy(dtype=float))
+        found = [_number_in_cell(cell, quantity_name, column, n) for n, cell in enumerate(values)]
+        return column._replace(values=np.array(found))
+
+    has_headings = layout.header_line > 0
+    location = f"{name}, line {layout.header_line - 1}" if has_headings else name
+    return Table(layout.headings, location, load, has_headings)
+
+
+def _one_line(cell: object) -> str:
+    return " ".join(str(cell).split())
+
+
+def _number_in_cell(cell: Any, quantity_name: str, column: Column, row: int) -> float:
+    if cell is None or cell != cell or cell == "":
+        return math.nan
+    number = cell if isinstance(cell, int | float) else parse_number(str(cell).replace(",", "."))
+    if number is None or not math.isfinite(number):
+        remedy = "Format the cells of the column as numbers."
+        wrong = InvalidValue(quantity_name, str(cell), "is no number", remedy=remedy)
+        raise wrong.with_location(column.location(row))
+    return float(number)

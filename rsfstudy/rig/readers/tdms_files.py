@@ -1,0 +1,97 @@
+"""Reader of TDMS files of LabVIEW."""
+
+from __future__ import annotations
+
+import importlib
+import io
+import logging
+from typing import Any
+
+import numpy as np
+
+from rsfstudy.errors import DataError, InvalidValue
+from rsfstudy.rig.readers.missing_libraries import missing_library_error
+from rsfstudy.rig.readers.source import (
+    Source,
+    Table,
+    build_table_of_arrays,
+    merge_headings_with_units,
+)
+
+_SIGNATURE = b"TDSm"
+#: Properties of a channel with its units and its sampling interval.
+_PROPERTIES_OF_UNITS = ("unit_string", "NI_UnitDescription", "units", "unit")
+_PROPERTY_OF_INTERVAL = "wf_increment"
+
+
+def is_tdms(source: Source) -> bool:
+    """Return True if the file is a TDMS file.
+
+    Parameters
+    ----------
+    source : Source
+        File.
+
+    Returns
+    -------
+    bool
+        True if the file is a TDMS file.
+    """
+    return source.signature.startswith(_SIGNATURE)
+
+
+def read_tdms(source: Source) -> Table:
+    """Read the channels of a group of a TDMS file.
+
+    If the channels are waveforms, a column ``Time (s)`` is added.
+
+    Parameters
+    ----------
+    source : Source
+        TDMS file. By default, the first group with channels is read.
+
+    Returns
+    -------
+    Table
+        Channels with their units.
+
+    Raises
+    ------
+    DataError
+        If npTDMS is not installed, or if the file is damaged.
+    InvalidValue
+        If the file has no group of the given name.
+    """
+    try:
+        nptdms = importlib.import_module("nptdms")
+    except ImportError as error:
+        raise missing_library_error(source, "a TDMS file", "tdms", "npTDMS") from error
+    level = logging.root.manager.disable
+    logging.disable(logging.WARNING)  # npTDMS prints the bytes of damaged files.
+    try:
+        file = nptdms.TdmsFile.read(io.BytesIO(source.read_bytes()))
+    except Exception as error:  # Damaged files cause errors of many types.
+        raise DataError(f"{source.origin}: cannot be read as a TDMS file ({error})") from error
+    finally:
+        logging.disable(level)
+    groups = {group.name: group.channels() for group in file.groups()}
+    names = [name for name, channels in groups.items() if channels]
+    if not names or (source.sheet and source.sheet not in names):
+        raise InvalidValue("sheet", source.sheet, "is no group with channels", choices=names)
+    channels = groups[source.sheet or names[0]]
+    headings = merge_headings_with_units(
+        [channel.name for channel in channels], [_units_of_channel(of) for of in channels]
+    )
+    values = [np.asarray(channel[:]) for channel in channels]
+    intervals = {float(of.properties.get(_PROPERTY_OF_INTERVAL, 0.0)) for of in channels}
+    if len(intervals) == 1 and (interval := intervals.pop()) > 0.0:
+        headings = ["Time (s)", *headings]
+        values = [interval * np.arange(len(values[0])), *values]
+    return build_table_of_arrays(headings, values, str(source.origin))
+
+
+def _units_of_channel(channel: Any) -> str:
+    return next(
+        (str(channel.properties[name]) for name in _PROPERTIES_OF_UNITS
+         if channel.properties.get(name)), "",
+    )  # fmt: skip

@@ -1,0 +1,297 @@
+"""Reader of text files with one row of numbers per line."""
+
+from __future__ import annotations
+
+import csv
+import io
+import math
+import re
+from typing import Any, NamedTuple
+
+import numpy as np
+import pandas as pd
+
+from rsfstudy.errors import DataError, InvalidValue
+from rsfstudy.rig.columns import EXAMPLE_OF_TABLE_HEADER, Column
+from rsfstudy.rig.readers.source import Source, Table
+from rsfstudy.rig.readers.text_layout import (
+    BLANKS,
+    COMMENT_MARKS,
+    TextLayout,
+    detect_layout,
+    is_comment_or_rule,
+)
+from rsfstudy.rig.units import parse_number
+
+#: Characters of tables that pandas can parse.
+_CHARACTERS_OF_PLAIN_NUMERIC_TABLES = b"0123456789+-eE \t\r\n"
+#: Smallest number of bytes in which the layout of a file is detected. The detection continues to
+#: the end of the line.
+_MIN_BYTES_OF_HEAD = 2**18
+#: Largest fraction of control characters in a text file.
+_MAX_FRACTION_OF_CONTROL_CHARACTERS = 0.01
+_CONTROL_CHARACTER_PATTERN = re.compile(rb"[\x00-\x08\x0e-\x1a\x1c-\x1f]")
+#: Byte order marks of UTF-16, and the encodings of UTF-16 without a byte order mark by the parity
+#: of the positions of zero bytes.
+_UTF_16_MARKS = (b"\xff\xfe", b"\xfe\xff")
+_UTF_16_ENCODINGS = ("utf-16-be", "utf-16-le")
+#: Options of pandas that convert decimal numbers to the nearest floating-point numbers. Newer
+#: versions of pandas do so by default.
+_IS_EXACT_BY_DEFAULT = (*map(int, pd.__version__.split(".")[:2]),) >= (3, 1)
+_EXACT: dict[str, Any] = {} if _IS_EXACT_BY_DEFAULT else {"float_precision": "round_trip"}
+
+
+class _Rows(NamedTuple):
+    """Rows of a text file, as numbers or as fields.
+
+    Parameters
+    ----------
+    numbers : ndarray or None
+        Numbers of all fields, as an array of shape (rows, columns), or None if a field is not a
+        finite number.
+    fields : list of list of str
+        Fields of each row if ``numbers`` is None.
+    line_numbers : ndarray of int
+        Line number of each row.
+    """
+
+    numbers: np.ndarray | None
+    fields: list[list[str]]
+    line_numbers: np.ndarray
+
+
+def is_text(source: Source) -> bool:
+    """Return True if the first bytes of a file are text.
+
+    Parameters
+    ----------
+    source : Source
+        File.
+
+    Returns
+    -------
+    bool
+        True if the file is a text file.
+    """
+    if not source.is_file:
+        return False
+    head = source.signature
+    if head.startswith(_UTF_16_MARKS) or _find_utf_16_encoding(head):
+        return True
+    controls = len(_CONTROL_CHARACTER_PATTERN.findall(head))
+    return b"\0" not in head and controls <= _MAX_FRACTION_OF_CONTROL_CHARACTERS * len(head)
+
+
+def read_text(source: Source) -> Table:
+    """Read a table from a text file.
+
+    The columns may be separated by commas, semicolons, tabs or blanks.
+
+    Parameters
+    ----------
+    source : Source
+        Text file in UTF-8, UTF-16 or Windows-1252.
+
+    Returns
+    -------
+    Table
+        Columns of the file.
+
+    Raises
+    ------
+    DataError
+        If the file cannot be decoded.
+    InvalidValue
+        If the file has no header, if rows differ in length, or if numbers have decimal commas and
+        the decimal separator is a point.
+    """
+    name = str(source.origin)
+    data = _convert_to_utf_8(source.read_bytes(), name)
+    end = data.find(b"\n", _MIN_BYTES_OF_HEAD)
+    try:
+        lines = (data if end < 0 else data[:end]).decode().split("\n")
+        layout = detect_layout([line.rstrip("\r") for line in lines], source.decimal)
+        rows = _read_plain_rows(data, layout, source.decimal)
+        rows = _read_fields(data, layout) if rows is None else rows
+    except InvalidValue as error:
+        raise error.with_location(name) from error
+    except csv.Error as error:
+        raise DataError(f"{name}: cannot be read as CSV ({error})") from error
+    has_headings = layout.header_line > 0
+    location = f"{name}, line {layout.header_line}" if has_headings else name
+    if not layout.headings:
+        remedy = f"Its first line reads, for instance, {EXAMPLE_OF_TABLE_HEADER}."
+        raise InvalidValue("table", name, "has no header", remedy=remedy)
+
+    def load(index: int, quantity_name: str) -> Column:
+        column = Column(np.empty(0), "", index + 1, rows.line_numbers, name)
+        if rows.numbers is not None:
+            return column._replace(values=rows.numbers[:, index])
+        convert = _FieldConverter(quantity_name, column, source.decimal)
+        values = [convert.parse(row[index], n) for n, row in enumerate(rows.fields)]
+        return column._replace(values=np.array(values, dtype=float))
+
+    table = Table(layout.headings, location, load, has_headings)
+    _check_row_lengths(rows, layout, name)
+    return table
+
+
+def _find_utf_16_encoding(head: bytes) -> str:
+    """Return the encoding of UTF-16 text without a byte order mark, or an empty string."""
+    pairs = len(head) // 2
+    for encoding, zeros, others in zip(
+        _UTF_16_ENCODINGS, (head[::2], head[1::2]), (head[1::2], head[::2]), strict=True
+    ):
+        if pairs > 1 and zeros.count(0) > 0.9 * pairs and not others.count(0):
+            return encoding
+    return ""
+
+
+def _convert_to_utf_8(data: bytes, name: str) -> bytes:
+    """Convert text to UTF-8 with line feeds, without a byte order mark."""
+    head = data[:_MIN_BYTES_OF_HEAD]
+    encoding = "utf-16" if head.startswith(_UTF_16_MARKS) else _find_utf_16_encoding(head)
+    try:
+        if encoding:
+            data = data.decode(encoding).encode()
+        elif not data.isascii():
+            data = data.removeprefix(b"\xef\xbb\xbf")
+            data.decode()
+    except UnicodeDecodeError as error:
+        if encoding:
+            raise DataError(f"{name}: cannot be read as {encoding} ({error})") from error
+        # Windows programs write the micro sign as the byte 0xb5.
+        data = data.decode("cp1252", errors="replace").encode()
+    return data if b"\n" in head or b"\r" not in head else data.replace(b"\r", b"\n")
+
+
+def _read_plain_rows(data: bytes, layout: TextLayout, decimal: str) -> _Rows | None:
+    """Read a table that contains only finite numbers and delimiters.
+
+    The function returns None if the table contains other characters. A table with other characters
+    has to be read line by line.
+    """
+    start = _find_start_of_line(data, layout.body_line)
+    delimiter = r"\s+" if layout.delimiter == BLANKS else layout.delimiter
+    allowed = _CHARACTERS_OF_PLAIN_NUMERIC_TABLES + decimal.encode() + layout.delimiter.encode()
+    body = data[start:].rstrip()
+    if not body or body.translate(None, allowed):
+        return None
+    try:
+        numbers = pd.read_csv(
+            io.BytesIO(body), sep=delimiter, header=None, dtype=float, decimal=decimal, **_EXACT
+        ).to_numpy()
+    except (ValueError, pd.errors.ParserError):
+        return None
+    if numbers.shape[1] != len(layout.headings) or not np.isfinite(numbers).all():
+        return None
+    lines = layout.body_line + np.arange(body.count(b"\n") + 1)
+    if len(lines) != len(numbers):
+        filled = [n for n, line in enumerate(body.split(b"\n")) if line.strip()]
+        lines = lines[filled]
+    return _Rows(numbers, [], lines) if len(lines) == len(numbers) else None
+
+
+def _find_start_of_line(data: bytes, line_number: int) -> int:
+    """Return the position of the first byte of a line."""
+    start = 0
+    for _line in range(line_number - 1):
+        start = data.find(b"\n", start) + 1
+        if not start:
+            return len(data)
+    return start
+
+
+def _read_fields(data: bytes, layout: TextLayout) -> _Rows:
+    """Read the fields of each row, without blank lines and comments."""
+    body = data[_find_start_of_line(data, layout.body_line) :].decode()
+    first = layout.body_line
+    found: list[list[str]] = []
+    numbers: list[int] = []
+    if layout.delimiter == BLANKS:
+        for number, line in enumerate(body.split("\n"), first):
+            if not is_comment_or_rule(line):
+                found.append(line.split())
+                numbers.append(number)
+        return _Rows(None, found, np.array(numbers, dtype=int))
+    reader = csv.reader(io.StringIO(body, newline=""), delimiter=layout.delimiter)
+    for row in reader:
+        is_comment = row and row[0].lstrip().startswith(COMMENT_MARKS)
+        if any(row) and not is_comment and not (len(row) == 1 and is_comment_or_rule(row[0])):
+            found.append(row)
+            numbers.append(first - 1 + reader.line_num)
+    return _Rows(None, found, np.array(numbers, dtype=int))
+
+
+def _check_row_lengths(rows: _Rows, layout: TextLayout, name: str) -> None:
+    """Raise ``InvalidValue`` if a row has more or fewer fields than the header.
+
+    Empty fields at the end of a row are ignored.
+    """
+    size = len(layout.headings)
+    for number, row in zip(rows.line_numbers, rows.fields, strict=False):
+        while len(row) > size and not row[-1].strip():
+            row.pop()
+        if len(row) != size:
+            rule = f"has {len(row)} fields, and the header {size}"
+            remedy = (
+                "Numbers have a decimal point, or pass decimal=',' (--decimal ',')."
+                if len(row) > size
+                else ""
+            )
+            wrong = InvalidValue("line", layout.delimiter.join(row), rule, remedy=remedy)
+            raise wrong.with_location(f"{name}, line {number}")
+
+
+class _FieldConverter(NamedTuple):
+    """Converter of the fields of a column to numbers.
+
+    Parameters
+    ----------
+    quantity_name : str
+        Name of the quantity for error messages.
+    column : Column
+        Column whose location is used in error messages.
+    decimal : {".", ","}
+        Decimal separator.
+    """
+
+    quantity_name: str
+    column: Column
+    decimal: str
+
+    def parse(self, text: str, row: int) -> float:
+        """Convert a field to a number.
+
+        Parameters
+        ----------
+        text : str
+            Field. An empty field is converted to NaN.
+        row : int
+            Index of the row.
+
+        Returns
+        -------
+        float
+            Number.
+
+        Raises
+        ------
+        InvalidValue
+            If the field is not a finite number.
+        """
+        if not text.strip():
+            return math.nan
+        pointed = text.replace(",", ".", 1) if self.decimal == "," and "." not in text else text
+        found = parse_number(pointed)
+        if found is None:
+            remedy = "Write digits alone, as in 1.5e-3; units stand in the header."
+            if "," in text:
+                remedy = "Write a decimal point, or pass decimal=',' (--decimal ',')."
+            wrong = InvalidValue(self.quantity_name, text, "is no number", remedy=remedy)
+            raise wrong.with_location(self.column.location(row))
+        if not math.isfinite(found):
+            raise InvalidValue(self.quantity_name, text.strip(), "must be finite").with_location(
+                self.column.location(row)
+            )
+        return found

@@ -1,0 +1,282 @@
+"""Detection of the delimiter, the header and the first row of a text file.
+
+The detection compares the fields of the first lines. A line that contains mostly numbers is a row
+of the table. The header is the last line of text before the first row that has as many fields as
+the rows.
+"""
+
+from __future__ import annotations
+
+import csv
+import re
+from collections import Counter
+from collections.abc import Iterator, Sequence
+from typing import NamedTuple
+
+from rsfstudy.errors import InvalidValue
+from rsfstudy.rig.readers.source import merge_headings_with_units
+from rsfstudy.rig.units import find_size_of_units, parse_number
+
+#: Name of the delimiter of columns that are separated by one or more blanks.
+BLANKS = " "
+#: First characters of comment lines.
+COMMENT_MARKS = ("#", "%")
+#: Maximum number of lines that are compared to detect the layout.
+_MAX_COMPARED_LINES = 1000
+#: Maximum number of characters of a number in the compared lines.
+_MAX_NUMBER_LENGTH = 50
+_SEPARATOR_LINE_PATTERN = re.compile(r'"?sep=(.)"?', re.IGNORECASE)
+_DECIMAL_COMMA_PATTERN = re.compile(r"[-+]?[0-9]*,[0-9]+(?:[eE][-+]?[0-9]+)?")
+_RULE_PATTERN = re.compile(r"[-=_+|* \t]{3,}")
+#: Names of units that are no known units of rsfstudy, but often stand below headings.
+_OTHER_UNITS = frozenset(
+    ("", "-", ".", "1", "none", "v", "mv", "bit", "bits", "counts", "degc", "°c", "c", "hz", "nr")
+)
+
+
+class TextLayout(NamedTuple):
+    """Layout of a text file.
+
+    Parameters
+    ----------
+    delimiter : str
+        Delimiter of the columns, or `BLANKS`.
+    headings : list of str
+        Headings of the columns, with units. If the file has no header, the headings are the numbers
+        of the columns, counted from 1. The list is empty if the file contains no text.
+    header_line : int
+        Number of the line with the headings, counted from 1, or 0 if the file has no header.
+    body_line : int
+        Number of the first line after the header, counted from 1.
+    """
+
+    delimiter: str
+    headings: list[str]
+    header_line: int
+    body_line: int
+
+
+def is_comment_or_rule(line: str) -> bool:
+    """Return True if a line is blank, a comment, or a horizontal rule such as ``-----``.
+
+    Parameters
+    ----------
+    line : str
+        Line of a text file.
+
+    Returns
+    -------
+    bool
+        True if the line contains no data.
+    """
+    bare = line.strip()
+    return not bare or bare.startswith(COMMENT_MARKS) or bool(_RULE_PATTERN.fullmatch(bare))
+
+
+def split_fields(line: str, delimiter: str) -> list[str]:
+    """Split a line into fields.
+
+    Parameters
+    ----------
+    line : str
+        Line of a text file.
+    delimiter : str
+        Delimiter of the fields, or `BLANKS`.
+
+    Returns
+    -------
+    list of str
+        Fields without surrounding blanks.
+    """
+    if delimiter == BLANKS:
+        return line.split()
+    return [field.strip() for row in csv.reader([line], delimiter=delimiter) for field in row]
+
+
+def detect_layout(lines: Sequence[str], decimal: str) -> TextLayout:
+    """Detect the layout of a text file from its first lines.
+
+    Parameters
+    ----------
+    lines : sequence of str
+        First lines of the file.
+    decimal : {".", ","}
+        Decimal separator.
+
+    Returns
+    -------
+    TextLayout
+        Layout of the file.
+
+    Raises
+    ------
+    InvalidValue
+        If numbers have decimal commas and ``decimal`` is a point.
+    """
+    lines = lines[:_MAX_COMPARED_LINES]
+    skipped, stated = _find_separator_line(lines)
+    candidates = [stated] if stated else ["\t", ";", BLANKS, ","]
+    for delimiter in candidates:
+        if delimiter == decimal:
+            continue
+        rows = [
+            [] if is_comment_or_rule(line) else split_fields(line, delimiter)
+            for line in lines[skipped:]
+        ]
+        sizes = Counter(len(row) for row in rows if _is_row_of_numbers(row, decimal))
+        if decimal == "." and delimiter != ",":
+            _check_decimal_commas(rows, sizes)
+        size = max(sizes, key=lambda n: (sizes[n], n), default=0)
+        if size > 1 or (size == 1 and delimiter == candidates[-1]):
+            first = next(
+                n for n, row in enumerate(rows, skipped)
+                if len(row) == size and _is_row_of_numbers(row, decimal)
+            )  # fmt: skip
+            return _find_header(lines, skipped, first, delimiter, size)
+    return _layout_without_numbers(lines, skipped, stated)
+
+
+def _find_separator_line(lines: Sequence[str]) -> tuple[int, str]:
+    """Return the number of lines before the table, and the delimiter that a line states.
+
+    The line ``sep=;`` is written by spreadsheet programs.
+    """
+    for number, line in enumerate(lines):
+        if line.strip():
+            match = _SEPARATOR_LINE_PATTERN.fullmatch(line.strip("\r\n"))
+            return (number + 1, match[1]) if match else (0, "")
+    return 0, ""
+
+
+def _is_row_of_numbers(fields: Sequence[str], decimal: str) -> bool:
+    """Return True if more than half of the fields that are not empty are numbers."""
+    texts = [text for text in fields if text]
+    if decimal == ",":
+        texts = [text if "." in text else text.replace(",", ".", 1) for text in texts]
+    return 2 * sum(map(_is_number, texts)) > len(texts)
+
+
+def _is_number(text: str) -> bool:
+    return len(text) < _MAX_NUMBER_LENGTH and parse_number(text) is not None
+
+
+def _check_decimal_commas(rows: Sequence[Sequence[str]], sizes: Counter[int]) -> None:
+    """Raise ``InvalidValue`` if most rows consist of numbers with decimal commas."""
+    commas = [
+        row
+        for row in rows
+        if len(row) > 1
+        and any(_DECIMAL_COMMA_PATTERN.fullmatch(text) for text in row)
+        and all(not t or _DECIMAL_COMMA_PATTERN.fullmatch(t) or _is_number(t) for t in row)
+    ]
+    if len(commas) > sum(sizes.values()):
+        number = next(text for text in commas[0] if "," in text)
+        remedy = "Pass decimal=',' (--decimal ','), or write decimal points."
+        raise InvalidValue("number", number, "has a decimal comma", remedy=remedy)
+
+
+def _find_header(
+    lines: Sequence[str], first_line: int, first_row: int, delimiter: str, size: int
+) -> TextLayout:
+    """Find the header before the first row of numbers.
+
+    Line numbers in the arguments are counted from 0.
+    """
+    texts = [
+        (number, fields)
+        for number, line in enumerate(lines[:first_row])
+        if number >= first_line and (fields := _split_header(line, delimiter, size))
+    ]
+    whole = [(number, fields) for number, fields in texts if len(fields) == size]
+    # Comments and single words before a table without headings are no header.
+    whole = whole or [
+        (number, fields)
+        for number, fields in texts
+        if (len(fields) > 1 or fields[0].endswith((")", "]")))
+        and not lines[number].lstrip().startswith(COMMENT_MARKS)
+    ]
+    if not whole:
+        return TextLayout(delimiter, [str(n + 1) for n in range(size)], 0, first_row + 1)
+    at, headings = whole[-1]
+    body = at + 1
+    if len(whole) > 1 and len(whole[-2][1]) == len(headings) and _are_units(headings):
+        headings = merge_headings_with_units(whole[-2][1], headings)
+        at = whole[-2][0]
+    return TextLayout(delimiter, headings, at + 1, body + 1)
+
+
+def _split_header(line: str, delimiter: str, size: int) -> list[str]:
+    """Split a line of text into headings, if possible as many as the rows have fields.
+
+    The list is empty if the line contains no text or a number.
+    """
+    text = line.strip().lstrip("".join(COMMENT_MARKS)).strip()
+    if not text or _RULE_PATTERN.fullmatch(text):
+        return []
+    first: list[str] = []
+    for fields in _split_in_several_ways(text, delimiter):
+        first = first or fields
+        if len(fields) == size:
+            first = fields
+            break
+    fields = first
+    has_number = any(text != "1" and _is_number(text) for text in fields)
+    return [] if has_number or not any(fields) else fields
+
+
+def _split_in_several_ways(text: str, delimiter: str) -> Iterator[list[str]]:
+    """Yield the fields of a header for several delimiters, beginning with the given one."""
+    if delimiter == BLANKS:
+        yield from _split_at_blanks(text)
+    for mark in (delimiter, "\t", ";", ","):
+        if mark != BLANKS:
+            yield split_fields(text, mark)
+    yield re.split(r"\s{2,}", text)
+    if delimiter != BLANKS:
+        yield from _split_at_blanks(text)
+
+
+def _split_at_blanks(text: str) -> Iterator[list[str]]:
+    """Yield the fields of a header whose headings and units are separated by blanks."""
+    words = text.split()
+    yield _merge_brackets(words)
+    yield re.split(r"(?<=[)\]])\s+", text)
+    if len({word.startswith(("(", "[")) for word in words}) == 1:
+        yield words
+
+
+def _merge_brackets(words: Sequence[str]) -> list[str]:
+    """Append units in brackets to the words before the units."""
+    groups: list[list[str]] = []
+    depth = 0
+    for word in words:
+        if groups and (depth > 0 or word.startswith(("(", "["))):
+            groups[-1].append(word)
+        else:
+            groups.append([word])
+        depth += word.count("(") - word.count(")")
+    return [" ".join(group) for group in groups]
+
+
+def _are_units(fields: Sequence[str]) -> bool:
+    """Return True if all fields of a line look like units, and at least one unit is known."""
+    bare = [text.strip(" ()[]") for text in fields]
+    known = [find_size_of_units(text) is not None for text in bare]
+    return any(known) and all(
+        found or text.lower() in _OTHER_UNITS for found, text in zip(known, bare, strict=True)
+    )
+
+
+def _layout_without_numbers(lines: Sequence[str], first_line: int, stated: str) -> TextLayout:
+    """Return the layout of a file in which no line contains mostly numbers.
+
+    The header is the first line that is not blank.
+    """
+    for number, line in enumerate(lines):
+        text = line.strip().lstrip("".join(COMMENT_MARKS)).strip()
+        if number >= first_line and text:
+            delimiter = stated or next(
+                (mark for mark in "\t;," if mark in text), "," if {"(", "["} & {*text} else BLANKS
+            )
+            return TextLayout(delimiter, split_fields(text, delimiter), number + 1, number + 2)
+    return TextLayout(",", [], 1, 1)

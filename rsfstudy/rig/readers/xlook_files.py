@@ -1,0 +1,95 @@
+"""Reader of binary xlook files."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from rsfstudy.errors import DataError
+from rsfstudy.rig.columns import Column
+from rsfstudy.rig.readers.source import Source, Table, merge_headings_with_units
+
+#: Layout of xlook files. The constants are the size of the file header in bytes, the size of each
+#: column header in bytes, and the number of column headers. The data of an xlook file follow the
+#: headers.
+_HEADER_BYTES, _COLUMN_HEADER_BYTES, _MAX_COLUMNS = 36, 84, 32
+_DATA_START_BYTE = _HEADER_BYTES + _COLUMN_HEADER_BYTES * _MAX_COLUMNS
+#: Formats that can be read, for the error of files in other formats.
+_FORMATS = "text, Excel, MATLAB, TDMS, NetCDF and xlook"
+
+
+def is_binary(source: Source) -> bool:
+    """Return True if the beginning of a file contains a null byte.
+
+    Files of xlook have no signature. Other binary formats have to be recognised before.
+
+    Parameters
+    ----------
+    source : Source
+        File.
+
+    Returns
+    -------
+    bool
+        True if the file may be a file of xlook.
+    """
+    return b"\0" in source.signature[:_DATA_START_BYTE]
+
+
+def read_xlook(source: Source) -> Table:
+    """Read a binary xlook file.
+
+    The file is big-endian. The file contains a file header, column headers of 84 bytes each, and
+    one float32 array per column. The column ``time`` of xlook files contains sampling intervals,
+    which the function sums.
+
+    Parameters
+    ----------
+    source : Source
+        Binary file.
+
+    Returns
+    -------
+    Table
+        Columns of the file, with the units in the file.
+
+    Raises
+    ------
+    DataError
+        If the file is not a file of xlook, or ends too early.
+    """
+    data, path = source.read_bytes(), source.origin
+    used = int.from_bytes(data[24:28], "big")
+    if not 0 < used <= _MAX_COLUMNS:
+        raise DataError(
+            f"{path}: has an unknown binary format. Formats that can be read: {_FORMATS}. Export "
+            f"the table as a CSV file. (As a file of xlook, it would have {used} columns.)"
+        )
+    if len(data) < _DATA_START_BYTE:
+        raise DataError(f"{path}: ends within the headers of an xlook file")
+    names, units, columns, begin = [], [], [], _DATA_START_BYTE
+    for number in range(used):
+        start = _HEADER_BYTES + _COLUMN_HEADER_BYTES * number
+        header = data[start : start + _COLUMN_HEADER_BYTES]
+        name, unit = (
+            part.split(b"\0")[0].decode("ascii", "replace").strip()
+            for part in (header[:13], header[13:26])
+        )
+        count = int.from_bytes(header[80:84], "big")
+        if begin + 4 * count > len(data):
+            raise DataError(f"{path}: ends within column {number + 1}, {name!r}")
+        names.append(name)
+        units.append(unit)
+        columns.append((begin, count))
+        begin += 4 * count
+
+    # The last sample of a column may be missing.
+    longest = max(count for _start, count in columns)
+    common = min(count for _start, count in columns if count >= longest - 1)
+
+    def load(index: int, quantity_name: str) -> Column:
+        start, count = columns[index]
+        values = np.frombuffer(data, ">f4", min(count, common), start).astype(float)
+        values = np.cumsum(values) if quantity_name == "time" else values
+        return Column(values, "", index + 1)
+
+    return Table(merge_headings_with_units(names, units), str(path), load)

@@ -1,0 +1,207 @@
+"""Selection, filtering and thinning of the rows of a record while it is read."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from rsfstudy.errors import InvalidValue
+from rsfstudy.fitting import FILTER_KINDS, LOW_PASS_ORDERS, Filter
+from rsfstudy.rig.columns import Column
+from rsfstudy.rig.units import (
+    compute_conversion_factor,
+    convert_to_si,
+    find_size_of_units,
+    split_number_and_units,
+)
+
+#: Kinds of quantities that limit the rows, by the exponents of kilogram, metre and second.
+_COLUMN_BY_EXPONENTS = {(0, 0, 1): "time", (0, 1, 0): "displacement"}
+_REMEDY_FOR_LIMITS = "Write it as in '100 s' or '2 mm', or as a number in s."
+#: Default units of columns without units.
+_DEFAULT_UNITS = {"time": "s", "displacement": "um", "slip": "um"}
+
+
+@dataclass(frozen=True)
+class RowSelection:
+    """Selection, filter and thinning of the rows of a record.
+
+    Parameters
+    ----------
+    rows : (int, int), optional
+        Numbers of the first and the last row, counted from 1. By default, all rows are read.
+    begin, end : quantity, optional
+        Time or load point displacement of the first and the last row, such as "100 s" or "2 mm". A
+        number is a time in s.
+    thin : int, default: 1
+        Distance of the rows that remain. Each ``thin``-th row remains after the filter.
+    filter : str, default: ""
+        Filter of friction or stress with its size, such as "mean 1 s" or "butterworth_2 2 Hz".
+
+    Raises
+    ------
+    InvalidValue
+        If an option has another type, or if the filter is unknown.
+    """
+
+    rows: Sequence[int] | None = None
+    begin: Any = None
+    end: Any = None
+    thin: int = 1
+    filter: str = ""
+
+    def __post_init__(self) -> None:
+        """Check the row numbers and the thinning."""
+        if self.rows is not None and not _are_row_numbers(self.rows):
+            rule = "must be the numbers of the first and the last row, counted from 1"
+            raise InvalidValue("rows", self.rows, rule, remedy="Pass rows=(1, 5000), for example.")
+        if not isinstance(self.thin, int) or isinstance(self.thin, bool) or self.thin < 1:
+            raise InvalidValue("thin", self.thin, "must be a whole number from 1")
+        parse_filter(self.filter)
+
+    def cut(self, columns: Mapping[str, Column]) -> tuple[dict[str, Column], list[str]]:
+        """Select the rows between the limits.
+
+        Parameters
+        ----------
+        columns : mapping of str to Column
+            Columns by name.
+
+        Returns
+        -------
+        columns : dict of str to Column
+            Columns with the selected rows.
+        processing : list of str
+            Description of the selection. The list is empty if all rows were selected.
+
+        Raises
+        ------
+        InvalidValue
+            If no row lies between the limits, or if a limit refers to a missing column.
+        """
+        count = min(len(column.values) for column in columns.values())
+        first, last = (1, count) if self.rows is None else (self.rows[0], min(self.rows[1], count))
+        first -= 1
+        if self.begin is not None:
+            first = max(first, self._find_row("begin", self.begin, columns))
+        if self.end is not None:
+            last = min(last, self._find_row("end", self.end, columns))
+        if first >= last:
+            stated = {"rows": self.rows, "begin": self.begin, "end": self.end}
+            rule = f"selects no row: the record has {count:,} rows"
+            raise InvalidValue("selection", stated, rule)
+        if (first, last) == (0, count):
+            return dict(columns), []
+        kept = slice(first, last)
+        cut = {
+            name: of._replace(values=of.values[kept], line_numbers=of.line_numbers[kept])
+            for name, of in columns.items()
+        }
+        return cut, [f"rows {first + 1} to {last} of {count}"]
+
+    def _find_row(self, name: str, limit: Any, columns: Mapping[str, Column]) -> int:
+        """Return the index of the first row, or the index after the last row."""
+        if isinstance(limit, bool) or not isinstance(limit, int | float | str):
+            raise InvalidValue(name, limit, "is no time or displacement", remedy=_REMEDY_FOR_LIMITS)
+        text = limit if isinstance(limit, str) else f"{limit!r} s"
+        size = find_size_of_units(split_number_and_units(text)[1])
+        key = _COLUMN_BY_EXPONENTS.get(size[1]) if size else None
+        if key is None:
+            raise InvalidValue(name, limit, "is no time or displacement", remedy=_REMEDY_FOR_LIMITS)
+        if key == "displacement" and key not in columns:
+            key = "slip"
+        if key not in columns:
+            rule = f"needs the column {key.replace('slip', 'displacement')}"
+            raise InvalidValue(name, limit, rule, remedy="Pass rows=(first, last).")
+        column = columns[key]
+        si = "s" if key == "time" else "m"
+        units = column.units or _DEFAULT_UNITS[key]
+        value = convert_to_si(name, text, si) / float(compute_conversion_factor(key, units, si))
+        inside = column.values >= value if name == "begin" else column.values <= value
+        if not inside.any():
+            rule = f"lies outside the record, {column.values[0]:g} to {column.values[-1]:g} {units}"
+            raise InvalidValue(name, limit, rule)
+        if name == "begin":
+            return int(np.argmax(inside))
+        return len(inside) - int(np.argmax(inside[::-1]))
+
+    def smooth(
+        self, columns: Mapping[str, np.ndarray], filtered_names: Sequence[str]
+    ) -> tuple[dict[str, np.ndarray], list[str]]:
+        """Filter friction or stress, and keep each ``thin``-th row.
+
+        Parameters
+        ----------
+        columns : mapping of str to ndarray
+            Columns by name. If a filter is applied, the column ``time`` is in s.
+        filtered_names : sequence of str
+            Names of the columns to filter.
+
+        Returns
+        -------
+        columns : dict of str to ndarray
+            Filtered and thinned columns. Rows without a complete averaging time are left out.
+        processing : list of str
+            Descriptions of the filter and of the thinning.
+
+        Raises
+        ------
+        InvalidValue
+            If the record has no time, or if the filter does not fit the sampling intervals.
+        """
+        found, processing = dict(columns), []
+        if chosen := parse_filter(self.filter):
+            if "time" not in found:
+                remedy = "Leave the filter out."
+                raise InvalidValue("filter", self.filter, "needs the column time", remedy=remedy)
+            time = found["time"]
+            kept = chosen.complete_rows(time)
+            found |= {name: chosen.filter_rows(time, found[name]) for name in filtered_names}
+            found = {name: values[kept] for name, values in found.items()}
+            processing.append(f"{' and '.join(filtered_names)} filtered by {self.filter}")
+        if self.thin > 1:
+            found = {name: values[:: self.thin].copy() for name, values in found.items()}
+            processing.append(f"one of every {self.thin} rows")
+        return found, processing
+
+
+def _are_row_numbers(rows: Any) -> bool:
+    """Return True if a value is a pair of increasing positive integers."""
+    if not isinstance(rows, list | tuple) or len(rows) != 2:
+        return False
+    is_integer = all(isinstance(row, int) and not isinstance(row, bool) for row in rows)
+    return is_integer and 1 <= rows[0] <= rows[1]
+
+
+def parse_filter(text: str) -> Filter | None:
+    """Create a filter from a string with units.
+
+    Parameters
+    ----------
+    text : str
+        Kind of filter and its size, such as "mean 1 s" or "butterworth_2 2 Hz".
+
+    Returns
+    -------
+    Filter or None
+        Filter, or None if the string is empty.
+
+    Raises
+    ------
+    InvalidValue
+        If the kind is unknown, or if the size has other units.
+    """
+    if not text:
+        return None
+    kind, _, size = str(text).partition(" ")
+    if kind not in FILTER_KINDS:
+        remedy = "Write it as in 'mean 1 s' or 'butterworth_2 2 Hz'."
+        raise InvalidValue("filter", text, "is unknown", choices=FILTER_KINDS, remedy=remedy)
+    number = convert_to_si("filter", size, "1/s" if kind in LOW_PASS_ORDERS else "s")
+    if not 0.0 < number < math.inf:
+        raise InvalidValue("filter", text, "must have a positive size")
+    return Filter(kind, number)

@@ -1,0 +1,273 @@
+"""Selection of the columns of records by their usual headings.
+
+The questions ``read_record``, ``events`` and ``history`` need different columns of the same files.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping, Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from rsfstudy.errors import InvalidValue
+from rsfstudy.rig.columns import HEADING_PATTERN, Column, ColumnSpec, parse_column_spec
+from rsfstudy.rig.readers import read_source
+from rsfstudy.rig.readers.source import Table
+from rsfstudy.rig.units import compute_conversion_factor
+
+#: SI units of the columns of a record, and factors from SI units to the units of `Record`.
+UNITS_AND_FACTORS_OF_RECORD_COLUMNS = {
+    "time": ("s", 1.0),
+    "displacement": ("m", 1e6),
+    "slip": ("m", 1e6),
+    "friction": ("1", 1.0),
+    "shear_stress": ("Pa", 1.0),
+    "normal_stress": ("Pa", 1.0),
+    "velocity": ("m/s", 1e6),
+    "pore_pressure": ("Pa", 1.0),
+}
+#: Units of columns in the examples of error messages. Columns that are not listed are in MPa.
+_USUAL_UNITS = {"time": "s", "displacement": "um", "slip": "um", "velocity": "um/s"}
+#: Spellings of units without dimension.
+_NO_UNITS = ("1", "-", ".", "none")
+#: For each column, the columns that replace it.
+_ALTERNATIVES = {
+    "displacement": "slip",
+    "slip": "displacement",
+    "friction": "shear_stress",
+    "shear_stress": "friction",
+}
+#: For each column, the pattern that matches the start of common headings.
+_PATTERNS_OF_USUAL_HEADINGS = {
+    "time": r"t(ime)?\b|time|zeit|temps|tiempo|tempo",
+    "displacement": r"(load.*)?disp|lp(\b|_?disp)|l\.?p\.? disp|load.?point",
+    "slip": r"(fault.*)?slip",
+    "friction": r"fric|mu\b|coeff|\u00b5$|\u03bc$",
+    "shear_stress": r"shear|shr|tau|(shear.*)?force",
+    "normal_stress": r"(eff\w*[ _])?nor|sigma",
+    "velocity": r"(load.*)?vel",
+    "pore_pressure": r"pore|p_?p\b",
+}
+
+
+class UsableColumns(NamedTuple):
+    """Columns that a question can use.
+
+    Parameters
+    ----------
+    names : tuple of str
+        Names of the columns, in the order in which they are found by their headings. A column is
+        not searched if a column that replaces it was found before: ``slip`` replaces
+        ``displacement``, and ``shear_stress`` replaces ``friction``, and conversely.
+    shear_stress_suffices : bool, default: False
+        If True, ``normal_stress`` is not searched if ``shear_stress`` was found.
+    """
+
+    names: tuple[str, ...]
+    shear_stress_suffices: bool = False
+
+
+def find_factor_to_record_units(column_name: str, units: str) -> float:
+    """Compute the factor that converts a column to the units of `Record`.
+
+    Parameters
+    ----------
+    column_name : str
+        Name of the column.
+    units : str
+        Units of the column. Columns without units are in s, um, um/s and MPa.
+
+    Returns
+    -------
+    float
+        Conversion factor.
+
+    Raises
+    ------
+    InvalidValue
+        If the units do not fit the column.
+    """
+    si, ours = UNITS_AND_FACTORS_OF_RECORD_COLUMNS[column_name]
+    if not units:
+        return {"Pa": 1e6}.get(si, 1.0)
+    if si == "1" and units in _NO_UNITS:
+        return 1.0
+    return float(compute_conversion_factor(column_name, units, si)) * ours
+
+
+def read_selected_columns(
+    table: Table, selected_columns: Mapping[str, Any] | None, usable: UsableColumns
+) -> dict[str, Column]:
+    """Read the columns that the user selected, and usable columns with usual headings.
+
+    Parameters
+    ----------
+    table : Table
+        Table with all columns.
+    selected_columns : mapping of str to str or tuple, or None
+        Heading and units of columns by name. If the value is None and the arrays in memory have no
+        units, all columns are read.
+    usable : UsableColumns
+        Columns that the question can use.
+
+    Returns
+    -------
+    dict of str to Column
+        Columns by name, with their units.
+
+    Raises
+    ------
+    InvalidValue
+        If a column is unknown to the question, if a selected column does not exist, if several
+        columns have usual headings of a usable column, or if a column has no units.
+    """
+    for name in selected_columns or ():
+        _check_column_name(name, usable.names)
+    if selected_columns is None and table.has_only_columns:
+        for name in table.headings:
+            _check_column_name(name, usable.names)
+        return {name: table.read_column(name, ColumnSpec(name)) for name in table.headings}
+    found = dict(selected_columns or {})
+    # A stated normal stress belongs to a stress that the user selects.
+    has_stress = not {"friction", "shear_stress"}.isdisjoint(found)
+    for name in usable.names if table.has_headings else ():
+        if name == "normal_stress" and (
+            has_stress or (usable.shear_stress_suffices and "shear_stress" in found)
+        ):
+            continue
+        if name not in found and _ALTERNATIVES.get(name) not in found:
+            found |= _find_usual_heading(name, table)
+    headings = dict.fromkeys(table.headings)
+    return {
+        name: _read_column_with_units(table, name, selection, headings)
+        for name, selection in found.items()
+    }
+
+
+def _check_column_name(column_name: str, known_names: Sequence[str]) -> None:
+    if column_name not in known_names:
+        raise InvalidValue("column", column_name, "is unknown", choices=known_names)
+
+
+def _read_column_with_units(
+    table: Table, name: str, selection: Any, headings: Mapping[str, Any]
+) -> Column:
+    """Read a column, and check that it has units.
+
+    The units of friction may be omitted, but the units of other columns are required.
+    """
+    spec = parse_column_spec(selection, headings)
+    index = table.find_column(spec.heading)
+    stated = spec.units or table.units_of_heading(index)
+    if not (stated or table.default_units or name == "friction") and isinstance(selection, str):
+        column = table.read_column(name, spec)
+        if column.units:  # The type of the values implies the units.
+            return column
+        whole = f"{spec.heading} ({_USUAL_UNITS.get(name, 'MPa')})"
+        remedy = f"Write them in the file, as in {whole}, or here: --columns '{name}={whole},...' "
+        remedy += f"(columns={{'{name}': '{whole}', ...}})."
+        raise InvalidValue("heading", selection, "states no units", remedy=remedy)
+    return table.read_column(name, spec)
+
+
+def has_time_column(source: Any) -> bool:
+    """Return True if a table has a column with a usual heading for time.
+
+    Parameters
+    ----------
+    source : str, Path or object
+        File or object that contains the table, as for ``read_record``.
+
+    Returns
+    -------
+    bool
+        True if the table is a record. Protocols have durations or distances in place of times.
+    """
+    return bool(_find_usual_heading("time", read_source(source)))
+
+
+def _find_usual_heading(column_name: str, table: Table) -> dict[str, str]:
+    """Find the column with a usual heading for a quantity.
+
+    If several headings match, headings with compatible units take precedence. Among headings with
+    compatible units, a heading that is equal to the name of the quantity takes precedence. The
+    function raises an error if several columns are still possible.
+    """
+    parts = {text: match for text in table.headings if (match := HEADING_PATTERN.fullmatch(text))}
+    meant = [
+        text
+        for text, m in parts.items()
+        if re.match(_PATTERNS_OF_USUAL_HEADINGS[column_name], m[1], re.IGNORECASE)
+    ]
+    meant = [
+        text for text in meant if _has_compatible_units(column_name, parts[text][2] or "")
+    ] or meant
+    meant = [text for text in meant if parts[text][1] == column_name] or meant
+    if len(meant) > 1:
+        remedy = (
+            f"Say which, as in --columns '{column_name}={meant[-1]}' "
+            f"(columns={{'{column_name}': ...}})."
+        )
+        rule = "may be any of several columns"
+        raise InvalidValue("column", column_name, rule, choices=meant, remedy=remedy).with_location(
+            table.location
+        )
+    return {column_name: meant[0]} if meant else {}
+
+
+def _has_compatible_units(column_name: str, units: str) -> bool:
+    """Return True if the units are compatible with the quantity of a column."""
+    try:
+        return find_factor_to_record_units(column_name, units) > 0.0
+    except InvalidValue:
+        return False
+
+
+def missing_columns_error(table: Table, rule: str) -> InvalidValue:
+    """Return the error for a table in which required columns were not found.
+
+    Parameters
+    ----------
+    table : Table
+        Table with all columns.
+    rule : str
+        Sentence that names the missing columns.
+
+    Returns
+    -------
+    InvalidValue
+        Error with the headings of the table, and an example of a selection.
+    """
+    if table.has_headings:
+        shown = "t (s)", "lp (um)", "mu"
+    else:
+        shown = "1 (s)", "2 (um)", "3"
+    remedy = (
+        f"Say which is which: --columns 'time={shown[0]},displacement={shown[1]},friction="
+        f"{shown[2]}', or columns={{'time': '{shown[0]}', 'displacement': '{shown[1]}', "
+        f"'friction': '{shown[2]}'}}."
+    )
+    header = ", ".join(table.headings)[:200]
+    if not table.has_headings:
+        rule = f"states no headings, and {rule}"
+        header = f"{len(table.headings)} columns without headings"
+    return InvalidValue("header", header, rule, remedy=remedy).with_location(table.location)
+
+
+def check_finite(columns: Mapping[str, Column]) -> None:
+    """Raise an error for the first value that is not finite.
+
+    Parameters
+    ----------
+    columns : mapping of str to Column
+        Columns by name.
+
+    Raises
+    ------
+    InvalidValue
+        If a value is not finite. The error message contains the location of the value.
+    """
+    for name, column in columns.items():
+        column.check_values(name, ~np.isfinite(column.values), "must be a finite number")
