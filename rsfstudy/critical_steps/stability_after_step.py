@@ -85,8 +85,9 @@ def has_frictional_damping_only(scene: Scene) -> bool:
     """
     parts = scene.parts
     varies = parts.normal_stress.depends_on_shear_stress or parts.fluid.effects
-    varies = varies or parts.temperature.unknowns
-    return not varies and not scene.dynamics.radiated_stress_slope(0.0)
+    if varies or parts.temperature.unknowns:
+        return False
+    return not scene.dynamics.radiated_stress_slope(0.0)
 
 
 def may_have_closed_orbits(scene: Scene) -> bool:
