@@ -156,6 +156,7 @@ REDUCED_AXES = {
     "dilatant_cycles": {"drainage": [1.0], "dilatancy": [0.0, 0.004, 0.008]},
     "dilatant_steps": {"drainage": [0.1, 1.0, 10.0]},
     "displacement_boundary": {"b_over_a": 1.0 + 1.0 / np.array([0.25, 0.5, 0.75, 1.0, 2.0])},
+    "flash_heating_cycles": {"weakened_friction": [0.1, 0.2, 0.5]},
     "fit_coverage": {
         "process": ["white", "ar1", "encoder", "coarsely_rounded"],
         "seed": list(range(12)),
@@ -182,6 +183,8 @@ REDUCED_AXES = {
         "stiffness_ratio": [0.4, 0.8],
         "load_velocity_ratio": 10.0 ** np.linspace(0.0, 3.0, 4),
     },
+    "thermal_pressurisation": {"drainage": [0.001, 0.01, 0.05, 1.0, 10.0, 100.0]},
+    "thermal_pressurisation_cycles": {"heating": [1e-4, 1e-3, 1e-2]},
     "triggering": {
         "case": ["imposed, alpha = 0", "imposed, alpha = 0.56", "inclined, alpha = 0.56"],
         "stiffness_ratio": [0.05, 0.25, 0.5, 1.0, 1.25, 2.0],
@@ -200,9 +203,10 @@ REDUCED_AXES = {
 #: Studies whose motions use the compiled engine, which ``test_compiled`` compares with SciPy.
 COMPILED_ONLY_STUDIES = (
     "bounded_slip", "coverage", "dilatant_cycles", "dilatant_steps", "displacement_boundary",
-    "injection", "normal_stress_steps", "rate_step_lattice", "resonance", "rig_recurrence",
-    "slide_hold_slide", "stress_drop", "triggering", "two_states", "uncertain_recurrence",
-    "velocity_steps", "wave_triggering", "what_matters",
+    "flash_heating_cycles", "injection", "normal_stress_steps", "rate_step_lattice", "resonance",
+    "rig_recurrence", "slide_hold_slide", "stress_drop", "thermal_pressurisation_cycles",
+    "triggering", "two_states", "uncertain_recurrence", "velocity_steps", "wave_triggering",
+    "what_matters",
 )  # fmt: skip
 
 

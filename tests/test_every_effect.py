@@ -43,18 +43,41 @@ EFFECTS = [
     {"fluid": "dilatant", "dilatancy": 0.004, "drainage": 3.0},
     {"fluid": "dilatant", "dilatancy": 0.004, "drainage": 0.7, "radiation_damping": 1e-4},
 ]
+#: Effects of heat. The activation terms require a law with one state.
+HEAT = {"temperature": "shear_heating", "heating": 1e-3, "cooling": 0.3}
+ACTIVATED = {**HEAT, "direct_activation": 30.0, "evolution_activation": 20.0}
+PRESSURISED = {**HEAT, "fluid": "thermal", "pressurisation": 2.0, "drainage": 0.5}
+HEAT_EFFECTS = [
+    ACTIVATED,
+    {**PRESSURISED, "dilatancy": 0.004, "radiation_damping": 1e-4},
+    {**ACTIVATED, **PRESSURISED, "stress_dependence": 0.0},
+]
 #: All laws and normal stresses, with each effect that is compatible with both.
 SCENES = [
     {"law": law, **stress, **effect}
     for law, stress, effect in itertools.product(sorted(laws.BUILT_IN_PARTS), STRESSES, EFFECTS)
     if not ("stress_dependence" in effect and stress.get("normal_stress") == "imposed")
 ]
+SCENES += [
+    {"law": law, **stress, **effect}
+    for law, stress, effect in itertools.product(
+        sorted(laws.BUILT_IN_PARTS), STRESSES[::2], HEAT_EFFECTS
+    )
+    if not (law.startswith("two_") and "direct_activation" in effect)
+]
 SCENES += [{"law": law, **STRENGTHENING} for law in ("two_slip_states", "two_slowness_states")]
 #: Scenes with inertia, and with periods at which the effect of inertia exceeds rounding errors.
 MASSIVE = [
     {"inertia": True, "period": 1e8, **stress, **effect}
     for stress in (CONSTANT, {"alpha": 0.56})
-    for effect in ({}, {"law": "slowness"}, {"law": "composite"}, *EFFECTS[2:4])
+    for effect in (
+        {},
+        {"law": "slowness"},
+        {"law": "composite"},
+        *EFFECTS[2:4],
+        ACTIVATED,
+        PRESSURISED,
+    )
 ]
 
 
@@ -190,7 +213,7 @@ def test_slip_rate_grows_as_the_unknowns_change(fields):
     """
     scene = Scene(**{"load_velocity_ratio": 3.0, "stiffness": 0.01, **fields})
     equations = equations_between_ruptures(scene, with_time=False)
-    at = scene.a * np.array([0.3, 0.2, 0.1, 0.05, 0.02][: 1 + scene.state_count])
+    at = scene.a * np.array([0.3, 0.2, 0.1, 0.05, 0.02, 0.01][: 1 + scene.state_count])
     rates, step = np.array(equations.evaluate_rates(tuple(at))), 1e-5
     ahead, behind = (
         equations.evaluate_point(tuple(at + s * rates)).log_slip_rate for s in (step, -step)

@@ -65,6 +65,9 @@ CALLS: dict[str, dict] = {
     "velocity_ramp_duration": {"velocity_ramp": 2.0},
     "load_velocity_ratio": {},
     **{name: {"fluid": "dilatant"} for name in ("dilatancy", "drainage")},
+    "weakening_velocity_ratio": {"law": "flash_heating"},
+    "cooling": {"temperature": "shear_heating"},
+    "pressurisation": {"temperature": "shear_heating", "fluid": "thermal"},
 }
 
 

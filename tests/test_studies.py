@@ -59,6 +59,7 @@ WIDE = {
     "dilatancy D1": "eight decimals are given",
     "dilatancy D3": "truncation of differences, which is not the same at every place",
     "displacement_boundary C10": "the paper says 'a few percents'",
+    "flash_heating H2": "truncation of differences, which is not the same at every place",
     "fit_coverage F1": "chance: binomial standard deviations",
     "fit_coverage F2": "chance: binomial standard deviations",
     "fit_coverage_joint J1": "chance: binomial standard deviations",
@@ -79,6 +80,8 @@ WIDE = {
     "stability_map C1": "half of a bracket, which holds the boundary anywhere",
     "wave_triggering W1": "one bound of second order for all; of slow waves it nearly vanishes",
     "stress_drop C15": "the paper says whole multiples",
+    "thermal_pressurisation H11": "truncation of differences",
+    "thermal_pressurisation_step H15": "one bound of first order for all slips",
     "uncertain_recurrence U1": "what sampling leaves, of which the seed makes more or less",
     "what_matters W3": "what sampling leaves, of which the seed makes more or less",
 }

@@ -25,6 +25,10 @@ SAME = {"a": 0.01, "b_over_a": 1.8, "mu_star": 0.7, "load_velocity_ratio": 2.0}
 #: integration in time.
 MASS = {"inertia": True, "period": 2.0 * math.pi * 0.03, "reference_rate": 1.0}
 WAVES = {"radiation_damping": 2e-3}
+#: Strong heating, so that all terms are large within a few slip distances.
+HEAT = {"temperature": "shear_heating", "heating": 0.01, "cooling": 0.2, "direct_activation": 15.0,
+        "evolution_activation": 10.0}  # fmt: skip
+FLASH = {"weakening_velocity_ratio": 3.0, "weakened_friction": 0.3, "weakening_exponent": 2.0}
 STATES = {"b_over_a": None, "b1_over_a": 1.2, "b2_over_a": 0.6, "length_ratio": 4.0}
 RAMP = {**IMPOSED, "law": "slowness", "stiffness": 0.025, "ramp_duration": 4.0}
 WAVY = {"stiffness": 0.016, "oscillation_period": 8.0, "oscillation_amplitude": 0.05}
@@ -52,6 +56,12 @@ EVENTFUL = {
               stiffness=0.008),
         12.0,
     ),
+    "flash": (scene(law="flash_heating", **FLASH, **CONSTANT, **WAVES, stiffness=0.012), 12.0),
+    "hot": (scene(law="slowness", **CONSTANT, **HEAT, **WAVES, stiffness=0.0065), 12.0),
+    "pressurised": (
+        scene(**CONSTANT, **HEAT, **WAVES, fluid="thermal", pressurisation=2.0, stiffness=0.0065),
+        12.0,
+    ),
     "ruptures": (scene(**INCLINED, **MASS, stiffness=0.0065), 15.0),
     "slowness, ruptures": (scene(law="slowness", **IMPOSED, **MASS, stiffness=0.0065), 7.5),
     "inclined, waves": (scene(**INCLINED, **WAVES, stiffness=0.0065), 30.0),
@@ -74,6 +84,33 @@ MOTIONS = {
         scene(phi=65.0, alpha=0.0, fluid="dilatant", dilatancy=0.004, drainage=0.7, **MASS,
               stiffness=0.0065),
         12.0,
+    ),
+    "flash, mass": (
+        scene(law="flash_heating", **{**FLASH, "weakened_friction": 0.5}, **CONSTANT, **MASS,
+              stiffness=0.03),
+        6.0,
+    ),
+    "flash, inclined, waves": (
+        scene(law="flash_heating", **FLASH, **INCLINED, **WAVES, stiffness=0.02), 12.0
+    ),
+    "hot, inclined": (scene(law="perrin_rice_zheng", **INCLINED, **HEAT, stiffness=0.016), 12.0),
+    "hot, inclined, mass": (scene(**INCLINED, **HEAT, **MASS, stiffness=0.0065), 12.0),
+    "hot flash": (
+        scene(law="flash_heating", **FLASH, **CONSTANT, **HEAT, **WAVES, stiffness=0.012), 12.0
+    ),
+    "hot, oscillation": (scene(**IMPOSED, **HEAT, **WAVY), 12.0),
+    "hot, oscillation, inclined, waves": (
+        scene(law="slowness", **INCLINED, **WAVES, **HEAT, **WAVY), 12.0
+    ),
+    "hot, Nagata": (scene(law="slowness", **INCLINED, **HEAT, stress_dependence=0.7,
+                          stiffness=0.016), 12.0),
+    "pressurised, dilatant, inclined, mass": (
+        scene(phi=65.0, alpha=0.0, **HEAT, **MASS, fluid="thermal", pressurisation=0.5,
+              dilatancy=0.004, drainage=0.7, stiffness=0.0065), 8.0
+    ),
+    "pressurised, inclined, waves": (
+        scene(law="slowness", **INCLINED, **HEAT, **WAVES, fluid="thermal", pressurisation=2.0,
+              stiffness=0.0065), 12.0
     ),
     "ramp": (scene(**RAMP, normal_stress_ramp=0.1), 12.0),
     "ramp down": (scene(**RAMP, normal_stress_ramp=-0.1), 12.0),

@@ -99,8 +99,9 @@ def test_units_that_both_know_are_the_same(name):
     quantity = registry.Quantity(1.0, registry.parse_units(name)).to_base_units()
     size, exponents = _KNOWN_UNITS[name]
     assert quantity.magnitude == pytest.approx(size, rel=1e-15)
-    of = {"[mass]": exponents[0], "[length]": exponents[1], "[time]": exponents[2]}
-    assert dict(quantity.dimensionality) == {n: e for n, e in of.items() if e}
+    dimensions = ("[mass]", "[length]", "[time]", "[temperature]", "[substance]")
+    of = zip(dimensions, exponents, strict=True)
+    assert dict(quantity.dimensionality) == {n: e for n, e in of if e}
 
 
 NUMBERS = st.one_of(

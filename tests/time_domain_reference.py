@@ -13,6 +13,14 @@ dependence N, the equations are
     f = g + eta (V - 1), or K eps**2 V d(ln V) = (f - g) dt with inertia
     dTheta = V b h(u) dt - (alpha ds + N dg)/s,  u = Theta/b + ln V
     dphi = V (dilatancy ln V - phi) dt,  dp = -drainage p dt - dphi
+
+With the temperature rise Y, the friction coefficient and u contain further terms, and heating
+raises the pressure:
+
+    mu = mu_* + a (ln V + q_a L) + Theta,  u = Theta/b + ln V + q_b L,  L = 1/(1 + Y) - 1
+    dY = H [(mu_* + g) V - mu_*] dt - C Y dt,  dp = ... + pressurisation dY
+
+With flash heating, V b h(u) is V {f_ss - mu_* - a ln V - Theta}.
 """
 
 from __future__ import annotations
@@ -35,7 +43,10 @@ EVOLUTION_FUNCTIONS: Mapping[str, Callable[[float, float], float]] = {
     "slowness": lambda u, _eps: math.expm1(-u),
     "perrin_rice_zheng": lambda u, _eps: -math.sinh(u),
     "family": lambda u, eps: math.expm1(-eps * u) / eps,
+    "flash_heating": lambda u, _eps: -u,
 }
+#: Fields of scenes with heat, which are 0 in other scenes.
+HEAT_FIELDS = ("heating", "cooling", "direct_activation", "evolution_activation", "pressurisation")
 
 #: Upper bound of ln V, because trial steps of the solver can overflow.
 MAX_LOG_SLIP_RATE = 300.0
@@ -61,8 +72,9 @@ class InstantState(NamedTuple):
 class TimeDomainMotion:
     """Motion of a scene in time.
 
-    The unknowns are f, the state variables, porosity and pore pressure of a dilatant fault,
-    and ln V if the scene has radiation damping or inertia.
+    The unknowns are f, the state variables, porosity and pore pressure of a fault with a
+    fluid, the temperature rise if the temperature changes, and ln V if the scene has
+    radiation damping or inertia.
 
     Parameters
     ----------
@@ -73,7 +85,8 @@ class TimeDomainMotion:
     """
 
     def __init__(self, scene: Scene, velocity_ramp: float = 0.0) -> None:
-        of = {name: value or 0.0 for name, value in scene.as_dict().items()}
+        of = dict.fromkeys(HEAT_FIELDS, 0.0)
+        of |= {name: value or 0.0 for name, value in scene.as_dict().items()}
         if scene.load_velocity_ratio is None and not of["displacement_step"]:
             of["load_velocity_ratio"] = 1.0
         self.of, self.mass, self.velocity_ramp = of, bool(of["inertia"]), velocity_ramp
@@ -88,7 +101,8 @@ class TimeDomainMotion:
             self.bs = [of["b1_over_a"] * self.a, of["b2_over_a"] * self.a]
             self.lengths = [1.0, of["length_ratio"]]
         self.h = EVOLUTION_FUNCTIONS[name]
-        self.wet, self.has_rate = scene.fluid == "dilatant", self.mass or self.damping > 0.0
+        self.wet, self.has_rate = scene.fluid != "drained", self.mass or self.damping > 0.0
+        self.hot = scene.temperature != "isothermal"
         stiff = self.has_rate or bool(of["regularised"])
         self.method = "LSODA" if stiff else "DOP853"
         # This module does not implement the partition of stress effects among several states.
@@ -147,9 +161,20 @@ class TimeDomainMotion:
             x = brentq(missing, -60.0, 60.0, xtol=1e-15)
         s = 1.0 + e + self.cot * (f - self.damping * math.expm1(x) * (not self.mass))
         states = [theta - self.alpha * math.log(s / before), *[0.0] * (len(self.bs) - 1)]
-        return [f, *states, *[0.0, 0.0][: 2 * self.wet], *[x][: self.has_rate]]
+        others = [0.0, 0.0] * self.wet + [0.0] * self.hot
+        return [f, *states, *others, *[x][: self.has_rate]]
 
     # ---- equations -------------------------------------------------------------------------------
+
+    def offset_of_steady_state(self, x: float) -> float:
+        """Return the steady state of flash heating plus b ln V, and otherwise 0."""
+        if self.of["law"] != "flash_heating":
+            return 0.0
+        power, ratio = self.of["weakening_exponent"], self.of["weakening_velocity_ratio"]
+        low_velocity = self.mu + (self.a - self.bs[0]) * x
+        fall = (1.0 + ratio**-power) / (1.0 + math.exp(min(power * (x - math.log(ratio)), 600.0)))
+        weakened = self.of["weakened_friction"]
+        return weakened + (low_velocity - weakened) * fall ** (1.0 / power) - low_velocity
 
     def rates_and_state(
         self, time: float, y: Sequence[float], middle: float
@@ -159,6 +184,8 @@ class TimeDomainMotion:
         velocity, e, change = self.loading_at(time, middle)
         f, states, theta = y[0], y[1 : 1 + count], sum(y[1 : 1 + count])
         pores, pressure = y[1 + count : 3 + count] if self.wet else (0.0, 0.0)
+        warm = y[1 + count + 2 * self.wet] if self.hot else 0.0
+        colder, direct = -warm / (1.0 + warm), a * of["direct_activation"]
         if self.has_rate:
             x = y[-1]
             v = math.exp(min(x, MAX_LOG_SLIP_RATE))
@@ -169,24 +196,30 @@ class TimeDomainMotion:
             v = math.copysign(-math.exp(held) * math.expm1(-2.0 * abs(coefficient)), coefficient)
             x = math.log(max(abs(v), 1e-300))
         else:
-            x = ((mu + f) / (1.0 + e + cot * f - pressure) - mu - theta) / a
+            x = (mu + f) / (1.0 + e + cot * f - pressure) - mu - theta - direct * colder
+            x /= a
             v = math.exp(min(x, MAX_LOG_SLIP_RATE))
-        friction = mu + a * x + theta
+        friction = mu + a * x + theta + direct * colder
         g = f - self.damping * (v - 1.0)
         if self.mass:
             g = ((1.0 + e - pressure) * friction - mu) / (1.0 - cot * friction)
         s = 1.0 + e + cot * g - pressure
         coefficient = (mu + g) / s
+        activated = of["evolution_activation"] * colder
+        activated -= self.offset_of_steady_state(x) / self.bs[0]
         evolving = [
-            abs(v) * b / length * self.h(state / b + x, of["law_exponent"])
+            abs(v) * b / length * self.h(state / b + x + activated, of["law_exponent"])
             for b, length, state in zip(self.bs, self.lengths, states, strict=True)
         ]
+        warming = of["heating"] * ((mu + g) * v - mu) - of["cooling"] * warm
         opening = v * (of["dilatancy"] * x - pores) if self.wet else 0.0
         draining = -of["drainage"] * pressure - opening if self.wet else 0.0
+        draining += of["pressurisation"] * warming
         df, nagata = self.stiffness * (velocity - v), of["stress_dependence"]
-        # dg [1 + N - c (mu - alpha)] = s (a dx + evolution) + (mu - alpha)(de - dp)
+        # dg [1 + N - c (mu - alpha)] = s (a dx + a q_a dL + evolution) + (mu - alpha)(de - dp)
         yields = 1.0 + nagata - cot * (coefficient - self.alpha)
-        pushed = s * sum(evolving) + (coefficient - self.alpha) * (change - draining)
+        softening = -direct * warming / (1.0 + warm) ** 2
+        pushed = s * (sum(evolving) + softening) + (coefficient - self.alpha) * (change - draining)
         if self.mass:
             dx = (f - g) / (self.stiffness * self.eps**2 * v)
             dg = (s * a * dx + pushed) / yields
@@ -196,6 +229,7 @@ class TimeDomainMotion:
         ds = change - draining + cot * dg
         evolving[0] -= (self.alpha * ds + nagata * dg) / s
         fluid = [opening, draining] if self.wet else []
+        fluid += [warming] if self.hot else []
         rates = [df, *evolving, *fluid, *([dx] if self.has_rate else [])]
         return rates, InstantState(v, x, dx, f, g, s, theta)
 

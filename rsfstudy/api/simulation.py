@@ -139,7 +139,9 @@ def simulate(
         - ``load_point_displacement`` and ``friction_coefficient`` are the values that a laboratory
           rig measures. The friction coefficient is spring stress divided by the difference of
           normal stress and the pore pressure outside the fault.
-        - ``porosity`` and ``pore_pressure`` exist for a dilatant fluid.
+        - ``porosity`` and ``pore_pressure`` exist for a dilatant fluid, and ``pore_pressure`` for a
+          thermal fluid.
+        - ``temperature_rise`` exists if the temperature changes.
         - ``regime`` is the code of the equations of motion. The attribute ``flag_meanings`` of
           ``regime`` lists the names of the codes.
         - ``instability_time`` exists if the scene has neither inertia nor radiation damping, and
@@ -314,6 +316,9 @@ def _recording_to_dataset(
     }
     first = Recording.FIRST_STATE_COLUMN + scene.state_count - len(fluid)
     columns |= {about: recorded_rows[:, first + i] for i, about in enumerate(fluid)}
+    after_law = Recording.FIRST_STATE_COLUMN + scene.parts.law.state_count
+    heat = scene.parts.temperature.unknowns
+    columns |= {about: recorded_rows[:, after_law + i] for i, about in enumerate(heat)}
     if scene.parts.law.state_count > 1:
         of_law = range(scene.parts.law.state_count)
         columns |= {

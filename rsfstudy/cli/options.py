@@ -354,6 +354,14 @@ EXAMPLE_VALUES_OF_RIG_OPTIONS = {
     "mass": "1e4 kg/m^2",
     "shear_modulus": "30 GPa",
     "density": "2700 kg/m^3",
+    "thermal_diffusivity": "1 mm^2/s",
+    "heat_capacity": "2.4 MJ/m^3/K",
+    "shear_zone_width": "0.1 mm",
+    "reference_temperature": "295 K",
+    "heat_loss_width": "0.7 mm",
+    "direct_activation_energy": "89 kJ/mol",
+    "evolution_activation_energy": "89 kJ/mol",
+    "pressurisation_factor": "0.14 MPa/K",
     "load_velocity": "10 um/s",
 }
 

@@ -126,7 +126,7 @@ def _stays_below_norm(scene: Scene, point: MotionPoint) -> bool:
     friction approaches its steady state at the present slip rate. If b > 0, the steady state rises
     as ln V decreases, so the state continues to strengthen friction.
 
-    Pore pressure raises ln V by at most the loss of strength due to pore pressure, divided by a. At
+    Pore pressure and heat raise ln V by at most the loss of strength due to them, divided by a. At
     the increased ln V, the states must weaken friction more slowly than spring stress decreases.
     """
     _value, slope, shift, shift_slope = scene.friction_relation(point.psis)(point.frictional_stress)
@@ -151,25 +151,46 @@ def _stays_below_norm(scene: Scene, point: MotionPoint) -> bool:
 
 
 def _bound_pore_pressure_effect(scene: Scene, point: MotionPoint) -> tuple[float, float]:
-    """Compute an upper bound of the increase of ln V by pore pressure.
+    """Compute an upper bound of the increase of ln V by pore pressure and heat.
 
-    The function returns the upper bound, and the stress-induced change of the state at the upper
-    bound. The upper bound is infinite if no bound is found. An increase of ln V is an upper bound
-    if the highest pore pressure at the increased ln V reduces strength by less than a times the
-    increase.
+    The function returns the upper bound, and the smallest decrease of the state by stress and
+    temperature. The upper bound is infinite if no bound is found. An increase of ln V is an upper
+    bound if the highest pore pressure and temperature at the increased ln V reduce strength by less
+    than a times the increase.
     """
-    fluid, psis = scene.parts.fluid, point.psis
-    value, _slope, shift, _ = scene.friction_relation(psis)(point.frictional_stress)
-    if not fluid.unknowns:
+    value, _slope, shift, _ = scene.friction_relation(point.psis)(point.frictional_stress)
+    if not scene.parts.fluid.unknowns and not scene.parts.temperature.unknowns:
         return 0.0, shift
-    own = psis[-len(fluid.unknowns) :]
     for bound in _TESTED_LOG_RATE_INCREASES:
-        pressure = fluid.highest_pressure(point.log_slip_rate + bound, own)
-        if math.isinf(pressure):
+        hottest, coldest = _bound_unknowns(scene, point, point.log_slip_rate + bound)
+        if math.isinf(max(map(abs, (*hottest, *coldest)))):
             break
-        weaker, _slope, shift, _ = scene.friction_relation((*psis[:-1], pressure))(
-            point.frictional_stress
-        )
+        weaker = scene.friction_relation(hottest)(point.frictional_stress)[0]
         if weaker - value < bound * scene.a:
+            shift = scene.friction_relation(coldest)(point.frictional_stress)[2]
             return bound, shift
     return math.inf, shift
+
+
+def _bound_unknowns(
+    scene: Scene, point: MotionPoint, log_slip_rate: float
+) -> tuple[tuple[float, ...], tuple[float, ...]]:
+    """Return states with the highest pressure and the extreme temperatures.
+
+    The slip rate of the future motion must not exceed the argument.
+    """
+    fluid, temperature = scene.parts.fluid, scene.parts.temperature
+    hottest, coldest, range_of_rise = list(point.psis), list(point.psis), 0.0
+    if temperature.unknowns:
+        place = scene.parts.law.state_count
+        stress = scene.mu_star + max(point.spring_stress, point.frictional_stress)
+        coldest[place], hottest[place] = temperature.rise_bounds(
+            scene, point.psis[place], stress * math.exp(log_slip_rate)
+        )
+        range_of_rise = hottest[place] - coldest[place]
+    if fluid.unknowns:
+        pressure = fluid.highest_pressure(log_slip_rate, point.psis[-len(fluid.unknowns) :])
+        # The pressure is the sum of the response to drainage and of the response to heating.
+        heated = fluid.pressurisation_factor
+        hottest[-1] = coldest[-1] = pressure + (heated * range_of_rise if heated else 0.0)
+    return tuple(hottest), tuple(coldest)

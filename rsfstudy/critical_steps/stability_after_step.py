@@ -74,11 +74,14 @@ def has_frictional_damping_only(scene: Scene) -> bool:
     Returns
     -------
     bool
-        False if shear stress or pore pressure changes the effective normal stress, or if waves
-        radiate stress.
+        False if shear stress or pore pressure changes the effective normal stress, if the
+        temperature changes, or if waves radiate stress.
     """
-    varies = scene.parts.normal_stress.depends_on_shear_stress or scene.parts.fluid.effects
-    return not varies and not scene.dynamics.radiated_stress_slope(0.0)
+    parts = scene.parts
+    varies = parts.normal_stress.depends_on_shear_stress or parts.fluid.effects
+    if varies or parts.temperature.unknowns:
+        return False
+    return not scene.dynamics.radiated_stress_slope(0.0)
 
 
 def may_have_closed_orbits(scene: Scene) -> bool:

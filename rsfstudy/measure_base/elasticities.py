@@ -23,6 +23,14 @@ from rsfstudy.status import Status
 NUMERIC_SCENE_FIELDS = tuple(
     name for name, kind in SceneFields.TYPES.items() if kind in (float, float | None)
 )
+#: Fields of heat. The default parameters do not contain these fields, so that the results for
+#: scenes without heat do not change.
+_FIELDS_OF_HEAT = frozenset(
+    {
+        "heating", "cooling", "direct_activation", "evolution_activation", "pressurisation",
+        "weakening_velocity_ratio", "weakened_friction", "weakening_exponent",
+    }
+)  # fmt: skip
 #: Parameters of a rig that are not fields of a scene, and advice on computing elasticities with
 #: respect to these parameters.
 _RIG_QUANTITIES_THAT_ARE_NOT_SCENE_FIELDS = (
@@ -145,7 +153,10 @@ class Elasticities(Measure):
             rule = "must be a measure whose headline is one number"
             raise InvalidValue("measure", self.measure, rule)
         object.__setattr__(
-            self, "parameters", tuple(self.parameters) or self._differentiable_parameter_names
+            self,
+            "parameters",
+            tuple(self.parameters)
+            or tuple(n for n in self._differentiable_parameter_names if n not in _FIELDS_OF_HEAT),
         )
         for name in self.parameters:
             if name not in self._differentiable_parameter_names:

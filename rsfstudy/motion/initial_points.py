@@ -138,11 +138,12 @@ def compute_restart_point(scene: Scene, spring_stress: float, states: Numbers) -
 def _reset_loading_unknowns(scene: Scene, states: Numbers) -> Numbers:
     """Replace the unknowns of the loading by their initial values.
 
-    The unknowns of the loading follow the states of the friction law. Unknowns of the previous
-    loading are removed.
+    The unknowns of the loading follow the states of the friction law and the temperature. Unknowns
+    of the previous loading are removed.
     """
-    begun, of_law = scene.parts.loading.initial_unknowns(scene), scene.parts.law.state_count
-    return (*states[:of_law], *begun, *states[of_law + len(begun) : scene.state_count])
+    begun, parts = scene.parts.loading.initial_unknowns(scene), scene.parts
+    kept = parts.law.state_count + len(parts.temperature.unknowns)
+    return (*states[:kept], *begun, *states[kept + len(begun) : scene.state_count])
 
 
 def _find_specified_initial_states(scene: Scene, steady_states: Numbers) -> tuple[Numbers, float]:

@@ -1,10 +1,11 @@
 """Base classes and parameter indices for user-defined parts of a slider.
 
 Derive a state evolution law from ``Law`` or ``LawBase``, a normal stress condition from
-``NormalStress``, a pore fluid from ``Fluid``, the dynamics from ``Dynamics``, and a loading from
-``Loading``. Declare the fields of the part with ``number`` and ``flag``. The functions of parts
-receive a tuple of parameters ``p``. Constants such as ``LAW`` are the indices of the parameters in
-the tuple ``p``. This package only exports names that are defined in ``rsfstudy.slider``.
+``NormalStress``, a pore fluid from ``Fluid``, the dynamics from ``Dynamics``, a loading from
+``Loading``, and a temperature from ``Temperature``. Declare the fields of the part with ``number``
+and ``flag``. The functions of parts receive a tuple of parameters ``p``. Constants such as ``LAW``
+are the indices of the parameters in the tuple ``p``. This package only exports names that are
+defined in ``rsfstudy.slider``.
 """
 
 from __future__ import annotations
@@ -43,6 +44,7 @@ if TYPE_CHECKING:
     )
     from rsfstudy.slider.parts import Part, flag, number
     from rsfstudy.slider.scene_view import SceneView
+    from rsfstudy.slider.temperature import Temperature
 else:
     __getattr__, __dir__ = build_lazy_export_functions(
         __name__,
@@ -76,6 +78,7 @@ else:
             ),
             "slider.parts": ("Part", "flag", "number"),
             "slider.scene_view": ("SceneView",),
+            "slider.temperature": ("Temperature",),
         },
     )
 
@@ -109,6 +112,7 @@ __all__ = [
     "STRESS_DEPENDENCE",
     "SceneView",
     "Segment",
+    "Temperature",
     "flag",
     "number",
 ]

@@ -186,7 +186,8 @@ def _closed_form_critical_stiffness(scene: Scene) -> float:
     """
     law, coupling = scene.parts.law, scene.parts.normal_stress.coupling
     others = law.steady_states or law.depends_on_stress or scene.parts.fluid.effects
-    if coupling is None or others or scene.imposed_normal_stress:
+    hot = scene.parts.temperature.unknowns
+    if coupling is None or others or hot or scene.imposed_normal_stress:
         return math.nan
     return critical_stiffness_closed_form(
         scene.log_load_velocity, scene.mu_star, scene.a, scene.b, *coupling

@@ -259,8 +259,8 @@ def _misfit_to_closed_form(
 ) -> float:
     r"""Compute the largest difference between stress and its closed form.
 
-    The closed form applies if normal stress is constant after the step. The result is in units of
-    sigma_*, and is NaN if the law or the scene has no closed form.
+    The closed form applies if normal stress and temperature are constant after the step. The result
+    is in units of sigma_*, and is NaN if the law or the scene has no closed form.
 
     Notes
     -----
@@ -269,7 +269,7 @@ def _misfit_to_closed_form(
     """
     law, parts = scene.parts.law, scene.parts
     stress_acts = parts.normal_stress.effects or parts.fluid.effects or law.depends_on_stress
-    if stress_acts or law.relaxation is None:
+    if stress_acts or parts.temperature.unknowns or law.relaxation is None:
         return math.nan
     left = np.array([law.relaxation(scene.log_load_velocity, at) for at in slip.tolist()])
     exact = steady_state + (1.0 + scene.imposed_normal_stress) * scene.b * left

@@ -442,12 +442,12 @@ def _closed_form_applies(
     """Return True if the closed form of a rigid slider applies.
 
     The closed form requires steady sliding before the step, and a friction coefficient that does
-    not depend on normal stress or pore pressure. If the law has a characteristic slip rate, the
-    velocity before the step must also be V_*.
+    not depend on normal stress, pore pressure or temperature. If the law has a characteristic slip
+    rate, the velocity before the step must also be V_*.
     """
     law, stress, fluid = scene.parts.law, scene.parts.normal_stress, scene.parts.fluid
     stress_acts = stress.normal_stress or stress.state_effect or law.depends_on_stress
-    if stress_acts or stress.effects or fluid.unknowns:
+    if stress_acts or stress.effects or fluid.unknowns or scene.parts.temperature.unknowns:
         return False
     if not law.scale_free and evaluated_step.velocity_before != 1.0:
         return False

@@ -18,8 +18,8 @@ from rsfstudy.rig.row_selection import RowSelection
 from rsfstudy.rig.units import compute_conversion_factor, convert_to_si, find_size_of_units
 from rsfstudy.rig.usual_headings import UsableColumns, check_finite, read_selected_columns
 
-#: Exponents of kilogram, metre and second in the units of force.
-_EXPONENTS_OF_FORCE = (1, 1, -2)
+#: Exponents of base units (see ``units``) in the units of force.
+_EXPONENTS_OF_FORCE = (1, 1, -2, 0, 0)
 #: Columns that may contain a force instead of a stress.
 _STRESS_COLUMNS = ("shear_stress", "normal_stress")
 

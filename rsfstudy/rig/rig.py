@@ -85,19 +85,45 @@ class Rig(HtmlTableMixin):
     density : quantity, optional
         Density :math:`\rho` of the medium in kg/m³, for radiation damping. Pass both the shear
         modulus and the density, or neither of them.
+    thermal_diffusivity : quantity, optional
+        Thermal diffusivity :math:`\alpha_{th}` in m²/s. If the rig has a thermal diffusivity, its
+        scenes have ``temperature="shear_heating"``. Shear heating also requires the next three
+        quantities.
+    heat_capacity : quantity, optional
+        Heat capacity :math:`\rho c` per volume in J/m³/K.
+    shear_zone_width : quantity, optional
+        Width :math:`w` of the shear zone in m.
+    reference_temperature : quantity, optional
+        Absolute temperature :math:`T_*` of steady sliding at :math:`V_*` in K.
+    heat_loss_width : quantity, optional
+        Width :math:`w_h` from which heat flows out, in m. The default is the width of the shear
+        zone. If heat flows through rock with the thickness :math:`L` on each side, use
+        :math:`w_h = \sqrt{w L/2}`.
+    direct_activation_energy, evolution_activation_energy : quantity, optional
+        Activation energies :math:`Q_a` and :math:`Q_b` of the direct effect and of the evolution
+        effect in J/mol.
+    pressurisation_factor : quantity, optional
+        Undrained increase :math:`\Lambda_p` of pore pressure per temperature in Pa/K. If the rig
+        has a pressurisation factor, its scenes have ``fluid="thermal"``.
 
     Raises
     ------
     InvalidValue
         If a value is not a quantity, if a value is not positive, if units are incompatible, if both
-        mass and period are given, if a mass is given without a stiffness, or if only one of shear
-        modulus and density is given.
+        mass and period are given, if a mass is given without a stiffness, if only one of shear
+        modulus and density is given, or if a quantity of shear heating is missing.
 
     Notes
     -----
     For a mass :math:`m` and a stiffness :math:`k`, the period is :math:`T = 2 \pi \sqrt{m/k}`. The
     coefficient of radiation damping, :math:`\eta = \sqrt{G \rho}/2`, approximates the inertia of
-    the medium.
+    the medium. The fields of shear heating are
+
+    .. math::
+
+        H = \frac{\sigma_* D_c}{\rho c \, w \, T_*}, \quad
+        C = \frac{\alpha_{th} D_c}{w_h^2 V_*}, \quad q_i = \frac{Q_i}{R \, T_*}, \quad
+        \text{pressurisation} = \frac{\Lambda_p T_*}{\sigma_*}.
 
     Examples
     --------
@@ -128,6 +154,14 @@ class Rig(HtmlTableMixin):
     mass: Any = None
     shear_modulus: Any = None
     density: Any = None
+    thermal_diffusivity: Any = None
+    heat_capacity: Any = None
+    shear_zone_width: Any = None
+    reference_temperature: Any = None
+    heat_loss_width: Any = None
+    direct_activation_energy: Any = None
+    evolution_activation_energy: Any = None
+    pressurisation_factor: Any = None
 
     def __post_init__(self) -> None:
         """Convert all quantities to SI units and check their values."""
@@ -205,7 +239,8 @@ class Rig(HtmlTableMixin):
             ``displacement_step`` as quantities with physical units. A velocity may be a ratio, as
             in ``load_velocity_ratio=10``, or a quantity, as in ``load_velocity="10 um/s"``. The
             field ``instability_norm`` may be a slip rate, for example ``"10 mm/s"``. Pass
-            ``inertia=False`` to ignore the mass or the period of the rig.
+            ``inertia=False`` to ignore the mass or the period of the rig, and
+            ``temperature="isothermal"`` to ignore heat.
 
         Returns
         -------
@@ -235,7 +270,8 @@ class Rig(HtmlTableMixin):
             )
             for n, v in fields.items()
         }
-        fields = {**derive_scene_fields_from_rig(self.as_dict()), **fields}
+        hot = fields.get("temperature") != "isothermal"
+        fields = {**derive_scene_fields_from_rig(self.as_dict(), with_heat=hot), **fields}
         for simplest in ("constant", "imposed") if "normal_stress" not in fields else ():
             with contextlib.suppress(InvalidValue):
                 return Scene(normal_stress=simplest, **fields)

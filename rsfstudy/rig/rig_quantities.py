@@ -51,7 +51,37 @@ RIG_QUANTITIES: Mapping[str, RigQuantity] = {
     "mass": RigQuantity("kg/m^2", 1e-2, 1e9, "$m$", "mass over the area of the fault"),
     "shear_modulus": RigQuantity("Pa", 1e5, 1e12, "$G$", "shear modulus of the medium"),
     "density": RigQuantity("kg/m^3", 1e2, 2e4, r"$\rho$", "density of the medium"),
+    "thermal_diffusivity": RigQuantity(
+        "m^2/s", 1e-8, 1e-4, r"$\alpha_{th}$", "thermal diffusivity of the fault"
+    ),
+    "heat_capacity": RigQuantity(
+        "J/m^3/K", 1e5, 1e7, r"$\rho c$", "heat capacity of the fault over its volume"
+    ),
+    "shear_zone_width": RigQuantity("m", 1e-7, 1e1, "$w$", "width of the shear zone"),
+    "reference_temperature": RigQuantity(
+        "K", 1e2, 2e3, "$T_*$", "temperature in steady sliding at the reference velocity"
+    ),
+    "heat_loss_width": RigQuantity("m", 1e-7, 1e2, "$w_h$", "width from which heat flows out"),
+    "direct_activation_energy": RigQuantity(
+        "J/mol", 1e3, 1e6, "$Q_a$", "activation energy of the direct effect"
+    ),
+    "evolution_activation_energy": RigQuantity(
+        "J/mol", 1e3, 1e6, "$Q_b$", "activation energy of the evolution effect"
+    ),
+    "pressurisation_factor": RigQuantity(
+        "Pa/K", 1e3, 1e8, r"$\Lambda_p$", "undrained pore pressure over temperature"
+    ),
 }
+#: Quantities that shear heating needs, and further quantities of heat.
+HEAT_QUANTITIES = (
+    "thermal_diffusivity", "heat_capacity", "shear_zone_width", "reference_temperature"
+)  # fmt: skip
+OPTIONAL_HEAT_QUANTITIES = (
+    "heat_loss_width", "direct_activation_energy", "evolution_activation_energy",
+    "pressurisation_factor",
+)  # fmt: skip
+#: Gas constant in J/(mol K).
+GAS_CONSTANT = 8.31446261815324
 #: Quantities that every rig needs, because they determine the scales of all other quantities.
 REQUIRED_QUANTITIES = ("normal_stress", "slip_distance", "reference_velocity")
 #: Axis names that differ from the names of rig quantities. Such an axis name is needed if a scene
@@ -181,8 +211,8 @@ def check_rig_quantities_are_consistent(rig_values: Mapping[str, Any]) -> None:
     Raises
     ------
     InvalidValue
-        If both mass and period are given, if a mass is given without a stiffness, or if only one of
-        shear modulus and density is given.
+        If both mass and period are given, if a mass is given without a stiffness, if only one of
+        shear modulus and density is given, or if a quantity of shear heating is missing.
     """
     if "mass" in rig_values and "period" in rig_values:
         rule = f"give mass or period (here {rig_values['period']:g} s), not both"
@@ -197,6 +227,12 @@ def check_rig_quantities_are_consistent(rig_values: Mapping[str, Any]) -> None:
         raise InvalidValue(
             "density", rig_values.get("density"), "goes with shear_modulus", remedy=remedy
         )
+    given = [n for n in (*HEAT_QUANTITIES, *OPTIONAL_HEAT_QUANTITIES) if n in rig_values]
+    missing = [n for n in HEAT_QUANTITIES if n not in rig_values]
+    if given and missing:
+        rule = f"needs {' and '.join(missing)}, because all of them determine shear heating"
+        remedy = "State them too, or leave the quantities of heat out."
+        raise InvalidValue(given[0], rig_values[given[0]], rule, remedy=remedy)
 
 
 def in_display_units(
@@ -231,13 +267,17 @@ def in_display_units(
     }
 
 
-def derive_scene_fields_from_rig(rig_values: Mapping[str, Any]) -> dict[str, Any]:
+def derive_scene_fields_from_rig(
+    rig_values: Mapping[str, Any], *, with_heat: bool = True
+) -> dict[str, Any]:
     """Compute the scene fields that a rig determines.
 
     Parameters
     ----------
     rig_values : mapping of str to float or ndarray
         Quantities of the rig in SI units.
+    with_heat : bool, default: True
+        Whether to include the fields of shear heating and thermal pressurisation.
 
     Returns
     -------
@@ -259,8 +299,31 @@ def derive_scene_fields_from_rig(rig_values: Mapping[str, Any]) -> dict[str, Any
         found["radiation_damping"] = (
             impedance * rig_values["reference_velocity"] / rig_values["normal_stress"]
         )
+    choices: dict[str, Any] = {"inertia": True} if "period" in found else {}
+    if with_heat and "heat_capacity" in rig_values:
+        found |= _derive_heat_fields(rig_values)
+        choices["temperature"] = "shear_heating"
+        choices |= {"fluid": "thermal"} if "pressurisation" in found else {}
     plain = {name: v if isinstance(v, np.ndarray) else float(v) for name, v in found.items()}
-    return plain | ({"inertia": True} if "period" in found else {})
+    return plain | choices
+
+
+def _derive_heat_fields(rig: Mapping[str, Any]) -> dict[str, Any]:
+    """Compute the scene fields of shear heating and thermal pressurisation."""
+    temperature, stress = rig["reference_temperature"], rig["normal_stress"]
+    per_slip = rig["heat_capacity"] * rig["shear_zone_width"] * temperature
+    width = rig.get("heat_loss_width", rig["shear_zone_width"])
+    rate = rig["reference_velocity"] / rig["slip_distance"]
+    found = {
+        "heating": stress * rig["slip_distance"] / per_slip,
+        "cooling": rig["thermal_diffusivity"] / (width * width) / rate,
+    }
+    for name in ("direct_activation", "evolution_activation"):
+        if f"{name}_energy" in rig:
+            found[name] = rig[f"{name}_energy"] / (GAS_CONSTANT * temperature)
+    if "pressurisation_factor" in rig:
+        found["pressurisation"] = rig["pressurisation_factor"] * temperature / stress
+    return found
 
 
 def is_dimensionless_field_with_scale(field_name: str) -> bool:

@@ -66,8 +66,10 @@ class LatticeScenesOnRig:
     def __post_init__(self) -> None:
         """Check that the base scene and the axes belong to the rig."""
         theirs = self.base_scene.as_dict()
-        for name, value in derive_scene_fields_from_rig(self.rig.as_dict()).items():
-            if name != "inertia" and not _is_close_within_rounding(theirs.get(name), value):
+        for name, value in self._derive_fields(self.rig.as_dict()).items():
+            if not isinstance(value, bool | str) and not _is_close_within_rounding(
+                theirs.get(name), value
+            ):
                 rule = f"is not that of the rig, {value:g}"
                 remedy = "Make the base of its study with rig.scene(...)."
                 raise InvalidValue(name, theirs.get(name), rule, remedy=remedy)
@@ -79,6 +81,11 @@ class LatticeScenesOnRig:
                 } & set(lacks):
                     rule = f"does not state {lacks[0]}, which the rig of the study does"
                     raise InvalidValue(along.dimension, dict(row), rule, remedy="State it.")
+
+    def _derive_fields(self, rig_values: Mapping[str, Any]) -> dict[str, Any]:
+        """Compute the fields that the rig determines, without heat if the base ignores it."""
+        hot = self.base_scene.parts.temperature.name != "isothermal"
+        return derive_scene_fields_from_rig(rig_values, with_heat=hot)
 
     @property
     def units(self) -> dict[str, str]:
@@ -131,9 +138,7 @@ class LatticeScenesOnRig:
         units, rig = self.units, self.compute_rig_quantities(axis_row)
         here, found = scale_factors_of_rig(rig), {}
         if set(RIG_NAME_BY_AXIS_NAME) & set(units) & set(axis_row):
-            found = self._compute_base_fields_constant_in_si(here) | derive_scene_fields_from_rig(
-                rig
-            )
+            found = self._compute_base_fields_constant_in_si(here) | self._derive_fields(rig)
             if "period" in self.rig.as_dict() and not self.base_scene.has_mass:
                 # The base scene ignores the inertia of the rig.
                 found.pop("inertia", None)

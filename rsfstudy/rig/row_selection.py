@@ -19,8 +19,11 @@ from rsfstudy.rig.units import (
     split_number_and_units,
 )
 
-#: Kinds of quantities that limit the rows, by the exponents of kilogram, metre and second.
-_COLUMN_BY_EXPONENTS = {(0, 0, 1): "time", (0, 1, 0): "displacement"}
+#: Kinds of quantities that limit the rows, by the exponents of units (see ``units``).
+_COLUMN_BY_EXPONENTS: Mapping[tuple[int, ...], str] = {
+    (0, 0, 1, 0, 0): "time",
+    (0, 1, 0, 0, 0): "displacement",
+}
 _REMEDY_FOR_LIMITS = "Write it as in '100 s' or '2 mm', or as a number in s."
 #: Default units of columns without units.
 _DEFAULT_UNITS = {"time": "s", "displacement": "um", "slip": "um"}

@@ -20,17 +20,17 @@ import numpy as np
 from rsfstudy.axes import Axis
 from rsfstudy.errors import InvalidValue
 
-#: Conversion factor to SI units, and the exponents of kilogram, metre and second.
-SiFactorAndExponents = tuple[Fraction, tuple[int, int, int]]
+#: Conversion factor to SI units, and the exponents of kilogram, metre, second, kelvin and mole.
+SiFactorAndExponents = tuple[Fraction, tuple[int, ...]]
 
-_STRESS_EXPONENTS, _FORCE_EXPONENTS, _LENGTH_EXPONENTS, _TIME_EXPONENTS = (
-    (1, -1, -2),
-    (1, 1, -2),
-    (0, 1, 0),
-    (0, 0, 1),
+_STRESS_EXPONENTS, _FORCE_EXPONENTS, _ENERGY_EXPONENTS = (
+    (1, -1, -2, 0, 0),
+    (1, 1, -2, 0, 0),
+    (1, 2, -2, 0, 0),
 )
-_SI_FACTOR_AND_EXPONENTS_BY_UNIT: Mapping[str, tuple[str | int, tuple[int, int, int]]] = {
-    "kg": (1, (1, 0, 0)),
+_LENGTH_EXPONENTS, _TIME_EXPONENTS = (0, 1, 0, 0, 0), (0, 0, 1, 0, 0)
+_SI_FACTOR_AND_EXPONENTS_BY_UNIT: Mapping[str, tuple[str | int, tuple[int, ...]]] = {
+    "kg": (1, (1, 0, 0, 0, 0)),
     **{
         f"{p}Pa": (x, _STRESS_EXPONENTS)
         for p, x in (("", "1"), ("k", "1e3"), ("M", "1e6"), ("G", "1e9"))
@@ -45,11 +45,14 @@ _SI_FACTOR_AND_EXPONENTS_BY_UNIT: Mapping[str, tuple[str | int, tuple[int, int, 
     "ms": ("1e-3", _TIME_EXPONENTS),
     **dict.fromkeys(("s", "sec", "seconds"), (1, _TIME_EXPONENTS)),
     "min": (60, _TIME_EXPONENTS),
-    "Hz": (1, (0, 0, -1)),
-    "kHz": ("1e3", (0, 0, -1)),
+    "Hz": (1, (0, 0, -1, 0, 0)),
+    "kHz": ("1e3", (0, 0, -1, 0, 0)),
     "h": (3600, _TIME_EXPONENTS),
     "day": (86400, _TIME_EXPONENTS),
     "year": (31557600, _TIME_EXPONENTS),
+    **{f"{p}J": (x, _ENERGY_EXPONENTS) for p, x in (("", "1"), ("k", "1e3"), ("M", "1e6"))},
+    "K": (1, (0, 0, 0, 1, 0)),
+    "mol": (1, (0, 0, 0, 0, 1)),
 }
 _KNOWN_UNITS: Mapping[str, SiFactorAndExponents] = {
     name: (Fraction(size), of) for name, (size, of) in _SI_FACTOR_AND_EXPONENTS_BY_UNIT.items()
@@ -264,7 +267,7 @@ def _parse_quantity(quantity_name: str, text: str, units: str) -> Fraction | flo
         return stated * Fraction(size) if math.isfinite(size) else size
     scale, exponents = _multiply_known_units(powers)
     wanted = _multiply_known_units(_parse_unit_powers(units.removeprefix("1")) or [])[1]
-    if exponents == (wanted[0], wanted[1] + 2, wanted[2]):
+    if exponents == (wanted[0], wanted[1] + 2, *wanted[2:]):
         rule = "is of force, and stress is force over area"
         raise InvalidValue(quantity_name, text, rule, remedy="Divide it by the area of the fault.")
     if exponents != wanted:
@@ -292,12 +295,12 @@ def _parse_unit_powers(unit_text: str) -> list[tuple[str, int]] | None:
 
 def _multiply_known_units(units_and_powers: Iterable[tuple[str, int]]) -> SiFactorAndExponents:
     """Multiply powers of units that are known without pint."""
-    scale, exponents = Fraction(1), [0, 0, 0]
+    scale, exponents = Fraction(1), [0] * 5
     for name, power in units_and_powers:
         size, of = _KNOWN_UNITS[name]
         scale *= size**power
         exponents = [e + power * o for e, o in zip(exponents, of, strict=True)]
-    return scale, (exponents[0], exponents[1], exponents[2])
+    return scale, tuple(exponents)
 
 
 def _compute_factor_with_pint(

@@ -192,7 +192,8 @@ def _state_names(scene: SceneView) -> tuple[str, ...]:
     """Return the names of the states."""
     count = scene.parts.law.state_count
     of_law = ["psi"] if count == 1 else [f"psi_{i + 1}" for i in range(count)]
-    return (*of_law, *(unknown.name for unknown in scene.pressure_source.unknowns))
+    heat = scene.parts.temperature.unknowns
+    return (*of_law, *(unknown.name for unknown in (*heat, *scene.pressure_source.unknowns)))
 
 
 @cached_per_scene

@@ -98,7 +98,8 @@ def compute_state_evolution_derivatives(
         scene.friction_functions.evolutions,
         scene.friction_parameter_values,
     )
-    shift = build_friction_relation(scene)(steady_state.frictional_stress)[2]
+    relation = build_friction_relation(scene, steady_state.states)
+    shift = relation(steady_state.frictional_stress)[2]
     arguments = [steady_state.log_slip_rate, shift, *steady_state.states]
     scales, columns, errors = _finite_difference_scales(scene, steady_state, shift), [], []
     # Each unit is the change of an argument that is equivalent to a change of ln V by 1. Rounding
@@ -200,4 +201,7 @@ def _finite_difference_scales(
         for x in (-1.0, 1.0)
     )
     moved = [0.5 * abs(y - x) for x, y in zip(slow, fast, strict=True)]
+    if scene.parts.temperature.unknowns:
+        place = scene.parts.law.state_count
+        moved[place] = _STATE_SCALE_OVER_B * (1.0 + steady_state.states[place])
     return [1.0, of_shift, *(by if by > _MIN_STATE_CHANGE * size else size for by in moved)]

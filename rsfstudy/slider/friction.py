@@ -28,14 +28,14 @@ from functools import cache, reduce
 from typing import NamedTuple
 
 from rsfstudy._deprecation import add_former_member_names
-from rsfstudy.slider import friction_relation, state_functions
+from rsfstudy.slider import friction_relation, state_functions, temperature_functions
 from rsfstudy.slider.parts import Function, Numbers
 from rsfstudy.slider.scene_view import SceneView
 
 
 @add_former_member_names
 class FrictionFunctions(NamedTuple):
-    """Functions that define the friction of a scene.
+    r"""Functions that define the friction of a scene.
 
     Parameters
     ----------
@@ -57,6 +57,9 @@ class FrictionFunctions(NamedTuple):
         Function ``(log_slip_rate, shift, p)`` that returns all states in steady sliding.
     state_sum : callable
         Function ``(psis) -> float`` that returns the sum of the states of the law.
+    state_variable : callable
+        Function ``(difference, psis, p)`` that returns the state variable :math:`\Theta` from the
+        difference between the sum of the states of the law and the shift.
     state_contribution : callable
         Function ``(changes, g, psis, p)`` that returns the contribution of state changes to the
         friction relation, so that ``a d ln V = strength'(g) dg - state_contribution``.
@@ -85,6 +88,7 @@ class FrictionFunctions(NamedTuple):
     evolutions: Function
     steady_states: Function
     state_sum: Function
+    state_variable: Function
     state_contribution: Function
     pressure_derivatives: Function
     states_from_strength: Function
@@ -129,7 +133,7 @@ def build_friction_functions(scene: SceneView) -> FrictionFunctions:
         )
     excluded = source.excluded_from_distance
     compared = [n for n, x in enumerate(source.unknowns, law_states) if x.name not in excluded]
-    return FrictionFunctions(
+    functions = FrictionFunctions(
         strength=strength,
         effective_normal_stress=effective,
         rig_normal_stress=outer,
@@ -137,6 +141,7 @@ def build_friction_functions(scene: SceneView) -> FrictionFunctions:
         evolutions=evolutions,
         steady_states=steady_states,
         state_sum=state_functions.build_sum_function(law_states),
+        state_variable=state_functions.isothermal_state_variable,
         state_contribution=state_functions.build_state_contribution_function(
             law_states, derivatives if source.unknowns else None
         ),
@@ -148,6 +153,11 @@ def build_friction_functions(scene: SceneView) -> FrictionFunctions:
         load_point_stress_change=friction_relation.build_pressure_function(-1 if oscillates else 0),
         state_count=scene.state_count,
         indices_of_states_in_distance=(*range(law_states), *compared),
+    )
+    if not scene.parts.temperature.unknowns:
+        return functions
+    return functions._replace(
+        **temperature_functions.build_replacements(scene, functions._asdict())
     )
 
 
@@ -205,15 +215,15 @@ def _build_stress_functions(
 def build_friction_relation(
     scene: SceneView, states: Numbers = ()
 ) -> Callable[[float], tuple[float, float, float, float]]:
-    """Return the friction relation of a scene as a function of stress.
+    r"""Return the friction relation of a scene as a function of stress.
 
     Parameters
     ----------
     scene : Scene
         Scene with friction parameters.
     states : tuple of float, optional
-        States of the scene, from which the pore pressure is read. By default, the function uses the
-        pore pressure of steady sliding.
+        States of the scene, from which the pore pressure and the temperature are read. By default,
+        the function uses those of steady sliding at :math:`V_*`.
 
     Returns
     -------
@@ -288,4 +298,9 @@ def compute_steady_states(scene: SceneView, log_slip_rate: float, state_shift: f
         States :math:`\Psi_i`.
     """
     p = scene.friction_parameter_values
-    return scene.friction_functions.steady_states(log_slip_rate, state_shift, p)
+    states: Numbers = scene.friction_functions.steady_states(log_slip_rate, state_shift, p)
+    if not scene.parts.temperature.unknowns:
+        return states
+    place = scene.parts.law.state_count
+    rise = temperature_functions.steady_temperature_rise(scene, log_slip_rate)
+    return (*states[:place], rise, *states[place + 1 :])

@@ -15,7 +15,8 @@ shift. The sum of the states of the law acts on friction, so the vector of weigh
 If the scene has a fluid, the weight of the pore pressure :math:`P`, the last state, is minus the
 derivative of strength with respect to :math:`P`, and the weight of porosity is 0. Because the
 pressure also changes the shift, the last column of :math:`M` includes the product of :math:`E_s`
-and the derivative of the shift with respect to :math:`P`.
+and the derivative of the shift with respect to :math:`P`. The same applies to a temperature that
+changes.
 
 If an external load changes the normal stress by :math:`-dP`, the frictional stress changes by an
 additional term,
@@ -37,6 +38,7 @@ from rsfstudy.slider.evolution_derivatives import (
     compute_state_evolution_derivatives,
 )
 from rsfstudy.slider.friction import build_friction_relation
+from rsfstudy.slider.parameter_layout import temperature_parameter_values
 from rsfstudy.slider.polynomials import (
     PolynomialCoefficients,
     compute_resolvent_polynomials,
@@ -44,6 +46,7 @@ from rsfstudy.slider.polynomials import (
 )
 from rsfstudy.slider.scene_view import SceneView
 from rsfstudy.slider.steady_state import SteadySliding
+from rsfstudy.slider.temperature_functions import temperature_derivatives
 
 
 class LinearisedForceBalance(NamedTuple):
@@ -104,7 +107,7 @@ def linear_friction_response(
     ----------
     Rice and Ruina (1983), J. Appl. Mech. 50, 343-349.
     """
-    _value, slope, _shift, shift_slope = build_friction_relation(scene)(
+    _value, slope, _shift, shift_slope = build_friction_relation(scene, steady_state.states)(
         steady_state.frictional_stress
     )
     by_rate, by_shift, by_state, _error = (
@@ -113,7 +116,8 @@ def linear_friction_response(
     by_state = [list(row) for row in by_state]
     weights, shifting = _log_slip_rate_change_by_each_state(scene, steady_state)
     for row, of_shift in zip(by_state, by_shift, strict=True):
-        row[-1] += of_shift * shifting
+        for place, shift in shifting.items():
+            row[place] += of_shift * shift
     denominator, adjugate = compute_resolvent_polynomials(by_state)
     above = [scene.a * x for x in denominator]
     below = [slope * x for x in denominator]
@@ -126,16 +130,23 @@ def linear_friction_response(
 
 def _log_slip_rate_change_by_each_state(
     scene: SceneView, steady_state: SteadySliding
-) -> tuple[list[float], float]:
+) -> tuple[list[float], dict[int, float]]:
     """Return the weight of each state in the friction relation.
 
-    The function also returns the derivative of the shift with respect to the last state.
+    The function also returns the derivatives of the shift with respect to the temperature and the
+    pore pressure, by the index of the state.
     """
     law, fluid = scene.parts.law.state_count, len(scene.parts.fluid.unknowns)
-    if not fluid:
-        return [1.0] * law, 0.0
-    by_pressure = scene.friction_functions.pressure_derivatives
-    gained, shifted = by_pressure(
-        steady_state.frictional_stress, steady_state.states, scene.friction_parameter_values
-    )
-    return [*[1.0] * law, *[0.0] * (fluid - 1), -gained], shifted
+    weights, shifts = [1.0] * law, dict[int, float]()
+    if scene.parts.temperature.unknowns:
+        gained, shifts[law] = temperature_derivatives(
+            steady_state.states[law], temperature_parameter_values(scene)
+        )
+        weights.append(-gained)
+    if fluid:
+        by_pressure = scene.friction_functions.pressure_derivatives
+        gained, shifts[-1] = by_pressure(
+            steady_state.frictional_stress, steady_state.states, scene.friction_parameter_values
+        )
+        weights += [*[0.0] * (fluid - 1), -gained]
+    return weights, shifts

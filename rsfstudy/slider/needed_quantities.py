@@ -112,8 +112,7 @@ def quantities_known_to_part(scene: SceneView, part: Part) -> frozenset[str]:
         change.unknown_quantity_name for change in _causes_of_unknown_quantities(scene)
     }
     found = constant | part.received_quantities
-    if scene.parts.law.regularised and part is scene.parts.law:
-        # The friction coefficient of forward slip is not valid if slip reverses.
+    if part is scene.parts.law and _causes_of_unknown_friction(scene):
         found -= {FRICTION_COEFFICIENT}
     return frozenset(
         found | {name for name, terms in _QUANTITIES_COMPUTED_FROM_OTHERS.items() if found >= terms}
@@ -143,10 +142,22 @@ def _causes_of_unknown_quantities(scene: SceneView) -> list[_CauseOfUnknownQuant
     if parts.fluid.unknowns:
         cause = f"fluid={parts.fluid.name!r}"
         found.append(_CauseOfUnknownQuantity(PORE_PRESSURE, cause, "set fluid='drained'"))
-    if parts.law.regularised:
-        cause = "regularised=True"
-        found.append(_CauseOfUnknownQuantity(FRICTION_COEFFICIENT, cause, "set regularised=False"))
-    return found
+    return found + _causes_of_unknown_friction(scene)
+
+
+def _causes_of_unknown_friction(scene: SceneView) -> list[_CauseOfUnknownQuantity]:
+    """Return the reasons why a law cannot compute the friction coefficient.
+
+    The friction coefficient of forward slip is not valid if slip reverses. The state that a law
+    receives contains a part of the effect of temperature.
+    """
+    causes, temperature = [], scene.parts.temperature
+    if scene.parts.law.regularised:
+        causes.append(("regularised=True", "set regularised=False"))
+    if any(temperature.activation):
+        cause = f"temperature={temperature.name!r}"
+        causes.append((cause, "leave the activation terms out"))
+    return [_CauseOfUnknownQuantity(FRICTION_COEFFICIENT, *texts) for texts in causes]
 
 
 def _missing_quantities_error(

@@ -2,8 +2,9 @@
 
 The tuple starts with the parameters that every scene has, followed by the parameters of each slot.
 The parameters of the law are ``p[LAW]``, ``p[LAW + 1]`` and so on. The parameters of the law come
-last, because a law can have any number of parameters. The module also defines the columns of
-segment tables and limits that prevent overflow.
+last, because a law can have any number of parameters. Only if the temperature changes, its
+parameters follow those of the law. The module also defines the columns of segment tables and limits
+that prevent overflow.
 """
 
 from __future__ import annotations
@@ -114,7 +115,30 @@ def pack_friction_parameter_values(scene: SceneView) -> Numbers:
         *_part_parameters_padded_with_nan(scene.pressure_source, scene, DYNAMICS - FLUID),
         *_part_parameters_padded_with_nan(parts.dynamics, scene, LAW - DYNAMICS),
     )
-    return (*common, *own, *collect_parameter_values(law, scene))
+    last = collect_parameter_values(law, scene), temperature_parameter_values(scene)
+    return (*common, *own, *last[0], *last[1])
+
+
+def temperature_parameter_values(scene: SceneView) -> Numbers:
+    """Return the parameters of the temperature, which follow those of the law.
+
+    Parameters
+    ----------
+    scene : Scene
+        Scene to convert.
+
+    Returns
+    -------
+    tuple of float
+        Activation terms multiplied by a and b, the pressurisation factor of the fluid, and the
+        parameters of the temperature part. The tuple is empty if the temperature is constant.
+    """
+    temperature = scene.parts.temperature
+    if not temperature.unknowns:
+        return ()
+    direct, evolution = temperature.activation
+    common = scene.a * direct, scene.b * evolution, scene.parts.fluid.pressurisation_factor
+    return (*common, *collect_parameter_values(temperature, scene))
 
 
 def _part_parameters_padded_with_nan(

@@ -18,7 +18,7 @@ from typing import Any, TypeVar
 
 from rsfstudy.errors import InvalidValue
 from rsfstudy.quantities import Quantity, is_variable_name
-from rsfstudy.slider import dynamics, fluid, laws, loading, normal_stress
+from rsfstudy.slider import dynamics, fluid, laws, loading, normal_stress, temperature
 from rsfstudy.slider.field_name_hints import canonical_law_name
 from rsfstudy.slider.needed_quantities import check_names_of_needed_quantities
 from rsfstudy.slider.parts import Part, field_names, is_boolean_field, part_field_quantities
@@ -90,6 +90,14 @@ SLOTS: tuple[Slot, ...] = (
         "what balances the spring besides friction",
     ),
     Slot("loading", loading.Loading, loading.BUILT_IN_PARTS, "step", "what the load point does"),
+    Slot(
+        "temperature",
+        temperature.Temperature,
+        temperature.BUILT_IN_PARTS,
+        "isothermal",
+        "temperature of the fault",
+        omit_if_default=True,
+    ),
 )
 #: Slots whose part is selected by name. In the other slots, the values of fields such as
 #: ``inertia`` select the part.

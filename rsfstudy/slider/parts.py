@@ -1,8 +1,9 @@
 """Base class and field declarations of the parts of a slider.
 
-A scene has five slots: the state evolution law, the normal stress condition, the pore fluid, the
-dynamics and the loading. Each choice for a slot is a frozen dataclass derived from ``Part``,
-usually in its own module. The class declares the fields of the part with ``number`` and ``flag``.
+A scene has six slots: the state evolution law, the normal stress condition, the pore fluid, the
+dynamics, the loading and the temperature. Each choice for a slot is a frozen dataclass derived from
+``Part``, usually in its own module. The class declares the fields of the part with ``number`` and
+``flag``.
 
 The functions of a part are plain functions of floats. The functions receive the parameters of a
 scene as a flat tuple ``p``. The parameters of a part start at the index of its slot, for example
@@ -17,6 +18,7 @@ To add an effect, derive a class from the base class of a slot:
 - ``Fluid`` defines unknowns that determine the pore pressure.
 - ``Dynamics`` defines the dependence of the slip rate on stress.
 - ``Loading`` defines the motion of the load point.
+- ``Temperature`` defines how the temperature of the fault changes.
 """
 
 from __future__ import annotations

@@ -47,6 +47,7 @@ def build_motion_point_assembling_function(friction_functions: FrictionFunctions
         friction_functions.effective_normal_stress,
         friction_functions.rig_normal_stress,
     )
+    state_variable = friction_functions.state_variable
     pressure, imposed, imposed_change = (
         friction_functions.boundary_pressure,
         friction_functions.load_point_stress,
@@ -79,7 +80,7 @@ def build_motion_point_assembling_function(friction_functions: FrictionFunctions
             f,
             g,
             psi,
-            psi - shift,
+            state_variable(psi - shift, psis, p),
             psi - state_sum(steady),
             distance,
             (p[MU_STAR] + g + pushed) / ratio,

@@ -24,6 +24,7 @@ from rsfstudy.slider import (
     parameter_layout,
     part_registry,
     stability,
+    temperature,
 )
 from rsfstudy.slider.dynamics.quasi_static import QuasiStatic
 from rsfstudy.slider.loading.step import StepLoading
@@ -52,7 +53,7 @@ class Scene(SceneFunctions, SceneQuantities):
     scene is immutable, and its values are checked when it is created. Quantities are dimensionless,
     with stress in :math:`\sigma_*`, slip in :math:`D_c`, time in :math:`D_c/V_*` and slip rate in
     :math:`V_*`. The method ``as_dict``, which returns the values of the fields, is inherited from
-    ``SceneBase`` in ``slider.scene_base``.
+    ``SceneBase`` in ``slider.scene_assembly``.
 
     Parameters
     ----------
@@ -66,10 +67,13 @@ class Scene(SceneFunctions, SceneQuantities):
         driving stress that is inclined at the angle ``phi``. A user-defined class is also accepted.
     fluid : str or type, default: "drained"
         Pore fluid. "drained" is constant pore pressure. With "dilatant", pore pressure falls when
-        the slip rate increases, because the pores open. A user-defined class is also accepted.
-        Stress is normalised by the effective normal stress of steady sliding at :math:`V_*`. Pore
-        pressure is measured from the pressure of the surroundings, which is also its initial value.
-        A history of pore pressure changes the pressure of the surroundings.
+        the slip rate increases. With "thermal", pore pressure rises when the fault heats up. A
+        user-defined class is also accepted. Stress is normalised by the effective normal stress of
+        steady sliding at :math:`V_*`. Pore pressure is measured from the pressure of the
+        surroundings, which is also its initial value and which a history of pore pressure changes.
+    temperature : str or type, default: "isothermal"
+        Temperature. "isothermal" is constant temperature. With "shear_heating", the work of the
+        shear stress heats the fault. A user-defined class is also accepted.
     a : float, default: 0.0145
         Direct effect parameter.
     mu_star : float, default: 0.76
@@ -110,6 +114,12 @@ class Scene(SceneFunctions, SceneQuantities):
         effect.
     law_exponent : float, default: 0.5
         Exponent of the family of laws, from 0 (slip law) to 1 (slowness law).
+    weakening_velocity_ratio : float, default: 1e5
+        Weakening velocity :math:`V_w/V_*` of the law with flash heating.
+    weakened_friction : float, default: 0.2
+        Friction coefficient far above the weakening velocity.
+    weakening_exponent : float, default: 8.0
+        Sharpness of the transition at the weakening velocity.
     b1_over_a : float, default: 1.0
         Ratio :math:`b_1/a` of the first state, for laws with two states. Laws with two states do
         not have the field ``b_over_a``. Negative values are allowed.
@@ -127,9 +137,13 @@ class Scene(SceneFunctions, SceneQuantities):
         stress.
     dilatancy : float, default: 0.01
         Dilatancy :math:`\epsilon/(\beta \sigma_*)` of the dilatant fluid: the decrease of pore
-        pressure under undrained conditions if :math:`\ln V` increases by 1.
+        pressure under undrained conditions if :math:`\ln V` increases by 1. The default for the
+        thermal fluid is 0.
     drainage : float, default: 1.0
-        Drainage rate :math:`c^* D_c/V_*` of the dilatant fluid.
+        Drainage rate :math:`c^* D_c/V_*` of the dilatant or thermal fluid.
+    pressurisation : float, default: 1.0
+        Pressurisation factor :math:`\Lambda_p T_*/\sigma_*` of the thermal fluid: the increase of
+        pore pressure under undrained conditions if the temperature rises by :math:`T_*`.
     inertia : bool, default: False
         If True, the slider has mass.
     radiation_damping : float, default: 0.0
@@ -182,6 +196,12 @@ class Scene(SceneFunctions, SceneQuantities):
         Load point velocity in :math:`V_*` after the first velocity step.
     displacement_between_steps : float, default: 20.0
         Load point displacement between successive velocity steps in :math:`D_c`.
+    heating : float, default: 1e-3
+        Relative rise of absolute temperature by a slip of :math:`D_c` at unit shear stress.
+    cooling : float, default: 1.0
+        Cooling rate :math:`c_{th} D_c/V_*` of a fault with shear heating.
+    direct_activation, evolution_activation : float, default: 0.0
+        Activation terms :math:`Q/(R T_*)` of the direct effect and of the evolution effect.
     dynamics : type, optional
         User-defined class of dynamics. By default the fields ``inertia`` and ``radiation_damping``
         select the dynamics, and motion is quasi-static if neither is set.
@@ -193,8 +213,8 @@ class Scene(SceneFunctions, SceneQuantities):
     Attributes
     ----------
     parts : SceneParts
-        Parts of the scene: ``slider``, ``law``, ``normal_stress``, ``fluid``, ``dynamics`` and
-        ``loading``. Each field of the scene belongs to one of the parts.
+        Parts of the scene: ``slider``, ``law``, ``normal_stress``, ``fluid``, ``dynamics``,
+        ``loading`` and ``temperature``. Each field of the scene belongs to one of the parts.
 
     Raises
     ------
@@ -354,8 +374,8 @@ class Scene(SceneFunctions, SceneQuantities):
 
         See ``stability.critical_stiffness`` for the definition.
         """
-        slider, law, stress, pores, *_others = self.parts
-        return _critical_stiffness(slider.a, slider.mu_star, law, stress, pores)
+        slider, law, stress, pores, *_others, heat = self.parts
+        return _critical_stiffness(slider.a, slider.mu_star, law, stress, pores, heat)
 
 
 part_registry.RESERVED_NAMES.update(dir(Scene), Scene.__annotations__)
@@ -368,6 +388,7 @@ def _critical_stiffness(
     law: laws.LawBase,
     normal_stress_part: normal_stress.NormalStress,
     fluid_part: fluid.Fluid,
+    temperature_part: temperature.Temperature,
 ) -> float:
     """Compute the critical stiffness of all sliders with the same friction.
 
@@ -375,7 +396,6 @@ def _critical_stiffness(
     stiffness of the slider to the value of a.
     """
     slider = SliderParameters(a=a, mu_star=mu_star, stiffness=a)
-    scene = Scene(
-        SceneParts(slider, law, normal_stress_part, fluid_part, QuasiStatic(), StepLoading())
-    )
+    others = QuasiStatic(), StepLoading(), temperature_part
+    scene = Scene(SceneParts(slider, law, normal_stress_part, fluid_part, *others))
     return stability.critical_stiffness(scene, 0.0, quasi_static=True)

@@ -12,7 +12,7 @@ from functools import cache
 from typing import Any, NamedTuple
 
 from rsfstudy.errors import InvalidValue
-from rsfstudy.slider import dynamics, fluid, laws, loading, normal_stress
+from rsfstudy.slider import dynamics, fluid, laws, loading, normal_stress, temperature
 from rsfstudy.slider.field_name_hints import (
     hint_for_unknown_choice,
     hint_for_unknown_field,
@@ -36,6 +36,7 @@ from rsfstudy.slider.slider_parameters import (
     SliderParameters,
     with_stiffness_default,
 )
+from rsfstudy.slider.temperature.isothermal import Isothermal
 from rsfstudy.slider.user_loadings import UserLoading
 
 
@@ -56,6 +57,8 @@ class SceneParts(NamedTuple):
         Dynamics.
     loading : Loading
         Loading history.
+    temperature : Temperature
+        Temperature of the fault.
     """
 
     slider: SliderParameters
@@ -64,6 +67,7 @@ class SceneParts(NamedTuple):
     fluid: fluid.Fluid
     dynamics: dynamics.Dynamics
     loading: loading.Loading
+    temperature: temperature.Temperature = Isothermal()
 
 
 def build_parts(field_values: Mapping[str, Any]) -> SceneParts:

@@ -12,6 +12,7 @@ from rsfstudy.quantities import HtmlTableMixin, Quantity
 from rsfstudy.slider.field_name_hints import hint_for_positional_argument
 from rsfstudy.slider.part_registry import (
     OMITTED_DEFAULTS,
+    SLOT_NAMES,
     SLOTS_WITH_PART_CHOSEN_BY_NAME,
     UserPart,
     add_scene_fields_to_signature,
@@ -120,12 +121,12 @@ class SceneBase(HtmlTableMixin):
             values[name] = getattr(self.parts, name).name
         for part in self.parts:
             values |= vars(part)
-        kept = (
-            n
-            for n in self.field_index.all_field_names
-            if n not in OMITTED_DEFAULTS or values[n] is not None
-        )
-        return {name: values[name] for name in kept}
+        return {
+            name: values[name]
+            for name in self.field_index.all_field_names
+            if name not in OMITTED_DEFAULTS
+            or values[name] != (OMITTED_DEFAULTS[name] if name in SLOT_NAMES else None)
+        }
 
     def stored_fields(self) -> dict[str, Any]:
         """Return the fields that identify the scene in files and in journals.

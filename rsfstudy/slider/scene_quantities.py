@@ -61,9 +61,11 @@ class SceneQuantities(SceneBase):
     def state_count(self) -> int:
         """Total number of states of the scene.
 
-        The total includes the states of the law and the unknowns of the loading and of the fluid.
+        The total includes the states of the law, the temperature if it changes, and the unknowns of
+        the loading and of the fluid.
         """
-        return self.parts.law.state_count + len(self.pressure_source.unknowns)
+        of_law, heat = self.parts.law.state_count, len(self.parts.temperature.unknowns)
+        return of_law + heat + len(self.pressure_source.unknowns)
 
     @property
     def effects(self) -> tuple[str, ...]:

@@ -19,6 +19,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from rsfstudy.errors import InvalidValue
 from rsfstudy.slider.evolution_derivatives import compute_state_evolution_derivatives
 from rsfstudy.slider.linear_response import LinearisedForceBalance, linearise_force_balance
 from rsfstudy.slider.polynomials import (
@@ -310,6 +311,8 @@ def spring_response_to_normal_stress(
 
     Raises
     ------
+    InvalidValue
+        If the temperature changes, because imposed normal stress also changes the heating.
     ValueError
         If steady sliding does not exist at this slip rate.
 
@@ -326,6 +329,10 @@ def spring_response_to_normal_stress(
     with stress in units of :math:`\sigma`. As :math:`K` decreases to its critical value, the
     response has a resonance at :math:`\omega D_c/V = \sqrt{(b - a)/a}`.
     """
+    if scene.parts.temperature.unknowns:
+        remedy = "Set temperature='isothermal', or simulate the oscillation."
+        name = scene.parts.temperature.name
+        raise InvalidValue("temperature", name, "has no linear response here", remedy=remedy)
     still = scene.under_steady_loading
     steady = _require_steady_sliding(still, log_slip_rate)
     psis = (*steady.states, *(0.0 for _unknown in scene.pressure_source.unknowns))

@@ -91,6 +91,26 @@ def find_law_functions(law: LawBase) -> tuple[Function, Function]:
     )
 
 
+def isothermal_state_variable(difference: float, psis: Numbers, p: Numbers) -> float:
+    r"""Return the state variable at constant temperature.
+
+    Parameters
+    ----------
+    difference : float
+        Sum of the states of the law minus the shift, :math:`\sum_i \Psi_i - \mathrm{shift}`.
+    psis : tuple of float
+        States of the scene. This argument is ignored.
+    p : tuple of float
+        Parameters of the scene. This argument is ignored.
+
+    Returns
+    -------
+    float
+        State variable :math:`\Theta`, which is equal to ``difference``.
+    """
+    return difference
+
+
 @cache
 def append_auxiliary_evolutions(
     law_evolutions: Function, auxiliary_rates: Function, law_state_count: int

@@ -21,6 +21,7 @@ from rsfstudy.slider.friction import build_friction_relation, compute_steady_sta
 from rsfstudy.slider.parts import Numbers
 from rsfstudy.slider.scene_caching import cached_per_scene
 from rsfstudy.slider.scene_view import SceneView
+from rsfstudy.slider.temperature_functions import thermal_friction_change
 
 #: Largest deviation of frictional stress, in units of sigma_*, that the root search considers.
 _MAX_STEADY_FRICTIONAL_STRESS = 1e9
@@ -64,7 +65,8 @@ def steady_sliding(scene: SceneView, log_slip_rate: float) -> SteadySliding | No
     Returns
     -------
     SteadySliding or None
-        Stresses and states. None if no frictional stress satisfies the friction relation.
+        Stresses and states. None if no frictional stress satisfies the friction relation, or if
+        the steady temperature is unknown.
 
     Notes
     -----
@@ -72,13 +74,15 @@ def steady_sliding(scene: SceneView, log_slip_rate: float) -> SteadySliding | No
     :math:`\mathrm{strength}(g) = a \ln(V/V_*) + \sum_i \Psi_i`. The spring stress is the sum of the
     frictional stress and the stress that radiation damping adds.
     """
-    friction = frictional_stress_for_friction(
-        scene, steady_friction_minus_reference(scene, log_slip_rate)
-    )
+    change = steady_friction_minus_reference(scene, log_slip_rate)
+    friction = None if math.isnan(change) else frictional_stress_for_friction(scene, change)
     if friction is None:
         return None
     spring_stress = friction + scene.dynamics.radiated_stress(log_slip_rate)
-    shift = build_friction_relation(scene)(friction)[2]
+    heated = scene.parts.temperature.unknowns
+    # The steady temperature does not depend on the shift, but the shift depends on temperature.
+    states = compute_steady_states(scene, log_slip_rate, 0.0) if heated else ()
+    shift = build_friction_relation(scene, states)(friction)[2]
     return SteadySliding(
         log_slip_rate, friction, spring_stress, compute_steady_states(scene, log_slip_rate, shift)
     )
@@ -97,7 +101,8 @@ def steady_friction_minus_reference(scene: SceneView, log_slip_rate: float) -> f
     Returns
     -------
     float
-        Difference :math:`\mu_{ss} - \mu_*`.
+        Difference :math:`\mu_{ss} - \mu_*`. The result is NaN if the steady temperature is
+        unknown.
 
     Notes
     -----
@@ -107,8 +112,9 @@ def steady_friction_minus_reference(scene: SceneView, log_slip_rate: float) -> f
     ----------
     Ruina (1983), J. Geophys. Res. 88, 10359-10370.
     """
-    psi = scene.friction_functions.state_sum(compute_steady_states(scene, log_slip_rate, 0.0))
-    return float(scene.a * log_slip_rate + psi)
+    states = compute_steady_states(scene, log_slip_rate, 0.0)
+    psi = scene.friction_functions.state_sum(states)
+    return float(scene.a * log_slip_rate + psi + thermal_friction_change(scene, states))
 
 
 def frictional_stress_for_friction(
@@ -247,15 +253,17 @@ def min_steady_log_slip_rate(scene: SceneView) -> float:
     strongest = value - shift
     if strongest > 1e6:
         return -math.inf
-    if scene.parts.law.steady_states is None:
+    if scene.parts.law.steady_states is None and not any(scene.parts.temperature.activation):
         return strongest / (scene.a - scene.b) if scene.b > scene.a else -math.inf
+
+    def excess(log_slip_rate: float) -> float:
+        change = steady_friction_minus_reference(scene, log_slip_rate)
+        # Without a steady temperature, the slip rate is too small.
+        return 1.0 if math.isnan(change) else change - strongest
+
     slower = -1.0
-    while steady_friction_minus_reference(scene, slower) <= strongest:
+    while excess(slower) <= 0.0:
         slower *= 2.0
         if slower < _MIN_LOG_SLIP_RATE:
             return -math.inf
-    return float(
-        brentq(
-            lambda x: steady_friction_minus_reference(scene, x) - strongest, slower, 0.0, xtol=1e-12
-        )
-    )
+    return float(brentq(excess, slower, 0.0, xtol=1e-12))

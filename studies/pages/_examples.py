@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-#: Example scene for each built-in friction law, normal stress condition, fluid, dynamics and
-#: loading.
+#: Example scene for each built-in friction law, normal stress condition, fluid, dynamics, loading
+#: and temperature.
 SCENES = {
     "composite": 'Scene(law="composite", b_over_a=1.5, cutoff_velocity_ratio=0.1)',
     "cut_off": 'Scene(law="cut_off", b_over_a=1.5, cutoff_velocity_ratio=1000)',
+    "flash_heating": 'Scene(law="flash_heating", b_over_a=1.4, weakening_velocity_ratio=1e5)',
     "family": 'Scene(law="family", law_exponent=0.5)',
     "perrin_rice_zheng": 'Scene(law="perrin_rice_zheng", b_over_a=1.5)',
     "slip": 'Scene(law="slip", b_over_a=1.5)',
@@ -18,6 +19,9 @@ SCENES = {
     "variable": 'Scene(normal_stress="variable", alpha=0.25, phi=55)',
     "dilatant": 'Scene(fluid="dilatant", dilatancy=0.01, drainage=1)',
     "drained": 'Scene(fluid="drained")',
+    "thermal": 'Scene(fluid="thermal", temperature="shear_heating", pressurisation=1.5)',
+    "isothermal": 'Scene(temperature="isothermal")',
+    "shear_heating": 'Scene(temperature="shear_heating", cooling=5, direct_activation=35)',
     "inertia": "Scene(inertia=True, stiffness_ratio=0.8)",
     "quasi_static": "Scene(stiffness_ratio=1.2)",
     "radiation_damping": "Scene(radiation_damping=1e-4, stiffness_ratio=0.8)",

@@ -11,9 +11,18 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import Any
 
+from rsfstudy.quantities import Quantity
 from rsfstudy.slider.needed_quantities import PORE_PRESSURE, SLIP_RATE
-from rsfstudy.slider.parts import Numbers, Part, discover_parts
+from rsfstudy.slider.parts import (
+    NON_NEGATIVE,
+    POSITIVE,
+    Numbers,
+    Part,
+    discover_parts,
+    number,
+)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -53,6 +62,11 @@ class Fluid(Part):
     defining_methods = frozenset({"auxiliary_rates", "parameter_values"})
     received_quantities = frozenset({SLIP_RATE, PORE_PRESSURE})
 
+    @property
+    def pressurisation_factor(self) -> float:
+        """Undrained pore pressure in sigma_* per unit of the temperature rise."""
+        return 0.0
+
     def highest_pressure(self, log_slip_rate: float, states: Numbers) -> float:
         r"""Compute an upper bound of the future pore pressure.
 
@@ -70,6 +84,58 @@ class Fluid(Part):
             class knows no upper bound of the pore pressure.
         """
         return math.inf
+
+
+#: Pore pressure of the built-in fluids.
+PORE_PRESSURE_QUANTITY = Quantity(
+    "pore_pressure",
+    r"$(p-p_\infty)/\sigma_*$",
+    "1",
+    "pore pressure above that of the surroundings",
+    "sigma_*",
+)
+
+
+def declare_dilatancy_field(default: float) -> Any:
+    """Declare the field ``dilatancy`` of a fluid.
+
+    Parameters
+    ----------
+    default : float
+        Default value.
+
+    Returns
+    -------
+    dataclasses.Field
+        Field for a dataclass.
+    """
+    return number(
+        default,
+        r"$\epsilon/(\beta\sigma_*)$",
+        "1",
+        "pore pressure that undrained dilatancy takes for each unit of ln V",
+        "sigma_*",
+        rule=NON_NEGATIVE,
+    )
+
+
+def declare_drainage_field() -> Any:
+    """Declare the field ``drainage`` of a fluid.
+
+    Returns
+    -------
+    dataclasses.Field
+        Field for a dataclass, with a default of 1.
+    """
+    return number(
+        1.0,
+        "$c^*D_c/V_*$",
+        "1",
+        "rate at which pore pressure drains",
+        "V_*/D_c",
+        rule=POSITIVE,
+        remedy="Nearly undrained is a small number, and without drainage there is no steady state.",
+    )
 
 
 BUILT_IN_PARTS = discover_parts(__name__, __path__)

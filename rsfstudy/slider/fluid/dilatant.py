@@ -10,10 +10,15 @@ import math
 from dataclasses import dataclass
 
 from rsfstudy.quantities import Quantity
-from rsfstudy.slider.fluid import Fluid
+from rsfstudy.slider.fluid import (
+    PORE_PRESSURE_QUANTITY,
+    Fluid,
+    declare_dilatancy_field,
+    declare_drainage_field,
+)
 from rsfstudy.slider.laws import lacks_critical_stiffness
 from rsfstudy.slider.parameter_layout import FLUID, LARGEST_LOG_SLOWNESS
-from rsfstudy.slider.parts import NON_NEGATIVE, POSITIVE, Numbers, number
+from rsfstudy.slider.parts import Numbers
 from rsfstudy.slider.scene_view import SceneView
 
 
@@ -83,23 +88,8 @@ class DilatantFluid(Fluid):
     Segall and Rice (1995), J. Geophys. Res. 100, 22155-22171.
     """
 
-    dilatancy: float = number(
-        0.01,
-        r"$\epsilon/(\beta\sigma_*)$",
-        "1",
-        "pore pressure that undrained dilatancy takes for each unit of ln V",
-        "sigma_*",
-        rule=NON_NEGATIVE,
-    )
-    drainage: float = number(
-        1.0,
-        "$c^*D_c/V_*$",
-        "1",
-        "rate at which pore pressure drains",
-        "V_*/D_c",
-        rule=POSITIVE,
-        remedy="Nearly undrained is a small number, and without drainage there is no steady state.",
-    )
+    dilatancy: float = declare_dilatancy_field(0.01)
+    drainage: float = declare_drainage_field()
 
     name = "dilatant"
     unknowns = (
@@ -110,13 +100,7 @@ class DilatantFluid(Fluid):
             "porosity above that of steady sliding at V_star",
             "beta sigma_*",
         ),
-        Quantity(
-            "pore_pressure",
-            r"$(p-p_\infty)/\sigma_*$",
-            "1",
-            "pore pressure above that of the surroundings",
-            "sigma_*",
-        ),
+        PORE_PRESSURE_QUANTITY,
     )
     auxiliary_rates = staticmethod(porosity_and_pressure_rates)
     auxiliary_steady_states = staticmethod(steady_porosity_and_pressure)

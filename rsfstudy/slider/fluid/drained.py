@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
+from rsfstudy.errors import InvalidValue
 from rsfstudy.slider.fluid import Fluid
 
 
@@ -22,3 +24,14 @@ class DrainedFluid(Fluid):
 
     name = "drained"
     rejection_hint = "while the fault is drained", "set fluid='dilatant'"
+
+    @classmethod
+    def rejection_error(cls, name: str, value: Any) -> InvalidValue:
+        """Return the error for a field that belongs to another fluid.
+
+        See ``Part.rejection_error``.
+        """
+        if name != "pressurisation":
+            return super().rejection_error(name, value)
+        remedy = "Leave it out, or set fluid='thermal'."
+        return InvalidValue(name, value, "has no meaning while the fault is drained", remedy=remedy)

@@ -263,6 +263,8 @@ class LawBase(Part):
             remedy = "Leave it out, or state `coupling` where the proportion is constant."
             raise self.field_error("stress_dependence", rule, remedy)
         pressed = source.unknowns and not loading.has_load_point_unknown
+        if scene.parts.temperature.unknowns:
+            pressed, source = True, scene.parts.temperature
         one_way = (
             source if pressed else None if scene.dynamics.allows_reversed_slip else scene.dynamics
         )

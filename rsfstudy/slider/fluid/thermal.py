@@ -1,0 +1,176 @@
+"""Thermal pressurisation with drainage, and optionally with dilatancy (Rice 2006).
+
+The fluid in the pores expands more than the pores when the fault heats up. The pore pressure rises
+until fluid flows out to the surroundings.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+from rsfstudy.errors import InvalidValue
+from rsfstudy.quantities import Quantity
+from rsfstudy.slider.fluid import (
+    PORE_PRESSURE_QUANTITY,
+    Fluid,
+    declare_dilatancy_field,
+    declare_drainage_field,
+)
+from rsfstudy.slider.fluid.dilatant import (
+    DilatantFluid,
+    porosity_and_pressure_rates,
+    steady_porosity_and_pressure,
+)
+from rsfstudy.slider.laws import lacks_critical_stiffness
+from rsfstudy.slider.parameter_layout import FLUID, LARGEST_LOG_SLOWNESS
+from rsfstudy.slider.parts import NON_NEGATIVE, Function, Numbers, number
+from rsfstudy.slider.scene_view import SceneView
+
+
+def pressure_rate(log_slip_rate: float, states: Numbers, fraction: float, p: Numbers) -> Numbers:
+    r"""Compute the rate of the pore pressure due to drainage.
+
+    Parameters
+    ----------
+    log_slip_rate : float
+        Natural logarithm of the slip rate, :math:`\ln(V/V_*)`.
+    states : tuple of float
+        Pore pressure :math:`P`.
+    fraction : float
+        Slip per unit of the independent variable, by which the result is multiplied.
+    p : tuple of float
+        Parameters of the scene. The function reads the drainage :math:`c^* D_c/V_*` from
+        ``p[FLUID + 1]``.
+
+    Returns
+    -------
+    tuple of float
+        Change of the pore pressure per unit slip in :math:`D_c`, multiplied by ``fraction``.
+    """
+    time = fraction * math.exp(min(-log_slip_rate, LARGEST_LOG_SLOWNESS))
+    return (-p[FLUID + 1] * time * states[0],)
+
+
+def steady_pressure(log_slip_rate: float, p: Numbers) -> Numbers:
+    """Return the pore pressure of steady sliding, which is zero.
+
+    Parameters
+    ----------
+    log_slip_rate : float
+        Natural logarithm of the slip rate. This argument is ignored.
+    p : tuple of float
+        Parameters of the scene. This argument is ignored.
+
+    Returns
+    -------
+    tuple of float
+        Pore pressure.
+    """
+    return (0.0,)
+
+
+@dataclass(frozen=True, kw_only=True)
+class ThermalFluid(Fluid):
+    r"""Pore fluid that expands by heat, with drainage to the surroundings.
+
+    The heat is that of the part ``temperature``, which must be ``"shear_heating"``.
+
+    Parameters
+    ----------
+    pressurisation : float, default: 1.0
+        Pressurisation factor :math:`\Lambda_p T_*/\sigma_*`, the undrained increase of pore
+        pressure in :math:`\sigma_*` if the temperature rises by :math:`T_*`. Here
+        :math:`\Lambda_p` is the increase of pressure per kelvin.
+    drainage : float, default: 1.0
+        Drainage rate :math:`c^* D_c/V_*`.
+    dilatancy : float, default: 0.0
+        Dilatancy :math:`\epsilon/(\beta \sigma_*)` (see ``DilatantFluid``). Without dilatancy, the
+        porosity is not an unknown.
+
+    Notes
+    -----
+    With the temperature rise :math:`\vartheta`, the pore pressure obeys
+
+    .. math::
+
+        \frac{dP}{dt} = \frac{\Lambda_p T_*}{\sigma_*} \frac{d\vartheta}{dt} - c^* P
+          - \frac{d\varphi}{dt}.
+
+    At a constant friction coefficient :math:`\mu`, and without cooling and drainage, the pressure
+    is :math:`P = 1 - \exp(-\mu E \delta)` after the slip :math:`\delta` of a rigid slider, with
+    :math:`E = H \Lambda_p T_*/\sigma_*`.
+
+    References
+    ----------
+    Rice (2006), J. Geophys. Res. 111, B05311; Segall and Rice (2006), J. Geophys. Res. 111, B09316.
+    """
+
+    pressurisation: float = number(
+        1.0,
+        r"$\Lambda_p T_*/\sigma_*$",
+        "1",
+        "undrained pore pressure by a temperature rise of T_star",
+        "sigma_*",
+        rule=NON_NEGATIVE,
+        omit_if_default=True,
+    )
+    dilatancy: float = declare_dilatancy_field(0.0)
+    drainage: float = declare_drainage_field()
+
+    name = "thermal"
+
+    @property
+    def unknowns(self) -> tuple[Quantity, ...]:  # type: ignore[override]
+        """Pore pressure, after the porosity if the fault dilates."""
+        return DilatantFluid.unknowns if self.dilatancy else (PORE_PRESSURE_QUANTITY,)
+
+    @property
+    def auxiliary_rates(self) -> Function:  # type: ignore[override]
+        """Function that computes the rates of the unknowns, without heating."""
+        return porosity_and_pressure_rates if self.dilatancy else pressure_rate
+
+    @property
+    def auxiliary_steady_states(self) -> Function:  # type: ignore[override]
+        """Function that returns the unknowns in steady sliding."""
+        return steady_porosity_and_pressure if self.dilatancy else steady_pressure
+
+    def highest_pressure(self, log_slip_rate: float, states: Numbers) -> float:
+        """Compute an upper bound of the future pore pressure without heating.
+
+        See ``Fluid.highest_pressure``.
+        """
+        if not self.dilatancy:
+            return max(states[-1], 0.0)
+        return DilatantFluid.highest_pressure(self, log_slip_rate, states)  # type: ignore[arg-type]
+
+    @property
+    def pressurisation_factor(self) -> float:
+        """Undrained pore pressure in sigma_* per unit of the temperature rise."""
+        return self.pressurisation
+
+    @property
+    def effects(self) -> tuple[str, ...]:
+        """Names of the physical effects that are active in the part."""
+        return ("thermal_pressurisation", *("dilatancy",) * bool(self.dilatancy))
+
+    def parameter_values(self, scene: SceneView) -> Numbers:
+        """Return the dilatancy and the drainage rate.
+
+        See ``Part.parameter_values``. The pressurisation factor is among the parameters of the
+        temperature.
+        """
+        return self.dilatancy, self.drainage
+
+    def check(self, scene: SceneView) -> None:
+        """Check that the temperature changes and that the stiffness ratio is defined.
+
+        See ``Part.check``.
+        """
+        if not scene.parts.temperature.unknowns:
+            rule = f"has no meaning for temperature={scene.parts.temperature.name!r}"
+            remedy = "Set temperature='shear_heating', or choose another fluid."
+            raise InvalidValue("fluid", self.name, rule, remedy=remedy)
+        if lacks_critical_stiffness(scene):
+            rule = "leaves no critical stiffness with thermal pressurisation"
+            raise self.field_error("drainage", rule, "Give stiffness itself, or raise drainage.")

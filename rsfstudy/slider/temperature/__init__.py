@@ -1,0 +1,108 @@
+r"""Temperature of the fault.
+
+Each module of this package defines one choice. The function ``discover_parts`` finds the modules
+automatically. The unknown is the temperature rise :math:`\vartheta = (T - T_*)/T_*`, relative to
+the absolute temperature :math:`T_*` of steady sliding at :math:`V_*`. If the friction depends on
+temperature,
+
+.. math::
+
+    \mu = \mu_* + a \left(\ln\frac{V}{V_*} + q_a \Lambda\right) + \Theta, \quad
+    \Lambda = \frac{T_*}{T} - 1 = -\frac{\vartheta}{1 + \vartheta},
+
+and the offset :math:`u` of the state variable from its steady state increases by
+:math:`q_b \Lambda`. With the activation energies :math:`Q_a` and :math:`Q_b`,
+:math:`q_i = Q_i/(R T_*)`. The base class is ``Temperature``.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import ClassVar
+
+from rsfstudy.slider.needed_quantities import (
+    EFFECTIVE_NORMAL_STRESS,
+    FRICTION_COEFFICIENT,
+    SHEAR_STRESS,
+    SLIP_RATE,
+)
+from rsfstudy.slider.parts import Function, Part, discover_parts
+from rsfstudy.slider.scene_view import SceneView
+
+
+@dataclass(frozen=True, kw_only=True)
+class Temperature(Part):
+    r"""Base class of the choices for the temperature of the fault.
+
+    A temperature that changes declares one unknown, the temperature rise, in ``unknowns``, and
+    defines the following function as a static method:
+
+    - ``temperature_rate(log_slip_rate, rise, friction, normal_stress, fraction, parameters)``
+      returns the change of the temperature rise per unit slip in :math:`D_c`, multiplied by
+      ``fraction``, which is the slip per unit of the independent variable. The argument
+      ``friction`` is the friction coefficient, and ``normal_stress`` is the effective normal stress
+      in :math:`\sigma_*`. The tuple ``parameters`` contains the values of ``parameter_values``,
+      followed by the other fields that the class declares with ``number``. The rate must be zero if
+      the fault slides steadily at :math:`V_*` with a temperature rise of zero.
+
+    The temperature rise of a rupture may be extremely large, so it never counts for the distance
+    from steady sliding, which determines whether a motion has settled.
+
+    Examples
+    --------
+    >>> from rsfstudy import Scene
+    >>> from rsfstudy.slider.temperature import Temperature
+    >>> scene = Scene()
+    >>> isinstance(scene.parts.temperature, Temperature)
+    True
+    >>> scene.temperature
+    'isothermal'
+    """
+
+    received_quantities = frozenset(
+        {SLIP_RATE, FRICTION_COEFFICIENT, EFFECTIVE_NORMAL_STRESS, SHEAR_STRESS}
+    )
+    temperature_rate: ClassVar[Function | None] = None
+
+    @classmethod
+    def required_functions(cls) -> tuple[str, ...]:
+        """Return the names of the functions that the part must define.
+
+        Returns
+        -------
+        tuple of str
+            ``("temperature_rate",)`` if the temperature is an unknown, and otherwise an empty
+            tuple.
+        """
+        return ("temperature_rate",) if cls.unknowns else ()
+
+    @property
+    def activation(self) -> tuple[float, float]:
+        """Activation terms of the direct effect and of the evolution effect.
+
+        The base class returns two zeros, because its friction does not depend on temperature.
+        """
+        return 0.0, 0.0
+
+    def rise_bounds(self, scene: SceneView, rise: float, power: float) -> tuple[float, float]:
+        r"""Compute bounds of the future temperature rise.
+
+        Parameters
+        ----------
+        scene : Scene
+            Scene that the temperature belongs to.
+        rise : float
+            Current temperature rise.
+        power : float
+            Upper bound of the product of shear stress and slip rate, in :math:`\sigma_* V_*`.
+
+        Returns
+        -------
+        tuple of (float, float)
+            Lower and upper bound of the temperature rise. The base class returns infinite bounds.
+        """
+        return -math.inf, math.inf
+
+
+BUILT_IN_PARTS = discover_parts(__name__, __path__)

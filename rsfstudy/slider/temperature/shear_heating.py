@@ -1,0 +1,188 @@
+"""Shear heating of a fault that loses heat to its surroundings.
+
+The friction may depend on the temperature of the fault (Chester 1994).
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+from rsfstudy.quantities import Quantity
+from rsfstudy.slider.laws import lacks_critical_stiffness
+from rsfstudy.slider.needed_quantities import EFFECTIVE_NORMAL_STRESS, FRICTION_COEFFICIENT
+from rsfstudy.slider.parameter_layout import LARGEST_LOG_SLOWNESS
+from rsfstudy.slider.parts import NON_NEGATIVE, POSITIVE, Numbers, number
+from rsfstudy.slider.scene_view import SceneView
+from rsfstudy.slider.temperature import Temperature
+
+
+def temperature_rate(
+    log_slip_rate: float,
+    rise: float,
+    friction: float,
+    normal_stress: float,
+    fraction: float,
+    parameters: Numbers,
+) -> float:
+    r"""Compute the rate of the temperature rise.
+
+    Parameters
+    ----------
+    log_slip_rate : float
+        Natural logarithm of the slip rate, :math:`\ln(V/V_*)`.
+    rise : float
+        Temperature rise :math:`\vartheta`.
+    friction : float
+        Friction coefficient :math:`\mu`.
+    normal_stress : float
+        Effective normal stress :math:`s` in :math:`\sigma_*`.
+    fraction : float
+        Slip per unit of the independent variable, by which the result is multiplied.
+    parameters : tuple of float
+        Heating :math:`H`, cooling :math:`C`, and the product :math:`H \mu_*`.
+
+    Returns
+    -------
+    float
+        Change of the temperature rise per unit slip in :math:`D_c`, multiplied by ``fraction``.
+
+    Notes
+    -----
+    In units of :math:`D_c/V_*` for time and :math:`V_*` for the slip rate,
+
+    .. math::
+
+        \frac{d\vartheta}{dt} = H (\mu s V - \mu_*) - C \vartheta.
+    """
+    heating, cooling, steady_heating = parameters
+    time = fraction * math.exp(min(-log_slip_rate, LARGEST_LOG_SLOWNESS))
+    return fraction * heating * friction * normal_stress - time * (steady_heating + cooling * rise)
+
+
+@dataclass(frozen=True, kw_only=True)
+class ShearHeating(Temperature):
+    r"""Fault that is heated by the work of the shear stress, and cools at a rate.
+
+    Parameters
+    ----------
+    heating : float, default: 1e-3
+        Temperature rise per unit slip at unit shear stress,
+        :math:`H = \sigma_* D_c/(\rho c w T_*)`, without cooling. Here :math:`\rho c` is the
+        volumetric heat capacity and :math:`w` is the width of the shear zone.
+    cooling : float, default: 1.0
+        Cooling rate :math:`C = c_{th} D_c/V_*`, for example with
+        :math:`c_{th} = \alpha_{th}/w_h^2` for the thermal diffusivity :math:`\alpha_{th}` and the
+        width :math:`w_h` from which heat flows out.
+    direct_activation : float, default: 0.0
+        Activation term :math:`q_a = Q_a/(R T_*)` of the direct effect.
+    evolution_activation : float, default: 0.0
+        Activation term :math:`q_b = Q_b/(R T_*)` of the evolution effect.
+
+    Notes
+    -----
+    In steady sliding, :math:`\vartheta = (H/C) (\mu s V/V_* - \mu_*)`. Where heating by
+    :math:`R T^2/Q` separates the slip rates, rate weakening changes to rate strengthening if
+    :math:`Q_a = Q_b = Q`, because higher temperatures have the same effect as lower slip rates.
+
+    References
+    ----------
+    Chester (1994), J. Geophys. Res. 99, 7247-7261; Blanpied, Tullis and Weeks (1998), J. Geophys.
+    Res. 103, 489-511; Kato (2001), Earth Planet. Sci. Lett. 186, 417-426.
+    """
+
+    heating: float = number(
+        1e-3,
+        r"$\sigma_* D_c/(\rho c w T_*)$",
+        "1",
+        "temperature rise over T_star by slip of D_c at unit shear stress",
+        rule=NON_NEGATIVE,
+        omit_if_default=True,
+    )
+    cooling: float = number(
+        1.0,
+        "$c_{th}D_c/V_*$",
+        "1",
+        "cooling rate of the fault",
+        "V_*/D_c",
+        rule=POSITIVE,
+        remedy="Nearly adiabatic is a small number, and without cooling there is no steady state.",
+        omit_if_default=True,
+    )
+    direct_activation: float = number(
+        0.0,
+        "$Q_a/(RT_*)$",
+        "1",
+        "activation term of the direct effect",
+        rule=NON_NEGATIVE,
+        omit_if_default=True,
+    )
+    evolution_activation: float = number(
+        0.0,
+        "$Q_b/(RT_*)$",
+        "1",
+        "activation term of the evolution effect",
+        rule=NON_NEGATIVE,
+        omit_if_default=True,
+    )
+
+    name = "shear_heating"
+    unknowns = (
+        Quantity(
+            "temperature_rise",
+            r"$(T-T_*)/T_*$",
+            "1",
+            "temperature above that of steady sliding at V_star",
+            "T_*",
+        ),
+    )
+    needs = frozenset({FRICTION_COEFFICIENT, EFFECTIVE_NORMAL_STRESS})
+    temperature_rate = staticmethod(temperature_rate)
+
+    @property
+    def activation(self) -> tuple[float, float]:
+        """Activation terms of the direct effect and of the evolution effect."""
+        return self.direct_activation, self.evolution_activation
+
+    @property
+    def effects(self) -> tuple[str, ...]:
+        """Names of the physical effects that are active in the part."""
+        return ("shear_heating", *("thermal_activation",) * any(self.activation))
+
+    def parameter_values(self, scene: SceneView) -> Numbers:
+        r"""Return the parameters of ``temperature_rate``.
+
+        See ``Part.parameter_values``.
+        """
+        return self.heating, self.cooling, self.heating * scene.mu_star
+
+    def rise_bounds(self, scene: SceneView, rise: float, power: float) -> tuple[float, float]:
+        """Compute bounds of the future temperature rise.
+
+        See ``Temperature.rise_bounds``. The temperature approaches the steady temperature of the
+        power, which lies between that without slip and that of the largest power.
+        """
+        over_cooling = self.heating / self.cooling
+        lowest = -over_cooling * scene.mu_star
+        return min(rise, lowest), max(rise, over_cooling * power + lowest)
+
+    def check(self, scene: SceneView) -> None:
+        """Check the activation terms and the temperature of the surroundings.
+
+        See ``Part.check``. The activation terms require a law with one state. If the friction
+        depends on temperature, the temperature of the surroundings must be positive.
+        """
+        if any(self.activation):
+            law = scene.parts.law
+            if law.state_count > 1:
+                name = "direct_activation" if self.direct_activation else "evolution_activation"
+                rule = f"is for laws with one state, and law={law.name!r} has {law.state_count}"
+                raise self.field_error(name, rule, "Leave it out, or choose another law.")
+            hottest = self.cooling / scene.mu_star
+            if self.heating >= hottest:
+                rule = f"must be less than cooling/mu_star = {hottest:g}: otherwise the "
+                rule += "surroundings would be colder than absolute zero"
+                raise self.field_error("heating", rule, "Lower it, or raise cooling.")
+        if lacks_critical_stiffness(scene):
+            rule = "leaves no critical stiffness at V_*"
+            raise self.field_error("heating", rule, "Give stiffness itself, or raise cooling.")

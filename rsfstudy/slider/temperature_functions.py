@@ -1,0 +1,389 @@
+r"""Effects of the temperature rise on friction, and its evolution.
+
+The temperature rise :math:`\vartheta` is the first element of the tuple of states after the states
+of the law. With :math:`\Lambda = -\vartheta/(1 + \vartheta)`, the state
+:math:`\Psi = \Theta + \mathrm{shift}_\sigma(g)`, in which :math:`\mathrm{shift}_\sigma` is the
+decrease of the state variable due to stress, obeys
+
+.. math::
+
+    a \ln\frac{V}{V_*} + \Psi = \mathrm{strength}_\sigma(g) - a q_a \Lambda, \quad
+    \mathrm{shift} = \mathrm{shift}_\sigma(g) - b q_b \Lambda,
+
+so the two activation terms only change the strength and the shift that the law receives. The
+parameters of the temperature follow the parameters of the law in the parameter tuple ``p``:
+:math:`a q_a`, :math:`b q_b`, the pressurisation factor of the fluid, and the parameters that the
+temperature part declares.
+
+The function `build_replacements` is the main function. The functions that it returns have the
+arguments that ``friction.FrictionFunctions`` describes.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping
+from functools import cache, partial
+from typing import Any, NamedTuple
+
+from rsfstudy.slider.friction_relation import zero_normal_stress_excess
+from rsfstudy.slider.parameter_layout import LAW, MU_STAR, A, temperature_parameter_values
+from rsfstudy.slider.parts import Function, Numbers, collect_parameter_values
+from rsfstudy.slider.scene_caching import cached_per_scene
+from rsfstudy.slider.scene_view import SceneView
+from rsfstudy.slider.state_functions import build_sum_function, find_law_functions
+
+#: Number of parameters that precede the parameters that the temperature part declares.
+_COMMON_PARAMETER_COUNT = 3
+#: Smallest temperature, relative to T_*. Lower temperatures occur only in trial steps of the
+#: integrator.
+_MIN_TEMPERATURE = 1e-3
+#: Limits of the effective normal stress, in sigma_*, that is computed from the friction
+#: coefficient. The limits are exceeded only in trial steps of the integrator.
+_MIN_NORMAL_STRESS, _MAX_NORMAL_STRESS = 1e-12, 1e12
+#: Number of Newton iterations for the normal stress, if it depends nonlinearly on shear stress.
+_NORMAL_STRESS_ITERATION_COUNT = 30
+#: Largest change of ln V between two points along the branch of steady sliding.
+_MAX_LOG_SLIP_RATE_CHANGE = 0.25
+#: Value of ln(V/V_*) below which slip does not heat the fault, to double precision.
+_MIN_HEATING_LOG_SLIP_RATE = -60.0
+#: Maximum number of secants in the search of a steady temperature, its relative tolerance, and the
+#: largest last step if rounding errors prevent that the tolerance is reached.
+_MAX_SECANT_COUNT, _ROOT_TOLERANCE, _STAGNATION_TOLERANCE = 30, 1e-14, 1e-10
+
+
+class _Places(NamedTuple):
+    """Places of the temperature in the tuples of states and parameters.
+
+    The index of the state is negative. The last parameter precedes the index ``end``.
+    """
+
+    state: int
+    first_parameter: int
+    end: int
+
+
+def build_replacements(scene: SceneView, isothermal: Mapping[str, Any]) -> dict[str, Any]:
+    """Build the friction functions that the temperature of a scene changes.
+
+    Parameters
+    ----------
+    scene : Scene
+        Scene whose temperature is an unknown.
+    isothermal : mapping of str to object
+        Attributes of the ``FrictionFunctions`` of the scene without the temperature.
+
+    Returns
+    -------
+    dict of str to object
+        Attributes of ``FrictionFunctions`` with their new values.
+    """
+    parts, source, law_states = scene.parts, scene.pressure_source, scene.parts.law.state_count
+    first = LAW + len(collect_parameter_values(parts.law, scene))
+    end = first + len(temperature_parameter_values(scene))
+    places = _Places(-1 - len(source.unknowns), first, end)
+    stress, oscillates = parts.normal_stress, parts.loading.has_load_point_unknown
+    normal_stress = _build_normal_stress_function(
+        stress.normal_stress or zero_normal_stress_excess,
+        has_pressure=bool(source.unknowns) and not oscillates,
+        is_linear=stress.normal_stress is None or stress.coupling is not None,
+    )
+    evolutions, steady_states = find_law_functions(parts.law)
+    replacements: dict[str, Any] = {
+        "evolutions": _append_temperature_evolution(
+            evolutions,
+            source.auxiliary_rates,
+            _build_warming_function(
+                parts.temperature.temperature_rate, normal_stress, law_states, places
+            ),
+            law_states,
+            first + 2 if parts.fluid.pressurisation_factor else 0,
+        ),
+        "steady_states": _insert_steady_temperature(steady_states, source.auxiliary_steady_states),
+        "indices_of_states_in_distance": tuple(
+            i + (i >= law_states) for i in isothermal["indices_of_states_in_distance"]
+        ),
+    }
+    if any(parts.temperature.activation):
+        contribution = isothermal["state_contribution"]
+        replacements |= {
+            "strength": _add_temperature_to_strength(isothermal["strength"], places),
+            "state_contribution": _add_temperature_to_contribution(contribution, places),
+            "state_variable": _build_state_variable_function(places),
+        }
+    return replacements
+
+
+# ---- effects on friction -------------------------------------------------------------------------
+
+
+def inverse_temperature_change(rise: float) -> float:
+    r"""Compute the change of the inverse temperature.
+
+    Parameters
+    ----------
+    rise : float
+        Temperature rise :math:`\vartheta`.
+
+    Returns
+    -------
+    float
+        Value of :math:`\Lambda = T_*/T - 1`.
+    """
+    return -rise / max(1.0 + rise, _MIN_TEMPERATURE)
+
+
+def temperature_derivatives(rise: float, parameters: Numbers) -> tuple[float, float]:
+    r"""Compute the derivatives of strength and shift with respect to temperature.
+
+    Parameters
+    ----------
+    rise : float
+        Temperature rise :math:`\vartheta`.
+    parameters : tuple of float
+        Parameters of the temperature, which start with :math:`a q_a` and :math:`b q_b`.
+
+    Returns
+    -------
+    strength_derivative, shift_derivative : float
+        Derivatives with respect to :math:`\vartheta`, :math:`a q_a/(1 + \vartheta)^2` and
+        :math:`b q_b/(1 + \vartheta)^2`.
+    """
+    falling = max(1.0 + rise, _MIN_TEMPERATURE) ** -2
+    return parameters[0] * falling, parameters[1] * falling
+
+
+@cache
+def _add_temperature_to_strength(strength_function: Function, places: _Places) -> Function:
+    """Return the friction relation with both activation terms."""
+    place, first, second = places.state, places.first_parameter, places.first_parameter + 1
+
+    def thermal_strength(g: float, psis: Numbers, p: Numbers) -> tuple[float, float, float, float]:
+        value, slope, shift, shift_slope = strength_function(g, psis, p)
+        change = inverse_temperature_change(psis[place])
+        return value - p[first] * change, slope, shift - p[second] * change, shift_slope
+
+    return thermal_strength
+
+
+@cache
+def _add_temperature_to_contribution(contribution_function: Function, places: _Places) -> Function:
+    """Return the contribution of state changes to friction, with temperature."""
+    place, first, end = places.state, places.first_parameter, places.end
+
+    def thermal_contribution(changes: Numbers, g: float, psis: Numbers, p: Numbers) -> float:
+        gained = temperature_derivatives(psis[place], p[first:end])[0]
+        return contribution_function(changes, g, psis, p) - gained * changes[place]
+
+    return thermal_contribution
+
+
+@cache
+def _build_state_variable_function(places: _Places) -> Function:
+    r"""Return a function that computes the state variable.
+
+    The sum of the states minus the shift is :math:`\Theta + b q_b \Lambda`.
+    """
+    place, second = places.state, places.first_parameter + 1
+
+    def state_variable(difference: float, psis: Numbers, p: Numbers) -> float:
+        return difference - p[second] * inverse_temperature_change(psis[place])
+
+    return state_variable
+
+
+# ---- evolution of the temperature ----------------------------------------------------------------
+
+
+@cache
+def _build_normal_stress_function(
+    total_normal_stress: Function, *, has_pressure: bool, is_linear: bool
+) -> Function:
+    r"""Return a function ``(friction, psis, p)`` for the effective normal stress.
+
+    The frictional stress :math:`g` solves :math:`\mu_* + g = \mu s(g)`. Newton's method needs a
+    single iteration if the normal stress :math:`s` is a linear function of :math:`g`. If
+    ``has_pressure`` is True, the last state reduces the normal stress.
+    """
+    iterations = 1 if is_linear else _NORMAL_STRESS_ITERATION_COUNT
+
+    def normal_stress(friction: float, psis: Numbers, p: Numbers) -> float:
+        g, pressure = friction - p[MU_STAR], psis[-1] if has_pressure else 0.0
+        ratio = 1.0
+        for _ in range(iterations):
+            excess, change = total_normal_stress(g, p)
+            ratio = 1.0 + excess - pressure
+            resisting = max(1.0 - friction * change, _MIN_NORMAL_STRESS)
+            step = (friction * ratio - p[MU_STAR] - g) / resisting
+            g += step
+            ratio += change * step
+        return min(max(ratio, _MIN_NORMAL_STRESS), _MAX_NORMAL_STRESS)
+
+    return normal_stress
+
+
+@cache
+def _build_warming_function(
+    temperature_rate: Function, normal_stress: Function, law_state_count: int, places: _Places
+) -> Function:
+    r"""Return a function ``(x, psis, shift, fraction, p)`` for the rate of temperature.
+
+    The friction coefficient is
+    :math:`\mu = \mu_* + a \ln V + \Psi - \mathrm{shift} - (b q_b - a q_a) \Lambda`.
+    """
+    place, first, end = law_state_count, places.first_parameter, places.end
+    own, state_sum = first + _COMMON_PARAMETER_COUNT, build_sum_function(law_state_count)
+
+    def warming(x: float, psis: Numbers, shift: float, fraction: float, p: Numbers) -> float:
+        rise, activated = psis[place], p[first + 1] - p[first]
+        friction = p[MU_STAR] + p[A] * x + state_sum(psis) - shift
+        friction -= activated * inverse_temperature_change(rise)
+        stress = normal_stress(friction, psis, p)
+        return temperature_rate(x, rise, friction, stress, fraction, p[own:end])
+
+    return warming
+
+
+@cache
+def _append_temperature_evolution(
+    law_evolutions: Function,
+    auxiliary_rates: Function | None,
+    warming: Function,
+    law_state_count: int,
+    pressurisation_index: int,
+) -> Function:
+    """Return the evolution of law states, temperature and other unknowns.
+
+    The pressurisation index is 0 if heat does not change the pore pressure.
+    """
+    place, after = law_state_count, law_state_count + 1
+
+    def evolutions(x: float, psis: Numbers, shift: float, fraction: float, p: Numbers) -> Numbers:
+        changes = law_evolutions(x, psis[:place], shift, fraction, p)
+        return (*changes, warming(x, psis, shift, fraction, p))
+
+    if auxiliary_rates is None:
+        return evolutions
+
+    def evolutions_with_others(
+        x: float, psis: Numbers, shift: float, fraction: float, p: Numbers
+    ) -> Numbers:
+        changes = law_evolutions(x, psis[:place], shift, fraction, p)
+        heated = warming(x, psis, shift, fraction, p)
+        others = auxiliary_rates(x, psis[after:], fraction, p)
+        pressed = p[pressurisation_index] * heated if pressurisation_index else 0.0
+        return (*changes, heated, *others[:-1], others[-1] + pressed)
+
+    return evolutions_with_others
+
+
+# ---- steady sliding ------------------------------------------------------------------------------
+
+
+@cache
+def _insert_steady_temperature(
+    law_steady_states: Function, auxiliary_steady_states: Function | None
+) -> Function:
+    """Return the steady states with NaN for the temperature rise.
+
+    The function `steady_temperature_rise` must solve an equation for the temperature rise, and the
+    distance from steady sliding does not contain it.
+    """
+
+    def steady_states(log_slip_rate: float, shift: float, p: Numbers) -> Numbers:
+        return (*law_steady_states(log_slip_rate, shift, p), math.nan)
+
+    if auxiliary_steady_states is None:
+        return steady_states
+
+    def all_steady_states(log_slip_rate: float, shift: float, p: Numbers) -> Numbers:
+        of_law = law_steady_states(log_slip_rate, shift, p)
+        return (*of_law, math.nan, *auxiliary_steady_states(log_slip_rate, p))
+
+    return all_steady_states
+
+
+@cached_per_scene
+def steady_temperature_rise(scene: SceneView, log_slip_rate: float) -> float:
+    r"""Compute the temperature rise of steady sliding.
+
+    Several temperatures may be steady at the same slip rate. The function follows the temperature
+    from its value at :math:`V_*`, which is zero, to the slip rate.
+
+    Parameters
+    ----------
+    scene : Scene
+        Scene whose temperature is an unknown.
+    log_slip_rate : float
+        Natural logarithm of the slip rate, :math:`\ln(V/V_*)`.
+
+    Returns
+    -------
+    float
+        Temperature rise :math:`\vartheta`. The result is NaN if the steady temperature cannot be
+        followed to the slip rate.
+    """
+    functions, p = scene.friction_functions, scene.friction_parameter_values
+    place, activated = scene.parts.law.state_count, temperature_parameter_values(scene)[1]
+
+    def warming(x: float, rise: float) -> float:
+        shift = -activated * inverse_temperature_change(rise)
+        steady = functions.steady_states(x, shift, p)
+        psis = (*steady[:place], rise, *steady[place + 1 :])
+        return float(functions.evolutions(x, psis, shift, math.exp(min(x, 0.0)), p)[place])
+
+    log_slip_rate = max(log_slip_rate, _MIN_HEATING_LOG_SLIP_RATE)
+    count = max(1, math.ceil(abs(log_slip_rate) / _MAX_LOG_SLIP_RATE_CHANGE))
+    # Without activation terms, only differences of temperature matter.
+    coldest = -1.0 if any(scene.parts.temperature.activation) else -math.inf
+    rise, before = 0.0, 0.0
+    for step in range(count + 1):
+        x = log_slip_rate * step / count
+        guess = 2.0 * rise - before if step > 1 else rise
+        before = rise
+        rise = _find_root_by_secants(partial(warming, x), guess)
+        if not coldest < rise < math.inf:
+            return math.nan
+    return rise
+
+
+def _find_root_by_secants(function: Callable[[float], float], guess: float) -> float:
+    """Find a root close to a guess, or return NaN."""
+    before, at = guess, guess + 1e-4 * (1.0 + abs(guess))
+    value_before, value = function(before), function(at)
+    if value_before == 0.0:
+        return before
+    step = math.inf
+    for _ in range(_MAX_SECANT_COUNT):
+        if value == value_before:
+            break
+        step = -value * (at - before) / (value - value_before)
+        before, value_before, at = at, value, at + step
+        if abs(step) <= _ROOT_TOLERANCE * abs(at):
+            return at
+        value = function(at)
+    # Rounding errors of the function may prevent further convergence.
+    return at if abs(step) <= _STAGNATION_TOLERANCE * (1.0 + abs(at)) else math.nan
+
+
+def thermal_friction_change(scene: SceneView, states: Numbers) -> float:
+    r"""Compute the change of steady friction by the temperature rise.
+
+    Parameters
+    ----------
+    scene : Scene
+        Scene with friction parameters.
+    states : tuple of float
+        States of steady sliding.
+
+    Returns
+    -------
+    float
+        Change of the friction coefficient, :math:`(a q_a - b q_b) \Lambda`. The change is zero if
+        the friction does not depend on temperature.
+    """
+    if not any(scene.parts.temperature.activation):
+        return 0.0
+    direct, evolution = temperature_parameter_values(scene)[:2]
+    rise = states[scene.parts.law.state_count]
+    return (direct - evolution) * inverse_temperature_change(rise)
