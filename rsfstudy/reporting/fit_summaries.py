@@ -1,4 +1,4 @@
-"""Tables and remarks on fits that commands print and reports show."""
+"""Tables of fits, and remarks on fits, for commands and reports."""
 
 from __future__ import annotations
 
@@ -21,12 +21,12 @@ from rsfstudy.reporting.tables import TextTable
 from rsfstudy.status import Status
 from rsfstudy.storage import read_declaration
 
-#: Maximum number of fits next to each other in a table.
+#: Maximum number of fits in one table. Each fit has one column.
 _MAX_FITS_PER_TABLE = 3
-#: Headings of the parameters in the final table, which has one row per fit.
+#: Headings of the parameters in the table that has one row per fit.
 _PARAMETERS_IN_FIT_SUMMARY = ("a", "b", "b1", "b2", "Dc")
-#: If the ratio of a standard error to the value of the parameter exceeds this limit, neither number
-#: is printed.
+#: Maximum ratio of the standard error of a parameter to its value. If the ratio is larger, neither
+#: the value nor the standard error is printed.
 _MAX_PRINTED_RELATIVE_ERROR = 1e4
 #: If the AIC values of two friction laws differ by more than this limit, the comparison of the laws
 #: is decisive.
@@ -46,9 +46,9 @@ def summarise_fits(dataset: xr.Dataset) -> Iterator[TextTable | str]:
     Yields
     ------
     TextTable or str
-        Parameter tables with up to three fits of the same step side by side. The tables are
-        followed by remarks and a comparison of the laws. If there are several steps or records, a
-        final table has one row per fit.
+        Tables of the fitted parameters, remarks on the fits, and a comparison of the laws. A
+        parameter table shows up to three fits of the same step. If there are several steps or
+        records, a final table has one row per fit.
     """
     places: dict[str, list[xr.Dataset]] = {}
     for one in split_into_single_fits(dataset):
@@ -73,7 +73,7 @@ def summarise_fits(dataset: xr.Dataset) -> Iterator[TextTable | str]:
 def _compare_laws_of_fits(fits: Sequence[xr.Dataset]) -> Iterator[str]:
     """Yield a sentence that names the law with the lowest AIC.
 
-    The sentence also reports whether the AIC difference to the second-best law is decisive.
+    The sentence also reports whether the AIC of the second-best law is higher by a decisive amount.
     """
     known = [(one["criterion"].item(), str(one["law"].item())) for one in fits]
     known = sorted(pair for pair in known if math.isfinite(pair[0]))
@@ -144,7 +144,7 @@ def _bracketed_units(parameter_name: str) -> str:
 
 
 def _describe_window(fit: xr.Dataset) -> str:
-    """Describe the velocities of the step and the fitted window."""
+    """Describe the velocities before and after the step, and the fitted window."""
     speeds = (fit[n].item() for n in ("velocity_before", "velocity_after"))
     ends = (fit[n].item() for n in ("window_begins", "window_ends"))
     rows = int(fit["rows_fitted"].item())
@@ -202,8 +202,9 @@ def _format_rounded_to_error(value: float, error: float) -> str:
 def _iterate_fit_remarks(fit: xr.Dataset) -> Iterator[str]:
     """Yield remarks on a fit.
 
-    The remarks include the message of the fit, the differences between windows, the credible
-    intervals of the posterior, and the result of the autocorrelation test.
+    The remarks include the message of the fit and the result of the autocorrelation test. If the
+    record was fitted with several windows, the remarks include the differences between the windows.
+    If there are posterior samples, the remarks include credible intervals.
     """
     law, message = fit["law"].item(), str(fit["message"].item())
     if status_label_of_fit(fit) == Status.ERRORS_NOT_VALID.label:
