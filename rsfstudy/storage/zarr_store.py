@@ -1,9 +1,9 @@
 """Writing of Zarr stores, for lattices that do not fit in memory.
 
-Zarr stores need the optional dependency ``rsfstudy[zarr]``. ``write_store`` writes a lattice slab
-by slab under a temporary name, reads each slab back, and finally renames the store. An existing
-store is never replaced, because a program that has opened the store would read a mixture of old and
-new chunks.
+Zarr stores require the optional dependency ``rsfstudy[zarr]``. The function ``write_store`` divides
+the lattice into slabs. It writes each slab to a store with a temporary name, reads the slab back
+and finally renames the store. An existing store is never replaced, because a program that has
+opened the existing store would read a mixture of old and new chunks.
 """
 
 from __future__ import annotations
@@ -31,7 +31,8 @@ from rsfstudy.study import Study
 #: Maximum number of values in a slab (32 MB of float64). A slab consists of complete rows along the
 #: first axis, and has at least one row.
 _MAX_VALUES_PER_SLAB = 4_000_000
-#: Options for writing a slab. The metadata are consolidated once, together with the reductions.
+#: Options for writing a slab. The metadata are not consolidated after each slab, but only once,
+#: when the reductions are written.
 _ZARR_WRITE_OPTIONS: Mapping[str, Any] = {"consolidated": False, "zarr_format": 3}
 
 #: Function that reads a slice of the cells, in row-major order.
@@ -53,7 +54,7 @@ def check_zarr_installed() -> None:
 
 
 def check_store_does_not_exist(path: Path) -> None:
-    """Check that a store does not exist.
+    """Check that the path of a new store does not exist.
 
     Parameters
     ----------
@@ -63,7 +64,7 @@ def check_store_does_not_exist(path: Path) -> None:
     Raises
     ------
     DataError
-        If the path exists.
+        If the path already exists.
     """
     if path.exists():
         raise DataError(
@@ -105,7 +106,7 @@ def write_store(
     Raises
     ------
     DataError
-        If the store cannot be written, or if the data that were read back differ from the lattice.
+        If the store cannot be written, or if the data in the written store differ from the lattice.
     """
     beside = path.with_name(f".{path.name}.new")
     try:
@@ -151,7 +152,8 @@ def _write_lattice(
     row = math.prod(within)  # number of cells
     rows = min(length, max(1, _MAX_VALUES_PER_SLAB // (width * row)))
     coords = _convert_strings_to_object_dtype(xr.Dataset(coords=coordinates))
-    # The fill values are the values of pending cells, so a lost chunk is read as pending cells.
+    # The fill values are the values of pending cells. If a chunk is lost, its cells are therefore
+    # read as pending cells.
     pending = build_lattice_variables(
         study, CellColumns.build_pending_cells(1, width), (1,) * len(study.shape)
     )
