@@ -11,20 +11,21 @@ Consider a small perturbation of slip, :math:`du`, that grows as :math:`\exp(p s
 Here :math:`D` and :math:`S` are the derivatives of strength and of the shift with respect to
 frictional stress. The matrix :math:`M` and the vectors :math:`E_x` and :math:`E_s` contain the
 derivatives of the state evolution with respect to the states, to :math:`x = \ln V` and to the
-shift. The sum of the states of the law acts on friction, so the vector of weights is :math:`1^T`.
-If the scene has a fluid, the weight of the pore pressure :math:`P`, the last state, is minus the
-derivative of strength with respect to :math:`P`, and the weight of porosity is 0. Because the
-pressure also changes the shift, the last column of :math:`M` includes the product of :math:`E_s`
-and the derivative of the shift with respect to :math:`P`.
+shift. Friction depends on the sum of the states of the law, so the weight of each of these states
+is 1 (the vector :math:`1^T`). If the scene has a fluid, the last state is the pore pressure
+:math:`P`. The weight of :math:`P` is minus the derivative of strength with respect to :math:`P`,
+and the weight of porosity is 0. The pressure also changes the shift. The last column of :math:`M`
+therefore includes the product of :math:`E_s` and the derivative of the shift with respect to
+:math:`P`.
 
-If an external load changes the normal stress by :math:`-dP`, the frictional stress changes by an
-additional term,
+If the loading changes the normal stress by :math:`-dP`, the frictional stress changes by the
+additional term
 
 .. math::
 
-    -\frac{F - S_P \, 1^T (p - M)^{-1} E_s}{D - S \, 1^T (p - M)^{-1} E_s} \, dP,
+    -\frac{F - S_P \, 1^T (p - M)^{-1} E_s}{D - S \, 1^T (p - M)^{-1} E_s} \, dP.
 
-in which :math:`F` and :math:`S_P` are the derivatives of strength and of the shift with respect to
+Here :math:`F` and :math:`S_P` are the derivatives of strength and of the shift with respect to
 :math:`P`.
 """
 
@@ -77,7 +78,7 @@ def linear_friction_response(
     steady_state: SteadySliding,
     evolution_derivatives: StateEvolutionDerivatives | None = None,
 ) -> tuple[PolynomialCoefficients, PolynomialCoefficients]:
-    r"""Compute the response of friction to small perturbations of slip.
+    r"""Compute the response of frictional stress to small perturbations of slip.
 
     Parameters
     ----------
@@ -86,7 +87,7 @@ def linear_friction_response(
     steady_state : SteadySliding
         Steady sliding of the scene.
     evolution_derivatives : StateEvolutionDerivatives, optional
-        Derivatives of the state evolution. By default the function computes the derivatives.
+        Derivatives of the state evolution. By default, the function computes these derivatives.
 
     Returns
     -------
