@@ -1,10 +1,10 @@
 """Digest of Python objects and of the code that the objects use.
 
-A digest identifies functions, classes and data by their content. All code is digested as compiled
-code, so comments, docstrings and line numbers do not affect a digest. The digest of a function
-includes every object whose name the function uses. Equal code has equal digests in a study file, a
-script, a notebook and a worker process. Modules that are imported inside functions are not
-included.
+A digest identifies functions, classes and data by their content. The digest of a function is
+computed from its compiled code, so comments, docstrings and line numbers do not affect the digest.
+The digest of a function includes every object whose name the function uses. If a function is
+defined in a study file, a script, a notebook or a worker process, its digest is the same. The
+digest does not include modules that a function imports inside its body.
 """
 
 from __future__ import annotations
@@ -25,8 +25,8 @@ import numpy as np
 
 _TYPES_DIGESTED_BY_REPR = (int, float, complex, str, bytes, bool, type(None), type(Ellipsis))
 _INSTRUCTIONS_READING_GLOBALS = ("LOAD_GLOBAL", "LOAD_NAME", "LOAD_FROM_DICT_OR_GLOBALS")
-#: Functions by type of object. Each function returns the contents of a container or the function
-#: inside a wrapper.
+#: Types of objects, each with a function. The function returns the contents of a container, or the
+#: function inside a wrapper.
 _GETTERS_OF_CONTAINER_PARTS: tuple[tuple[Any, Callable[[Any], Any]], ...] = (
     (property, lambda value: (value.fget, value.fset)),
     (functools.cached_property, lambda value: value.func),
@@ -43,11 +43,11 @@ class ObjectDigest:
     Parameters
     ----------
     reads_module : callable
-        Function that takes the name of a module and returns True if the digest includes code of
-        the module. Classes and functions of other modules are identified by name only.
+        Function that takes the name of a module and returns True if the digest includes the code of
+        this module. Classes and functions of any other module are identified by their names only.
     replace : callable, optional
-        Function that is applied to the values of global names and closures. The digest includes
-        the returned object instead of the value.
+        Function that takes the value of a global name or of a closure variable and returns a
+        replacement. The digest includes the replacement instead of the value.
     """
 
     def __init__(
@@ -61,7 +61,7 @@ class ObjectDigest:
         self._visited: dict[Hashable, tuple[int, Any]] = {}
 
     def hexdigest(self, length: int = 16) -> str:
-        """Return the first digits of the digest.
+        """Return the first hexadecimal digits of the digest.
 
         Parameters
         ----------
@@ -76,20 +76,20 @@ class ObjectDigest:
         return self._sha256.hexdigest()[:length]
 
     def add(self, value: Any, used_names: Iterable[str] = ()) -> Self:
-        """Add an object and all objects that it uses to the digest.
+        """Update the digest with an object and all objects that this object uses.
 
         Parameters
         ----------
         value : object
             Object to add.
         used_names : iterable of str, optional
-            Names that the surrounding code uses. If the object is a module, only these members of
-            the module are added.
+            Names that the code containing ``value`` uses. If ``value`` is a module, only the
+            members with these names are added.
 
         Returns
         -------
         ObjectDigest
-            The digest itself.
+            The same ``ObjectDigest``, so that calls can be chained.
         """
         if isinstance(value, _TYPES_DIGESTED_BY_REPR):
             self._add_texts(repr(value))
@@ -110,7 +110,7 @@ class ObjectDigest:
             self._sha256.update(text.encode(errors="surrogatepass") + b"\0")
 
     def _is_first_visit(self, key: Hashable, value: Any) -> bool:
-        """Return True if an object is new, or else add the number of its first visit."""
+        """Return True if an object is new. Otherwise add the number of its first visit."""
         if key in self._visited:
             self._add_texts(f"object {self._visited[key][0]}")
             return False
@@ -137,7 +137,7 @@ class ObjectDigest:
             self._add_state_of_instance(value, used_names)
 
     def _add_module(self, module: ModuleType, used_names: Iterable[str]) -> None:
-        """Add the used members of a module."""
+        """Add the members of a module that the code uses."""
         if not self._reads_module(module.__name__):
             self._add_texts(module.__name__)
         elif self._is_first_visit((id(module), *used_names), module):
@@ -191,8 +191,8 @@ class ObjectDigest:
 class _PicklerWithoutCachedProperties(pickle.Pickler):
     """Pickler that omits the cached properties of all objects.
 
-    The cached properties do not affect the results, and may be present in one process but not in
-    another.
+    Cached properties do not affect the results. They may be present in one process and absent in
+    another process.
     """
 
     def reducer_override(self, value: Any) -> Any:
@@ -226,9 +226,9 @@ def _has_docstring_slot(code: CodeType) -> bool:
 
 
 def _is_generated_class_member(member_name: str, value: Any) -> bool:
-    """Return True for members that Python, dataclasses or msgspec generate.
+    """Return True if Python, dataclasses or msgspec generated a class member.
 
-    Generated members do not affect the results.
+    The digest omits generated members, because they do not affect the results.
     """
     if member_name == "_abc_impl" or member_name.startswith("__annot"):
         return True
@@ -237,7 +237,10 @@ def _is_generated_class_member(member_name: str, value: Any) -> bool:
 
 
 def _names_used_by_code(code: CodeType) -> Iterator[str]:
-    """Yield the global and attribute names that a function and its nested functions use."""
+    """Yield the global names and attribute names that a function uses.
+
+    The names include the names that nested functions use.
+    """
     yield from code.co_names
     for constant in code.co_consts:
         if isinstance(constant, CodeType):
@@ -256,7 +259,7 @@ def global_names_read_by(code: CodeType) -> tuple[str, ...]:
     Returns
     -------
     tuple of str
-        Names without duplicates. Names of attributes are not included.
+        Names of the globals without duplicates. Names of attributes are not included.
     """
     reads = [
         i.argval for i in dis.get_instructions(code) if i.opname in _INSTRUCTIONS_READING_GLOBALS

@@ -13,13 +13,14 @@ def build_agreement_table(agreement: pd.DataFrame) -> TextTable:
     Parameters
     ----------
     agreement : pandas.DataFrame
-        Agreement by variable, as ``rsfstudy.rerun`` and ``rsfstudy.compare`` return it.
+        Table with one row per variable. The functions ``rsfstudy.rerun`` and ``rsfstudy.compare``
+        return such tables.
 
     Returns
     -------
     TextTable
-        Number of identical values of each variable, and number of values that differ by more than
-        the sum of both error estimates.
+        Table with one row per variable. Each row contains the number of identical values and the
+        number of values that differ by more than the sum of both error estimates.
     """
     rows = [
         {

@@ -1,7 +1,7 @@
 """Parsing of ``AXIS=VALUES`` assignments on the command line.
 
-The options ``--set``, ``--cell``, ``--columns`` and the options of a rig are converted to Python
-values.
+The functions convert the values of ``--set``, ``--cell``, ``--columns`` and the rig options to
+Python values.
 """
 
 from __future__ import annotations
@@ -20,20 +20,20 @@ _FLAG_VALUE_BY_WORD = {"true": True, "yes": True, "false": False, "no": False}
 
 
 def parse_overrides(study: Study, settings: tuple[str, ...]) -> dict[str, Any]:
-    """Parse the overrides of axes and fields of a study.
+    """Parse the values of ``--set`` for a study.
 
     Parameters
     ----------
     study : Study
-        Study whose axes define the valid labels.
+        Study whose axis labels are recognised in the values.
     settings : tuple of str
         Values of the option ``--set``.
 
     Returns
     -------
     dict
-        Value or list of values for each axis or field. If a value is the path of a CSV file with a
-        loading, the file is read.
+        Value or list of values of each axis or field. If the value of the field ``loading`` is the
+        path of a CSV file, the value is replaced by the loading in this file.
 
     Raises
     ------
@@ -54,7 +54,7 @@ def parse_overrides(study: Study, settings: tuple[str, ...]) -> dict[str, Any]:
 
 
 def parse_scene_field_assignments(settings: tuple[str, ...]) -> dict[str, Any]:
-    """Parse the fields of a scene.
+    """Parse the values of ``--set`` for a single scene.
 
     Parameters
     ----------
@@ -79,7 +79,7 @@ def parse_scene_field_assignments(settings: tuple[str, ...]) -> dict[str, Any]:
 def _parse_each_assignment(
     settings: tuple[str, ...], parse_assignment: Callable[[str], tuple[str, Any]]
 ) -> dict[str, Any]:
-    """Parse assignments, and reject a name that is set twice."""
+    """Parse assignments, and raise an error if a name is set twice."""
     found: dict[str, Any] = {}
     for text in settings:
         name, given = parse_assignment(text)
@@ -90,20 +90,20 @@ def _parse_each_assignment(
 
 
 def parse_loading_file(file_path: Any, rig: Rig | None) -> Any:
-    """Read a loading from a CSV file.
+    """Read a loading if a value is the path of a CSV file.
 
     Parameters
     ----------
     file_path : object
         Value of the field ``loading``.
     rig : Rig or None
-        Rig that defines the units of the file.
+        Rig that converts the values in the file to dimensionless values.
 
     Returns
     -------
     object
-        If the value is the path of a CSV file, the loading in this file. The name of the loading is
-        the name of the file. Any other value is returned unchanged.
+        Loading, if the value is the path of a CSV file. The loading has the name of the file. Any
+        other value is returned unchanged.
     """
     path = Path(str(file_path))
     return read_loading_file(path, rig) if path.suffix.lower() == ".csv" else file_path
@@ -118,12 +118,12 @@ def read_loading_file(path: Path, rig: Rig | None) -> UserLoading:
         File. A table with a column of times is a record of the load point. Any other table is a
         protocol.
     rig : Rig or None
-        Rig that defines the units of the file.
+        Rig that converts the values in the file to dimensionless values.
 
     Returns
     -------
     UserLoading
-        Loading. The name of the loading is the name of the file.
+        Loading with the name of the file.
     """
     read = history if has_time_column(path) else read_protocol
     return read(path, rig, name=path.stem)
@@ -135,12 +135,12 @@ def parse_rig(option_texts: Mapping[str, str]) -> Rig:
     Parameters
     ----------
     option_texts : mapping of str to str
-        Option values by name. Options that do not belong to the rig are ignored.
+        Option values by option name. Options that do not belong to the rig are ignored.
 
     Returns
     -------
     Rig
-        Rig with the quantities that the options specify.
+        Rig with the specified quantities.
 
     Raises
     ------
@@ -225,7 +225,8 @@ def parse_column_assignments(text: str | None) -> dict[str, str] | None:
     Returns
     -------
     dict of str to str or None
-        Column headings by quantity. The value is None if the option is empty.
+        Column headings by quantity. The function returns None if the option was not used or is
+        empty.
 
     Raises
     ------
@@ -246,7 +247,8 @@ def parse_axis_assignment(text: str, known_labels: Collection[str]) -> tuple[str
         Assignment ``AXIS=VALUES``. The values are a label, a single value, a comma-separated list,
         a range ``start:stop:count``, or a logarithmic range ``start:stop:count:log``.
     known_labels : collection of str
-        Labels of the axes. A label may contain commas.
+        Labels of the axes. The function does not split a known label, because labels may contain
+        commas.
 
     Returns
     -------

@@ -1,7 +1,8 @@
-"""Click classes for commands whose modules are imported when they are needed.
+"""Click classes that import the module of a command only when it is needed.
 
-``rsfstudy --help`` imports the modules of all commands, but none of the libraries that the commands
-use. ``rsfstudy NAME`` imports only the module of one command.
+The command ``rsfstudy NAME`` imports only the module of the command ``NAME``. The command
+``rsfstudy --help`` imports the modules of all commands. It does not import the large libraries,
+because the functions of the commands import them.
 """
 
 from __future__ import annotations
@@ -24,7 +25,7 @@ class LazyCommands(MutableMapping[str, click.Command]):
     """
 
     def __init__(self) -> None:
-        """Create the mapping without importing any command."""
+        """Create the mapping without importing the modules of the commands."""
         self._loaded: dict[str, click.Command] = {}
         self._module_by_name = dict(MODULE_BY_COMMAND)
 
@@ -37,7 +38,7 @@ class LazyCommands(MutableMapping[str, click.Command]):
         return self._loaded[name]
 
     def __setitem__(self, name: str, command: click.Command) -> None:
-        """Add a command that is already imported."""
+        """Add a command whose module has already been imported."""
         self._module_by_name.setdefault(name, "")
         self._loaded[name] = command
 
@@ -78,9 +79,9 @@ class CommandGroup(click.Group):
         return list(self.commands)
 
     def invoke(self, context: click.Context) -> Any:
-        """Call a command, and convert Ctrl-C and signals to an error.
+        """Call a command, and raise ``Interrupted`` after Ctrl-C or a signal.
 
-        Without the conversion, Click would print an empty line before its message.
+        If Click handled the interruption, it would print an empty line before its message.
 
         Parameters
         ----------
@@ -104,7 +105,7 @@ class CommandGroup(click.Group):
 
 
 class Command(click.Command):
-    """Command whose function receives its arguments and options as one object."""
+    """Command that passes its arguments and options to a function as one object."""
 
     def invoke(self, context: click.Context) -> int:
         """Call the function of the command.

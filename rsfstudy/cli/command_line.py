@@ -1,4 +1,4 @@
-"""Entry point of the command line, with the error messages and exit statuses of all commands."""
+"""Entry point of the command line: error messages and exit statuses."""
 
 from __future__ import annotations
 
@@ -44,8 +44,9 @@ def cli() -> None:
 def main() -> None:
     """Run the command line and exit with the status of the command.
 
-    Errors are printed as a single message without a traceback. If the environment variable
-    ``RSFSTUDY_TRACEBACK`` is set, the traceback of an unexpected exception is printed.
+    If an error ends the command, the function prints a message without a traceback. If the
+    environment variable ``RSFSTUDY_TRACEBACK`` is set, the function prints the traceback of an
+    unexpected exception.
     """
     warnings.filterwarnings("always", category=UserWarning, module="rsfstudy")
     warnings.filterwarnings("ignore", category=IncompleteWarning)  # commands print it themselves
@@ -81,7 +82,7 @@ def main() -> None:
 
 
 def _describe_unexpected_error(error: Exception) -> str:
-    """Return a message for an exception that no command handles."""
+    """Format the message for an exception that the command did not handle."""
     if isinstance(error, OSError) and error.strerror:
         place = f" ({shorten_text(error.filename)})" if error.filename else ""
         remedy = "Check that the directory exists, is writable, and has free space."
@@ -95,9 +96,10 @@ def _describe_unexpected_error(error: Exception) -> str:
 
 
 def _raise_signal_interrupt(signal_number: int, _frame: object) -> None:
-    """Interrupt the command, and ignore all further signals.
+    """Raise an interrupt when a signal arrives, and ignore later signals.
 
-    The program ``timeout`` sends two signals, and the second signal must not interrupt the cleanup.
+    The program ``timeout`` sends two signals. The second signal must not interrupt the cleanup
+    after the first signal.
     """
     for other in _SIGNALS_THAT_END_COMMAND:
         signal.signal(other, signal.SIG_IGN)
@@ -105,9 +107,10 @@ def _raise_signal_interrupt(signal_number: int, _frame: object) -> None:
 
 
 class _WarnOnceHandler(logging.Handler):
-    """Log handler that prints each message of a library once, as a warning.
+    """Log handler that prints each log message as a warning, but only once.
 
-    Matplotlib logs the same message for each text label in a figure.
+    The handler is needed because Matplotlib repeats the same message for each text label in a
+    figure.
     """
 
     def __init__(self, level: int) -> None:

@@ -20,13 +20,13 @@ _MIN_WIDTH, _MAX_WIDTH = 16, 1000
 class PlainConsole(Console):
     """Console that prints text literally, including square brackets.
 
-    Control characters are printed as escape sequences, because they could change the state of the
-    terminal.
+    Control characters could change the state of the terminal. The console therefore prints control
+    characters as visible escape sequences.
     """
 
     @property
     def size(self) -> ConsoleDimensions:
-        """Terminal size, with the width limited to a fixed range.
+        """Size of the terminal. The width is limited to a fixed range.
 
         The environment variable ``COLUMNS`` overrides the width of the terminal.
         """
@@ -78,7 +78,7 @@ class PlainConsole(Console):
 
 
 def make_text_printable(text: str) -> str:
-    """Shorten a long string, and escape its control characters.
+    """Shorten a string if it is long, and escape its control characters.
 
     Parameters
     ----------
@@ -88,7 +88,8 @@ def make_text_printable(text: str) -> str:
     Returns
     -------
     str
-        Text with at most about 5,000 characters and visible escape sequences.
+        String of at most about 5,000 characters, in which control characters are replaced by
+        visible escape sequences.
     """
     return escape_control_characters(shorten_text(text, _MAX_PRINTED_CHARACTERS))
 

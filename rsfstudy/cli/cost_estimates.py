@@ -1,7 +1,7 @@
-"""Descriptions of the cost of a study.
+"""Estimates of the work and the computing time of a study.
 
-The cost is based on the measured times of cells in earlier runs. If there are no measured times,
-the description contains a rough estimate.
+The computing time is estimated from the measured times of cells in earlier runs. If there are no
+measured times, the estimate is based on typical times.
 """
 
 from __future__ import annotations
@@ -18,33 +18,35 @@ from rsfstudy.execution import CellPlan
 from rsfstudy.motion import Engine
 from rsfstudy.storage import CellTimings
 
-#: Typical speed-up of the compiled engine relative to SciPy, by measure. The page of benchmarks
-#: reports speed-ups by factors from 7 to 12 for critical steps, and from 31 to 72 for limit cycles.
-#: The speed-up increases with the accuracy of the computation.
+#: Typical speed-up of the compiled engine relative to the SciPy engine, by name of the measure. We
+#: measured speed-ups by factors from 7 to 12 for critical steps, and from 31 to 72 for limit
+#: cycles. The speed-up is larger at higher accuracy.
 _COMPILED_SPEEDUP_BY_MEASURE = {"critical_step": 10, "limit_cycle": 30}
-#: Name of the measure that compares the integrators of SciPy. The measure needs the SciPy engine.
+#: Name of the measure that compares the integrators of SciPy. Studies with this measure can only
+#: use the SciPy engine.
 _NAME_OF_MEASURE_REQUIRING_SCIPY_ENGINE = "work_precision"
-#: Minimum computing time in s for which the faster engine is suggested.
+#: Estimated computing time in s. If a study takes longer than this time, the commands suggest the
+#: compiled engine.
 _MIN_SECONDS_FOR_FASTER_ENGINE_HINT = 60.0
 
 
 @dataclass(frozen=True)
 class CostEstimate:
-    """Expected work and computing time of a study on one core.
+    """Estimated work and computing time of a study on one core.
 
     Parameters
     ----------
     rhs_evaluations : int
         Expected number of right-hand-side evaluations, rounded to two significant digits.
     seconds : float
-        Computing time in s.
+        Estimated computing time in s.
     cell_count : int
         Number of distinct cells of the study.
     measured_cells : int
-        Number of cells of the study whose computing times have been measured.
+        Number of cells of the study with a measured computing time.
     timed_cells : int
-        Number of cells with measured times in the journal. If the number is 0, the computing time
-        is a rough estimate.
+        Number of all cells with a measured computing time in the journal. If this number is 0, the
+        estimated computing time is based on typical times.
     journal : Path
         Path of the journal.
     """
@@ -65,13 +67,13 @@ def estimate_study_cost(cell_plan: CellPlan, output_directory: Path) -> CostEsti
     cell_plan : CellPlan
         Cells of the study.
     output_directory : Path
-        Directory of results. If the directory contains cells of an earlier run with the same
-        accuracy and engine, their measured times are used.
+        Directory of results. If the directory contains the journal of an earlier run with the same
+        accuracy and engine, the estimate uses the measured times in this journal.
 
     Returns
     -------
     CostEstimate
-        Expected work, and measured or estimated time.
+        Estimated work and computing time.
     """
     work, guess = cell_plan.estimate_evaluations_and_time()
     work = round(work, 2 - len(str(work)))  # more digits would not be significant
@@ -126,7 +128,7 @@ def describe_study_cost(cell_plan: CellPlan, output_directory: Path) -> str:
     Returns
     -------
     str
-        Number of right-hand-side evaluations, and measured or estimated time.
+        Text with the expected number of right-hand-side evaluations and the computing time.
     """
     cost = estimate_study_cost(cell_plan, output_directory)
     rtol, time = cell_plan.study.accuracy.rtol, f"{format_duration(cost.seconds)} on one core"
@@ -139,7 +141,7 @@ def describe_study_cost(cell_plan: CellPlan, output_directory: Path) -> str:
 
 
 def compiled_engine_hint(cell_plan: CellPlan, output_directory: Path) -> str:
-    """Return a hint that the compiled engine is faster.
+    """Return a hint for the user that the compiled engine is faster.
 
     Parameters
     ----------
@@ -151,9 +153,9 @@ def compiled_engine_hint(cell_plan: CellPlan, output_directory: Path) -> str:
     Returns
     -------
     str
-        Hint for the user. The text is empty if the study cannot use the compiled engine or already
-        uses it, if the directory contains cells of the study, or if the estimated time is at most
-        60 s.
+        Hint, or an empty string. The string is empty if the study cannot use the compiled engine or
+        already uses this engine. The string is also empty if the directory contains cells of the
+        study, or if the estimated computing time is at most 60 s.
     """
     measure, engine = cell_plan.study.measure.describe()["name"], cell_plan.study.accuracy.engine
     kept = output_directory / f"{cell_plan.study.name}.cells.sqlite"
@@ -200,7 +202,7 @@ def format_duration(seconds: float) -> str:
 
 
 def _timings_match_accuracy_and_engine(cell_plan: CellPlan, cell_timings: CellTimings) -> bool:
-    """Return True if the timings were measured with the rtol and engine of a plan."""
+    """Return True if timings were measured at the accuracy and engine of a plan."""
     asked = cell_plan.study.accuracy
     return cell_timings.fingerprint.get("rtol") == asked.rtol and cell_timings.fingerprint.get(
         "engine"
@@ -218,8 +220,8 @@ def describe_missing_engine_packages(engine_name: str) -> str:
     Returns
     -------
     str
-        Missing package and the command to install the package. The text is empty if the engine can
-        be used.
+        Name of the missing package and the command that installs this package. The string is empty
+        if the engine can be used.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""Checks of the data files that ``simulate`` and ``fit`` write next to their figures."""
+"""Checks before the commands ``simulate`` and ``fit`` overwrite data files."""
 
 from __future__ import annotations
 
@@ -14,21 +14,22 @@ from rsfstudy.errors import InvalidValue
 def check_output_may_be_replaced(
     output_path: Path, is_of_same_kind: Callable[[xr.Dataset], bool], kind_of_contents: str
 ) -> None:
-    """Check that an output file does not contain another kind of data.
+    """Check that a command does not overwrite a different kind of data.
 
     Parameters
     ----------
     output_path : Path
-        File to write, which need not exist.
+        File that the command will write. The file need not exist.
     is_of_same_kind : callable
-        Function that returns True if a dataset may be replaced.
+        Function that takes the dataset in the existing file and returns True if the command may
+        replace the dataset.
     kind_of_contents : str
-        Noun for the contents, such as "motion".
+        Noun for the data that the command writes, such as "motion".
 
     Raises
     ------
     InvalidValue
-        If the file contains another kind of data.
+        If the file exists and contains a different kind of data.
     """
     check_regular_file("--output", output_path)
     if not output_path.exists():

@@ -22,13 +22,13 @@ from rsfstudy.quantities import units_or_scale_of_variable
 def to_csv(dataset: xr.Dataset, path: Path) -> None:
     """Write the table of a dataset to a CSV file.
 
-    The header contains the units in the form that ``read_table`` reads. Numbers are written with
-    full precision, and status codes are written as labels.
+    The header contains the name and the units of each column, in a form that ``read_table`` can
+    read. Numbers are written with full precision, and status codes are written as labels.
 
     Parameters
     ----------
     dataset : xarray.Dataset
-        Results, a motion or a fit.
+        Dataset with the results of a study, a motion or a fit.
     path : Path
         CSV file to write.
     """
@@ -47,21 +47,22 @@ def to_csv(dataset: xr.Dataset, path: Path) -> None:
 def to_mat(dataset: xr.Dataset, path: Path) -> None:
     """Write all variables of a dataset to a MATLAB file.
 
-    The dimensions of each array keep their order. The structures ``units`` and ``dimensions``
-    contain the units and the names of the dimensions of each variable. The structure ``attributes``
-    contains the attributes of the dataset.
+    The dimensions of each array keep their order. The MATLAB structure ``units`` contains the units
+    of each variable. The structure ``dimensions`` contains the dimension names of each variable.
+    The structure ``attributes`` contains the attributes of the dataset.
 
     Parameters
     ----------
     dataset : xarray.Dataset
-        Results, a motion or a fit.
+        Dataset with the results of a study, a motion or a fit.
     path : Path
         MATLAB file to write.
 
     Raises
     ------
     InvalidValue
-        If a name is not valid in MATLAB. All names that rsfstudy defines are valid.
+        If the name of a variable or attribute is not valid in MATLAB. All names that rsfstudy
+        defines are valid.
     """
     from scipy.io import savemat
 

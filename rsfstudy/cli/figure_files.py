@@ -50,19 +50,20 @@ def write_figure(figure: Figure, path: Path, style: str | None = None) -> None:
 
 
 def default_figure_path(results_path: Path, options: CommandOptions) -> Path:
-    """Return the path of the figure in the directory of the results.
+    """Return the default path of the figure of a results file.
 
     Parameters
     ----------
     results_path : Path
-        Path of the results file, which need not exist.
+        Path of the results file. The file need not exist.
     options : CommandOptions
         Arguments and options of the command.
 
     Returns
     -------
     Path
-        Path with the format of ``--figure``.
+        Path in the directory of the results file. The option ``--figure`` determines the suffix of
+        the path.
     """
     name = results_path.name.removesuffix(".nc").removesuffix(".zarr")
     words = [name, options.variable, options.form or Defaults.FIGURE_FORMATS[0]]
@@ -70,7 +71,7 @@ def default_figure_path(results_path: Path, options: CommandOptions) -> Path:
 
 
 def load_user_figure_or_default(dataset: xr.Dataset, study_file: Path | None) -> Any:
-    """Load the user-defined figure of a dataset.
+    """Load the figure function of a study, or choose a default figure.
 
     Parameters
     ----------
@@ -82,9 +83,9 @@ def load_user_figure_or_default(dataset: xr.Dataset, study_file: Path | None) ->
     Returns
     -------
     callable, str or None
-        Function that draws the figure. The value is None if the study uses a figure of rsfstudy. If
-        the figure cannot be loaded and the user passed no study file, the function prints a note
-        and returns "lines", so that maps or lines are drawn.
+        Function that draws the figure, or None if the study uses a built-in figure. If the figure
+        cannot be loaded and the user passed no study file, ``load_user_figure_or_default`` prints a
+        note and returns "lines". The results are then drawn as maps or lines.
     """
     if StoredDataset(dataset).declaration.plot in FIGURE_NAMES:
         return None
@@ -101,7 +102,7 @@ def load_user_figure_or_default(dataset: xr.Dataset, study_file: Path | None) ->
 def draw_and_save_figure(
     dataset: xr.Dataset, figure_path: Path, options: CommandOptions, user_figure: Any
 ) -> list[Path]:
-    """Draw the figure of results, and save the figure.
+    """Draw the figure of a results dataset, and save the figure.
 
     Parameters
     ----------
@@ -112,7 +113,7 @@ def draw_and_save_figure(
     options : CommandOptions
         Arguments and options of the command.
     user_figure : callable, str or None
-        Figure to draw instead of the figure that the study declares.
+        Figure that replaces the figure in the declaration of the study.
 
     Returns
     -------
@@ -131,7 +132,7 @@ def draw_and_save_figure(
 
 
 def load_user_figure(results: xr.Dataset, study_file: str | Path | None = None) -> Any:
-    """Load the user-defined figure of a dataset from a study file.
+    """Load the custom figure of a dataset from the Python file of its study.
 
     Parameters
     ----------
@@ -143,7 +144,7 @@ def load_user_figure(results: xr.Dataset, study_file: str | Path | None = None) 
     Returns
     -------
     callable or None
-        Function that draws the figure. The value is None if the study uses a figure of rsfstudy.
+        Function that draws the figure, or None if the study uses a built-in figure.
 
     Raises
     ------
@@ -152,8 +153,8 @@ def load_user_figure(results: xr.Dataset, study_file: str | Path | None = None) 
 
     Notes
     -----
-    The dataset contains the path of the study file, but the function never executes this path,
-    because the results may come from an untrusted source.
+    The dataset contains the path of a study file. The function never executes the file at this
+    path, because the results may come from an untrusted source.
     """
     name, named_in = (
         StoredDataset(results).declaration.plot,

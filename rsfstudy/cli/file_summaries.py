@@ -1,4 +1,4 @@
-"""Summary of a file with results, fits, a motion, or results of a single scene."""
+"""Summary of a file that contains results, fits, a motion or a single scene."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ from rsfstudy.status import Status
 
 @dataclass(frozen=True)
 class FileSummary(CommandResult):
-    """Contents of a file.
+    """Dataset in a file, as the command ``show`` displays the dataset.
 
     Parameters
     ----------
@@ -39,7 +39,7 @@ class FileSummary(CommandResult):
 
     @property
     def exit_status(self) -> int:
-        """Failure if a cell, a fit or a motion failed, or if a cell has not been computed."""
+        """Exit status of the command. The status is 1 if a result failed or is missing."""
         kind = classify_contents(self.dataset)
         if kind == "results":
             succeeded = StudyResults(self.dataset, self.file).is_complete

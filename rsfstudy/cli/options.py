@@ -1,6 +1,7 @@
 """Options that several commands share.
 
-Slow modules are imported only when the value of an option is checked.
+The functions that check option values import slow modules. The import of this module is therefore
+fast.
 """
 
 from __future__ import annotations
@@ -38,7 +39,7 @@ class CommandOptions(SimpleNamespace):
         return shlex.join(["rsfstudy", *sys.argv[1:]])
 
     def collect_option_values(self, *option_names: str) -> dict[str, Any]:
-        """Return the values of selected options.
+        """Return the values of selected options as a dictionary.
 
         Parameters
         ----------
@@ -59,7 +60,7 @@ class CommandOptions(SimpleNamespace):
 
     @property
     def rig_option_texts(self) -> dict[str, str]:
-        """Rig options that the user specified, by name."""
+        """Values of the rig options that the user specified, by option name."""
         return {
             name: text
             for name in EXAMPLE_VALUES_OF_RIG_OPTIONS
@@ -68,7 +69,7 @@ class CommandOptions(SimpleNamespace):
 
 
 class FilePath(click.Path):
-    """Parameter type for nonempty paths that the operating system accepts.
+    """Click parameter type for paths.
 
     Parameters
     ----------
@@ -90,7 +91,7 @@ class FilePath(click.Path):
         value : str or Path
             Value of the parameter.
         param : click.Parameter or None
-            Parameter, whose name is used in error messages.
+            Parameter of the command. Its name is part of the error message.
         ctx : click.Context or None
             Context of the command.
 
@@ -117,8 +118,8 @@ def combine_option_decorators(
     Parameters
     ----------
     *option_decorators : callable
-        Decorators that ``click.option`` or ``click.argument`` returns. The help lists the options
-        in the given order.
+        Decorators that ``click.option`` or ``click.argument`` returned. The help text lists the
+        options in the same order.
 
     Returns
     -------
@@ -235,7 +236,8 @@ study_file_option = click.option(
     "itself.",
 )
 
-#: Mapping from the names of abscissae on the command line to variable names, if the names differ.
+#: Names of variables by their names on the command line. The mapping contains only abscissae that
+#: have a different name on the command line.
 _ABSCISSA_VARIABLES = {"displacement": "load_point_displacement"}
 abscissa_option = click.option(
     "--against",
@@ -249,7 +251,7 @@ abscissa_option = click.option(
 def _check_style_option(
     _context: click.Context, _option: click.Parameter, value: str | None
 ) -> str | None:
-    """Check a plotting style before the command starts, and return the style.
+    """Check a plotting style, and return the style.
 
     Raises
     ------
@@ -344,7 +346,7 @@ def make_set_scene_fields_option(
     return click.option("--set", "settings", multiple=True, metavar="FIELD=VALUE", help=help_text)
 
 
-#: Example values of the rig options, for the help texts.
+#: Example values of the rig options. The help texts show these values.
 EXAMPLE_VALUES_OF_RIG_OPTIONS = {
     "normal_stress": "5 MPa",
     "slip_distance": "10 um",

@@ -1,4 +1,7 @@
-"""Functions that print lines and tables, and import the consoles when they are called."""
+"""Printing of lines and tables.
+
+The console modules are imported only when a function of this module is called.
+"""
 
 from __future__ import annotations
 
@@ -19,8 +22,8 @@ def print_line(text: str, style: str = "", soft_wrap: bool = False) -> None:
     style : str, optional
         Style, such as "bold" or "red".
     soft_wrap : bool, default: False
-        If True, long lines are not wrapped. Lines with paths and commands should not be wrapped, so
-        that users can copy them.
+        If True, long lines are not wrapped. Pass True for lines that contain a path or a command,
+        so that users can copy the path or the command.
     """
     from rsfstudy.cli.console import stdout_console
 
@@ -46,7 +49,7 @@ def print_pieces(pieces: Iterable[SummaryTableOrSentence]) -> None:
     Parameters
     ----------
     pieces : iterable of (TextTable, mapping of str to str, or str)
-        Parts to print. Empty tables and empty mappings are not printed.
+        Items to print. Empty tables and empty mappings are not printed.
     """
     from rsfstudy.cli.table_layout import print_summary_piece
 

@@ -1,7 +1,8 @@
-"""Results of commands, and their output as text or as JSON.
+"""Results of commands, and functions that print a result as text or as JSON.
 
-Each command first computes a result, which includes the exit status, and then prints the result.
-The printed text and the JSON output are generated from the same result.
+Each command first creates a result object and then prints the result. The result object also
+determines the exit status of the command. The printed text and the JSON output are generated from
+the same result object.
 """
 
 from __future__ import annotations
@@ -16,7 +17,7 @@ import click
 from rsfstudy.errors import RunError
 
 EXIT_STATUS_OK, EXIT_STATUS_FAILED = 0, 1
-#: Version of the JSON output. The version changes if a key is removed, renamed or redefined.
+#: Version of the JSON format. The version is increased if a key is removed, renamed or redefined.
 JSON_FORMAT = 1
 
 
@@ -83,7 +84,7 @@ def output_result(result: Result, print_result: Callable[[Result], None], as_jso
 
 
 def to_json_value(value: Any) -> Any:
-    """Convert a value to a value that JSON can represent.
+    """Convert a value to a type that JSON can represent.
 
     Parameters
     ----------
@@ -93,8 +94,8 @@ def to_json_value(value: Any) -> Any:
     Returns
     -------
     object
-        Mappings, sequences and arrays are converted element by element. NaN and infinite numbers
-        become None. Values of other types, such as paths, become strings.
+        Converted value. The function converts mappings, sequences and arrays element by element.
+        NaN and infinite numbers become None. Values of other types, such as paths, become strings.
     """
     if hasattr(value, "tolist"):  # a scalar or an array of NumPy
         value = value.tolist()

@@ -1,4 +1,4 @@
-"""Declaration of a study before a run, with its expected cost."""
+"""Declaration of a study and estimated cost of a run."""
 
 from __future__ import annotations
 
@@ -16,20 +16,21 @@ from rsfstudy.execution import CellPlan
 from rsfstudy.reporting import describe_scene_and_rig_fields
 from rsfstudy.rig import Rig
 
-#: Maximum number of printed values of an axis.
+#: Maximum number of values that are printed for each axis.
 _MAX_PRINTED_AXIS_POINTS = 40
 
 
 @dataclass(frozen=True)
 class StudyDeclaration(CommandResult):
-    """Declaration of a study, and the plan of its cells.
+    """Declaration of a study, as the command ``show`` displays it.
 
     Parameters
     ----------
     study : Study
-        Study.
+        Study to display.
     output_directory : Path
-        Directory of results. Measured times in this directory are used for the cost.
+        Directory of results. If the directory contains measured times of earlier runs, the cost
+        estimate uses these times.
     """
 
     study: Study
@@ -38,12 +39,12 @@ class StudyDeclaration(CommandResult):
 
     @cached_property
     def plan(self) -> CellPlan:
-        """Cells of the study."""
+        """Plan of the cells of the study."""
         return CellPlan(self.study)
 
     @cached_property
     def varied_fields(self) -> set[str]:
-        """Names of the fields that vary between cells."""
+        """Names of the scene fields and measure fields that differ between cells."""
         varied = {field for axis in self.study.axes for field in axis.fields}
         if self.study.scene_builder:
             scales = self.study.scene_builder.build_scale_coordinates()

@@ -1,4 +1,4 @@
-"""Studies and worker pools that the options of a command describe."""
+"""Creation of studies and worker pools from the options of a command."""
 
 from __future__ import annotations
 
@@ -44,9 +44,10 @@ def selected_study_names(options: CommandOptions) -> list[str]:
 
 
 def build_study_from_options(study_name: str, options: CommandOptions) -> Study:
-    """Load a study, and apply the overrides and the rig of the options.
+    """Load a study, and apply the values of ``--set`` and the rig options.
 
-    If the rig has a stiffness, the stiffness of the rig replaces the values of a stiffness axis.
+    If the rig has a stiffness and the study has a stiffness axis, the stiffness of the rig replaces
+    the values of the axis.
 
     Parameters
     ----------
@@ -58,7 +59,7 @@ def build_study_from_options(study_name: str, options: CommandOptions) -> Study:
     Returns
     -------
     Study
-        Study with the overrides.
+        Study with the changed values.
 
     Raises
     ------
@@ -98,7 +99,7 @@ def open_worker_pool(options: CommandOptions, log_path: Path | None = None) -> I
     Yields
     ------
     WorkerPool
-        Worker processes, or the cluster that the user specified.
+        Pool of local worker processes or, if the user specified a scheduler, of cluster workers.
 
     Raises
     ------
@@ -117,8 +118,8 @@ def open_worker_pool(options: CommandOptions, log_path: Path | None = None) -> I
 def read_results_file(file: Path, study_file: Path | None) -> xr.Dataset:
     """Read a results file.
 
-    If a study file is passed, the file is executed first, because the file may define laws or other
-    components of the scenes.
+    If a study file is passed, the function first executes the study file, because the study file
+    may define laws or other parts of the scenes.
 
     Parameters
     ----------

@@ -1,7 +1,7 @@
-"""Results of one study, as commands print them and as they appear in JSON.
+"""Results of one study, for printed output and for JSON output.
 
-The functions whose names begin with ``print`` print a part of the results. All other functions only
-collect the results.
+The functions whose names begin with ``print`` print one section of the results. The other functions
+collect the results without printing.
 """
 
 from __future__ import annotations
@@ -38,7 +38,8 @@ class StudyResults:
     dataset : xarray.Dataset
         Results of the study.
     file : str
-        Path of the results file, for the commands that recompute failed cells.
+        Path of the results file. The path is part of the shell commands that recompute failed
+        cells.
     """
 
     dataset: xr.Dataset
@@ -71,7 +72,7 @@ class StudyResults:
 
     @cached_property
     def verdicts(self) -> pd.DataFrame:
-        """Verdicts on the claims of the study."""
+        """Table of the claims of the study and their verdicts."""
         return check(self.dataset)
 
     def json_fields(self) -> dict[str, Any]:
@@ -80,7 +81,7 @@ class StudyResults:
         Returns
         -------
         dict of str to object
-            Status counts, reductions, missing reductions and failed cells.
+            Number of cells by status, reductions, missing reductions and failed cells.
         """
         return summarise_study_as_fields(self.dataset, self.file)
 
@@ -139,7 +140,7 @@ def print_study_name(results: StudyResults) -> None:
 
 
 def print_verdicts(verdicts: pd.DataFrame) -> None:
-    """Print claims and the number of checked claims.
+    """Print a table of the claims, and the number of checked claims.
 
     Parameters
     ----------
@@ -174,7 +175,7 @@ def print_failures(results: StudyResults, with_commands: bool = True) -> None:
     results : StudyResults
         Results of the study.
     with_commands : bool, default: True
-        If False, the commands are not printed.
+        If False, the function does not print the commands.
     """
     if results.pending_count:
         cells = pluralize(results.dataset["status"].size, "cell")

@@ -1,7 +1,7 @@
-"""Tables for terminals of any width.
+"""Layout of printed tables for terminals of any width.
 
-Each column is at least as wide as its longest number, name or word. If the columns do not fit next
-to each other, each row is printed as a list of headings and values.
+Each column is at least as wide as the longest number, name or word in the column. If the table is
+wider than the terminal, each row is printed as a list of headings and values.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from rich.text import Text
 from rsfstudy.cli.console import make_text_printable, stdout_console
 from rsfstudy.reporting import SummaryTableOrSentence, TextTable
 
-#: Number of characters between columns, and minimum width of a column of prose.
+#: Number of characters between two columns, and minimum width of a column that contains prose.
 _CHARACTERS_BETWEEN_COLUMNS, _MIN_WIDTH_OF_PROSE_COLUMN = 2, 20
 
 
@@ -98,9 +98,9 @@ def _print_row_as_list(row: Mapping[str, str], prose_columns: Collection[str], s
 
 
 def _longest_unbreakable_length(text: str, is_prose: bool) -> int:
-    """Return the length of the longest part of a string that cannot be split.
+    """Return the length of the longest unbreakable piece of a string.
 
-    Prose can be split between words. Any other string must not be split.
+    Prose can be split between words. A number or a name cannot be split.
     """
     return max(map(cell_len, text.split() if is_prose else [text]), default=0)
 

@@ -1,4 +1,4 @@
-"""Build command that adds the commit to wheels of the package.
+"""Setuptools build command that stores the commit in wheels of the package.
 
 Setuptools loads this module by its path, without importing the package. No other module imports
 this module.
@@ -13,9 +13,10 @@ from setuptools.command.build_py import build_py
 
 
 class BuildWithCommit(build_py):  # type: ignore[misc]  # Setuptools has no type hints.
-    """Build command that writes the commit to ``commit.txt`` in the package.
+    """Setuptools build command that writes the commit to a file in the package.
 
-    The file is not written if git cannot determine the commit.
+    The command writes the file ``commit.txt``. If git cannot determine the commit, the file is not
+    written.
     """
 
     def run(self) -> None:

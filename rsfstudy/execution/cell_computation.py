@@ -38,17 +38,17 @@ from rsfstudy.study import STUDIES_PACKAGE, Cell, CellChanges
 if TYPE_CHECKING:
     from rsfstudy.execution.cell_plan import CellBatchIterator, CellPlan
 
-#: Ratio of the wall time limit to the CPU time limit of a cell. The wall time limit ends cells that
-#: sleep or wait.
+#: Ratio of the wall time limit of a cell to its CPU time limit. The wall time limit is needed
+#: because a cell that sleeps or waits uses no CPU time.
 WALL_TIME_LIMIT_OVER_CPU_TIME_LIMIT = 10.0
-#: Time in s after which finished cells are passed to the journal. Writing the cells to disk may
-#: take 30 ms.
+#: Time in s between two transfers of finished cells to the journal. The cells are not transferred
+#: one by one, because each write to the disk may take 30 ms.
 _FINISHED_CELLS_HANDOVER_INTERVAL = 0.5
 #: Unique identifier of this process.
 _PROCESS_ID = uuid.uuid4().hex
-#: CPU time that Dask may use on a worker, relative to the time limit of a cell.
+#: CPU time that Dask itself may use on a worker, as a fraction of the CPU time limit of a cell.
 _DASK_CPU_TIME_OVER_CELL_TIME = 0.25
-#: Maximum length of a stored message, in characters.
+#: Maximum length of a message in the journal, in characters.
 _MAX_MESSAGE_LENGTH = 2000
 
 StoredCellRows = list[StoredCellRow]
@@ -56,7 +56,7 @@ StoredCellRows = list[StoredCellRow]
 
 @dataclass(frozen=True)
 class CellTask:
-    """Scene, measure, accuracy and conditions that all cells of a run share.
+    """Settings that all cells of a run have in common.
 
     Parameters
     ----------
@@ -67,15 +67,15 @@ class CellTask:
     accuracy : Accuracy
         Accuracy of each cell.
     time_limit : float, optional
-        CPU time in s that a cell may use on a worker. The CPU time is not limited if cells are
-        computed in the process of the user. The default is ``CELL_TIME_LIMIT``.
+        CPU time in s that a cell may use on a worker. The default is ``CELL_TIME_LIMIT``. If cells
+        are computed in the process of the user, their CPU time is not limited.
     user_parts : tuple of UserPart, default: ()
         User-defined parts of the slider.
     user_stepper_classes : tuple of type, default: ()
-        Class of the user-defined stepper. The tuple is empty if the stepper is built in.
+        Class of the user-defined stepper. If the run uses a built-in stepper, the tuple is empty.
     code_fingerprint : mapping of str to str, optional
-        Versions and code digests that affect the results. All workers must have the same versions
-        and digests.
+        Versions and code digests that affect the results. The versions and code digests of each
+        worker must be equal to these values.
     origin_process_id : str, optional
         Identifier of the process that created the task.
     """
@@ -91,20 +91,21 @@ class CellTask:
 
     @functools.cached_property
     def output_packer(self) -> OutputPacker:
-        """Layout in which the outputs of a cell are stored."""
+        """Converter of the outputs of a cell to a row of the journal."""
         return OutputPacker(self.measure)
 
 
-#: Function that takes a task and an iterator of batches, and yields finished cells in any order.
+#: Type of the functions that compute cells. Such a function takes a task and an iterator of
+#: batches, and yields lists of finished cells in any order.
 CellBatchMapper = Callable[[CellTask, "CellBatchIterator"], Generator[StoredCellRows]]
 
 
 def compute_serially(task: CellTask, batches: CellBatchIterator) -> Generator[StoredCellRows]:
     """Compute cells one after the other in this process.
 
-    Finished cells are yielded in groups, because writing each cell separately may take longer than
-    the computation of the cell. The groups contain 1, 1, 2, 4, 8, ... cells. A group ends early if
-    the computation of its cells takes longer than 0.5 s.
+    Finished cells are yielded in groups, because writing a single cell to the journal may take
+    longer than computing the cell. The groups contain 1, 1, 2, 4, 8, ... cells. If the computation
+    of a group takes longer than 0.5 s, the group ends early.
 
     Parameters
     ----------
@@ -137,9 +138,9 @@ def compute_serially(task: CellTask, batches: CellBatchIterator) -> Generator[St
 def serialize_task(task: CellTask) -> bytes:
     """Serialise a task for the workers.
 
-    Code that workers cannot import is included in the serialised task. The serialised task also
-    includes the modules of named studies. If a worker imported these modules, the worker would load
-    all code that declares and reduces studies.
+    The serialised task includes the code that workers cannot import. It also includes the code of
+    modules of named studies. If a worker imported these modules instead, it would load all modules
+    that are needed to declare and reduce studies.
 
     Parameters
     ----------
@@ -199,9 +200,9 @@ def _load_cell_task(serialized_task: bytes) -> CellTask:
 def pack_cell_batch(plan: CellPlan, cell_numbers: np.ndarray) -> bytes:
     """Pack a batch of cells into as few bytes as possible.
 
-    The batches are compressed because the Dask scheduler keeps all batches in memory. User-defined
-    parts of the slider are packed by name, because the serialised task contains the code of the
-    parts.
+    The batches are compressed because the Dask scheduler keeps all batches in memory. A batch
+    contains only the names of user-defined parts, because the serialised task contains the code of
+    these parts.
 
     Parameters
     ----------
@@ -225,7 +226,8 @@ def pack_cell_batch(plan: CellPlan, cell_numbers: np.ndarray) -> bytes:
 def compute_batch(serialized_task: bytes, packed_batch: bytes) -> bytes:
     """Compute a packed batch of cells in a worker process.
 
-    If a cell exceeds its time limit, the operating system terminates the worker process.
+    If the computation of a cell exceeds the time limit, the operating system terminates the worker
+    process.
 
     Parameters
     ----------
@@ -237,9 +239,9 @@ def compute_batch(serialized_task: bytes, packed_batch: bytes) -> bytes:
     Returns
     -------
     bytes
-        Pickled list of the finished cells. The list contains only the first cells of the batch if
-        the batch takes longer than 0.5 s. The list is pickled in this function because Dask would
-        serialise each value of a list separately.
+        Pickled list of the finished cells. If the computation takes longer than 0.5 s, the function
+        stops early, and the list contains only the first cells of the batch. The list is pickled in
+        this function because Dask would serialise each value of a list separately.
 
     Raises
     ------
@@ -285,14 +287,15 @@ def compute_cell(
     cell : Cell
         Cell to compute.
     propagated_exceptions : tuple of type, default: ()
-        Types of exceptions that the function raises instead of recording them in the outcome.
+        Types of exceptions that ``compute_cell`` does not catch. All other exceptions are recorded
+        in the outcome.
 
     Returns
     -------
     outcome : Outcome
         Status, outputs and message of the cell.
     wall_time : float
-        Wall time in s, excluding the compilation of code.
+        Wall time of the computation in s. The time for compiling code is not included.
     """
     begin = time.perf_counter() - Engine.compilation_log.total_compilation_seconds
     try:
@@ -315,16 +318,16 @@ def _shorten_message_for_storage(message: str) -> str:
 
 
 class _CpuTimeLimits:
-    """CPU time limits of the threads that compute cells in this process.
+    """CPU time limits for the threads that compute cells in this process.
 
-    If a thread exceeds its limit, the operating system ends the process, even if the thread holds
-    the lock of the Python interpreter. The limits apply to CPU time rather than wall time, because
-    a slow or busy machine needs more wall time for the same computation.
+    If a thread exceeds its limit, the operating system ends the process. This also works if the
+    thread holds the lock of the Python interpreter. CPU time is limited instead of wall time,
+    because a busy machine needs more wall time for the same computation.
 
-    Because the operating system measures the CPU time of the whole process, the limit is multiplied
-    by the number of computing threads. The CPU time limit is set once per batch instead of once per
-    cell. All cells of a batch except the last cell finish within
-    ``_FINISHED_CELLS_HANDOVER_INTERVAL``.
+    The operating system measures the CPU time of the whole process. The limit is therefore
+    multiplied by the number of computing threads. The limit is set once per batch instead of once
+    per cell. This is sufficient because a batch stops ``_FINISHED_CELLS_HANDOVER_INTERVAL`` after
+    its start, so only the last cell of a batch can run for a long time.
     """
 
     def __init__(self) -> None:
@@ -333,7 +336,7 @@ class _CpuTimeLimits:
 
     @contextlib.contextmanager
     def enforce_in_this_thread(self, seconds: float) -> Iterator[None]:
-        """Limit the CPU time that this thread uses for a cell."""
+        """Limit the CPU time that the current thread can use for a cell."""
         self._update_threads_and_timers(1, seconds)
         try:
             yield
@@ -349,7 +352,7 @@ class _CpuTimeLimits:
 
     @contextlib.contextmanager
     def suspend_temporarily(self) -> Iterator[None]:
-        """Suspend the CPU time limits, and restart the timers afterwards."""
+        """Suspend the CPU time limits during a ``with`` block."""
         self._set_timers(0.0)
         try:
             yield
@@ -360,8 +363,8 @@ class _CpuTimeLimits:
     def _set_timers(seconds: float) -> None:
         """Set the CPU timers, or cancel the timers if the limit is 0 s.
 
-        If the CPU time limit is exceeded, the stacks of all threads are written to the log of the
-        worker.
+        If a process exceeds the CPU time limit, the stack traces of all threads are written to the
+        worker log before the process ends.
         """
         faulthandler.cancel_dump_traceback_later()
         signal.setitimer(signal.ITIMER_PROF, 0.0)

@@ -1,4 +1,4 @@
-"""Planning of the cells of a study: keys, order, batches and cost.
+"""Planning of a study: keys, order, batches and cost of the cells.
 
 ``CellPlan`` computes the keys of all cells before any cell is computed. ``CellBatchIterator``
 divides the cells into batches.
@@ -25,8 +25,8 @@ from rsfstudy.study import CellChanges, Study
 
 _CELL_KEY_DTYPE = np.dtype("V16")
 _GOLDEN_SECTION_RATIO = (math.sqrt(5.0) - 1.0) / 2.0
-#: Target duration of a batch in s, and maximum number of cells in a batch. If a machine fails, all
-#: cells of its batch are lost.
+#: Target computation time of a batch in s, and maximum number of cells in a batch. The batches are
+#: small because all cells of a batch must be computed again if a machine fails.
 _TARGET_SECONDS_PER_BATCH, MAX_BATCH_SIZE = 0.3, 5000
 #: Typical time per right-hand-side evaluation in s, by engine, including all overheads.
 _SECONDS_PER_RHS_EVALUATION = {Engine.SCIPY: 1.2e-5, Engine.PYTHON: 8e-6, Engine.COMPILED: 5e-7}
@@ -35,8 +35,9 @@ _SECONDS_PER_RHS_EVALUATION = {Engine.SCIPY: 1.2e-5, Engine.PYTHON: 8e-6, Engine
 def compute_cell_key(scene: Scene, measure: Measure) -> bytes:
     """Compute the key that identifies a cell.
 
-    The key is a digest of the exact values of the scene fields and the measure fields. The cell
-    number and the axes do not affect the key, so equal cells of a study have the same key.
+    The key is a digest of the exact values of the scene fields and the measure fields. The key does
+    not depend on the number of the cell or on the axes. Cells with equal fields therefore have the
+    same key.
 
     Parameters
     ----------
@@ -74,9 +75,10 @@ def _digest_cell_fields(
 
 
 class CellPlan:
-    """Keys of the cells of a study, in row-major order.
+    """Plan of a study: keys of all cells, in row-major order.
 
-    A plan contains only a few of the scenes, so that plans of large lattices fit in memory.
+    A plan does not store the scenes of all cells, so that the plan of a large lattice fits in
+    memory.
 
     Parameters
     ----------
@@ -86,10 +88,10 @@ class CellPlan:
     Attributes
     ----------
     keys : ndarray of bytes, shape (n,)
-        Key of each cell. Equal cells have equal keys.
+        Key of each cell. Cells with equal fields have equal keys.
     unique_cell_numbers : ndarray of int
-        Numbers of the distinct cells. If several cells are equal, only the first of these cells is
-        included.
+        Numbers of the cells that must be computed. If several cells have the same key, only the
+        first of these cells is included.
     example_scenes : list of Scene
         One scene for each combination of slider parts in the lattice.
 
@@ -134,8 +136,8 @@ class CellPlan:
         Returns
         -------
         iterator of tuple of (bytes, CellChanges)
-            Key of each cell, and the field values that differ from the scene and measure of the
-            study.
+            Key of each cell, and the field values of the cell that differ from the base scene or
+            from the measure of the study.
         """
         keys: list[bytes] = self.keys[cell_numbers].tolist()
         return zip(keys, map(self.study.cell_changes, cell_numbers.tolist()), strict=True)
@@ -165,8 +167,8 @@ def _add_failure_counts_to_error(
 ) -> InvalidValue:
     """Add the number of invalid axis points to the error message of a cell.
 
-    The number of invalid points is added only if the lattice has an axis with numbered points, such
-    as random samples.
+    The number is added only if the lattice has an axis with numbered points, for example an axis of
+    random samples.
     """
     if cell_number == study.size:
         return first_error
@@ -190,9 +192,9 @@ def _add_failure_counts_to_error(
 class CellBatchIterator(Iterator[np.ndarray]):
     """Iterator over batches of cell numbers.
 
-    The size of each batch is chosen so that the computation of the batch takes about 0.3 s. The
-    computation time is estimated from the wall times of the finished cells. The wall times affect
-    only the sizes of the batches, and never the results.
+    The iterator chooses the size of each batch so that the computation of the batch takes about 0.3
+    s. The computation time of a batch is estimated from the wall times of finished cells. These
+    wall times affect only the sizes of the batches, and never the results.
 
     Parameters
     ----------
@@ -211,7 +213,7 @@ class CellBatchIterator(Iterator[np.ndarray]):
         self._timed_cells, self._timed_seconds = 0, 0.0
 
     def __next__(self) -> np.ndarray:
-        """Return the cell numbers of the next batch."""
+        """Return an array with the cell numbers of the next batch."""
         numbers = self._cell_numbers[
             self._next_cell_index : self._next_cell_index + self.compute_next_batch_size()
         ]
@@ -226,7 +228,7 @@ class CellBatchIterator(Iterator[np.ndarray]):
         Returns
         -------
         int
-            Number of cells, which is 1 until the first cell has finished.
+            Number of cells. The number is 1 until the first cell has finished.
         """
         if not self._timed_seconds:
             return 1
@@ -252,11 +254,11 @@ class CellBatchIterator(Iterator[np.ndarray]):
 
 
 def order_cells_by_golden_section(cell_numbers: np.ndarray) -> np.ndarray:
-    """Reorder cells so that the first few cells represent all cells.
+    """Reorder cells so that the first few cells are typical of all cells.
 
-    If there are ``n`` cells, the position in ``cell_numbers`` advances by about ``0.618 * n``
-    (modulo ``n``) from one cell of the new order to the next. The computation times and failures of
-    the first few cells are therefore typical of the remaining cells.
+    Neighbouring cells in the new order are about ``0.618 * n`` positions apart in ``cell_numbers``
+    (modulo ``n``), where ``n`` is the number of cells. The first few cells are therefore spread
+    over the whole lattice. Their computation times and failures are typical of the remaining cells.
 
     Parameters
     ----------

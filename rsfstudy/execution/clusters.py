@@ -1,4 +1,4 @@
-"""Dask clusters, either local worker processes or a running scheduler."""
+"""Connections to Dask clusters: local worker processes or a running scheduler."""
 
 from __future__ import annotations
 
@@ -20,18 +20,18 @@ from typing import Any
 
 from rsfstudy.errors import InvalidValue, RunError, shorten_text
 
-#: Timeout in s for connections to a process on this machine.
+#: Timeout in s for connections between processes on this machine.
 _CLUSTER_CONNECT_TIMEOUT = 600
-#: Signals that end a run in an orderly way if a handler is installed.
+#: Signals after which a run ends in an orderly way. A handler for these signals must be installed.
 _SIGNALS_THAT_END_RUN = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 
 
 def check_script_has_main_guard(worker_count: int) -> None:
     """Check that worker processes would not run the main script again.
 
-    Worker processes import the main script. The line of the main script that starts the computation
-    must therefore be inside a condition, such as ``if __name__ == "__main__":``. Notebooks and
-    commands are not checked, because workers do not import them.
+    Worker processes import the main script. In the main script, the line that starts the
+    computation must therefore be inside a condition, such as ``if __name__ == "__main__":``.
+    Notebooks and commands are not checked, because worker processes do not import them.
 
     Parameters
     ----------
@@ -63,11 +63,11 @@ def check_script_has_main_guard(worker_count: int) -> None:
 
 @contextlib.contextmanager
 def _delay_interrupts() -> Iterator[None]:
-    """Delay signals such as Ctrl-C until the end of the ``with`` block.
+    """Delay Ctrl-C and other signals until the end of the ``with`` block.
 
-    A second Ctrl-C is not delayed. Processes that are started in the ``with`` block do not receive
-    Ctrl-C. These processes also do not receive the signal that a terminal sends when the terminal
-    closes. The main process ends the run first, and then ends its workers.
+    A second Ctrl-C is not delayed. Processes that start inside the ``with`` block ignore Ctrl-C.
+    They also ignore the signal that a terminal sends when it closes. The main process can therefore
+    end the run before it ends its workers.
     """
     held: list[int] = []
     found = {int(number): signal.getsignal(number) for number in _SIGNALS_THAT_END_RUN}
@@ -97,11 +97,12 @@ def _delay_interrupts() -> Iterator[None]:
 
 
 def _ignore_unknown_names_in_unregister(unregister: Callable[..., None]) -> Any:
-    """Wrap ``resource_tracker.unregister`` so that unknown names cause no traceback.
+    """Wrap ``resource_tracker.unregister`` to avoid tracebacks.
 
-    If the tracker process is killed, Python starts another tracker process. The new process does
-    not know the existing semaphores and prints a traceback whenever a semaphore is released. The
-    wrapper registers each name again before releasing it. Registering a name twice is harmless.
+    If the tracker process is killed, Python starts a new tracker process. The existing semaphores
+    are not registered with the new tracker process, so it prints a traceback whenever one of these
+    semaphores is released. The wrapper therefore registers each name again before the name is
+    removed. Registering a name twice is harmless.
     """
 
     @functools.wraps(unregister)
@@ -113,7 +114,7 @@ def _ignore_unknown_names_in_unregister(unregister: Callable[..., None]) -> Any:
 
 
 def _tolerate_lost_resource_tracker() -> None:
-    """Install ``_ignore_unknown_names_in_unregister`` for the lifetime of the process.
+    """Install ``_ignore_unknown_names_in_unregister`` until the process ends.
 
     The wrapper must stay installed, because semaphores are released whenever they are
     garbage-collected.
@@ -194,7 +195,8 @@ def start_local_cluster(worker_count: int, log_path: Path) -> Iterator[Any]:
 async def _check_scheduler_answers(scheduler_address: str) -> None:
     """Check that a Dask scheduler answers at an address.
 
-    If another program listens at the address, the Dask client would wait forever.
+    Without this check, the Dask client would wait forever if a different program listens at the
+    address.
     """
     from distributed import Security
     from distributed.comm.core import connect

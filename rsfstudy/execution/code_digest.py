@@ -1,9 +1,10 @@
 """Digests of user-defined classes and of the measures in named studies.
 
-The digests are computed from the objects in memory, because the files may have changed since the
-import. Measures in the modules of named studies are digested like user-defined measures, because
-the other code of these modules does not affect the results. The code of Python, of installed
-packages and of rsfstudy is not included (see ``module_graph`` for the digests of rsfstudy).
+The digests are computed from the objects in memory, because the source files may have changed since
+the import. Measures that are defined in the modules of named studies are treated like user-defined
+measures, because the other code in these modules does not affect the results. The digests do not
+include the code of Python, of installed packages and of rsfstudy. The module ``module_graph``
+computes the digests of rsfstudy.
 """
 
 from __future__ import annotations
@@ -30,18 +31,19 @@ _INSTALLATION_DIRECTORIES = tuple(
 
 
 def digest_measures_of_studies(measure_classes: Iterable[type]) -> dict[str, str]:
-    """Compute the digest of measures that are defined in the modules of named studies.
+    """Compute the digest of the measures that named studies define.
 
     Parameters
     ----------
     measure_classes : iterable of type
-        Classes of the measure.
+        Class of the measure, and classes of nested measures.
 
     Returns
     -------
     dict of str to str
-        Digest of the measures, by the names of their modules. The dictionary is empty if no class
-        is defined in the module of a named study.
+        Dictionary with one entry: the key contains the names of the modules, and the value is the
+        digest of the measures. The dictionary is empty if no class is defined in the module of a
+        named study.
     """
     theirs = tuple(kind for kind in measure_classes if _is_study_module(kind.__module__))
     names = ", ".join(dict.fromkeys(kind.__module__.removeprefix("rsfstudy.") for kind in theirs))
@@ -54,8 +56,8 @@ def digest_user_classes(*classes_or_data: object) -> str:
     Parameters
     ----------
     *classes_or_data : object
-        Classes, and data such as protocols. Classes of rsfstudy and of installed packages are
-        ignored.
+        Classes, and data such as protocols. The function ignores classes of rsfstudy and of
+        installed packages.
 
     Returns
     -------
@@ -71,14 +73,14 @@ def digest_user_classes(*classes_or_data: object) -> str:
 
 
 def _digest(objects: tuple[object, ...]) -> str:
-    """Compute the digest of objects and of the code of users and named studies that they use."""
+    """Compute the digest of objects and of the code that the objects use."""
     return (
         ObjectDigest(lambda m: _is_study_module(m) or _is_user_module(m)).add(objects).hexdigest()
     )
 
 
 def is_defined_in_rsfstudy(defined_class: type) -> bool:
-    """Return True if a class is defined in rsfstudy itself, outside the named studies.
+    """Return True if a class is defined in rsfstudy but not in a named study.
 
     Parameters
     ----------

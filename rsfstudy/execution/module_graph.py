@@ -1,10 +1,10 @@
 """Import graph and code digests of the modules of rsfstudy.
 
 The results of a cell depend on the modules that the measure and the parts of the scene import,
-directly or indirectly. ``ModuleGraph`` finds these modules from the source files, without importing
-them, and computes one digest per module. Docstrings, comments and imports for type annotations do
-not affect a digest. A package that exports its names lazily is replaced by the modules that define
-the imported names.
+directly or indirectly. ``ModuleGraph`` finds these modules by reading the source files and computes
+one digest per module. The modules are not imported. Docstrings, comments and imports for type
+annotations do not affect the digests. If a package exports its names lazily, an import from the
+package is treated as an import from the modules that define the imported names.
 """
 
 from __future__ import annotations
@@ -47,17 +47,18 @@ class ModuleGraph:
 
     @cached_property
     def combined_digest(self) -> str:
-        """Digest of all modules together."""
+        """Single digest of all modules."""
         return ObjectDigest(lambda _name: False).add(self.digests()).hexdigest()
 
     def digests(self, roots: Iterable[str] | None = None) -> dict[str, str]:
-        """Compute the digests of all modules that some modules can reach.
+        """Compute the digests of modules and of all modules that they import.
 
         Parameters
         ----------
         roots : iterable of str, optional
-            Full names of modules. Modules without source files are ignored. By default, the digests
-            of all modules are computed.
+            Full names of modules. The function computes the digests of these modules and of all
+            modules that they import directly or indirectly. Modules without source files are
+            ignored. By default, the function computes the digests of all modules.
 
         Returns
         -------
@@ -78,7 +79,7 @@ class ModuleGraph:
         return reached
 
     def _modules_loaded_by(self, source: str, names: Iterable[str]) -> Iterator[str]:
-        """Yield the modules that ``from source import names`` or ``import source`` loads."""
+        """Yield the modules that an import statement loads."""
         path = source.removeprefix(_PACKAGE_NAME).removeprefix(".")
         parts = path.split(".")
         for package in (".".join(parts[:length]) for length in range(1, len(parts) + 1)):
@@ -89,7 +90,8 @@ class ModuleGraph:
         if exports is not None:
             exported = {f"{path}.{name}": module for name, module in exports.items()}
             modules = [exported.get(module, module) for module in modules]
-            # An unknown name may stand for any name, so all exports of the package are included.
+            # If a name is unknown, the import may refer to any name, so all exports of the package
+            # are included.
             if not modules or not all(module in self._modules for module in modules):
                 modules = [*exports.values()]
         for module in modules:
@@ -115,12 +117,16 @@ class _Module:
 
     @cached_property
     def imports(self) -> list[tuple[str, list[str]]]:
-        """Modules of the package that the module imports, with the imported names."""
+        """Modules of the package that this module imports, with the imported names."""
         return _find_imports(self._code)
 
     @cached_property
     def lazy_exports(self) -> Mapping[str, str] | None:
-        """Modules that define the exported names, or None unless the module exports lazily."""
+        """Modules that define the names that this module exports lazily.
+
+        Each key is an exported name, and each value is the name of a module. If the module does not
+        export names lazily, the value is None.
+        """
         if _LAZY_EXPORT_FUNCTION.encode() not in self._source:
             return None
         tables = (
@@ -139,8 +145,8 @@ class _Module:
 def _find_imports(code: CodeType) -> list[tuple[str, list[str]]]:
     """Find the modules of the package that the code imports, with the imported names.
 
-    A string that is the name of a module counts as an import, because it may be passed to
-    ``importlib.import_module``.
+    A string that is the name of a module is treated as an import, because the code may pass the
+    string to ``importlib.import_module``.
     """
     prefix = f"{_PACKAGE_NAME}."
     found: list[tuple[str, list[str]]] = []

@@ -1,4 +1,4 @@
-"""Preparation of a study run."""
+"""Preparation of the run of a study."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ def prepare_study_run(study: Study, options: OutputOptions, workers: WorkerPool)
     Returns
     -------
     StudyRun
-        Run of the study. The run starts when you call the ``StudyRun`` object as a function.
+        Run of the study. To start the run, call the ``StudyRun`` object as a function.
 
     Raises
     ------

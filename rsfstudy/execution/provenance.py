@@ -1,8 +1,8 @@
 """Provenance of results.
 
-The fingerprint (``run_fingerprint``) contains all settings, versions and code digests that affect
-the results. The provenance (``collect_provenance``) also contains the time, the command, the commit
-and the machine.
+The function ``run_fingerprint`` collects the fingerprint, which contains all settings, versions and
+code digests that affect the results. The function ``collect_provenance`` collects the provenance,
+which contains the fingerprint, the time, the command, the commit and the machine.
 """
 
 from __future__ import annotations
@@ -29,8 +29,8 @@ if TYPE_CHECKING:
     from rsfstudy.study import Study
 
 _PACKAGE_DIRECTORY = Path(__file__).parent.parent
-#: Packages of rsfstudy that affect the results of cells. The package ``parts`` only exports names
-#: of ``slider``.
+#: Subpackages of rsfstudy whose code affects the results of cells. The package ``parts`` is not
+#: included, because it only exports names of ``slider``.
 _PACKAGES_AFFECTING_CELL_RESULTS = (
     "slider",
     "parts",
@@ -64,8 +64,8 @@ def read_physics_sources(package_directory: Path) -> dict[str, bytes]:
     return {file.relative_to(package_directory).as_posix(): file.read_bytes() for file in files}
 
 
-#: Modules with the contents of the source files at the time of the import. Later changes of the
-#: files do not affect the running code.
+#: Import graph of the source files at the time of the import. The source files are read only once,
+#: because later changes of the files do not affect the running code.
 _modules_at_import = ModuleGraph(read_physics_sources(_PACKAGE_DIRECTORY))
 
 
@@ -79,7 +79,7 @@ def code_fingerprint(
     engine : str, optional
         Name of the engine.
     user_classes : iterable of object, default: ()
-        Classes of the measure, and user-defined parts and steppers.
+        Class of the measure, and classes of user-defined parts and steppers.
 
     Returns
     -------
@@ -97,10 +97,11 @@ def code_fingerprint(
 
 
 def digest_reachable_modules(measure: Measure, scenes: Iterable[Scene]) -> dict[str, str]:
-    """Compute the code digests of all modules that a measure and scenes can reach.
+    """Compute the code digests of the modules that a measure and scenes use.
 
-    A measure that is defined outside rsfstudy may use any module, so the digests of all modules are
-    computed. A part that is defined outside rsfstudy may use any module of ``slider``.
+    The modules are those that the measure and the parts of the scenes import directly or
+    indirectly. A user-defined measure may use any module of rsfstudy, so in this case all modules
+    are included. A user-defined part may use any module of ``slider``.
 
     Parameters
     ----------
@@ -131,8 +132,8 @@ def digest_reachable_modules(measure: Measure, scenes: Iterable[Scene]) -> dict[
 def run_fingerprint(study: Study, scenes: Iterable[Scene]) -> dict[str, Any]:
     """Collect all settings, versions and digests that affect the results.
 
-    The scene fields and the plain fields of the measure are excluded, because the keys of the cells
-    are computed from these fields.
+    The fingerprint does not contain the scene fields and the measure fields, because the keys of
+    the cells are computed from these fields.
 
     Parameters
     ----------
@@ -145,7 +146,7 @@ def run_fingerprint(study: Study, scenes: Iterable[Scene]) -> dict[str, Any]:
     -------
     dict of str to object
         Fingerprint as plain data. The entry ``physics`` contains one code digest for each module
-        that the measure and the parts of the scenes can reach.
+        that the measure and the parts of the scenes import directly or indirectly.
     """
     plain, accuracy = study.measure.plain_fields, study.accuracy
     return {
@@ -196,7 +197,7 @@ def collect_provenance(study: Study, command_line: str, scenes: Iterable[Scene])
 def provenance_attributes(command_line: str) -> dict[str, str]:
     """Build the root attributes that describe the origin of a dataset.
 
-    The attributes are used for datasets of a single scene.
+    The function is used for datasets of a single scene.
 
     Parameters
     ----------
@@ -214,7 +215,7 @@ def provenance_attributes(command_line: str) -> dict[str, str]:
 
 @functools.cache
 def _build_source_attribute() -> str:
-    """Build the attribute ``source`` from the version and the commit."""
+    """Build the attribute ``source`` from the version and the commit of rsfstudy."""
     commit = read_git_commit_and_state(_PACKAGE_DIRECTORY.parent)
     return f"rsfstudy {version('rsfstudy')}, commit {commit}, numerical model of a spring-slider"
 
@@ -231,10 +232,10 @@ _PACKAGES_WITH_RECORDED_VERSION = (
 
 
 def read_git_commit_and_state(checkout_directory: Path) -> str:
-    """Return the commit and the state of a Git checkout.
+    """Return the commit of a Git checkout, and whether files have been changed.
 
-    Only changes of the package, the named studies and ``pyproject.toml`` are considered, because
-    other files do not affect the results.
+    The function only checks the package, the named studies and ``pyproject.toml``, because changes
+    of other files do not affect the results.
 
     Parameters
     ----------
@@ -271,9 +272,10 @@ def read_git_commit_and_state(checkout_directory: Path) -> str:
 
 
 def package_versions(name: str) -> dict[str, str]:
-    """Return the versions of the packages that only a particular engine needs.
+    """Return the versions of the additional packages that an engine requires.
 
-    NumPy and SciPy are not included, because ``code_fingerprint`` adds them for all engines.
+    The versions of NumPy and SciPy are not included, because ``code_fingerprint`` adds these
+    versions for all engines.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Run of a study, from the plan of its cells to the results file.
+"""Run of a study.
 
 Calling a ``StudyRun`` computes the missing cells, adds each finished cell to the journal, assembles
 the dataset, applies the reductions and writes the results file.
@@ -32,10 +32,11 @@ from rsfstudy.storage import (
 )
 from rsfstudy.study import Study
 
-#: Names of the statuses of cells whose worker process ended during the computation.
+#: Status names of cells whose worker process ended before the cell was finished.
 _STATUSES_OF_LOST_CELLS = (Status.WORKER_LOST.name, Status.TIME_LIMIT_SPENT.name)
 _NAMES_OF_ANSWER_STATUSES = frozenset(status.name for status in Status if status.is_answer)
-#: Number of failed cells after which a run ends early if no cell has succeeded.
+#: Number of failed cells after which a run ends early. A run ends early only if no cell has
+#: succeeded.
 _MAX_FAILURES_WITHOUT_SUCCESS = 10
 
 ProgressCallback = Callable[[int, int], None]
@@ -43,29 +44,30 @@ ProgressCallback = Callable[[int, int], None]
 
 @dataclass(frozen=True, kw_only=True)
 class OutputOptions:
-    """Output files of a run, and handling of failed cells.
+    """Options for the output files of a run and for the handling of failed cells.
 
     Parameters
     ----------
     output : Path or None, default: None
-        Directory of the results file and the journal. If None, no files are written.
+        Directory for the results file and the journal. If None, the run writes no files.
     format : {"netcdf", "zarr"}, default: "netcdf"
         Format of the results. A Zarr store is written in slabs, so the lattice does not need to fit
         in memory.
     fresh : bool, default: False
         If True, delete the journal and compute all cells again.
     keep_going : bool, default: False
-        If True, continue even if all of the first cells fail.
+        If True, the run continues even if the first cells have all failed.
     despite_failures : bool, default: False
-        If True and some cells have failed, apply reductions to the remaining cells.
+        If True, the reductions ignore failed cells. If False, a reduction that depends on a failed
+        cell has no result.
     command_line : str, default: "rsfstudy.run"
-        Command line or Python call of the user, for the history of the file.
+        Command line or Python call of the user. The results file contains this text in its history.
 
     Raises
     ------
     InvalidValue
-        If the format is unknown, or if a Zarr store has no output directory or cannot be written
-        because the package zarr is not installed.
+        If the format is unknown. If the format is "zarr", also if there is no output directory or
+        if the package zarr is not installed.
     """
 
     output: Path | None = None
@@ -99,14 +101,15 @@ class StudyRun:
     task : CellTask
         Scene, measure and accuracy of the cells.
     workers : int, default: 1
-        Number of cells that are computed at the same time. The number affects the sizes of the
-        batches.
+        Number of cells that are computed at the same time. The sizes of the batches depend on this
+        number.
 
     Raises
     ------
     InvalidValue
         If the scene of a cell is invalid, or if a reduction or a claim cannot be applied to the
-        lattice. The constructor checks the study before any cell is computed.
+        lattice. The constructor performs these checks, so errors are raised before any cell is
+        computed.
     """
 
     def __init__(
@@ -120,10 +123,11 @@ class StudyRun:
         self._check_reductions_and_claims()
 
     def _check_reductions_and_claims(self) -> None:
-        """Check the reductions and claims on a lattice without computed cells.
+        """Check that the reductions and claims of the study can be applied.
 
-        The check finds mistakes in a study before any cell is computed. Claims are not checked if
-        the user has overridden values of the study.
+        The check uses a lattice without results, so that mistakes in a study are found before any
+        cell is computed. If the user changed values of the study, for example with ``--set``, the
+        claims are not checked.
         """
         pending = CellColumns.build_pending_cells(
             self.study.size, self.task.output_packer.packed_number_count
@@ -141,12 +145,12 @@ class StudyRun:
             claim.check_selection(lattice)
 
     def output_path(self, file_suffix: str) -> Path:
-        """Return the path of a file of this run.
+        """Return the path of an output file of this run.
 
         Parameters
         ----------
         file_suffix : str
-            End of the file name, after the name of the study.
+            Suffix of the file name. The file name consists of the name of the study and the suffix.
 
         Returns
         -------
@@ -166,7 +170,8 @@ class StudyRun:
     ) -> xr.Dataset:
         """Compute the missing cells, and write the results.
 
-        After the computation, the run assembles the dataset and applies the reductions.
+        When all cells are finished, the method assembles the dataset, applies the reductions and
+        writes the results file.
 
         Parameters
         ----------
@@ -187,11 +192,11 @@ class StudyRun:
             If the results cannot be written, or if the journal contains cells that were computed
             with different settings.
         RunError
-            If the run cannot continue. The finished cells remain in the journal and, for NetCDF
-            output, in the file ``NAME.partial.nc``.
+            If the run cannot continue. The finished cells are stored in the journal. If the output
+            format is NetCDF, they are also stored in the file ``NAME.partial.nc``.
         Interrupted
-            If the user interrupts the run. The finished cells remain in the journal and, for NetCDF
-            output, in the file ``NAME.partial.nc``.
+            If the user interrupts the run. The finished cells are stored in the same way as for
+            ``RunError``.
         """
         keeping = self.options
         if keeping.format == "zarr":
@@ -213,7 +218,7 @@ class StudyRun:
         cell_batch_mapper: CellBatchMapper,
         progress_callback: ProgressCallback,
     ) -> None:
-        """Compute the cells that are missing in the journal."""
+        """Compute the cells that are not in the journal, and failed cells."""
         cells = self.plan.unique_cell_numbers
         # Failed cells are computed again.
         answered = journal.statuses(self.plan.keys[cells]) < int(Status.WORK_BUDGET_SPENT)
@@ -280,7 +285,7 @@ class StudyRun:
         return written
 
     def assemble_lattice_dataset(self, journal: CellJournal) -> xr.Dataset:
-        """Assemble the dataset of the journal, without reductions.
+        """Assemble a dataset from the cells in the journal, without reductions.
 
         Parameters
         ----------
@@ -312,7 +317,7 @@ class StudyRun:
         )
 
     def _save_partial_results(self, journal: CellJournal, error: BaseException) -> RunError:
-        """Write the finished cells to a file, and return the error to raise."""
+        """Write the finished cells to a file, and build the error for the user."""
         why = f"{self.study.name}: {str(error) or 'interrupted'}. "
         if self.options.output is not None and self.options.format == "netcdf":
             lattice = self.assemble_lattice_dataset(journal)
@@ -326,7 +331,7 @@ class StudyRun:
         return kind(why + self._describe_how_to_resume(journal))
 
     def _describe_how_to_resume(self, journal: CellJournal) -> str:
-        """Describe the finished cells, and how to resume the run."""
+        """Describe how many cells are finished, and how to resume the run."""
         known = int((journal.statuses(self.plan.keys) != int(Status.PENDING)).sum())
         text = f"{known} of {self.study.size} cells are finished"
         if self.options.output is None:

@@ -1,7 +1,7 @@
-"""Log file for the errors of worker processes.
+"""Redirection of worker errors to a log file.
 
-The log file contains stack traces of threads, and tracebacks of Dask and of the libraries that Dask
-uses.
+The log file contains stack traces of threads. It also contains the tracebacks that Dask and the
+libraries of Dask print.
 """
 
 from __future__ import annotations
@@ -27,9 +27,9 @@ _NAMES_OF_DASK_LOGGERS = ("distributed", "tornado", "asyncio")
 
 @contextlib.contextmanager
 def open_worker_log(log_path: Path | None) -> Iterator[Path]:
-    """Open a log file for errors, and redirect the loggers of Dask to it.
+    """Open a log file, and redirect the loggers of Dask to this file.
 
-    An empty log file is deleted when the context is left.
+    If the log file is empty at the end of the ``with`` block, the file is deleted.
 
     Parameters
     ----------

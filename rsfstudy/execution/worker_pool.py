@@ -1,9 +1,9 @@
 """Computation of cells on Dask workers.
 
 ``WorkerPool`` starts worker processes on this machine, or uses a Dask cluster. If a worker dies,
-its batch is lost, and other batches that were waiting on that worker may be lost too. The pool
-computes all lost cells again, one at a time, while no other cell is running. Therefore, a cell is
-recorded as lost only if the cell itself kills a worker.
+its current batch is lost. Batches that were waiting for the same worker may also be lost. The pool
+computes the lost cells again, one at a time, while no other cell is running. A cell is therefore
+recorded as lost only if its own computation kills a worker.
 """
 
 from __future__ import annotations
@@ -39,17 +39,19 @@ from rsfstudy.execution.clusters import check_script_has_main_guard, start_local
 from rsfstudy.measures import Outcome
 from rsfstudy.status import Status
 
-#: Maximum value of the time limit of a cell in s, about three years. The timers of the operating
-#: system accept only slightly more than ``WALL_TIME_LIMIT_OVER_CPU_TIME_LIMIT`` times this value.
+#: Largest allowed time limit of a cell in s, about three years. The wall time limit is
+#: ``WALL_TIME_LIMIT_OVER_CPU_TIME_LIMIT`` times this value, which is just below the largest value
+#: that the timers of the operating system accept.
 _MAX_TIME_LIMIT = 1e8
 #: Maximum number of worker processes per core, and maximum number of worker processes on a machine
-#: with one core or two cores.
+#: with one or two cores.
 _MAX_WORKERS_PER_CORE, _MAX_WORKERS_ON_SMALL_MACHINES = 4, 8
-#: Durations in s during which a run has no worker. After the first duration, the run issues a
-#: warning. After the second duration, the run ends.
+#: If a run has had no worker for the first of these times in s, the run issues a warning. If the
+#: run has had no worker for the second of these times, the run ends.
 WARN_AFTER_SECONDS_WITHOUT_WORKER, GIVE_UP_AFTER_SECONDS_WITHOUT_WORKER = 30.0, 600.0
 _POLL_INTERVAL = 2.0
-#: Number of times that a cell may kill its worker before the cell is recorded as lost.
+#: Number of workers that a cell may kill. After this number of workers, the cell is recorded as
+#: lost.
 _MAX_WORKER_DEATHS_PER_CELL = 2
 _SCHEDULER_LOST_MESSAGE = "the Dask scheduler is lost"
 
@@ -57,20 +59,22 @@ _SCHEDULER_LOST_MESSAGE = "the Dask scheduler is lost"
 class WorkerPool(contextlib.ExitStack):
     """Pool of workers that compute the cells of one or more runs.
 
-    Use the pool as a context manager. Worker processes on this machine are started when the first
-    cell is computed, which takes a few seconds. The worker processes end when the context is left.
+    Use the pool as a context manager. Local worker processes are started when the first cell is
+    computed. Starting the processes takes a few seconds. The processes end at the end of the
+    ``with`` block.
 
     Parameters
     ----------
     process_count : int, default: 2
         Number of worker processes on this machine. If 0, cells are computed in this process.
     dask_client : distributed.Client, optional
-        Client of a Dask cluster. The cluster is used instead of worker processes on this machine.
+        Client of a Dask cluster. If a client is passed, the cells are computed on the cluster, and
+        no local worker processes are started.
     cell_time_limit : float, optional
         CPU time in s that a cell may use on a worker. The default is ``CELL_TIME_LIMIT``.
     log_path : Path, optional
-        File to which the worker processes on this machine write the errors of all runs. By default,
-        each run has its own log file.
+        File to which the local worker processes write errors. If this argument is passed, all runs
+        use this log file. By default, each run has its own log file.
 
     Raises
     ------
@@ -119,7 +123,7 @@ class WorkerPool(contextlib.ExitStack):
         self._mapper_of_started_processes: CellBatchMapper | None = None
 
     def count_concurrent_cells(self) -> int:
-        """Count the cells that are computed at the same time.
+        """Return the number of cells that are computed at the same time.
 
         Returns
         -------
@@ -141,8 +145,8 @@ class WorkerPool(contextlib.ExitStack):
         Parameters
         ----------
         log_path : Path, optional
-            File to which the worker processes on this machine write errors. If the pool has its own
-            log file, this file is not used.
+            File to which the local worker processes write errors. The argument is ignored if the
+            pool was created with its own log file.
 
         Returns
         -------
@@ -161,7 +165,7 @@ class WorkerPool(contextlib.ExitStack):
     def _compute_batches_on_processes(
         self, log_path: Path | None, task: CellTask, batches: CellBatchIterator
     ) -> Generator[StoredCellRows]:
-        """Compute batches on local processes, and start the processes if necessary."""
+        """Compute batches on local worker processes, and start them if necessary."""
         from rsfstudy.execution import worker_log
 
         try:
@@ -188,7 +192,8 @@ def make_dask_batch_mapper(
     dask_client : distributed.Client
         Client of the cluster.
     log_path : str, optional
-        File to which the workers write errors. Error messages contain the name of this file.
+        File to which the workers write errors. Messages about lost workers contain the path of this
+        file.
 
     Returns
     -------
@@ -210,9 +215,9 @@ def make_dask_batch_mapper(
             return future
 
         def run_isolated(cell: np.ndarray) -> StoredCellRows:
-            """Compute a suspect cell while no other cell is running.
+            """Compute a cell that may have killed its worker, while no other cell runs.
 
-            If the worker of the cell dies repeatedly, the cell is recorded as lost.
+            If the cell kills its worker repeatedly, the cell is recorded as lost.
             """
             (key,) = plan.keys[cell].tolist()
             for _ in range(_MAX_WORKER_DEATHS_PER_CELL):
@@ -316,7 +321,7 @@ def count_worker_threads(dask_client: Any) -> int:
 
 
 def _wait_for_finished_futures(dask_client: Any, running_futures: Iterable[Any]) -> Iterable[Any]:
-    """Wait until at least one future is finished, and return finished futures.
+    """Wait until at least one future is finished, and return all finished futures.
 
     Raises
     ------
@@ -359,7 +364,7 @@ def _batch_result(future: Any) -> StoredCellRows | None:
     Raises
     ------
     RunError
-        If the cluster failed for any other reason.
+        If the batch failed for a reason other than the death of its worker.
     """
     from distributed import KilledWorker
 

@@ -1,8 +1,9 @@
-"""Former arguments ``accuracy`` and ``meter``, which an integrator has replaced.
+"""Support for the deprecated arguments ``accuracy`` and ``meter``.
 
-Functions that took an accuracy and a work meter now take an integrator. Calls with the former
-arguments, and user-defined measures with the former signature of ``compute``, work until version
-1.0.0 and emit a ``DeprecationWarning``.
+Functions that had the arguments ``accuracy`` and ``meter`` now have the argument ``integrator``.
+Until version 1.0.0, calls with the deprecated arguments still work and emit a
+``DeprecationWarning``. The same applies to user-defined measures whose method ``compute`` has the
+deprecated arguments.
 """
 
 from __future__ import annotations
@@ -29,7 +30,7 @@ _CALL_REMEDY = (
 
 
 def accept_accuracy_and_meter(function: AnyFunction) -> AnyFunction:
-    """Let a function with the parameter ``integrator`` accept the former arguments.
+    """Let a function with an ``integrator`` accept the deprecated arguments.
 
     Parameters
     ----------
@@ -53,7 +54,7 @@ def accept_accuracy_and_meter(function: AnyFunction) -> AnyFunction:
 def replace_accuracy_and_meter(
     arguments: tuple[Any, ...], keywords: dict[str, Any]
 ) -> tuple[tuple[Any, ...], dict[str, Any]]:
-    """Replace an accuracy and a work meter among the arguments by an integrator.
+    """Replace the arguments ``accuracy`` and ``meter`` by an integrator.
 
     Parameters
     ----------
@@ -65,14 +66,15 @@ def replace_accuracy_and_meter(
     Returns
     -------
     arguments : tuple
-        Positional arguments without accuracy and work meter.
+        Positional arguments without the accuracy and the work meter.
     keywords : dict
-        Keyword arguments, with an integrator if the call contains the former arguments.
+        Keyword arguments. If the call contains the deprecated arguments, an integrator is added.
 
     Raises
     ------
     InvalidValue
-        If the call contains only one of the former arguments, or arguments of other types.
+        If the call contains only one of the deprecated arguments, or if a deprecated argument has
+        the wrong type.
     """
     pair = {
         **dict(

@@ -1,9 +1,10 @@
 """Integrator of the motions of a measurement.
 
-An ``Integrator`` has an accuracy and counts right-hand side evaluations. ``Integrator.follow``
-integrates a scene through its loading segments, as a series of events. Consecutive loading segments
-without a jump in stress form a chain. The driver of the event loop integrates each chain, and
-``Integrator.follow`` handles the jumps in stress between the chains.
+An ``Integrator`` stores the requested accuracy and counts right-hand side evaluations. The method
+``Integrator.follow`` integrates a scene through its loading segments and yields events. A chain is
+a sequence of loading segments in which the stress does not jump from one segment to the next. The
+event loop integrates each chain. Between two chains, ``Integrator.follow`` applies the jump in
+stress.
 """
 
 from __future__ import annotations
@@ -39,10 +40,11 @@ from rsfstudy.slider import Equations, MotionPoint, Numbers, Scene
 
 @wrap_methods_in_error_boundary
 class Integrator:
-    """Integrator of motions to a requested accuracy, with a count of the work.
+    """Integrator of motions with a requested accuracy and a work counter.
 
-    A measure receives the integrator of its cell. The attribute ``work_meter`` counts all motions
-    that are integrated with an integrator or with its copies, which share the work budget.
+    A measure receives the integrator of its cell. The attribute ``work_meter`` counts the
+    right-hand side evaluations of all motions that the integrator and its copies integrate. The
+    integrator and its copies share one work budget.
 
     Parameters
     ----------
@@ -72,7 +74,7 @@ class Integrator:
     point_with_slip_rate = staticmethod(initial_points.point_with_slip_rate)
 
     def __init__(self, accuracy: Accuracy) -> None:
-        """Create an integrator whose count starts at zero."""
+        """Create an integrator whose evaluation count is zero."""
         self.accuracy, self.work_meter = accuracy, WorkMeter(accuracy.budget)
 
     @property
@@ -92,21 +94,21 @@ class Integrator:
 
     @property
     def evaluations(self) -> int:
-        """Number of right-hand side evaluations of all motions."""
+        """Total number of right-hand side evaluations counted so far."""
         return self.work_meter.evaluations
 
     @property
     def is_budget_exceeded(self) -> bool:
-        """True if the evaluations exceed the work budget."""
+        """True if the number of evaluations exceeds the work budget."""
         return self.work_meter.evaluations > self.work_meter.budget
 
     def counted_by(self, work_meter: WorkMeter) -> Integrator:
-        """Return a copy that adds its evaluations to another counter.
+        """Return a copy that adds its evaluations to a different counter.
 
         Parameters
         ----------
         work_meter : WorkMeter
-            Counter, which also defines the work budget.
+            Counter of the copy. The counter also defines the work budget.
 
         Returns
         -------
@@ -118,24 +120,24 @@ class Integrator:
         return copied
 
     def with_accuracy(self, accuracy: Accuracy) -> Integrator:
-        """Return a copy with another accuracy that shares the count.
+        """Return a copy with a different accuracy and the same work counter.
 
         Parameters
         ----------
         accuracy : Accuracy
-            New accuracy. The budget of the count does not change.
+            Accuracy of the copy. The work budget of the counter does not change.
 
         Returns
         -------
         Integrator
-            Copy that adds its evaluations to the same count.
+            Copy that uses the same work counter.
         """
         copied = object.__new__(Integrator)
         copied.accuracy, copied.work_meter = accuracy, self.work_meter
         return copied
 
     def with_rtol(self, rtol: float) -> Integrator:
-        """Return a copy with another relative error tolerance that shares the count.
+        """Return a copy with a different relative tolerance and the same counter.
 
         Parameters
         ----------
@@ -145,12 +147,12 @@ class Integrator:
         Returns
         -------
         Integrator
-            Copy that adds its evaluations to the same count.
+            Copy that uses the same work counter.
         """
         return self.with_accuracy(self.accuracy.with_rtol(rtol))
 
     def refined(self) -> Integrator:
-        """Return a copy with ten times smaller tolerances that shares the count.
+        """Return a copy with ten times smaller tolerances and the same counter.
 
         The difference between the results of the two integrators is an estimate of the error. See
         ``estimate_error`` and ``Accuracy.refined``.
@@ -158,7 +160,7 @@ class Integrator:
         Returns
         -------
         Integrator
-            Copy that adds its evaluations to the same count.
+            Copy that uses the same work counter.
         """
         return self.with_accuracy(self.accuracy.refined())
 
@@ -173,7 +175,7 @@ class Integrator:
         Returns
         -------
         Integrator
-            This integrator, or a copy that shares the count.
+            This integrator, or a copy that uses the same work counter.
         """
         return self if self.rtol <= rtol else self.with_rtol(rtol)
 
@@ -188,7 +190,7 @@ class Integrator:
         Returns
         -------
         Integrator
-            This integrator, or a copy that shares the count.
+            This integrator, or a copy that uses the same work counter.
         """
         return self if self.rtol >= rtol else self.with_rtol(rtol)
 
@@ -214,7 +216,7 @@ class Integrator:
         floor_over_tolerance: float,
         error_scale: float | None = None,
     ) -> float:
-        """Estimate the error of a result from the result of a refined run.
+        """Estimate the error of a result by comparison with a refined result.
 
         Parameters
         ----------
@@ -223,10 +225,11 @@ class Integrator:
         refined_value : float
             Result that was computed with the refined integrator.
         floor_over_tolerance : float
-            Minimum relative error, as a fraction of the requested relative error. The error
-            estimate includes the minimum even if both runs agree by chance.
+            Minimum relative error, as a fraction of the requested relative error. The minimum is
+            part of the error estimate even if both results agree by chance.
         error_scale : float, optional
-            Reference value by which relative errors are multiplied. The default is ``value``.
+            Reference value that converts relative errors to absolute errors. The default is
+            ``value``.
 
         Returns
         -------
@@ -249,7 +252,8 @@ class Integrator:
         Returns
         -------
         bool
-            True if the scene has inertia, and its effect exceeds its limit on the slow manifold.
+            True if the scene has inertia and the effect of inertia is too large for the slow
+            manifold.
         """
         return inertia_matters_at(scene, self.accuracy, point)
 
@@ -263,7 +267,7 @@ class Integrator:
         backward: bool = False,
         recording: Recording | None = None,
     ) -> Iterator[Event]:
-        """Yield the events of a motion that follows a single system of equations.
+        """Integrate a single system of equations, and yield the events.
 
         Parameters
         ----------
@@ -274,12 +278,13 @@ class Integrator:
         event_specs : sequence of EventSpecification, default: ()
             Requested events.
         local_tolerance : float, optional
-            Local error tolerance of a step. The default follows from the accuracy.
+            Local error tolerance of an integration step. The default is computed from the accuracy
+            of the integrator.
         backward : bool, default: False
             If True, the independent variable decreases.
         recording : Recording, optional
-            Object that receives the recorded rows. The independent variable of a rigid slider is
-            slip, so the ``sample_times`` of the recording are slips.
+            Object that records the motion. For a rigid slider, the independent variable is slip, so
+            the ``sample_times`` of the recording are values of slip.
 
         Returns
         -------
@@ -316,9 +321,9 @@ class Integrator:
         event_specs : sequence of EventSpecification, default: ()
             Requested events.
         start : MotionPoint, optional
-            Initial point within the last loading segment. By default, the motion starts in the
-            first segment, from steady sliding at V_* or from the initial stress and state of the
-            scene.
+            Initial point of a motion that starts within the last loading segment. By default, the
+            motion starts in the first loading segment. The default initial point is steady sliding
+            at V_*, or the initial stress and state of the scene.
         with_time : bool, default: False
             If True, time is one of the unknowns. If False, the times and slips of events may be
             NaN, and the integration needs fewer right-hand side evaluations.
@@ -327,7 +332,8 @@ class Integrator:
         until : float, default: inf
             Time at which the motion ends, in D_c/V_*.
         resume_from : Event, optional
-            Last event of an earlier motion of the scene. The motion continues from this event.
+            Last event of an earlier motion of the same scene. The new motion continues from this
+            event.
 
         Yields
         ------

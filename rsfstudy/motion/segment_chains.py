@@ -1,4 +1,4 @@
-"""Chains of loading segments between which stress jumps, and the events at their starts."""
+"""Chains of loading segments, and the events at the start of each chain."""
 
 from __future__ import annotations
 
@@ -17,14 +17,15 @@ from rsfstudy.slider import SINGLE_ENDLESS_SEGMENT_TABLE, MotionPoint, Numbers, 
 def list_segment_chains(
     scene: Scene, *, only_last_segment: bool
 ) -> Sequence[tuple[Scene, np.ndarray]]:
-    """Return the segment chains of a motion.
+    """Split the loading segments of a scene into chains.
 
     Parameters
     ----------
     scene : Scene
         Scene of the motion.
     only_last_segment : bool
-        If True, the motion starts in the last loading segment, which has no end.
+        If True, the motion starts in the last loading segment. The last loading segment has no end
+        time.
 
     Returns
     -------
@@ -39,9 +40,9 @@ def list_segment_chains(
 def find_remaining_segment_chains(
     scene: Scene, resume_from: Event
 ) -> tuple[Sequence[tuple[Scene, np.ndarray]], MotionPoint]:
-    """Return the segment chains after the end of a motion, and the initial point.
+    """Return the remaining segment chains of a motion that is continued.
 
-    If the motion ended at a jump in stress, the initial point is the point after this jump.
+    If the motion ended at a jump in stress, the continued motion starts after this jump.
 
     Parameters
     ----------
@@ -101,15 +102,16 @@ def iterate_segment_start_events(
     segment_scene: Scene,
     event_specs: Sequence[EventSpecification],
 ) -> Iterator[Event]:
-    """Yield the events at the start of a segment chain, except the first chain.
+    """Yield the events at the jump in stress at the start of a segment chain.
 
-    The first event is the start of the loading segment. The following events are requested events
-    that occur at the jump in stress.
+    The first chain of a motion does not start with a jump in stress, so the function is not called
+    for the first chain. The first event is the start of the loading segment. The other events are
+    the requested events that occur at the jump in stress.
 
     Parameters
     ----------
     event : Event
-        Start of the motion in the chain.
+        Event at which the motion enters the chain.
     point_and_parameters_before : tuple of (MotionPoint, tuple of float)
         Last point and last parameters of the previous chain.
     segment_scene : Scene

@@ -1,7 +1,7 @@
 """Tables and summaries of results, for the command line and the HTML report.
 
-The functions take a dataset and return tables of plain text, such as tables of reductions, claims,
-failed cells and fits. The package never computes results and never prints.
+Most functions take a dataset and return tables whose cells are strings. There are tables of
+reductions, claims, failed cells and fits. The package never computes results and never prints.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Tables and counts of the cells of a study by status."""
+"""Tables of the cells of a study, and number of cells with each status."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ _MAX_FAILURES = 20
 
 
 def count_statuses(dataset: xr.Dataset) -> Mapping[str, int]:
-    """Count the cells per status.
+    """Count the cells with each status.
 
     Parameters
     ----------
@@ -38,7 +38,7 @@ def count_statuses(dataset: xr.Dataset) -> Mapping[str, int]:
 
 
 def count_failures(dataset: xr.Dataset) -> Mapping[str, int]:
-    """Count the failed cells per status.
+    """Count the failed cells with each status.
 
     Parameters
     ----------
@@ -84,8 +84,9 @@ def format_status_counts(dataset: xr.Dataset) -> str:
     Returns
     -------
     str
-        Number of cells per status, and total number of right-hand-side evaluations. If no cell has
-        the status ``ok``, each status is followed by its meaning.
+        String with the number of cells with each status, and with the total number of
+        right-hand-side evaluations. If no cell has the status ``ok``, the string also explains each
+        status.
     """
     work, counts = int(dataset["rhs_evaluations"].sum()), count_statuses(dataset)
     nothing = Status.OK.label not in counts
@@ -97,7 +98,7 @@ def format_status_counts(dataset: xr.Dataset) -> str:
 
 
 def format_notes_on_incomplete_results(results: xr.Dataset) -> list[str]:
-    """Describe failed cells and reductions that could not be computed.
+    """Describe the failed cells and the reductions without results.
 
     Parameters
     ----------
@@ -107,7 +108,7 @@ def format_notes_on_incomplete_results(results: xr.Dataset) -> list[str]:
     Returns
     -------
     list of str
-        Notes, or an empty list if the results are complete.
+        Notes for the user. The list is empty if no cell failed and all reductions have results.
     """
     told = [
         f"no {name}: {why}" for name, why in find_refusal_reasons_of_reductions(results).items()
@@ -120,7 +121,7 @@ def format_notes_on_incomplete_results(results: xr.Dataset) -> list[str]:
 
 
 def failures_table(dataset: xr.Dataset, file: str) -> TextTable:
-    """Build a table of the first failed cells, and the commands to rerun them.
+    """Build a table of failed cells, with commands that recompute the cells.
 
     Parameters
     ----------
@@ -132,8 +133,9 @@ def failures_table(dataset: xr.Dataset, file: str) -> TextTable:
     Returns
     -------
     TextTable
-        Table with up to 20 failed cells. Each entry of ``values`` has the keys ``coordinates``,
-        ``status``, ``message`` and ``command``. The command recomputes the cell.
+        Table of the first 20 failed cells. Each entry of ``values`` has the keys ``coordinates``,
+        ``status``, ``message`` and ``command``. The value of ``command`` is a shell command that
+        recomputes the cell.
     """
     status = dataset["status"]
     failed = (status >= int(Status.WORK_BUDGET_SPENT)) & (status != int(Status.PENDING))
@@ -174,7 +176,8 @@ def build_frame_of_cells(
     Returns
     -------
     pandas.DataFrame
-        Table with one row per cell: coordinates on the axes, ``status`` and ``message``.
+        Table with one row per selected cell. The columns are the coordinates of the cell,
+        ``status`` and ``message``.
     """
     at = cell_mask.values
     columns = {name: dataset[name].broadcast_like(cell_mask).values[at] for name in axis_names}
@@ -186,7 +189,7 @@ def build_frame_of_cells(
 def format_recompute_command(
     dataset: xr.Dataset, results_file: str, cell_coordinates: Mapping[str, Any]
 ) -> str:
-    """Format the command that recomputes one cell.
+    """Format the shell command that recomputes one cell.
 
     Parameters
     ----------
@@ -200,7 +203,7 @@ def format_recompute_command(
     Returns
     -------
     str
-        Command for a shell.
+        Shell command.
     """
     words = ["rsfstudy", "rerun", results_file]
     declared_in = StoredDataset(dataset).provenance["declared_in"]

@@ -1,4 +1,4 @@
-"""Tables and remarks on fits that commands print and reports show."""
+"""Tables of fits, and remarks on fits, for commands and reports."""
 
 from __future__ import annotations
 
@@ -22,12 +22,12 @@ from rsfstudy.reporting.tables import TextTable
 from rsfstudy.status import Status
 from rsfstudy.storage import StoredDataset
 
-#: Maximum number of fits next to each other in a table.
+#: Maximum number of fits in one table. Each fit has one column.
 _MAX_FITS_PER_TABLE = 3
-#: Headings of the parameters in the final table, which has one row per fit.
+#: Headings of the parameters in the table that has one row per fit.
 _PARAMETERS_IN_FIT_SUMMARY = ("a", "b", "b1", "b2", "Dc")
-#: If the ratio of a standard error to the value of the parameter exceeds this limit, neither number
-#: is printed.
+#: Maximum ratio of the standard error of a parameter to its value. If the ratio is larger, neither
+#: the value nor the standard error is printed.
 _MAX_PRINTED_RELATIVE_ERROR = 1e4
 #: If the AIC values of two friction laws differ by more than this limit, the comparison of the laws
 #: is decisive.
@@ -88,7 +88,7 @@ def _describe_unfitted_step(place: str, fits: Sequence[xr.Dataset]) -> str:
 def _compare_laws_of_fits(fits: Sequence[xr.Dataset]) -> Iterator[str]:
     """Yield a sentence that names the law with the lowest AIC.
 
-    The sentence also reports whether the AIC difference to the second-best law is decisive.
+    The sentence also reports whether the AIC of the second-best law is higher by a decisive amount.
     """
     known = [(one["criterion"].item(), str(one["law"].item())) for one in fits]
     known = sorted(pair for pair in known if math.isfinite(pair[0]))
@@ -161,7 +161,7 @@ def _bracketed_units(parameter_name: str) -> str:
 
 
 def _describe_window(fit: xr.Dataset) -> str:
-    """Describe the velocities of the step and the fitted window."""
+    """Describe the velocities before and after the step, and the fitted window."""
     speeds = (fit[n].item() for n in ("velocity_before", "velocity_after"))
     ends = (fit[n].item() for n in ("window_begins", "window_ends"))
     rows = int(fit["rows_fitted"].item())
@@ -227,8 +227,9 @@ def format_with_error(value: float, error: float) -> str:
 def _iterate_fit_remarks(fit: xr.Dataset) -> Iterator[str]:
     """Yield remarks on a fit.
 
-    The remarks include the message of the fit, the differences between windows, the credible
-    intervals of the posterior, and the result of the autocorrelation test.
+    The remarks include the message of the fit and the result of the autocorrelation test. If the
+    record was fitted with several windows, the remarks include the differences between the windows.
+    If there are posterior samples, the remarks include credible intervals.
     """
     law, message = fit["law"].item(), str(fit["message"].item())
     if status_label_of_fit(fit) == Status.ERRORS_NOT_VALID.label:

@@ -1,4 +1,4 @@
-"""Numbers of fits, as a table for users and as dictionaries for machine-readable results."""
+"""Results of fits, as a table for users and as dictionaries for JSON output."""
 
 from __future__ import annotations
 
@@ -17,7 +17,8 @@ from rsfstudy.fitting import (
 from rsfstudy.reporting.tables import format_units
 from rsfstudy.status import Status
 
-#: Names that laboratories use for parameters, if the names in rsfstudy are different.
+#: Names that laboratories use for parameters, by parameter name in rsfstudy. The mapping contains
+#: only the parameters whose names differ.
 _LABORATORY_NAME_BY_PARAMETER_NAME = {
     "slip_distance": "Dc",
     "slip_distance_2": "Dc2",
@@ -25,7 +26,7 @@ _LABORATORY_NAME_BY_PARAMETER_NAME = {
     "stiffness": "k",
     "trend1": "trend",
 }
-#: Status of fits that have values and valid standard errors.
+#: Labels of the statuses of fits that have values and valid standard errors.
 _STATUS_LABELS_OF_FITS_WITH_VALUES = (Status.OK.label, Status.NOT_IDENTIFIED.label)
 
 
@@ -46,9 +47,10 @@ def is_fit(dataset: xr.Dataset) -> bool:
 
 
 def split_into_single_fits(dataset: xr.Dataset) -> list[xr.Dataset]:
-    """Split a dataset into its fits.
+    """Split a dataset of several fits into one dataset per fit.
 
-    If the fits have several windows, only the fits of the longest window are returned.
+    If the steps were fitted with several windows, the function returns only the fits with the
+    longest window.
 
     Parameters
     ----------
@@ -75,7 +77,7 @@ def split_into_single_fits(dataset: xr.Dataset) -> list[xr.Dataset]:
 
 
 def record_and_step_of_fit(fit: xr.Dataset) -> dict[str, Any]:
-    """Return the record and the step of a fit.
+    """Return the record name and the step number of a fit.
 
     Parameters
     ----------
@@ -163,7 +165,7 @@ def fit_table(dataset: xr.Dataset) -> pd.DataFrame:
 
 
 def list_fit_values(dataset: xr.Dataset) -> list[dict[str, Any]]:
-    """Return the numbers of each fit for machine-readable results.
+    """Return the results of each fit as a dictionary for JSON output.
 
     Parameters
     ----------
@@ -173,8 +175,8 @@ def list_fit_values(dataset: xr.Dataset) -> list[dict[str, Any]]:
     Returns
     -------
     list of dict
-        One dictionary per fit, with the keys that the page on running studies documents. The values
-        of the fitted parameters have the names, values and units of the dataset.
+        One dictionary per fit. The documentation page "Running studies" describes the keys of the
+        dictionaries. The fitted parameters have the same names, values and units as in the dataset.
 
     Raises
     ------
@@ -221,8 +223,9 @@ def normal_stresses_in_mpa(fit: xr.Dataset) -> dict[str, float]:
     Returns
     -------
     dict of str to float
-        If the fit has one step, the key is ``normal_stress``. If the fit has several steps, each
-        step has a numbered key. Normal stresses that are not finite are omitted.
+        Normal stresses in MPa. If the fit has one step, the only key is ``normal_stress``. If the
+        fit has several steps, the keys contain the number of the step. Normal stresses that are not
+        finite are omitted.
     """
     names = [str(n) for n in fit.data_vars if str(n).startswith("normal_stress_before_")]
     stresses = {n: fit[n].item() * 1e-6 for n in names or ["normal_stress_before"] if n in fit}
@@ -249,7 +252,7 @@ def stderr_of_fixed_stiffness(fit: xr.Dataset) -> float:
 
 
 def status_label_of_fit(fit: xr.Dataset) -> str:
-    """Return the label of the status of a fit.
+    """Return the status label of a fit.
 
     Parameters
     ----------
@@ -259,7 +262,7 @@ def status_label_of_fit(fit: xr.Dataset) -> str:
     Returns
     -------
     str
-        Label such as ``ok`` or ``not_identified``.
+        Status label, such as ``ok`` or ``not_identified``.
     """
     return Status.labels_by_code()[int(fit["status"])]
 

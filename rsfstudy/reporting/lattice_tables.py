@@ -1,4 +1,4 @@
-"""Tables and short descriptions of the main result of a study along its axes."""
+"""Tables of the primary output of a study, and short summaries of a study."""
 
 from __future__ import annotations
 
@@ -28,15 +28,17 @@ from rsfstudy.storage import StoredDataset
 
 #: Maximum number of cells in a table that shows all cells.
 _MAX_CELLS_SHOWN_WITHOUT_THINNING = 36
-#: If each point of a numbered axis has more fields than this number, a table shows fewer cells.
+#: Maximum number of fields per point of a numbered axis. If there are more fields, a table shows
+#: only a selection of the cells.
 _MAX_FIELDS_PER_POINT_WITHOUT_THINNING = 4
 
 
 def build_primary_output_table(dataset: xr.Dataset) -> TextTable:
-    """Build a table of the primary output along the axes.
+    """Build a table of the primary output of a study.
 
-    The table contains the coordinates, the error estimates, and the status if some cells have no
-    result. If the lattice has many cells, the table contains a selection of the cells.
+    Each row of the table contains the coordinates, the value and the error estimate of one cell. If
+    some cells have no value, the table also contains the status of each cell. If the lattice has
+    many cells, the table contains only a selection of the cells.
 
     Parameters
     ----------
@@ -117,7 +119,7 @@ def select_thinned_points(
 
 
 def summarise_study_as_text_lines(dataset: xr.Dataset) -> list[str]:
-    """Summarise the results of a study in lines of text.
+    """Summarise the results of a study in a few lines of text.
 
     Parameters
     ----------
@@ -127,7 +129,8 @@ def summarise_study_as_text_lines(dataset: xr.Dataset) -> list[str]:
     Returns
     -------
     list of str
-        Range of the primary output, one line per slope, and the number of cells per status.
+        Lines of text: the range of the primary output, one line per slope, and the number of cells
+        with each status.
     """
     lines, converted = [], DatasetUnits(dataset).convert_for_display()
     if (name := StoredDataset(dataset).primary_output) is not None:

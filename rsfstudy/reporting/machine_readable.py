@@ -1,7 +1,7 @@
-"""Machine-readable summaries of datasets, for the JSON output of commands.
+"""Summaries of datasets for the JSON output of commands.
 
-The functions return dictionaries of numbers, labels and texts. The dictionaries contain the numbers
-of the printed tables without rounding.
+The functions return dictionaries whose values are numbers and strings. The numbers are the same as
+in the printed tables, but they are not rounded.
 """
 
 from __future__ import annotations
@@ -30,12 +30,13 @@ def summarise_study_as_fields(dataset: xr.Dataset, file: str) -> dict[str, Any]:
     dataset : xarray.Dataset
         Results of a study.
     file : str
-        Path of the results file, for the commands that recompute failed cells.
+        Path of the results file. The path is part of the shell commands that recompute failed
+        cells.
 
     Returns
     -------
     dict of str to object
-        Status counts, reductions, missing reductions and failed cells.
+        Number of cells by status, reductions, missing reductions and failed cells.
     """
     rows = [row for table in build_reduction_tables(dataset) for row in table.values]
     return {
@@ -55,7 +56,7 @@ def summarise_study_as_fields(dataset: xr.Dataset, file: str) -> dict[str, Any]:
 
 
 def classify_contents(dataset: xr.Dataset) -> str:
-    """Return the kind of the contents of a file.
+    """Return the kind of data in a file.
 
     Parameters
     ----------
@@ -65,7 +66,8 @@ def classify_contents(dataset: xr.Dataset) -> str:
     Returns
     -------
     str
-        "results" (of a study), "fit", "motion", or "scene" for other results of a single scene.
+        The string "results" for the results of a study, "fit" for fits, "motion" for a motion, or
+        "scene" for other results of a single scene.
     """
     if is_fit(dataset):
         return "fit"
@@ -75,7 +77,7 @@ def classify_contents(dataset: xr.Dataset) -> str:
 
 
 def summarise_file_as_fields(dataset: xr.Dataset, file: str) -> dict[str, Any]:
-    """Summarise the contents of a file.
+    """Summarise the data in a file.
 
     Parameters
     ----------
@@ -87,7 +89,7 @@ def summarise_file_as_fields(dataset: xr.Dataset, file: str) -> dict[str, Any]:
     Returns
     -------
     dict of str to object
-        Kind of the contents, and the fields of this kind.
+        Kind of the data, and the fields that the JSON output contains for this kind.
     """
     kind = classify_contents(dataset)
     about = {"kind": kind, "file": file}
@@ -121,7 +123,7 @@ def _summarise_results(dataset: xr.Dataset, file: str) -> dict[str, Any]:
 
 
 def _select_applicable_fields(fields: Mapping[str, Any]) -> dict[str, Any]:
-    """Return the fields of a scene that are not None, because None marks absent fields."""
+    """Return the fields of a scene that are not None."""
     return {name: value for name, value in fields.items() if value is not None}
 
 
@@ -139,7 +141,7 @@ def _list_results(dataset: xr.Dataset) -> list[dict[str, Any]]:
 
 
 def build_contents_table(dataset: xr.Dataset) -> TextTable:
-    """Build a table of the results that a dataset contains.
+    """Build a table of the result variables in a dataset.
 
     Parameters
     ----------
@@ -149,7 +151,7 @@ def build_contents_table(dataset: xr.Dataset) -> TextTable:
     Returns
     -------
     TextTable
-        Name, description and dimensions of each result.
+        Table with the name, the description and the dimensions of each result variable.
     """
     found = _list_results(dataset)
     rows = [

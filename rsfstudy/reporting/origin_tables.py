@@ -22,24 +22,24 @@ def describe_scene_and_rig_fields(
     rig_values: Mapping[str, float],
     varied_names: Collection[str] = (),
 ) -> dict[str, str]:
-    """Describe the fields of a scene and of a rig.
+    """Describe the fields of a scene and the quantities of a rig.
 
     Parameters
     ----------
     heading : str
-        Key in the returned dictionary for the fields that have a nonzero value.
+        Key of the nonzero fields in the returned dictionary.
     scene_fields : mapping of str to object
         Fields of the scene.
     rig_values : mapping of str to float
         Quantities of the rig in SI units.
     varied_names : collection of str, optional
-        Names of the fields that vary along an axis. These fields are omitted.
+        Names of the fields that vary along an axis. The description omits these fields.
 
     Returns
     -------
     dict of str to str
-        Descriptions of the nonzero fields, the zero fields, the rig, and the slip rate of the
-        instability norm. Empty descriptions are omitted.
+        Descriptions of the nonzero fields, of the fields that are zero, of the rig, and of the slip
+        rate at the instability norm. Empty descriptions are omitted.
     """
     scene_fields = {n: v for n, v in scene_fields.items() if n not in varied_names}
     sizes = Rig.convert_quantities_for_display(rig_values, varied_names)
@@ -53,14 +53,15 @@ def describe_scene_and_rig_fields(
     norm, period = scene_fields.get("instability_norm"), scene_fields.get("period")
     if norm and period and {"slip_distance", "reference_velocity"} <= set(sizes):
         rate = norm * math.tau * sizes["slip_distance"][0] / period
-        # A norm below the reference velocity does not indicate an instability.
+        # An instability norm below the reference velocity is not described, because the slip rate
+        # of steady sliding would exceed this norm.
         if rate > sizes["reference_velocity"][0]:
             told["instability threshold"] = f"a slip rate of {rate:.4g} um/s on"
     return {name: text for name, text in told.items() if text}
 
 
 def find_constant_fields(dataset: xr.Dataset) -> tuple[dict[str, Any], dict[str, float]]:
-    """Find the fields of the scene and of the rig that have the same value in all cells.
+    """Find the scene fields and rig quantities that are equal in all cells.
 
     Parameters
     ----------
@@ -70,7 +71,7 @@ def find_constant_fields(dataset: xr.Dataset) -> tuple[dict[str, Any], dict[str,
     Returns
     -------
     scene : dict of str to object
-        Fields of the scene. Fields that do not apply are None.
+        Fields of the scene. The value of a field is None if the scene does not have this field.
     rig : dict of str to float
         Quantities of the rig in SI units. The dictionary is empty if the study has no rig.
     """
@@ -114,7 +115,7 @@ def describe_study_origin(dataset: xr.Dataset) -> dict[str, str]:
 
 
 def note_on_norms_near_load_velocity(dataset: xr.Dataset) -> str:
-    """Describe results whose instability norm is close to the load velocity.
+    """Describe results with an instability norm close to the load point velocity.
 
     Parameters
     ----------
@@ -124,9 +125,9 @@ def note_on_norms_near_load_velocity(dataset: xr.Dataset) -> str:
     Returns
     -------
     str
-        Number of results whose instability norm is close to the load point velocity, and the
-        message of the first such result. The string is empty if there is no such result, or if the
-        study has no rig.
+        String with the number of results whose instability norm is close to the load point
+        velocity, and with the message of the first of these results. The string is empty if there
+        is no such result, or if the study has no rig.
     """
     if StoredDataset(dataset).declaration.laboratory is None:
         return ""

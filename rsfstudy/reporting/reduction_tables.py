@@ -1,4 +1,4 @@
-"""Tables of reductions, and reasons for missing results of reductions."""
+"""Tables of reductions, and reasons why reductions have no results."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ _INTEGRATOR_COLUMNS = (
 
 
 def build_reduction_tables(dataset: xr.Dataset) -> Iterator[TextTable]:
-    """Yield tables of the slopes and of the comparison of integrators.
+    """Yield tables of the slopes of a study, and a comparison of integrators.
 
     Parameters
     ----------
@@ -65,7 +65,7 @@ def build_reduction_tables(dataset: xr.Dataset) -> Iterator[TextTable]:
 
 
 def _slope_table(dataset: xr.Dataset, reduction_name: str) -> TextTable:
-    """Return a table of a slope with its standard error and misfit."""
+    """Return a table of a slope, with its standard error and largest deviation."""
     slope = dataset[reduction_name]
     units, description = format_units(slope), slope.attrs.get("comment", reduction_name)
     heading = f"{reduction_name} ({units})" if units != "1" else reduction_name
@@ -99,7 +99,7 @@ def names_of_slope_reductions(dataset: xr.Dataset) -> list[str]:
 
 
 def build_reduction_tables_and_sentences(dataset: xr.Dataset) -> Iterator[TextTable | str]:
-    """Yield the tables of reductions, and the reasons for missing reductions.
+    """Yield the tables of reductions, and the reasons why results are missing.
 
     Parameters
     ----------
@@ -117,7 +117,7 @@ def build_reduction_tables_and_sentences(dataset: xr.Dataset) -> Iterator[TextTa
 
 
 def find_refusal_reasons_of_reductions(dataset: xr.Dataset) -> dict[str, str]:
-    """Find the reasons why reductions were refused, such as failed cells.
+    """Find the reasons why reductions were not computed, such as failed cells.
 
     Parameters
     ----------

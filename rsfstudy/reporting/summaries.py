@@ -46,9 +46,9 @@ def build_summary_tables_and_sentences(dataset: xr.Dataset) -> Iterator[SummaryT
     Yields
     ------
     TextTable, mapping of str to str, or str
-        The summary of a study includes the primary output and the reductions. The summary of a
-        motion includes the peak friction, the peak slip rate, the stability of the scene and the
-        events.
+        Items of the summary. The summary of a study includes the primary output and the reductions.
+        The summary of a motion includes the peak friction, the peak slip rate, the stability of the
+        scene and the events.
     """
     if fit_tables.is_fit(dataset):
         yield from summarise_fits(dataset)
@@ -93,7 +93,7 @@ def build_motion_tables_and_sentences(
 
 
 def is_motion(dataset: xr.Dataset) -> bool:
-    """Return True if a dataset is a motion or a part of a motion.
+    """Return True if a dataset is a motion, or a selection of times of a motion.
 
     Parameters
     ----------
@@ -110,7 +110,7 @@ def is_motion(dataset: xr.Dataset) -> bool:
 
 
 def describe_dataset_origin(dataset: xr.Dataset) -> dict[str, str]:
-    """Describe the contents and the provenance of a dataset.
+    """Describe the scene or the lattice of a dataset, and the provenance.
 
     Parameters
     ----------
@@ -136,7 +136,7 @@ def describe_dataset_origin(dataset: xr.Dataset) -> dict[str, str]:
 
 
 def measure_motion(dataset: xr.Dataset) -> dict[str, Any]:
-    """Measure the duration and the peak values of a motion.
+    """Compute the duration and the peak values of a motion.
 
     Parameters
     ----------
@@ -146,8 +146,9 @@ def measure_motion(dataset: xr.Dataset) -> dict[str, Any]:
     Returns
     -------
     dict of str to object
-        Numbers by name, and the units of times and slip rates. If the motion does not exceed the
-        instability norm, or if it has inertia or radiation damping, ``instability_time`` is None.
+        Numbers by name, and the units of times and slip rates. The entry ``instability_time`` is
+        None if the slip rate does not exceed the instability norm. The entry is also None if the
+        motion has inertia or radiation damping.
     """
     time, friction = dataset["time"], dataset["friction_coefficient"]
     over_reference = (10.0 ** dataset["log10_slip_rate"]).assign_attrs(scale="V_*")
@@ -167,7 +168,7 @@ def measure_motion(dataset: xr.Dataset) -> dict[str, Any]:
 
 
 def summarise_motion(dataset: xr.Dataset) -> dict[str, str]:
-    """Summarise a motion by its duration and its peak values.
+    """Describe the duration and the peak values of a motion.
 
     Parameters
     ----------
@@ -177,9 +178,9 @@ def summarise_motion(dataset: xr.Dataset) -> dict[str, str]:
     Returns
     -------
     dict of str to str
-        Duration, peak friction, peak slip rate, and friction at the end. If the motion has neither
-        inertia nor radiation damping and exceeds the instability norm, the time at which the motion
-        exceeds the norm is included.
+        Texts that describe the duration, the peak friction, the peak slip rate and the friction at
+        the end. If a motion without inertia and without radiation damping exceeds the instability
+        norm, the dictionary also describes the time at which the slip rate exceeds the norm.
     """
     found, unit = measure_motion(dataset), format_units(dataset["time"])
     told = {"duration": f"{found['duration']:.6g} {unit}"}
@@ -212,7 +213,7 @@ def describe_stability(scene: Scene) -> str:
 
 
 def build_events_table(event_catalogue: xr.Dataset) -> TextTable | str:
-    """Build a table of the events of a motion, without error estimates.
+    """Build a table of the events of a motion. The table has no error estimates.
 
     Parameters
     ----------

@@ -32,11 +32,11 @@ class TextTable:
     caption : str, optional
         Caption of the table.
     wrappable_columns : collection of str, optional
-        Headings of the columns whose texts may be wrapped between words.
+        Headings of the columns that contain prose. Lines of prose may be broken between words.
     row_colours : sequence of str, optional
         Colour of the last cell of each row.
     values : sequence of mapping of str to object, optional
-        Numbers and labels of each row without formatting, for machine-readable results.
+        Unformatted numbers and labels of each row, for JSON output.
     """
 
     rows: Sequence[Mapping[str, str]]
@@ -153,15 +153,15 @@ def format_units(variable: xr.DataArray) -> str:
     Returns
     -------
     str
-        Units, or the scale by which the variable is normalised. The string is "1" if the variable
-        is a pure number.
+        Units of the variable, or the scale by which the variable was divided. The string is "1" if
+        the variable is a pure number.
     """
     units = re.sub(r" (s|[num]?m)-1\b", r"/\1", units_or_scale_of_variable(variable.attrs) or "1")
     return re.sub(r" \((\w+)\)-1| (\(.*?\))-1", r"/\1\2", units)
 
 
 def format_axis_name(axis_coordinate: xr.DataArray) -> str:
-    """Format the name of an axis, with units if the axis has units.
+    """Format the name of an axis, with its units.
 
     Parameters
     ----------
@@ -171,8 +171,8 @@ def format_axis_name(axis_coordinate: xr.DataArray) -> str:
     Returns
     -------
     str
-        Name, followed by the units in brackets if the units differ from the units in the
-        vocabulary.
+        Name of the axis. If the units of the axis differ from the units in the vocabulary, the name
+        is followed by the units in brackets.
     """
     name, units = str(axis_coordinate.name), axis_coordinate.attrs.get("units", "1")
     return name if units in ("1", find_quantity(name).units) else f"{name} ({units})"
@@ -185,27 +185,27 @@ def build_table_along_dimensions(
     caption: str = "",
     wrappable_columns: Collection[str] = (),
 ) -> TextTable:
-    """Build a table with one row per combination of points of several dimensions.
+    """Build a table with one row for each combination of points on dimensions.
 
     Parameters
     ----------
     dataset : xarray.Dataset
         Dataset with the variables of the columns.
     dimensions : iterable of hashable
-        Dimensions along which the points become rows.
+        Dimensions of the rows. Each combination of points on these dimensions has one row.
     columns : sequence of Column
         Columns to the right of the coordinates.
     caption : str, optional
         Caption of the table.
     wrappable_columns : collection of str, optional
-        Headings of the columns whose texts may be wrapped between words.
+        Headings of the columns that contain prose. Lines of prose may be broken between words.
 
     Returns
     -------
     TextTable
-        Rows with the coordinates of a point, followed by the formatted values. Each entry of
-        ``values`` has the key ``coordinates`` and the keys of the columns. Codes are replaced by
-        their labels.
+        Table whose rows contain the coordinates of a point and the formatted values. Each entry of
+        ``values`` has the key ``coordinates`` and the keys of the columns. Codes of categorical
+        variables are replaced by their labels.
     """
     dims, rows, values = list(map(str, dimensions)), [], []
     flags = {column.key: read_flag_meanings(dataset[column.variable].attrs) for column in columns}

@@ -1,4 +1,4 @@
-"""Tables and counts of the verdicts on claims."""
+"""Tables of claims and verdicts, and number of claims with each verdict."""
 
 from __future__ import annotations
 
@@ -22,8 +22,8 @@ def claims_table(verdicts: pd.DataFrame) -> TextTable | str:
     Returns
     -------
     TextTable or str
-        Table of the claims. If no claim applies, the function returns a sentence. The sentence is
-        empty if there are no claims.
+        Table of the claims. If no claim applies, the function returns a sentence with the reason.
+        If there are no claims, the function returns an empty string.
     """
     rows = verdicts.to_dict("records")
     if not any(row["verdict"] != Claim.NOT_APPLICABLE for row in rows):
@@ -42,7 +42,7 @@ def claims_table(verdicts: pd.DataFrame) -> TextTable | str:
 
 
 def count_verdicts(verdicts: pd.DataFrame) -> str:
-    """Count the claims per verdict.
+    """Count the claims with each verdict.
 
     Parameters
     ----------
@@ -52,7 +52,8 @@ def count_verdicts(verdicts: pd.DataFrame) -> str:
     Returns
     -------
     str
-        Number of claims per verdict. If no claim applies, the string contains the reason.
+        String with the number of claims with each verdict. If no claim applies, the string contains
+        the reason.
     """
     given = list(verdicts["verdict"])
     if set(given) == {Claim.NOT_APPLICABLE}:
@@ -61,7 +62,7 @@ def count_verdicts(verdicts: pd.DataFrame) -> str:
 
 
 def summarise_verdicts(dataset: xr.Dataset, verdicts: pd.DataFrame) -> tuple[str, list[str]]:
-    """Summarise the verdicts of claims and the failures of cells.
+    """Summarise the verdicts of a study, and describe its failed cells.
 
     Parameters
     ----------
@@ -73,7 +74,7 @@ def summarise_verdicts(dataset: xr.Dataset, verdicts: pd.DataFrame) -> tuple[str
     Returns
     -------
     counts : str
-        Number of claims per verdict.
+        Text with the number of claims with each verdict.
     problems : list of str
         Descriptions of failed cells, and of claims whose verdict differs from the expected verdict.
     """

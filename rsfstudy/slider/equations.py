@@ -1,4 +1,4 @@
-"""Equations of motion of one scene, in the form that integrators use.
+"""Equations of motion of a scene, in the form that the integrators require.
 
 `equations_between_ruptures` and `equations_in_rupture` are the main functions. Both functions
 return `Equations` with the names and scales of the unknowns, the rates and the parameters.
@@ -31,7 +31,8 @@ from rsfstudy.slider.scene_view import SceneView
 if TYPE_CHECKING:
     from rsfstudy.slider.dynamics import Dynamics
 
-#: Names of two regimes of motion: ruptures with inertia, and the sliding of a rigid slider.
+#: Names of two regimes of motion. In the first regime, a rupture is integrated with inertia. In the
+#: second regime, the slider is rigid.
 RUPTURE_REGIME, RIGID_REGIME = "inertial", "rigid"
 
 
@@ -48,8 +49,8 @@ class Equations(NamedTuple):
     unknown_names : tuple of str
         Names of the unknowns.
     unknown_scales : tuple of float
-        Scale of each unknown. A change of an unknown by its scale affects the motion as much as a
-        change of :math:`\ln V` by 1.
+        Scale of each unknown. If an unknown changes by its scale, the effect on the motion is as
+        large as the effect of a change of :math:`\ln V` by 1.
     rate_function : callable
         Function ``rate(state, p) -> tuple`` that returns the derivatives of the unknowns.
     point_function : callable
@@ -60,7 +61,7 @@ class Equations(NamedTuple):
         Number of states of the scene.
     force_balance_function : callable, optional
         Function ``force_balance_function(spring, psis, p)`` that returns :math:`\ln(V/V_*)`, the
-        frictional stress and the decrease of the state due to stress. The attribute is None in the
+        frictional stress and the stress-induced decrease of the state. The value is None in the
         equations for ruptures and for rigid sliders.
     """
 
@@ -74,7 +75,7 @@ class Equations(NamedTuple):
     force_balance_function: Function | None = None
 
     def evaluate_rates(self, unknown_values: Numbers) -> Numbers:
-        """Evaluate the derivatives of the unknowns.
+        """Compute the derivatives of the unknowns.
 
         Parameters
         ----------
@@ -90,7 +91,10 @@ class Equations(NamedTuple):
 
     @property
     def is_rigid(self) -> bool:
-        """True for a rigid slider, for which slip is the independent variable."""
+        """True if the equations describe a rigid slider.
+
+        The independent variable of a rigid slider is slip.
+        """
         return self.regime == RIGID_REGIME
 
     def evaluate_point(self, unknown_values: Numbers) -> MotionPoint:
@@ -115,15 +119,15 @@ class Equations(NamedTuple):
 def equations_between_ruptures(scene: SceneView, *, with_time: bool) -> Equations:
     """Return the equations of a scene between ruptures.
 
-    Between ruptures, the effect of inertia is small or zero. The unknowns are the spring stress f
-    and the states.
+    Between ruptures, inertia has a small effect or no effect on the motion. The unknowns are the
+    spring stress f and the states.
 
     Parameters
     ----------
     scene : Scene
         Scene to integrate.
     with_time : bool
-        Whether to append time to the unknowns.
+        If True, time is an additional unknown.
 
     Returns
     -------
@@ -140,9 +144,9 @@ def equations_without_mass(scene: SceneView, *, with_time: bool) -> Equations:
     Parameters
     ----------
     scene : Scene
-        Scene to integrate. The function ignores the inertia of the scene.
+        Scene to integrate. If the scene has inertia, the function ignores the inertia.
     with_time : bool
-        Whether to append time to the unknowns.
+        If True, time is an additional unknown.
 
     Returns
     -------
@@ -157,7 +161,7 @@ def equations_without_mass(scene: SceneView, *, with_time: bool) -> Equations:
 def _build_slow_equations(
     scene: SceneView, dynamics: Dynamics, *, with_time: bool, along_path: bool = True
 ) -> Equations:
-    """Build the equations between ruptures from the friction of a scene and from dynamics."""
+    """Build the equations between ruptures for the given dynamics."""
     friction = scene.friction_functions
     balance, growth = _build_slip_rate_functions(friction, dynamics.build_slip_rate_functions)
     by_displacement, by_path, by_path_with_time = build_rate_functions_between_ruptures(
@@ -184,7 +188,7 @@ def _build_slip_rate_functions(
     friction_functions: FrictionFunctions,
     build_slip_rate_functions: Callable[[FrictionFunctions], tuple[Function, Function]],
 ) -> tuple[Function, Function]:
-    """Build the force balance and the derivative of ln V once for equal friction functions."""
+    """Build and cache the force balance and the derivative of ln V."""
     return build_slip_rate_functions(friction_functions)
 
 
@@ -200,15 +204,15 @@ def _state_names(scene: SceneView) -> tuple[str, ...]:
 def equations_in_rupture(scene: SceneView, *, with_time: bool = False) -> Equations:
     r"""Return the equations of a scene with inertia.
 
-    The unknowns are the spring stress f, the log rate :math:`\ln(V/V_*)`, the frictional stress g
-    and all states except the first.
+    The unknowns are the spring stress f, the logarithm of the slip rate :math:`\ln(V/V_*)`, the
+    frictional stress g and all states except the first.
 
     Parameters
     ----------
     scene : Scene
         Scene with inertia.
     with_time : bool, default: False
-        Whether to append inertial time, in units of :math:`T/(2 \pi)`, to the unknowns.
+        If True, inertial time in units of :math:`T/(2 \pi)` is an additional unknown.
 
     Returns
     -------
@@ -226,7 +230,7 @@ def equations_in_rupture(scene: SceneView, *, with_time: bool = False) -> Equati
 def _build_rupture_equations(
     scene: SceneView, *, with_time: bool = False, along_path: bool = True
 ) -> Equations:
-    """Build the equations in ruptures, or raise ``TypeError`` if there is no inertia."""
+    """Build the equations in ruptures. Raise TypeError if there is no inertia."""
     a, friction, others = scene.a, scene.friction_functions, _state_names(scene)[1:]
     if scene.dynamics.build_rupture_rate_function is None:
         raise TypeError(f"{scene.dynamics.name} has no equations of ruptures")
@@ -249,11 +253,12 @@ def _build_rupture_equations(
 
 
 def build_equations_against_displacement(scene: SceneView) -> Equations:
-    """Return the equations between ruptures as functions of displacement.
+    """Return the equations between ruptures with displacement as variable.
 
-    The displacement is slip plus load point displacement. Close to steady sliding, the rates are
-    nearly linear functions of the unknowns. The rates with respect to displacement remain linear
-    over a wider range than the rates with respect to path length.
+    The independent variable is the sum of slip and load point displacement. Close to steady
+    sliding, the derivatives of the unknowns are nearly linear functions of the unknowns. The
+    derivatives with respect to displacement are nearly linear over a wider range than the
+    derivatives with respect to path length.
 
     Parameters
     ----------
@@ -269,7 +274,7 @@ def build_equations_against_displacement(scene: SceneView) -> Equations:
 
 
 def build_equations_against_inertial_time(scene: SceneView) -> Equations:
-    r"""Return the equations of a scene with inertia as functions of time.
+    r"""Return the equations of a scene with inertia, with time as variable.
 
     Parameters
     ----------

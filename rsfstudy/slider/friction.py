@@ -1,24 +1,25 @@
-r"""Friction of a scene: functions that combine the parts that act on friction.
+r"""Friction functions of a scene, built from the parts of the scene.
 
 `build_friction_functions` combines the law, the normal stress condition, the fluid and the loading
 of a scene. The module ``friction_relation`` defines the friction relation between the frictional
-stress g, the slip rate and the states, and the module ``state_functions`` defines the functions of
-the states. Only the effects that are active in the scene are combined.
+stress g, the slip rate and the states. The module ``state_functions`` defines the functions of the
+states. The friction functions include only the effects that are active in the scene.
 
 The pore pressure :math:`P`, divided by :math:`\sigma_*`, reduces the effective normal stress, so
-:math:`s = \sigma/\sigma_* - P`. Friction and the effects of stress on the state depend on the
-effective normal stress only. The pressure :math:`P` is the last element of the tuple of states,
-after the states of the law. A loading that imposes normal stress also adds an unknown to the
-states. This unknown acts like a pore pressure. If the scene also has a fluid, the pressure around
-the fault is the first element after the states of the law.
+:math:`s = \sigma/\sigma_* - P`. Friction depends on :math:`\sigma` and :math:`P` only through the
+effective normal stress, and so do the effects of stress on the state. In the tuple of states, the
+states of the law come first, and the pressure :math:`P` is the last element. A loading that imposes
+normal stress adds an unknown that acts like a pore pressure. If a scene has such a loading and also
+a fluid, the first element after the states of the law is the pressure around the fault.
 
 If the displacement of the load point exceeds its mean motion by :math:`D`, the spring adds the
-shear stress :math:`K D`. The spring stress f and the frictional stress g exclude the stress
-:math:`K D`. The friction functions add :math:`K D` to g. Inertia and radiation damping depend only
-on the difference f - g. This difference is the same with and without :math:`K D`.
+shear stress :math:`K D`. The unknowns f (spring stress) and g (frictional stress) do not include
+the stress :math:`K D`. The friction functions therefore add :math:`K D` to g. The equations for
+inertia and radiation damping do not need :math:`K D`, because they depend only on the difference f
+- g.
 
-The functions take floats and the parameter tuple ``p`` (see ``parameter_layout``). Each function is
-built once for all scenes with the same functions of parts, so that it is compiled only once.
+The functions take floats and the parameter tuple ``p`` (see ``parameter_layout``). Scenes with the
+same combination of parts share the friction functions, so that each function is compiled only once.
 """
 
 from __future__ import annotations
@@ -41,18 +42,19 @@ class FrictionFunctions(NamedTuple):
     ----------
     strength : callable
         Function ``(g, psis, p) -> (strength, slope, shift, shift_slope)``. The slopes are
-        derivatives with respect to the frictional stress g. The tuple ``psis`` may omit the first
-        state.
+        derivatives with respect to the frictional stress g. The first state can be omitted from the
+        tuple ``psis``.
     effective_normal_stress : callable
-        Function ``(g, psis, p) -> (s - 1, slope)`` of the effective normal stress.
+        Function ``(g, psis, p) -> (s - 1, slope)`` that returns the effective normal stress minus 1
+        and its derivative with respect to g.
     rig_normal_stress : callable
-        Function ``(g, psis, p) -> (s - 1, slope)`` of the normal stress minus the pore pressure
-        outside the fault. A laboratory rig measures this stress.
+        Function ``(g, psis, p) -> (s - 1, slope)`` with the pore pressure outside the fault instead
+        of the pore pressure in the fault. A laboratory rig measures this effective normal stress.
     boundary_pressure : callable
-        Function ``(psis) -> P`` of the pore pressure outside the fault.
+        Function ``(psis) -> P`` that returns the pore pressure outside the fault.
     evolutions : callable
-        Function ``(log_slip_rate, psis, shift, fraction, p)`` that returns the change of all states
-        per slip distance of :math:`D_c`, multiplied by ``fraction``.
+        Function ``(log_slip_rate, psis, shift, fraction, p)`` that returns the derivatives of all
+        states with respect to slip in :math:`D_c`, multiplied by ``fraction``.
     steady_states : callable
         Function ``(log_slip_rate, shift, p)`` that returns all states in steady sliding.
     state_sum : callable
@@ -68,17 +70,16 @@ class FrictionFunctions(NamedTuple):
         respect to the pore pressure.
     states_from_strength : callable
         Function ``(strength, log_slip_rate, others, p)`` that returns all states. The first state
-        follows from the strength and the other states.
+        is computed from the strength, the slip rate and the other states.
     load_point_stress : callable
         Function ``(psis, p)`` that returns the shear stress :math:`K D`. The frictional stress g
-        excludes this stress.
+        does not include this stress.
     load_point_stress_change : callable
         Function ``(changes)`` that returns the change of the shear stress :math:`K D`.
     state_count : int
         Number of states.
     indices_of_states_in_distance : tuple of int
-        Indices of the states that are compared with their steady values to compute the distance
-        from steady sliding.
+        Indices of the states from which the distance from steady sliding is computed.
     """
 
     strength: Function
@@ -109,7 +110,8 @@ def build_friction_functions(scene: SceneView) -> FrictionFunctions:
     Returns
     -------
     FrictionFunctions
-        Friction functions, which are equal for all scenes with the same functions of parts.
+        Friction functions of the scene. All scenes with the same combination of parts have the same
+        functions.
     """
     law, source, loading = scene.parts.law, scene.pressure_source, scene.parts.loading
     oscillates, law_states = loading.has_load_point_unknown, law.state_count
@@ -162,7 +164,7 @@ def build_friction_functions(scene: SceneView) -> FrictionFunctions:
 
 
 def _find_stress_effects_on_state(scene: SceneView) -> tuple[Function, ...]:
-    """Return the functions of the effects of stress on the state variable."""
+    """Return the functions that define how stress changes the state variable."""
     law = scene.parts.law
     of_shear_stress = (
         friction_relation.shear_stress_effect_on_state if law.stress_dependence else None
@@ -179,10 +181,11 @@ def _build_stress_functions(
     boundary_pressure_index: int,
     allows_reversed_slip: bool,
 ) -> tuple[Function, Function, Function, Function]:
-    """Build the functions of the frictional stress.
+    """Build the friction functions whose argument is the frictional stress.
 
-    The argument ``last_unknown`` is ``"pressure"``, ``"load point"`` or empty. The functions are
-    the first three functions of ``FrictionFunctions`` and the derivatives with respect to the last
+    The argument ``last_unknown`` is ``"pressure"``, ``"load point"`` or an empty string. It
+    describes the last element of the tuple of states. The function returns the first three
+    functions of ``FrictionFunctions``, and a function for the derivatives with respect to the last
     unknown.
     """
     effect = (
@@ -247,8 +250,8 @@ def effective_normal_stress_at(
     frictional_stress : float
         Deviation of the frictional stress from :math:`\tau_*`, in units of :math:`\sigma_*`.
     states : tuple of float, optional
-        States of the scene, from which the pore pressure is read. By default, the function uses the
-        pore pressure of steady sliding.
+        States of the scene. The pore pressure is one of the states. By default, the function uses
+        the pore pressure in steady sliding.
 
     Returns
     -------
@@ -273,8 +276,8 @@ def build_state_evolution_function(scene: SceneView) -> Callable[[float, Numbers
     Returns
     -------
     callable
-        Function ``(log_slip_rate, psis, shift)`` that returns the change of each state per slip
-        distance of :math:`D_c`.
+        Function ``(log_slip_rate, psis, shift)`` that returns the derivative of each state with
+        respect to slip in :math:`D_c`.
     """
     evolutions, p = scene.friction_functions.evolutions, scene.friction_parameter_values
     return lambda log_slip_rate, psis, shift: evolutions(log_slip_rate, psis, shift, 1.0, p)
@@ -290,12 +293,12 @@ def compute_steady_states(scene: SceneView, log_slip_rate: float, state_shift: f
     log_slip_rate : float
         Natural logarithm of the slip rate, :math:`\ln(V/V_*)`.
     state_shift : float
-        Decrease of the state variable due to stress.
+        Stress-induced decrease of the state variable.
 
     Returns
     -------
     tuple of float
-        States :math:`\Psi_i`.
+        States :math:`\Psi_i` of steady sliding.
     """
     p = scene.friction_parameter_values
     states: Numbers = scene.friction_functions.steady_states(log_slip_rate, state_shift, p)

@@ -9,25 +9,25 @@ friction law :math:`\tau = \sigma [\mu_* + a \ln(V/V_*) + \Theta]` becomes
     a \ln(V/V_*) + \Psi = \mathrm{strength}(g), \qquad
     \mathrm{strength}(g) = \frac{\mu_* + g}{s(g)} - \mu_* + \mathrm{shift}(g).
 
-The shift is the decrease of the state variable :math:`\Theta` due to stress, for example
-:math:`\alpha \ln s`. The state :math:`\Psi` does not change when stress changes suddenly. The
-evolution of :math:`\Psi` depends only on the evolution law. If a law has several states,
-:math:`\Psi` is the sum of all states.
+The shift is the stress-induced decrease of the state variable :math:`\Theta`, for example
+:math:`\alpha \ln s`. The state :math:`\Psi` does not change when stress changes suddenly. Only the
+evolution law changes :math:`\Psi`. If a law has several states, :math:`\Psi` is the sum of all
+states.
 
-The functions of this module take and return floats, with the following arguments:
+The functions of this module take and return floats. The arguments are:
 
 - ``g`` or ``frictional_stress`` is the deviation of the frictional stress from :math:`\tau_*`, in
   units of :math:`\sigma_*`.
-- ``psis`` or ``states`` are the states of the scene. Only the unknowns that follow the states of
-  the law are read.
-- ``p`` are the parameters of the scene (see ``parameter_layout``).
+- ``psis`` or ``states`` is the tuple of the states of the scene. The functions only use the
+  unknowns that come after the states of the law, such as the pore pressure.
+- ``p`` is the tuple of the parameters of the scene (see ``parameter_layout``).
 - ``ratio`` and ``change`` are the normal stress ratio :math:`s` and its derivative with respect to
   ``g``.
 
-A function of the effective or total normal stress returns ``(s - 1, slope)``. An effect of stress
-on the state, ``(g, ratio, change, p)``, returns ``(shift, slope)``. A friction relation,
-``(g, psis, p)``, returns ``(strength, slope, shift, shift_slope)``. All slopes are derivatives with
-respect to ``g``.
+A function for the effective or total normal stress returns ``(s - 1, slope)``. A function for the
+effect of stress on the state takes the arguments ``(g, ratio, change, p)`` and returns ``(shift,
+slope)``. A function for the friction relation takes the arguments ``(g, psis, p)`` and returns
+``(strength, slope, shift, shift_slope)``. All slopes are derivatives with respect to ``g``.
 """
 
 from __future__ import annotations
@@ -45,8 +45,8 @@ from rsfstudy.slider.parameter_layout import (
 )
 from rsfstudy.slider.parts import Function, Numbers
 
-#: Smallest magnitude of the friction coefficient in scenes in which slip may reverse. The limit
-#: keeps the logarithm of the slip rate finite at zero stress.
+#: Lower limit of the magnitude of the friction coefficient in scenes in which the slip direction
+#: may reverse. At zero stress, the limit keeps the logarithm of the slip rate finite.
 _MIN_NONZERO_FRICTION_COEFFICIENT = 1e-280
 
 
@@ -122,7 +122,7 @@ def friction_relation_at_constant_normal_stress(
 ) -> FrictionRelationValues:
     """Evaluate the friction relation at constant normal stress.
 
-    The function applies to scenes in which stress does not change the state variable.
+    The function is used for scenes in which stress does not change the state variable.
     """
     return frictional_stress, 1.0, 0.0, 0.0
 
@@ -133,7 +133,7 @@ def zero_state_effect(
     normal_stress_derivative: float,
     p: Numbers,
 ) -> tuple[float, float]:
-    """Return a shift of zero for states that do not depend on stress."""
+    """Return a zero shift and a zero slope. Stress does not change the state."""
     return 0.0, 0.0
 
 
@@ -142,8 +142,8 @@ def build_strength_function(
 ) -> Function:
     r"""Return the friction relation for variable normal stress.
 
-    The arguments are the function of the effective normal stress and the effect of stress on the
-    state.
+    The first argument is the function for the effective normal stress. The second argument is the
+    function for the effect of stress on the state.
 
     Notes
     -----
@@ -206,8 +206,8 @@ def sum_state_effects(first_effect: Function, second_effect: Function) -> Functi
 def extend_relation_to_reversed_slip(forward_relation: Function) -> Function:
     r"""Return the friction relation of a fault that may slip backwards.
 
-    The argument is the friction relation for forward slip. In the returned relation, the log rate
-    is the logarithm of :math:`|V|/V_*`.
+    The argument is the function for the friction relation of forward slip. In the returned friction
+    relation, the logarithm of the slip rate is :math:`\ln(|V|/V_*)`.
 
     Notes
     -----
@@ -219,8 +219,8 @@ def extend_relation_to_reversed_slip(forward_relation: Function) -> Function:
         a \ln\frac{|V|}{V_*} = \frac{|\tau|}{\sigma} + a \ln\left[1 - e^{-2 |\tau|/(a
         \sigma)}\right] - \mu_* - \Theta.
 
-    For forward slip, the relative difference from the usual law is about :math:`e^{-2 \mu/a}`, or
-    1e-46 for typical parameters.
+    For forward slip, the relative difference between the regularised law and the usual law is about
+    :math:`e^{-2 \mu/a}`, which is 1e-46 for typical parameters.
 
     References
     ----------
@@ -242,18 +242,19 @@ def extend_relation_to_reversed_slip(forward_relation: Function) -> Function:
 def build_pressure_derivatives_function(
     normal_stress_function: Function, state_effect_function: Function
 ) -> Function:
-    r"""Return a function that differentiates strength with respect to pressure.
+    r"""Return a function for the derivatives of strength with respect to pressure.
 
-    The arguments are the function of the effective normal stress and the effect of stress on the
-    state. The returned function ``(g, psis, p)`` computes the derivatives of strength and of the
-    shift with respect to pore pressure, at constant frictional stress.
+    The first argument is the function for the effective normal stress. The second argument is the
+    function for the effect of stress on the state. The returned function ``(g, psis, p)`` computes
+    the derivatives of strength and of the shift with respect to pore pressure, at constant
+    frictional stress.
 
     Notes
     -----
-    The derivative of strength is :math:`(\mu_* + g)/s^2` plus the derivative of the shift. By the
-    chain rule, the derivative of the shift is the difference between two slopes of the shift. The
-    first slope assumes a normal stress derivative of -1, and the second slope assumes a normal
-    stress derivative of 0.
+    The derivative of strength is :math:`(\mu_* + g)/s^2` plus the derivative of the shift. The
+    derivative of the shift is the difference between two slopes, which the function for the effect
+    of stress returns. The first slope is evaluated with a normal stress derivative of -1, and the
+    second slope with a normal stress derivative of 0.
     """
 
     def pressure_derivatives(g: float, psis: Numbers, p: Numbers) -> tuple[float, float]:
@@ -266,15 +267,15 @@ def build_pressure_derivatives_function(
 
 
 def zero_load_point_stress(states: Numbers, p: Numbers) -> float:
-    """Return zero stress for a load point that moves steadily."""
+    """Return zero, because a load point that moves steadily adds no stress."""
     return 0.0
 
 
 def load_point_stress(states: Numbers, p: Numbers) -> float:
     r"""Compute the shear stress :math:`K D` due to an oscillation of the load point.
 
-    The last state is the unknown of the loading. The stress is zero at the start of the
-    oscillation.
+    The last element of the states is the unknown of the loading. The stress is zero at the start of
+    the oscillation.
     """
     return states[-1] - p[LOADING + 2]
 
@@ -283,7 +284,7 @@ def wrap_with_load_point_stress(friction_function: Function) -> Function:
     """Return a friction function that adds the stress of the load point.
 
     The argument g of ``friction_function`` is the total frictional stress. The argument g of the
-    returned function excludes the stress that `load_point_stress` returns.
+    returned function does not include the load point stress :math:`K D`.
     """
 
     def function_with_load_point_stress(g: float, psis: Numbers, p: Numbers) -> Numbers:
@@ -293,11 +294,11 @@ def wrap_with_load_point_stress(friction_function: Function) -> Function:
 
 
 def build_load_point_derivatives_function(strength_function: Function) -> Function:
-    """Return a function for the derivatives with respect to load point stress.
+    """Return a function for derivatives with respect to the load point stress.
 
-    The argument is the friction relation of the scene. The returned function ``(g, psis, p)``
-    computes the derivatives of strength and of the shift with respect to :math:`K D`. The
-    derivatives are equal to the derivatives with respect to g.
+    The argument is the function for the friction relation of the scene. The returned function ``(g,
+    psis, p)`` computes the derivatives of strength and of the shift with respect to :math:`K D`.
+    The derivatives are equal to the derivatives with respect to g.
     """
 
     def load_point_derivatives(g: float, psis: Numbers, p: Numbers) -> tuple[float, float]:

@@ -18,14 +18,14 @@ pressure also changes the shift, the last column of :math:`M` includes the produ
 and the derivative of the shift with respect to :math:`P`. The same applies to a temperature that
 changes.
 
-If an external load changes the normal stress by :math:`-dP`, the frictional stress changes by an
-additional term,
+If the loading changes the normal stress by :math:`-dP`, the frictional stress changes by the
+additional term
 
 .. math::
 
-    -\frac{F - S_P \, 1^T (p - M)^{-1} E_s}{D - S \, 1^T (p - M)^{-1} E_s} \, dP,
+    -\frac{F - S_P \, 1^T (p - M)^{-1} E_s}{D - S \, 1^T (p - M)^{-1} E_s} \, dP.
 
-in which :math:`F` and :math:`S_P` are the derivatives of strength and of the shift with respect to
+Here :math:`F` and :math:`S_P` are the derivatives of strength and of the shift with respect to
 :math:`P`.
 """
 
@@ -80,7 +80,7 @@ def linear_friction_response(
     steady_state: SteadySliding,
     evolution_derivatives: StateEvolutionDerivatives | None = None,
 ) -> tuple[PolynomialCoefficients, PolynomialCoefficients]:
-    r"""Compute the response of friction to small perturbations of slip.
+    r"""Compute the response of frictional stress to small perturbations of slip.
 
     Parameters
     ----------
@@ -89,7 +89,7 @@ def linear_friction_response(
     steady_state : SteadySliding
         Steady sliding of the scene.
     evolution_derivatives : StateEvolutionDerivatives, optional
-        Derivatives of the state evolution. By default the function computes the derivatives.
+        Derivatives of the state evolution. By default, the function computes these derivatives.
 
     Returns
     -------

@@ -1,8 +1,9 @@
-r"""Velocity ratios, and the path length along which motions are integrated.
+r"""Velocity ratios, and the path length as independent variable of motions.
 
-The equations between ruptures and in ruptures are both integrated along the path length
-:math:`\lambda`, which combines displacement (or inertial time) :math:`\delta` with
-:math:`x = \ln(V/V_*)`:
+Motions are integrated with the path length :math:`\lambda` as the independent variable. The path
+length combines a variable :math:`\delta` with :math:`x = \ln(V/V_*)`. Between ruptures,
+:math:`\delta` is displacement, and in ruptures, :math:`\delta` is inertial time. The path length is
+defined by
 
 .. math::
 
@@ -13,10 +14,11 @@ The equations between ruptures and in ruptures are both integrated along the pat
 While contacts heal, :math:`\ln V` decreases as the logarithm of displacement. When slip ends after
 a rupture, :math:`\ln V` decreases as the logarithm of the remaining time. If displacement or time
 were the independent variable, each integration step would have to be a fraction of the elapsed or
-remaining displacement or time. Measured in path length, the interval in which contacts heal or slip
-ends is only a few units long. The factor of 6 in the path length reduces the number of integration
-steps where slip is fastest, because the path bends over six units of :math:`\ln V` instead of one
-unit. Factors from 4 to 12 instead of 6 give similar results.
+remaining displacement or time, and many steps would be necessary. In contrast, the path length of
+such an interval is only a few units. The change of :math:`\ln V` is divided by 6 because this
+reduces the number of integration steps near the largest slip rate. The direction of the path then
+changes over six units of :math:`\ln V` instead of one unit. Factors from 4 to 12 instead of 6 need
+similar numbers of steps.
 """
 
 from __future__ import annotations
@@ -26,20 +28,21 @@ import math
 from rsfstudy.slider.parameter_layout import LOAD_VELOCITY, LOG_LOAD_VELOCITY
 from rsfstudy.slider.parts import Numbers
 
-#: Lower limit of ln(V/V_*), the logarithm of 10^-290. A motion without loading ends at this slip
-#: rate.
+#: Lower limit of ln(V/V_*), equal to the natural logarithm of 10^-290. If the load point does not
+#: move, a motion ends at this slip rate.
 STOPPED_LOG_SLIP_RATE = -290.0 * math.log(10.0)
 
-#: Largest difference between ln V_0 and ln V. The rate functions replace a larger difference by
-#: this limit. At lower slip rates the contact is treated as stationary, because the remaining slip
-#: changes the state by a relative amount below exp(-100).
+#: Upper limit of ln(V_0/V). The rate functions replace larger values by this limit. The contact is
+#: then treated as stationary, because the neglected slip changes the state by a relative amount
+#: below exp(-100).
 MAX_LOG_LOAD_OVER_SLIP_VELOCITY = 100.0
 
-#: Change of ln V that adds as much path length as one unit of displacement (D_c) or inertial time.
+#: Change of ln V that has the same path length as one unit of displacement (D_c) or one unit of
+#: inertial time.
 LOG_SLIP_RATE_PER_PATH_LENGTH = 6.0
-#: Largest slope of the path whose square is computed. The slope is the derivative of ln V/6 with
-#: respect to displacement or inertial time. Adding 1 to the square of a larger slope has no effect
-#: in double precision.
+#: Largest slope of the path for which the square of the slope is computed. The slope is the
+#: derivative of (ln V)/6 with respect to displacement or inertial time. For a larger slope, 1 plus
+#: the square of the slope equals the square in double precision.
 MAX_FINITE_PATH_SLOPE = 1e9
 
 VelocityRatios = tuple[float, float, float]
@@ -66,11 +69,10 @@ def velocity_ratios(log_slip_rate: float, p: Numbers) -> VelocityRatios:
 
     Notes
     -----
-    Below the lower limit of :math:`\ln(V/V_*)`, the contact is treated as stationary. At low slip
-    rates, the change of the state per unit slip may grow in proportion to :math:`1/V`. The product
-    of this change and the fraction :math:`V/(V + V_0)` remains finite. Without the lower limit of
-    :math:`\ln(V/V_*)`, the change of the state per unit slip would overflow and the fraction would
-    underflow.
+    If :math:`\ln(V/V_*)` is below its lower limit, the contact is treated as stationary. At low
+    slip rates, the derivative of the state with respect to slip may grow in proportion to
+    :math:`1/V`. The product of this derivative and the fraction :math:`V/(V + V_0)` remains finite.
+    Without the lower limit, the derivative would overflow and the fraction would underflow.
     """
     least = p[LOG_LOAD_VELOCITY] - MAX_LOG_LOAD_OVER_SLIP_VELOCITY
     x = least if log_slip_rate < least else log_slip_rate
@@ -105,14 +107,14 @@ def displacement_per_path_length(path_slope: float) -> float:
     Parameters
     ----------
     path_slope : float
-        Slope of the path, the derivative of :math:`\ln V/6` with respect to displacement or
-        inertial time. The square of the slope may overflow when slip stops, so the function does
-        not square very large slopes.
+        Slope of the path, which is the derivative of :math:`(\ln V)/6` with respect to displacement
+        or inertial time. When slip stops, the square of the slope may overflow, so the function
+        does not square very large slopes.
 
     Returns
     -------
     float
-        Displacement per unit path length.
+        Derivative of displacement (or inertial time) with respect to path length.
     """
     if abs(path_slope) > MAX_FINITE_PATH_SLOPE:
         return 1.0 / abs(path_slope)

@@ -1,8 +1,9 @@
-r"""Stress, slip rate and states of a motion at a point in time.
+r"""Functions for the stress, slip rate and states at a point of a motion.
 
 The module builds functions ``(state, rates, p) -> MotionPoint`` from the friction functions of a
-scene. The arguments are the unknowns of the equations of motion in one regime, the derivatives of
-the unknowns, and the parameters of the scene.
+scene. The argument ``state`` contains the unknowns of the equations of motion, ``rates`` contains
+the derivatives of the unknowns, and ``p`` contains the parameters of the scene. The unknowns are
+different between ruptures, in ruptures and for a rigid slider.
 """
 
 from __future__ import annotations
@@ -27,11 +28,11 @@ def build_motion_point_assembling_function(friction_functions: FrictionFunctions
     Returns
     -------
     callable
-        Function ``(x, growth, forces, states, changes, shift, p) ->
-        MotionPoint``. The arguments ``x`` and ``growth`` are :math:`x = \ln(V/V_*)` and its
-        derivative. The tuple ``forces`` contains f, the derivative of f, g, and the derivative of
-        g. The other arguments are the states, the derivatives of the states, the decrease of the
-        state variable due to stress, and the parameters.
+        Function ``(x, growth, forces, states, changes, shift, p) -> MotionPoint``. The arguments
+        ``x`` and ``growth`` are :math:`x = \ln(V/V_*)` and its derivative. The tuple ``forces``
+        contains f, the derivative of f, g, and the derivative of g. The other arguments are the
+        states, the derivatives of the states, the stress-induced decrease of the state variable,
+        and the parameters.
 
     Notes
     -----
@@ -99,10 +100,10 @@ def build_point_function_between_ruptures(
     force_balance_function: Function,
     log_slip_rate_growth_function: Function,
 ) -> Function:
-    """Return a function for stress, slip rate and states between ruptures.
+    """Return a function for the stress, slip rate and states between ruptures.
 
-    The functions ``(spring, psis, p)`` and ``(unknowns, rates, x, g, p)`` of the dynamics are
-    described in ``Dynamics``.
+    The class ``Dynamics`` documents the functions ``(spring, psis, p)`` and ``(unknowns, rates, x,
+    g, p)`` of the dynamics.
 
     Notes
     -----
@@ -130,7 +131,7 @@ def build_point_function_between_ruptures(
 
 @cache
 def build_point_function_in_rupture(friction_functions: FrictionFunctions) -> Function:
-    """Return a function for stress, slip rate and states in ruptures."""
+    """Return a function for the stress, slip rate and states in ruptures."""
     assemble_point = build_motion_point_assembling_function(friction_functions)
     strength, states_at, end = (
         friction_functions.strength,
@@ -149,7 +150,7 @@ def build_point_function_in_rupture(friction_functions: FrictionFunctions) -> Fu
 
 @cache
 def build_point_function_of_rigid_slider(friction_functions: FrictionFunctions) -> Function:
-    """Return a function for stress, slip rate and states of a rigid slider.
+    """Return a function for the stress, slip rate and states of a rigid slider.
 
     The spring stress f of a rigid slider is equal to the frictional stress g.
     """

@@ -1,4 +1,4 @@
-"""Polynomials in ascending order of their powers, for stability analyses."""
+"""Polynomials for stability analyses, with coefficients in ascending order."""
 
 from __future__ import annotations
 
@@ -11,14 +11,15 @@ import numpy as np
 
 from rsfstudy.slider.evolution_derivatives import NestedListMatrix
 
-#: Number of Newton iterations that improve the roots of a polynomial with one distant root.
+#: Number of Newton iterations for the roots of a polynomial in which one root is much larger than
+#: the other roots.
 _NEWTON_STEPS = 2
 
 PolynomialCoefficients = list[float]
 
 
 def dot_product(first: Sequence[float], second: Sequence[float]) -> float:
-    """Compute the sum of the products of the elements of two sequences."""
+    """Compute the scalar product of two sequences."""
     return sum(map(mul, first, second))
 
 
@@ -40,7 +41,8 @@ def compute_resolvent_polynomials(
     coefficients : list of float
         Coefficients of the characteristic polynomial, in ascending order.
     adjugate : list of list of list of float
-        Matrix coefficients of the adjugate matrix, in ascending order.
+        Coefficients of the adjugate matrix, which is a polynomial in :math:`p`, in ascending order.
+        Each coefficient is a matrix.
     """
     places = range(len(matrix))
     coefficients, terms = [1.0], [[[float(i == j) for j in places] for i in places]]
@@ -55,11 +57,12 @@ def compute_resolvent_polynomials(
 
 
 def find_roots_with_one_distant_root(polynomial: PolynomialCoefficients) -> np.ndarray:
-    """Find the roots of a polynomial with one root of large magnitude.
+    """Find the roots of a polynomial in which one root is very large.
 
-    A small mass makes one root about 1e20 times larger than the other roots. If all roots were
-    computed together, the small roots would lose digits. The function computes the small roots
-    without the leading coefficient and improves all roots by Newton iterations.
+    If the mass of the slider is small, one root is about 1e20 times larger than the other roots. If
+    all roots were computed together, the small roots would lose digits. The function therefore
+    computes the small roots from the polynomial without its leading coefficient. It then improves
+    all roots by Newton iterations.
     """
     falling = polynomial[::-1]
     roots = np.append(np.roots(falling[1:]), -falling[1] / falling[0]).astype(complex)
@@ -72,9 +75,10 @@ def find_roots_with_one_distant_root(polynomial: PolynomialCoefficients) -> np.n
 def split_even_and_odd_powers(
     polynomial: PolynomialCoefficients,
 ) -> tuple[PolynomialCoefficients, PolynomialCoefficients]:
-    """Return the real part and the imaginary part of a polynomial at i omega.
+    """Return the real and imaginary parts of a polynomial at p = i omega.
 
-    The real part, and the imaginary part divided by omega, are polynomials in omega**2.
+    The function returns two polynomials in omega**2: the real part, and the imaginary part divided
+    by omega.
     """
     even = [x * (-1.0) ** n for n, x in enumerate(polynomial[0::2])]
     odd = [x * (-1.0) ** n for n, x in enumerate(polynomial[1::2])]

@@ -11,11 +11,11 @@ independent variable :math:`\delta` is slip plus load point displacement,
     \frac{dt}{d\delta} = \frac{1}{V + V_0}.
 
 The dynamics of the scene determine the slip rate from :math:`f` and :math:`\Psi`. In ruptures, the
-independent variable of the equations of motion with inertia is inertial time, which is time in
-units of :math:`T/(2 \pi)`. Both regimes are integrated along the path length that the module
-``path_length`` defines.
+equations of motion include inertia. Their independent variable is inertial time, which is time in
+units of :math:`T/(2 \pi)`. In both regimes, the integrators use path length as the independent
+variable (see the module ``path_length``).
 
-The slip rate of a rigid slider is prescribed, and slip is the independent variable.
+For a rigid slider, the slip rate is prescribed, and slip is the independent variable.
 """
 
 from __future__ import annotations
@@ -43,10 +43,10 @@ def build_displacement_rate_function(
     *,
     allows_reversed_slip: bool,
 ) -> Function:
-    r"""Return a function for the rates with respect to displacement.
+    r"""Return a function for the derivatives with respect to displacement.
 
-    The returned function ``(state, p)`` computes the rate of the spring stress, the rates of the
-    states and the output of `velocity_ratios`.
+    The returned function ``(state, p)`` computes the derivative of the spring stress, the
+    derivatives of the states and the output of `velocity_ratios`.
 
     Notes
     -----
@@ -94,7 +94,7 @@ def build_rate_functions_between_ruptures(
     force_balance_function : callable
         Function ``(spring, psis, p)`` of the dynamics (see ``Dynamics``).
     allows_reversed_slip : bool
-        Whether slip and the load point may reverse.
+        If True, the direction of slip and the direction of the load point motion may reverse.
 
     Returns
     -------
@@ -143,8 +143,8 @@ def build_rate_functions_in_rupture(
     friction_functions : FrictionFunctions
         Friction functions of the scene.
     build_rupture_rate_function : callable
-        Function of the dynamics that builds the rates with respect to inertial time (see
-        ``Dynamics``).
+        Function of the dynamics that builds the function for the derivatives with respect to
+        inertial time (see ``Dynamics``).
 
     Returns
     -------
@@ -173,9 +173,8 @@ def build_rate_functions_in_rupture(
 def build_rate_function_of_rigid_slider(friction_functions: FrictionFunctions) -> Function:
     r"""Return the rate function of a rigid slider.
 
-    The returned function ``(state, p) -> tuple`` computes the derivatives of g and all states
-    except the first with respect to slip. The log rate :math:`\ln(V/V_*)` is the last element of
-    ``p``.
+    The returned function ``(state, p) -> tuple`` computes the derivatives with respect to slip of g
+    and of all states except the first. The last element of ``p`` is :math:`\ln(V/V_*)`.
 
     Notes
     -----

@@ -1,4 +1,4 @@
-"""Base class of scenes, which presents the fields of the parts as attributes."""
+"""Base class of scenes."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ from rsfstudy.slider.scene_assembly import (
 from rsfstudy.slider.scene_caching import cached_attribute
 from rsfstudy.slider.slider_parameters import ALTERNATIVE_STIFFNESS_FIELDS
 
-#: Attributes of a scene that are used only inside the package and are hidden from ``dir``.
+#: Names of scene attributes that ``dir`` does not list, because only the package uses them.
 _ATTRIBUTES_HIDDEN_FROM_DIR = frozenset(
     {
         "field_index",
@@ -47,14 +47,14 @@ _ATTRIBUTES_HIDDEN_FROM_DIR = frozenset(
 
 @wrap_methods_in_error_boundary
 class SceneBase(HtmlTableMixin):
-    """Base class of scenes, which provides the fields of the parts.
+    """Base class of scenes.
 
-    The fields of all parts are attributes of the scene.
+    The class makes the fields of all parts available as attributes of the scene.
 
     Parameters
     ----------
     parts : SceneParts, optional
-        Parts of the scene. By default the parts are built from the fields.
+        Parts of the scene. By default, the parts are built from the values of the fields.
     **given : object
         Values of the fields.
     """
@@ -74,7 +74,7 @@ class SceneBase(HtmlTableMixin):
         """Raise ``InvalidValue`` if the parts are incompatible."""
 
     def __getattr__(self, name: str) -> Any:
-        """Return the value of a field of one of the parts."""
+        """Return the value of a field. Each field belongs to a part of the scene."""
         if name.startswith("_"):
             raise AttributeError(name)
         layout = self.field_index
@@ -89,23 +89,23 @@ class SceneBase(HtmlTableMixin):
         return getattr(self, new)
 
     def __repr__(self) -> str:
-        """Return the call that creates the scene."""
+        """Return Python code that creates the scene."""
         return f"Scene({', '.join(f'{k}={v!r}' for k, v in self.as_dict().items())})"
 
     def __dir__(self) -> list[str]:
-        """Return the names of the public attributes, without inapplicable fields."""
+        """Return the names of the public attributes and of the fields with a value."""
         # Fields without a value may be properties that are computed from other fields.
         stated = {name for name, value in self.as_dict().items() if value is not None}
         names = {*super().__dir__(), *stated} - _ATTRIBUTES_HIDDEN_FROM_DIR
         return [name for name in names if not name.startswith("_")]
 
     def __reduce__(self) -> tuple[Any, ...]:
-        """Return the arguments for unpickling."""
+        """Return the function and the arguments with which pickle creates the scene."""
         return type(self), (self.parts,)
 
     @cached_attribute
     def field_index(self) -> FieldIndex:
-        """Index that assigns the fields to the parts."""
+        """Index that assigns each field to a part of the scene."""
         return build_field_index(tuple(map(type, self.parts[1:])))
 
     def as_dict(self) -> dict[str, Any]:
@@ -134,8 +134,9 @@ class SceneBase(HtmlTableMixin):
         Returns
         -------
         dict of str to object
-            Values by field name, without the default values of fields that were added to rsfstudy
-            later (see ``number``).
+            Values by field name. A field that was added to rsfstudy in a later version is omitted
+            if the field has its default value (see ``number``). The files and journals of earlier
+            versions therefore remain valid.
         """
         values = self.as_dict()
         for name, default in OMITTED_DEFAULTS.items():
@@ -144,13 +145,14 @@ class SceneBase(HtmlTableMixin):
         return values
 
     def describe(self) -> dict[str, Any]:
-        """Return the stored fields and the history of a user-defined loading.
+        """Return the stored fields and the contents of a user-defined loading.
 
         Returns
         -------
         dict of str to object
-            Values by field name, as ``stored_fields`` returns them. A protocol adds its segments in
-            the format that ``protocol`` accepts, and a sampled history adds the digest of its
+            Values by field name, as ``stored_fields`` returns them. If the loading is a protocol,
+            the dictionary also contains the segments in the format that ``protocol`` accepts. If
+            the loading is a sampled history, the dictionary also contains the digest of the
             samples.
         """
         history = (
@@ -171,7 +173,7 @@ class SceneBase(HtmlTableMixin):
         Returns
         -------
         iterator of (Quantity, object)
-            Pairs of a quantity and the value of the field.
+            Pairs of the quantity that describes a field and the value of the field.
         """
         return quantities_with_values(self.as_dict(), self.user_parts)
 
@@ -179,9 +181,9 @@ class SceneBase(HtmlTableMixin):
     def with_(self, **changes: Any) -> Self:
         """Return a copy of the scene with new values of some fields.
 
-        The values of the copy are checked. If a change replaces a part, the fields that do not
-        apply to the new part are dropped. Setting ``stiffness`` replaces ``stiffness_ratio``, and
-        vice versa.
+        The method checks the new values. If a change replaces a part, the copy does not have the
+        fields of the previous part that the new part lacks. If you set ``stiffness``, the copy has
+        no ``stiffness_ratio``, and vice versa.
 
         Parameters
         ----------

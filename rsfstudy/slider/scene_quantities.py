@@ -1,4 +1,4 @@
-"""Quantities of a scene that follow from the fields of its parts."""
+"""Quantities of a scene that are computed from the fields of the scene."""
 
 from __future__ import annotations
 
@@ -17,10 +17,10 @@ from rsfstudy.slider.scene_caching import cached_attribute
 
 @wrap_methods_in_error_boundary
 class SceneQuantities(SceneBase):
-    """Base class of scenes with the quantities that follow from the fields.
+    """Base class of scenes, with properties that are computed from the fields.
 
-    The critical stiffness is a quantity of the subclass ``Scene``, because its computation creates
-    a scene.
+    The critical stiffness is a property of the subclass ``Scene``, because the computation of the
+    critical stiffness creates a scene.
     """
 
     if TYPE_CHECKING:
@@ -41,11 +41,11 @@ class SceneQuantities(SceneBase):
 
     @cached_attribute
     def pressure_source(self) -> Fluid | Loading | FluidWithBoundaryPressure:
-        """Part that changes the effective normal stress by its last unknown.
+        """Part with an unknown that changes the effective normal stress.
 
-        The pressure source is the loading, if the loading has unknowns, and otherwise the fluid. If
-        both the loading and the fluid have unknowns, the pressure source is a combination in which
-        the loading imposes the pressure around the fault.
+        If the loading has unknowns, the pressure source is the loading. Otherwise, the pressure
+        source is the fluid. If both the loading and the fluid have unknowns, the pressure source
+        combines both parts. In the combination, the loading imposes the pressure around the fault.
         """
         imposed, pores = self.parts.loading, self.parts.fluid
         if not imposed.unknowns:
@@ -54,7 +54,7 @@ class SceneQuantities(SceneBase):
 
     @property
     def has_mass(self) -> bool:
-        """True if inertia acts during ruptures."""
+        """True if the equations of motion in ruptures include inertia."""
         return self.parts.dynamics.build_rupture_rate_function is not None
 
     @cached_attribute
@@ -79,7 +79,7 @@ class SceneQuantities(SceneBase):
 
     @cached_attribute
     def b(self) -> float:
-        """Evolution effect parameter of all states together."""
+        """Evolution effect parameter, summed over all states of the law."""
         return float(self.parts.slider.a * self.parts.law.b_over_a)
 
     @property
@@ -90,7 +90,7 @@ class SceneQuantities(SceneBase):
 
     @cached_attribute
     def _stiffness_from_ratio(self) -> float:
-        """Stiffness computed from the stiffness ratio."""
+        """Dimensionless stiffness, computed from the stiffness ratio."""
         ratio = self.parts.slider.stiffness_ratio
         assert ratio is not None  # The slider has either a stiffness or a stiffness ratio.
         if not 0.0 < self.critical_stiffness < math.inf:
@@ -106,9 +106,9 @@ class SceneQuantities(SceneBase):
     def stiffness_ratio(self) -> float:
         """Ratio of the stiffness to the critical stiffness at V_*.
 
-        Without rate weakening, steady sliding is stable at every stiffness, so the ratio is
-        infinite. With several states, steady sliding may be unstable only in a range of stiffness,
-        so a ratio below 1 does not imply instability.
+        If the law is not rate weakening, steady sliding is stable at every stiffness, and the ratio
+        is infinite. If the law has several states, steady sliding may be unstable only in a range
+        of stiffness. In this case, a ratio below 1 does not imply that steady sliding is unstable.
         """
         given = self.parts.slider.stiffness_ratio
         if given is not None:
@@ -117,20 +117,20 @@ class SceneQuantities(SceneBase):
 
     @cached_attribute
     def load_velocity(self) -> float:
-        """Load point velocity after the last step, in V_*."""
+        """Load point velocity after the last loading step, in V_*."""
         return self._segments[-1].load_velocity
 
     @cached_attribute
     def log_load_velocity(self) -> float:
         """Natural logarithm of the magnitude of the load point velocity.
 
-        The logarithm is negative infinity for a stationary load point.
+        The value is negative infinity if the load point does not move.
         """
         return math.log(abs(self.load_velocity)) if self.load_velocity else -math.inf
 
     @cached_attribute
     def imposed_normal_stress(self) -> float:
-        """Change of imposed normal stress after the last step, in sigma_*."""
+        """Total change of imposed normal stress after the last step, in sigma_*."""
         return self._segments[-1].normal_stress
 
     @property
@@ -155,13 +155,13 @@ class SceneQuantities(SceneBase):
     def inertial_time(self) -> float:
         """Time scale of inertia, T/(2 pi), in units of D_c/V_*.
 
-        A motion is unstable if the product of this time scale and the slip rate in units of
-        :math:`V_*` reaches the instability norm.
+        The instability norm is a limit of the product of this time scale and the slip rate in units
+        of :math:`V_*`. A motion is unstable if this product reaches the limit.
         """
         slider = self.parts.slider
         return slider.period * slider.reference_rate / (2.0 * math.pi)
 
     @cached_attribute
     def log_instability_rate(self) -> float:
-        """Natural logarithm of the slip rate V/V_* at which a motion is unstable."""
+        """Natural logarithm of the slip rate V/V_* at the instability norm."""
         return math.log(self.parts.slider.instability_norm / self.inertial_time)

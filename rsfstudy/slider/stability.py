@@ -36,15 +36,15 @@ from rsfstudy.slider.scene_caching import cached_per_scene
 from rsfstudy.slider.scene_view import SceneView
 from rsfstudy.slider.steady_state import SteadySliding, steady_sliding
 
-#: Limits below which a result cannot be distinguished from zero because of rounding errors. The
-#: first limit applies to a critical stiffness divided by a. The second limit applies to a growth
-#: rate per slip distance of D_c.
+#: Results below these limits cannot be distinguished from zero, because they are as small as
+#: rounding errors. The first number is the limit for the critical stiffness divided by a. The
+#: second number is the limit for the growth rate per unit slip in D_c.
 _MIN_CRITICAL_STIFFNESS_OVER_A, _GROWTH_RATE_FLOOR = 1e-12, 1e-9
-#: Rounding error of the growth rates, relative to the largest growth rate.
+#: Rounding error of all growth rates, as a fraction of the largest growth rate.
 _RELATIVE_ROOT_ROUNDING_ERROR = 64.0 * 2.0**-52
 
-#: The mass is treated as small if the ratio of the two leading polynomial coefficients is below
-#: this constant.
+#: If the ratio of the two leading coefficients of the polynomial is below this limit, the mass of
+#: the slider is treated as small.
 _SMALL_MASS_RATIO = 1e-6
 
 
@@ -56,11 +56,11 @@ def critical_stiffness(
     Parameters
     ----------
     scene : Scene
-        Scene with friction parameters. The stiffness of the scene is not used.
+        Scene with friction parameters. The function does not use the stiffness of the scene.
     log_slip_rate : float
         Natural logarithm of the slip rate, :math:`\ln(V/V_*)`.
     quasi_static : bool, default: False
-        Whether to ignore inertia and radiation damping.
+        If True, the function ignores inertia and radiation damping.
 
     Returns
     -------
@@ -96,15 +96,15 @@ def critical_stiffness(
 
 
 def all_critical_stiffnesses(scene: SceneView, log_slip_rate: float) -> list[float]:
-    r"""Compute all stiffnesses at which the stability of sliding changes.
+    r"""Compute all critical stiffnesses of steady sliding at a slip rate.
 
-    A scene with several states may have more than one critical stiffness. At each critical
-    stiffness, the number of growing perturbations changes.
+    At a critical stiffness, a small perturbation of steady sliding neither grows nor decays. A
+    scene with several states may have more than one critical stiffness.
 
     Parameters
     ----------
     scene : Scene
-        Scene with friction parameters. The stiffness of the scene is not used.
+        Scene with friction parameters. The function does not use the stiffness of the scene.
     log_slip_rate : float
         Natural logarithm of the slip rate, :math:`\ln(V/V_*)`.
 
@@ -135,8 +135,8 @@ def _find_critical_stiffnesses(
 ) -> list[float]:
     """Find all stiffnesses for which a growth rate is imaginary, above a minimum.
 
-    The stiffnesses are in ascending order. If no finite stiffness exists for a frequency because of
-    inertia, the list of stiffnesses contains ``math.inf``.
+    The stiffnesses are in ascending order. If inertia prevents a finite critical stiffness at some
+    frequency, the list contains ``math.inf``.
     """
     # For p = i omega, the polynomials depend on omega**2 only.
     (a_even, a_odd), (b_even, b_odd) = (
@@ -165,7 +165,7 @@ def _find_critical_stiffnesses(
 def _compute_growth_rates(
     linearised_balance: LinearisedForceBalance, stiffness: float
 ) -> np.ndarray:
-    """Compute the growth rates p at a stiffness, largest real part first."""
+    """Compute the growth rates p at a stiffness, sorted by descending real part."""
     spring_stress = [
         stiffness,
         linearised_balance.radiation_damping,
@@ -259,8 +259,8 @@ def largest_linear_growth_rate(scene: SceneView, log_slip_rate: float) -> Growth
     -------
     GrowthRate or None
         Growth rate with an error estimate. The error estimate includes the errors of the
-        derivatives of the law and the rounding errors of the growth rates. The result is None if
-        steady sliding does not exist at this slip rate.
+        derivatives of the law, and rounding errors. If steady sliding does not exist at this slip
+        rate, the function returns None.
     """
     scene = scene.under_steady_loading
     steady = steady_sliding(scene, log_slip_rate)
@@ -289,10 +289,10 @@ def largest_linear_growth_rate(scene: SceneView, log_slip_rate: float) -> Growth
 def spring_response_to_normal_stress(
     scene: SceneView, log_slip_rate: float, angular_frequency: float
 ) -> complex:
-    r"""Compute the response of the spring stress to imposed normal stress.
+    r"""Compute the response of spring stress to oscillations of normal stress.
 
-    The function considers small oscillations of the normal stress around steady sliding. The
-    loading of the scene must impose normal stress or pore pressure.
+    The function assumes small oscillations of the normal stress around steady sliding. The loading
+    of the scene must impose normal stress or pore pressure.
 
     Parameters
     ----------

@@ -1,6 +1,6 @@
 """Checks of variables and their attributes in results files.
 
-The checks are needed because other programs may have written the files.
+The checks are needed because the files may have been written by other programs.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ import xarray as xr
 
 from rsfstudy.errors import DataError, shorten_text
 
-#: Maximum length of each string attribute, in characters.
+#: Maximum length of string attributes in characters, by attribute name.
 _MAX_CHARACTERS_OF_TEXT_ATTRIBUTES = {
     "long_name": 2000,
     "units": 200,
@@ -37,8 +37,8 @@ def check_variable_attributes(dataset: xr.Dataset) -> None:
     Raises
     ------
     DataError
-        If an attribute has the wrong type or is too long, or if flag values and flag meanings do
-        not match.
+        If an attribute has the wrong type or is too long, or if the number of flag values differs
+        from the number of flag meanings.
     """
     for name, values in dataset.variables.items():
         for key, most in _MAX_CHARACTERS_OF_TEXT_ATTRIBUTES.items():
@@ -48,9 +48,9 @@ def check_variable_attributes(dataset: xr.Dataset) -> None:
 
 
 def check_motion_variables_are_numeric(dataset: xr.Dataset) -> None:
-    """Check that all variables with the dimensions of ``slip`` are numeric.
+    """Check that the variables with the same dimensions as ``slip`` are numeric.
 
-    In the dataset of a motion, these variables contain one value for each sample of the motion.
+    If the dataset is a motion, these variables have one value at each recorded time.
 
     Parameters
     ----------

@@ -1,7 +1,7 @@
-"""Layout of the finished cells of a study, as rows of a journal and as columns.
+"""Conversion of finished cells to rows of a journal and to columns.
 
 ``OutputPacker`` converts the outcome of a cell to a row of the journal. ``CellColumns`` contains
-the columns of many cells, from which a dataset is assembled.
+arrays with the results of many cells. Datasets are assembled from these arrays.
 """
 
 from __future__ import annotations
@@ -18,13 +18,14 @@ import numpy as np
 from rsfstudy.measures import Measure, Outcome
 from rsfstudy.status import Status
 
-#: Row of the table ``cells``: key, name of the status, message, number of right-hand-side
-#: evaluations, wall time in s, packed outputs, and checksum.
+#: Type of a row of the journal table ``cells``. A row contains the key, the name of the status, the
+#: message, the number of right-hand-side evaluations, the wall time in s, the packed outputs and
+#: the checksum.
 StoredCellRow = tuple[bytes, str, str, int, float, bytes, int]
 
 
 class OutputPacker:
-    """Layout of the outputs of a measure in a row of float64 numbers.
+    """Conversion of the outputs of a measure to a row of float64 numbers.
 
     Parameters
     ----------
@@ -36,9 +37,9 @@ class OutputPacker:
     shapes : dict of str to tuple of int
         Shape of each output.
     slices : dict of str to slice
-        Position of each output in the row.
+        Position of each output in the row of numbers.
     packed_number_count : int
-        Length of the row.
+        Length of the row of numbers.
     """
 
     def __init__(self, measure: Measure) -> None:
@@ -57,7 +58,7 @@ class OutputPacker:
         Parameters
         ----------
         output_values : mapping of str to float or ndarray
-            Outputs by name. Missing outputs become NaN.
+            Outputs by name. An output that is missing in the mapping is stored as NaN.
 
         Returns
         -------
@@ -97,7 +98,7 @@ class OutputPacker:
 
 @dataclass(frozen=True)
 class CellColumns:
-    """Statuses, messages, costs and outputs of a group of cells.
+    """Arrays with the statuses, messages, costs and outputs of several cells.
 
     Parameters
     ----------
@@ -121,7 +122,7 @@ class CellColumns:
 
     @classmethod
     def build_pending_cells(cls, cell_count: int, packed_number_count: int) -> CellColumns:
-        """Build the columns of cells that are not computed yet.
+        """Build the columns for cells that have not been computed.
 
         Parameters
         ----------

@@ -1,12 +1,13 @@
 """Journal of the finished cells of a study.
 
-The journal is an SQLite file next to the results. Each cell is stored as soon as it is finished, so
-that an interrupted run can be resumed. Only one run can use a journal at a time.
+The journal is an SQLite file in the directory of the results. Cells are stored soon after they have
+finished, so that an interrupted run can be resumed. Only one run at a time can use a journal.
 
-The key of a cell is a digest of the exact values of the scene fields and the measure fields. All
-other settings that affect the results form the fingerprint of the journal. A run rejects a journal
-with a different fingerprint (see ``fingerprints``), unless the only difference is a smaller work
-budget in the journal.
+The key of a cell is a digest of the exact values of the scene fields and the measure fields. The
+fingerprint of a journal contains all other settings that affect the results. If the fingerprint of
+the journal differs from the fingerprint of the run, the run rejects the journal (see
+``fingerprints``). There is one exception: the work budget of the journal may be smaller than the
+work budget of the run.
 """
 
 from __future__ import annotations
@@ -41,14 +42,14 @@ CREATE TABLE IF NOT EXISTS cells (
     key BLOB PRIMARY KEY, status TEXT, message TEXT, work INTEGER, seconds REAL, numbers BLOB,
     checksum INTEGER);
 """
-#: Query for database objects that do not belong to a journal. A trigger, for example, would run
-#: whenever the journal is written.
+#: Query for database objects that rsfstudy does not create. For example, a trigger in the file
+#: could run whenever rsfstudy writes to the journal.
 _FOREIGN_DATABASE_OBJECTS_QUERY = """
 SELECT type || ' ' || name FROM sqlite_master
 WHERE type NOT IN ('table', 'index') OR tbl_name NOT IN ('fingerprint', 'cells')
 """
 _KEYS_PER_QUERY = 900
-#: Maximum time in s to wait until another run releases the journal.
+#: Maximum time in s that a run waits for another run to release the journal.
 _LOCK_TIMEOUT = 5.0
 _UNUSABLE_JOURNAL_REMEDY = "Choose another --output, or start over with --fresh."
 
@@ -56,7 +57,8 @@ _UNUSABLE_JOURNAL_REMEDY = "Choose another --output, or start over with --fresh.
 class CellJournal:
     """Journal of the finished cells of one study.
 
-    The journal locks its file until the journal is closed. Use the journal as a context manager.
+    A ``CellJournal`` locks its file until the journal is closed. Use the journal as a context
+    manager.
 
     Parameters
     ----------
@@ -64,7 +66,7 @@ class CellJournal:
         SQLite file. If None, the journal is kept in memory.
     fingerprint : mapping of str to object
         Settings that affect the results of all cells, as plain data. The fingerprint does not
-        contain the fields that form the cell keys.
+        contain the scene fields and measure fields from which the cell keys are computed.
     output_packer : OutputPacker
         Layout of the outputs of a cell.
     fresh : bool, default: False
@@ -73,8 +75,9 @@ class CellJournal:
     Raises
     ------
     DataError
-        If the file cannot be opened, if another run uses the file, or if the stored fingerprint
-        differs from ``fingerprint``. If the fingerprints differ, the message lists the differences.
+        If the file cannot be opened, if another run uses the file, or if the fingerprint of the
+        journal differs from ``fingerprint``. If the fingerprints differ, the message lists the
+        differences.
     """
 
     def __init__(
@@ -115,10 +118,9 @@ class CellJournal:
         return DataError(f"cannot use {self._path}: {error}. {_UNUSABLE_JOURNAL_REMEDY}")
 
     def _read_or_store_fingerprint(self, run_fingerprint: str) -> Any:
-        """Return the fingerprint stored in the journal.
+        """Return the fingerprint that is stored in the journal.
 
-        If the journal is new, the method stores ``run_fingerprint`` and returns
-        ``run_fingerprint``.
+        If the journal is new, the method first stores ``run_fingerprint``.
         """
         with self._db:
             self._db.executescript(_CREATE_TABLES)
@@ -136,12 +138,13 @@ class CellJournal:
     def _accept_compatible_fingerprint(
         self, stored_fingerprint: Any, run_fingerprint: Mapping[str, Any]
     ) -> None:
-        """Accept other modules of code or a smaller work budget, and reject other differences.
+        """Check that the stored fingerprint is compatible with the fingerprint of a run.
 
-        The results in the journal remain valid if the run uses more or fewer modules than the
-        journal, and if the new work budget is larger, because no result depends on the budget. The
-        method then stores the merged fingerprint. For any other difference, the method raises
-        ``DataError``.
+        Only the code digests of modules that both fingerprints contain must be equal, because the
+        results in the journal do not depend on the other modules. The work budget of the run may
+        also be larger, because the result of a finished cell does not depend on the budget. In
+        these two cases, the method stores the merged fingerprint. For any other difference, the
+        method raises ``DataError``.
         """
         try:
             stored = dict(json.loads(stored_fingerprint))
@@ -178,7 +181,8 @@ class CellJournal:
         Parameters
         ----------
         cells : iterable of StoredCellRow
-            Finished cells. A cell replaces an existing cell with the same key.
+            Rows of the finished cells. If the journal already contains a row with the same key, the
+            new row replaces this row.
 
         Raises
         ------
@@ -204,8 +208,8 @@ class CellJournal:
         Returns
         -------
         ndarray of int8, shape (n,)
-            Codes of the statuses, in the order of ``cell_keys``. The status of a cell that is not
-            in the journal is ``PENDING``.
+            Status codes in the order of ``cell_keys``. If the journal does not contain a cell, its
+            status is ``PENDING``.
 
         Raises
         ------
@@ -229,8 +233,8 @@ class CellJournal:
         Returns
         -------
         CellColumns
-            Columns of the cells, in the order of ``cell_keys``. Cells that are not in the journal
-            are pending.
+            Columns of the cells, in the order of ``cell_keys``. If the journal does not contain a
+            cell, its status is ``PENDING``.
 
         Raises
         ------
@@ -254,9 +258,10 @@ class CellJournal:
     def _query_rows_of_cells(
         self, cell_keys: np.ndarray, column_names: str
     ) -> Iterator[tuple[list[int], list[Any]]]:
-        """Yield the stored rows of the cells that are in the journal, in groups.
+        """Yield stored rows in groups, and skip cells that are not in the journal.
 
-        Each group consists of two lists: indices into ``cell_keys``, and the corresponding rows.
+        Each group consists of two lists. The first list contains indices into ``cell_keys``, and
+        the second list contains the corresponding rows.
         """
         for start in range(0, len(cell_keys), _KEYS_PER_QUERY):
             wanted: list[bytes] = cell_keys[start : start + _KEYS_PER_QUERY].tolist()
@@ -276,7 +281,7 @@ class CellJournal:
 def _fill_cell_columns(
     columns: CellColumns, cell_indices: list[int], stored_rows: list[Any]
 ) -> None:
-    """Fill the columns with stored rows.
+    """Copy stored rows of the journal into columns.
 
     If a row is damaged, the function raises a KeyError, OverflowError, TypeError or ValueError.
     """
@@ -299,7 +304,7 @@ class CellTimings:
     fingerprint : mapping of str to object
         Fingerprint of the journal.
     seconds_by_cell_key : mapping of bytes to float
-        Wall time in s by cell key. Cells without a recorded time are omitted.
+        Wall time in s by cell key. The mapping omits cells whose wall time is not in the journal.
     """
 
     fingerprint: Mapping[str, Any]
@@ -332,7 +337,7 @@ class CellTimings:
 
 
 def _open_exclusively(path: Path | str) -> sqlite3.Connection:
-    """Open a database and lock it until it is closed or the process ends."""
+    """Open a database, and lock the database until it is closed."""
     db = sqlite3.connect(path, timeout=_LOCK_TIMEOUT)
     try:
         db.execute("PRAGMA locking_mode = EXCLUSIVE")
@@ -350,9 +355,9 @@ def _is_database_locked_error(error: Exception) -> bool:
 
 
 def _remove_journal(path: Path) -> None:
-    """Delete a journal and its rollback file, unless a run uses the journal.
+    """Delete a journal and its rollback file if no run uses the journal.
 
-    SQLite leaves a rollback file behind if a write is interrupted.
+    If SQLite is interrupted while it writes the journal, a rollback file remains.
     """
     if path.exists():
         try:

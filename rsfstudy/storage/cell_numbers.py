@@ -1,4 +1,4 @@
-"""Search for the cell of a lattice that has given coordinates."""
+"""Conversion of cell coordinates to cell numbers."""
 
 from __future__ import annotations
 
@@ -21,8 +21,9 @@ def find_cell_number(dataset: xr.Dataset, coordinate_values: Mapping[str, Any]) 
     dataset : xarray.Dataset
         Results of a study.
     coordinate_values : mapping of str to object
-        Coordinate value for each dimension. Dimensions with a single point can be omitted. Each
-        number must agree with a point of the axis within a relative tolerance of 1e-5.
+        Coordinate of the cell on each dimension. Dimensions with a single point can be omitted. A
+        number selects the nearest point of the axis. The relative difference between the number and
+        this point must not exceed 1e-5.
 
     Returns
     -------
@@ -62,10 +63,10 @@ def find_cell_number(dataset: xr.Dataset, coordinate_values: Mapping[str, Any]) 
 
 
 def _find_index_on_axis(axis_values: np.ndarray, wanted_value: Any) -> int | None:
-    """Find the index of an equal label or of the nearest number on an axis.
+    """Find the index of the axis point with a given label or number.
 
-    The relative difference between the wanted number and the nearest number on the axis must be at
-    most 1e-5.
+    A number selects the nearest number on the axis. The relative difference between these two
+    numbers must not exceed 1e-5.
     """
     if axis_values.dtype.kind in "iuf":
         try:

@@ -1,8 +1,8 @@
 """Comparison of results datasets.
 
 ``compare_same_lattice`` compares two datasets of the same study variable by variable.
-``compare_results`` compares any two results datasets, including their declarations, versions and
-machines.
+``compare_results`` compares the results of any two studies, and also compares the declarations,
+versions and machines.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ from rsfstudy.storage.schema import is_of_single_scene, read_provenance
 from rsfstudy.vocabulary import TIMING_VARIABLES
 
 _AGREEMENT_COLUMNS = ["variable", "values", "identical", "largest_difference", "beyond_errors"]
-#: Entries of a fingerprint that the declaration contains too.
+#: Entries of a fingerprint that are also part of the declaration.
 _FINGERPRINT_KEYS_ALSO_IN_DECLARATION = {"study", "measure", "rtol", "budget", "methods", "engine"}
 
 FirstAndSecondValue = tuple[Any, Any]
@@ -38,9 +38,9 @@ FirstAndSecondValue = tuple[Any, Any]
 def compare_same_lattice(first: xr.Dataset, second: xr.Dataset) -> pd.DataFrame:
     """Compare two datasets of the same study, variable by variable.
 
-    Only cells that are finished in both datasets are compared. Variables without the dimensions of
-    the lattice, such as results of reductions, are compared only if all cells are finished in both
-    datasets. Measured times are not compared.
+    Only cells that are finished in both datasets are compared. Some variables, such as the results
+    of reductions, do not have the dimensions of the lattice. These variables are compared only if
+    all cells are finished in both datasets. Measured times are not compared.
 
     Parameters
     ----------
@@ -50,13 +50,13 @@ def compare_same_lattice(first: xr.Dataset, second: xr.Dataset) -> pd.DataFrame:
     Returns
     -------
     pandas.DataFrame
-        Table with one row per variable. The column ``values`` is the number of compared values,
-        ``identical`` is the number of identical values, and ``largest_difference`` is the largest
-        absolute difference. The column ``beyond_errors`` is the number of values that differ by
-        more than the sum of both error estimates, or NaN if the variable has no error estimates.
-        For floating-point variables with flag values, every difference is counted in
-        ``beyond_errors``. The attribute ``differs`` in ``attrs`` contains the differences between
-        the fingerprints.
+        Table with one row per variable. The column ``values`` contains the number of compared
+        values, ``identical`` contains the number of identical values, and ``largest_difference``
+        contains the largest absolute difference. The column ``beyond_errors`` contains the number
+        of values that differ by more than the sum of both error estimates. If a variable has no
+        error estimates, ``beyond_errors`` is NaN. In floating-point variables with flag values,
+        every pair of different values is counted in ``beyond_errors``. The entry ``differs`` of
+        ``attrs`` contains the differences between the fingerprints.
     """
     if is_of_single_scene(first):
         return _compare_motions(first, second)
@@ -68,7 +68,7 @@ def compare_same_lattice(first: xr.Dataset, second: xr.Dataset) -> pd.DataFrame:
         if set(both.dims) <= set(values.dims):
             known = both.broadcast_like(values).transpose(*values.dims).values
             rows.append(_variable_agreement(name, first, second, known))
-        elif bool(both.all()):  # Reductions may use cells that one dataset lacks.
+        elif bool(both.all()):  # Reductions of incomplete datasets may use different cells.
             rows.append(_variable_agreement(name, first, second))
     return _agreement_table(
         rows, *(read_provenance(dataset)["fingerprint"] for dataset in (first, second))
@@ -89,14 +89,14 @@ def _compare_motions(first: xr.Dataset, second: xr.Dataset) -> pd.DataFrame:
 def _agreement_table(
     variable_rows: Sequence[dict[str, Any]], first: Mapping[str, Any], second: Mapping[str, Any]
 ) -> pd.DataFrame:
-    """Build the table of compared variables, with fingerprint differences."""
+    """Build the table of compared variables. Store fingerprint differences in attrs."""
     frame = pd.DataFrame(variable_rows, columns=_AGREEMENT_COLUMNS)
     frame.attrs["differs"] = find_fingerprint_differences(first, second)
     return frame
 
 
 def _finished_cell_mask(dataset: xr.Dataset) -> xr.DataArray:
-    """Return a mask that is True for finished cells."""
+    """Return an array that is True for finished cells."""
     return dataset["status"] != int(Status.PENDING)
 
 
@@ -105,8 +105,8 @@ def _variable_agreement(
 ) -> dict[str, Any]:
     """Compare one variable in the cells that are finished in both datasets.
 
-    If the shapes differ, or if only one of the two variables contains floating-point numbers, the
-    number of identical values is 0.
+    The number of identical values is 0 if the variables have different shapes, or if only one of
+    the variables contains floating-point numbers.
     """
     a, b = first[variable_name], second.get(variable_name)
     found: dict[str, Any] = {"variable": variable_name, "values": a.size, "identical": 0}
@@ -141,26 +141,30 @@ class Comparison:
     Parameters
     ----------
     declaration : mapping of str to tuple of (object, object)
-        Each declaration entry that differs, with its values in the first and in the second dataset.
-        The keys of the mapping are the paths of the entries. The value of a missing entry is None.
+        Entries of the declaration that differ. Each key is the path of an entry, and each value
+        contains the entry of the first dataset and the entry of the second dataset. If an entry is
+        missing in a dataset, None replaces the entry.
     origin : mapping of str to tuple of (object, object)
-        Versions, code digests and machines that differ.
+        Versions, code digests and machines that differ, by name. Each value contains the entries of
+        both datasets.
     differing_axis_points : mapping of str to tuple of (list, list)
-        For each axis that differs, the points that only the first dataset has, and the points that
-        only the second dataset has.
+        Axes that have different points in the two datasets. Each value contains a list of the
+        points that only the first dataset has, and a list of the points that only the second
+        dataset has.
     finished_cell_counts : tuple of int
         Number of cells that are finished in both datasets, only in the first dataset, and only in
         the second dataset.
     statuses : pandas.DataFrame
-        Table of the cells that are finished in both datasets with different statuses. The table has
-        one column for each coordinate of the cell. The columns ``first`` and ``second`` contain the
-        status in each dataset.
+        Table of the cells that are finished in both datasets and have different statuses. The table
+        has one column for each coordinate. The columns ``first`` and ``second`` contain the
+        statuses in the first and in the second dataset.
     agreement_table : pandas.DataFrame
-        Comparison of the variables in the cells that are finished in both datasets. The columns are
-        documented in ``compare_same_lattice``. If the main result has no error estimates, every
-        difference is counted in ``beyond_errors``.
+        Comparison of the variables in the cells that are finished in both datasets. The function
+        ``compare_same_lattice`` documents the columns. If the primary output has no error
+        estimates, every pair of different values of the primary output is counted in
+        ``beyond_errors``.
     uncompared_variables : mapping of str to str
-        Reasons why variables are not compared, by variable name.
+        Reason why a variable is not compared, by name of the variable.
     """
 
     declaration: Mapping[str, FirstAndSecondValue]
@@ -173,15 +177,15 @@ class Comparison:
 
     @property
     def beyond_errors(self) -> list[str]:
-        """Variables that differ by more than the sum of both error estimates."""
+        """Names of variables that differ by more than both error estimates together."""
         return list(self.agreement_table["variable"][self.agreement_table["beyond_errors"] > 0])
 
     @property
     def agrees(self) -> bool:
-        """True if the datasets agree in the cells that both datasets have finished.
+        """True if the datasets agree in the cells that are finished in both datasets.
 
-        The datasets agree if they have finished cells in common, if these cells have the same
-        statuses, and if no variable differs by more than the sum of the error estimates.
+        The datasets agree if at least one cell is finished in both datasets, if these cells have
+        the same statuses, and if no variable differs by more than the sum of both error estimates.
         """
         return self.finished_cell_counts[0] > 0 and self.statuses.empty and not self.beyond_errors
 
@@ -189,8 +193,8 @@ class Comparison:
 def compare_results(first: xr.Dataset, second: xr.Dataset) -> Comparison:
     """Compare two results datasets in the cells with equal coordinates.
 
-    A coordinate may be an axis in one dataset and have a fixed value in the other dataset. In this
-    case, only the cells at the fixed value are compared.
+    If a field is an axis in one dataset and has a fixed value in the other dataset, only the cells
+    with this fixed value are compared.
 
     Parameters
     ----------
@@ -205,9 +209,9 @@ def compare_results(first: xr.Dataset, second: xr.Dataset) -> Comparison:
     Raises
     ------
     InvalidValue
-        If one dataset has an axis for which the other dataset has neither an axis nor a fixed
-        value, or if points with the same label have different field values. For example, two
-        different random samples have numbered points with different values.
+        If one dataset has an axis and the other dataset does not contain the field of this axis, or
+        if points with the same label have different field values. For example, the points of two
+        different random samples have equal labels and different field values.
     """
     both = [
         _add_axes_of_other_dataset(one, other) for one, other in ((first, second), (second, first))
@@ -244,9 +248,10 @@ def compare_results(first: xr.Dataset, second: xr.Dataset) -> Comparison:
 
 
 def _add_axes_of_other_dataset(dataset: xr.Dataset, other: xr.Dataset) -> xr.Dataset:
-    """Add the axes that only the other dataset has.
+    """Add the missing axes to a dataset.
 
-    Each added axis has one point, which is the fixed value of the coordinate in the dataset.
+    The function adds the axes that only ``other`` has. Each added axis has a single point, which is
+    the fixed value of the coordinate in ``dataset``.
     """
     cells = set(dataset["status"].dims)
     for dimension in other["status"].dims:
@@ -264,7 +269,7 @@ def _add_axes_of_other_dataset(dataset: xr.Dataset, other: xr.Dataset) -> xr.Dat
 def _round_coordinates_for_alignment(dataset: xr.Dataset) -> dict[str, Any]:
     """Round the coordinates to 12 digits, so that two datasets can be aligned.
 
-    A coordinate is not rounded if two of its points would become equal.
+    If rounding would make two points of a coordinate equal, this coordinate is not rounded.
     """
     labels = {}
     for name in map(str, dataset.dims):
@@ -281,7 +286,7 @@ def _round_coordinates_for_alignment(dataset: xr.Dataset) -> dict[str, Any]:
 def _check_same_axis_points(first: xr.Dataset, second: xr.Dataset) -> None:
     """Check that points with the same label have the same field values.
 
-    Differences due to rounding errors are ignored.
+    The check ignores differences that are as small as rounding errors.
     """
     for name, one in first.coords.items():
         if not one.dims or name in one.dims or name not in second.coords:
@@ -298,7 +303,7 @@ def _check_same_axis_points(first: xr.Dataset, second: xr.Dataset) -> None:
 
 
 def _uncompared_variables(aligned_datasets: Sequence[xr.Dataset]) -> dict[str, str]:
-    """Find the variables that cannot be compared, with the reasons."""
+    """Find the variables that cannot be compared, and the reason for each variable."""
     first, second = aligned_datasets
     unequal = {
         str(d) for d in first["status"].dims if set(first.indexes[d]) != set(second.indexes[d])
@@ -318,7 +323,8 @@ def _uncompared_variables(aligned_datasets: Sequence[xr.Dataset]) -> dict[str, s
 def _compare_numbers_of_shared_cells(shared_cells: Sequence[xr.Dataset]) -> pd.DataFrame:
     """Compare the numeric variables in the cells that both datasets have.
 
-    If the main result has no error estimates, every difference is counted in ``beyond_errors``.
+    If the primary output has no error estimates, every pair of different values of the primary
+    output is counted in ``beyond_errors``.
     """
     frame = compare_same_lattice(*shared_cells)
     about = find_primary_output(shared_cells[0])
@@ -344,7 +350,7 @@ def _compare_statuses_of_shared_cells(
 def _flatten_declaration(declaration_part: Any, path: str = "") -> Iterator[tuple[str, Any]]:
     """Yield the path and value of each entry of a declaration.
 
-    A list of plain values is a single entry.
+    A list of plain values is yielded as a single entry.
     """
     if isinstance(declaration_part, dict) and declaration_part:
         for name, value in declaration_part.items():

@@ -1,11 +1,11 @@
-"""Digest of the contents of a dataset, stored in its NetCDF file.
+"""Digest of the contents of a dataset.
 
-The digest covers the numbers, the strings and the declaration of the dataset. A second digest, at
-the end of the file, covers all bytes of the file. The second digest is lost if the file is
-truncated or if another program saves the file. The digest of the contents is an attribute, and is
-preserved if another program saves the file. HDF5 stores checksums of small attributes, names and
-shapes. HDF5 does not store checksums of the data, nor of attributes larger than 4 kB, such as a
-long declaration.
+The digest covers the numbers, the strings and the declaration of the dataset. The NetCDF file
+stores this digest in an attribute, so the digest is preserved if another program saves the file. A
+different digest is stored at the end of the file and covers all bytes of the file. The digest at
+the end is lost if the file is truncated or if another program saves the file. The digest of the
+contents is needed because HDF5 does not store checksums of the data, nor of attributes larger than
+4 kB, such as a long declaration. HDF5 only stores checksums of small attributes, names and shapes.
 """
 
 from __future__ import annotations
@@ -20,9 +20,10 @@ import xarray as xr
 from rsfstudy.errors import DataError, shorten_text
 from rsfstudy.quantities import units_or_scale_of_variable
 
-#: Name of the file attribute that contains the digest.
+#: Name of the attribute that contains the digest of the contents.
 DIGEST_ATTRIBUTE = "content_digest"
-#: Names of the file attributes that affect how rsfstudy interprets the numbers.
+#: Names of the attributes that the digest includes. These attributes affect how rsfstudy interprets
+#: the numbers.
 _NAMES_OF_DIGESTED_ATTRIBUTES = ("declaration", "provenance", "scene", "end", "laboratory")
 
 
@@ -37,7 +38,7 @@ def compute_content_digest(dataset: xr.Dataset) -> str:
     Returns
     -------
     str
-        JSON object with one digest per variable and per digested attribute.
+        JSON object with the digest of each variable and the digest of each included attribute.
     """
     return json.dumps(_compute_digests(dataset))
 
@@ -45,9 +46,10 @@ def compute_content_digest(dataset: xr.Dataset) -> str:
 def check_content(dataset: xr.Dataset, path: str) -> None:
     """Check the contents of a dataset against its digest.
 
-    Datasets without a digest are not checked. The function compares only attributes and variables
-    that are listed in the digest. A variable is compared only if its dimensions, shape and units
-    are unchanged. Other programs may therefore add, remove, select or convert variables.
+    A dataset without a digest is not checked. The function checks only attributes and variables
+    that are listed in the digest. If the dimensions, the shape or the units of a variable have
+    changed, the variable is not checked. Other programs may therefore add, remove, select or
+    convert variables.
 
     Parameters
     ----------
@@ -87,7 +89,8 @@ def _build_damaged_file_error(path: str, part_name: str) -> DataError:
 def _compute_digests(dataset: xr.Dataset) -> dict[str, str]:
     """Compute one digest for each variable and each attribute.
 
-    The digest of a variable is preceded by the sizes, units and scale of the variable.
+    The entry of a variable consists of the sizes, the units and the scale of the variable, followed
+    by the digest of its values.
     """
     texts = {
         name: str(dataset.attrs[name])
@@ -117,7 +120,7 @@ def _array_to_portable_bytes(values: np.ndarray) -> bytes:
 
 
 def _parse_digest(text: object) -> Mapping[str, str]:
-    """Parse a digest string. Return an empty mapping for an invalid string."""
+    """Parse a digest string. If the string is invalid, return an empty mapping."""
     try:
         listed = json.loads(str(text))
     except (ValueError, RecursionError):

@@ -1,11 +1,11 @@
 """Reading and writing of results files.
 
 A NetCDF file is written under a temporary name, read back and compared with the dataset. The file
-is renamed only if the contents are identical. Each NetCDF file ends with a digest of all bytes of
-the file. HDF5 ignores this digest. The digest is checked before HDF5 opens the file, because HDF5
-may hang on damaged bytes. If the digest is missing, because another program saved the file or
-because the file was truncated, the file is checked against the digest of its contents (see
-``content_digest``).
+is renamed only if the contents are identical. Each NetCDF file ends with a digest of all preceding
+bytes. HDF5 ignores this digest. When a file is read, the digest is checked before HDF5 opens the
+file, because HDF5 may hang if the file is damaged. The digest at the end is missing if another
+program saved the file or if the file was truncated. In this case, the file is checked against the
+digest of its contents (see ``content_digest``).
 """
 
 from __future__ import annotations
@@ -42,7 +42,8 @@ ZARR_OPEN_OPTIONS: Mapping[str, Any] = {
     "cache": False,
     "zarr_format": 3,
 }
-#: Codecs of the Zarr stores that rsfstudy writes. Other codecs could run arbitrary code.
+#: Names of the codecs that a Zarr store may use. A store with any other codec is rejected, because
+#: the codec could run arbitrary code.
 _ALLOWED_ZARR_CODECS = {"bytes", "vlen-utf8", "zstd"}
 _DIGEST_TRAILER_PREFIX = b"\nrsfstudy sha256 "
 _DIGEST_TRAILER_LENGTH = len(_DIGEST_TRAILER_PREFIX) + 64
@@ -53,8 +54,8 @@ def write_dataset(dataset: xr.Dataset, path: Path) -> xr.Dataset:
     """Write a dataset to a NetCDF file.
 
     At any time, ``path`` contains either the old file or the complete new file. A program that has
-    opened the old file can continue to read the old data. If a process is killed during the write,
-    the next write overwrites the temporary file of the process.
+    opened the old file can continue to read the old data. If a process is killed while it writes
+    the temporary file, the temporary file remains until the next write overwrites it.
 
     Parameters
     ----------
@@ -66,13 +67,13 @@ def write_dataset(dataset: xr.Dataset, path: Path) -> xr.Dataset:
     Returns
     -------
     xarray.Dataset
-        Dataset with the attributes that the file contains. The entry ``encoding["source"]`` is the
+        Dataset with the same attributes as in the file. The entry ``encoding["source"]`` is the
         path of the file.
 
     Raises
     ------
     DataError
-        If the file cannot be written, or if the data that were read back differ from the dataset.
+        If the file cannot be written, or if the data in the written file differ from the dataset.
     """
     clean = convert_attributes_for_netcdf(
         dataset.assign_attrs({"layout": FILE_LAYOUT_VERSION, **dataset.attrs})
@@ -124,10 +125,10 @@ def _hash_file_contents(path: Path, byte_count: int) -> bytes:
 def open_zarr_store(path: Path) -> xr.Dataset:
     """Open a Zarr store lazily.
 
-    Zarr stores attributes as JSON, which does not distinguish numeric types. The function therefore
-    converts flag values to the dtype of their variable. The function also removes the dtype of
-    strings from the encoding, because older versions of xarray cannot write that dtype to a NetCDF
-    file.
+    Zarr stores attributes as JSON, and JSON does not distinguish numeric types. The function
+    therefore converts the flag values of each variable to the dtype of the variable. It also
+    removes the dtype of string variables from their encoding, because older versions of xarray
+    cannot write this dtype to a NetCDF file.
 
     Parameters
     ----------
@@ -166,7 +167,7 @@ def write_store_digest(store: Path) -> None:
 def _hash_store(store: Path) -> str:
     """Compute the digest of all files of a Zarr store.
 
-    The digest excludes the root attribute that contains the digest.
+    The root attribute that contains the digest is not included.
     """
     digest = hashlib.sha256()
     for file in sorted(file for file in store.rglob("*") if file.is_file()):
@@ -182,7 +183,7 @@ def _hash_store(store: Path) -> str:
 def _check_store_digest(path: Path) -> bool:
     """Check a Zarr store against its digest.
 
-    The function returns False if the store has no digest.
+    If the store has no digest, the function returns False.
     """
     attributes = json.loads((path / "zarr.json").read_text())["attributes"]
     if _STORE_DIGEST_ATTRIBUTE in attributes and attributes[_STORE_DIGEST_ATTRIBUTE] != _hash_store(
@@ -195,7 +196,7 @@ def _check_store_digest(path: Path) -> bool:
 def _check_file_digest(path: Path) -> bool:
     """Check a file against the digest at its end.
 
-    The function returns False if the file has no digest.
+    If the file has no digest at its end, the function returns False.
     """
     size = path.stat().st_size - _DIGEST_TRAILER_LENGTH
     with open(path, "rb") as file:
@@ -268,7 +269,7 @@ def read_dataset(path: Path) -> xr.Dataset:
 def _check_readable_path(path: Path, file_description: str) -> None:
     """Raise ``DataError`` unless a path is a regular file or a Zarr store.
 
-    The check prevents the opening of a pipe, which could block forever.
+    The check is needed because opening a pipe could block forever.
     """
     check_path("file", path)
     if not path.exists():
@@ -305,9 +306,9 @@ def convert_attributes_for_netcdf(dataset: xr.Dataset) -> xr.Dataset:
     Returns
     -------
     xarray.Dataset
-        Copy of the dataset. In the attributes, Boolean values become the strings "true" and
-        "false", dictionaries become JSON, sequences become arrays, and sequences with one element
-        become scalars. Attributes that are None are removed.
+        Copy of the dataset with converted attributes. Boolean values become the strings "true" and
+        "false". Dictionaries become JSON strings. Sequences become arrays, and sequences with one
+        element become scalars. Attributes that are None are removed.
     """
     clean = dataset.copy()
     clean.attrs = _convert_attribute_mapping_for_netcdf(dataset.attrs)

@@ -1,6 +1,7 @@
-"""Reconstruction of the scenes that datasets describe.
+"""Reconstruction of scenes from datasets.
 
-The attributes of a motion describe its scene. In the results of a study, each cell has a scene.
+The scene of a motion is rebuilt from the attributes of the dataset. In the results of a study, each
+cell has its own scene, which is rebuilt from the declaration of the study.
 """
 
 from __future__ import annotations
@@ -23,7 +24,7 @@ def scene_of_dataset(dataset: xr.Dataset, study: Study | None) -> Scene:
     Parameters
     ----------
     dataset : xarray.Dataset
-        Dataset of a single scene, or results of a study with one selected cell.
+        Dataset of a single scene, or results of a study from which the user selected one cell.
     study : Study or None
         Study that produced the dataset, or None if the dataset describes a single scene.
 
@@ -44,7 +45,7 @@ def scene_of_dataset(dataset: xr.Dataset, study: Study | None) -> Scene:
 
 
 def find_selected_cell_number(dataset: xr.Dataset, study: Study) -> int:
-    """Find the number of the selected cell.
+    """Find the cell number of the selected cell.
 
     Parameters
     ----------
@@ -61,7 +62,7 @@ def find_selected_cell_number(dataset: xr.Dataset, study: Study) -> int:
     Raises
     ------
     InvalidValue
-        If a coordinate has several values, or if its value is not on the axis of the study.
+        If a coordinate has several values, or if its value is not a point of the axis.
     """
     places = []
     for name, values in build_dimension_coordinates(study).items():
@@ -93,8 +94,8 @@ def read_scene_from_attributes(dataset: xr.Dataset) -> Scene:
     Raises
     ------
     DataError
-        If the attributes are missing or invalid, or if the samples of a loading do not match their
-        digest.
+        If the attributes are missing or invalid, or if the samples of a loading do not match the
+        digest of the samples.
     InvalidValue
         If the scene contains a user-defined part that is not registered.
     """

@@ -1,9 +1,10 @@
-"""Schema of stored declarations: studies, axes, scenes, measures, reductions and claims.
+"""Schema of the declarations of studies in results files.
 
-The structs describe the declaration of a study in a results file. The functions build the objects
-of a study from the structs. A missing entry is never replaced by a default value, because a default
-value could change the meaning of the study. No code is imported from a results file, so measures
-and reductions are found by their names among the classes of rsfstudy.
+The structs define the format of a declaration in a results file. The functions build studies,
+scenes, measures and reductions from the structs. A missing entry is never replaced by a default
+value, because a default value could change the meaning of the study. A results file does not
+contain code. The functions therefore look up the classes of measures and reductions in rsfstudy, by
+name.
 """
 
 from __future__ import annotations
@@ -32,14 +33,16 @@ from rsfstudy.storage.plain_data import (
 from rsfstudy.study import Claim, load_study, study_names
 
 MISSING_STUDY_FILE_REMEDY = "Name the file that declares it: --study FILE (study=)."
-#: Maximum number of claims of a study. Larger files would take minutes to check.
+#: Maximum number of claims of a study. Checking a larger number of claims would take minutes.
 _MAX_CLAIMS = 10_000
-#: Integer fields of measures and reductions. A larger number of points would not fit in memory.
+#: Type of the integer fields of measures and reductions. The range is limited because a larger
+#: number of points would not fit in memory.
 _Count = Annotated[int, msgspec.Meta(ge=-10_000_000, le=10_000_000)]
-#: Fields of a scene. User-defined parts are stored by their names.
+#: Type of the stored fields of a scene. A user-defined part is stored as the name of the part.
 StoredScene = Mapping[str, float | str | bool | None]
-#: Default values of scene fields that are missing in older files. Fields that the parts of a scene
-#: lack must be None, so only the defaults of slots, which are names, are included.
+#: Default values of scene fields that are missing in older files. Only the fields that select a
+#: part have a default value. Any other missing field must remain None, because the parts of the
+#: scene may not have this field.
 _DEFAULTS_OF_MISSING_FIELDS: Mapping[str, Any] = {
     **{n: v if isinstance(v, str) else None for n, v in SceneFields.OMITTED_DEFAULTS.items()},
     **{name: None for part in BUILT_IN_PARTS.values() for name in SceneFields.names_of_part(part)},
@@ -55,8 +58,9 @@ class StoredAxis(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     dimension : str
         Name of the dimension.
     values : sequence or mapping
-        List of values. For a zipped axis, mapping of point labels to field values. For a numbered
-        axis, mapping of field names to lists of values.
+        List of the values of an ordinary axis. The values of a zipped axis are a mapping of point
+        labels to field values. The values of a numbered axis are a mapping of field names to lists
+        of values.
     units : mapping of str to str, optional
         Units of the fields.
     drawn : mapping of str to object, optional
@@ -77,7 +81,8 @@ class StoredAxis(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
         Parameters
         ----------
         user_parts : mapping of str to UserPart, optional
-            User-defined parts by name. Other user-defined parts are represented by their names.
+            User-defined parts by name. The axis contains only the name of any other user-defined
+            part.
 
         Returns
         -------
@@ -101,13 +106,13 @@ class StoredAxis(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class _StoredMeasure(msgspec.Struct):
-    """Entries that every measure has."""
+    """Entries that the declaration of every measure has."""
 
     name: str
 
 
 class _StoredReduction(msgspec.Struct):
-    """Entries that every reduction has."""
+    """Entries that the declaration of every reduction has."""
 
     kind: str
     name: str
@@ -128,7 +133,7 @@ class StoredDeclaration(msgspec.Struct, frozen=True, forbid_unknown_fields=True)
     version : int
         Version of the study.
     base : mapping of str to object
-        Fields of the scene that all cells share.
+        Fields of the base scene. The axes change some of these fields.
     axes : sequence of StoredAxis
         Axes of the lattice.
     measure : mapping of str to object
@@ -144,7 +149,7 @@ class StoredDeclaration(msgspec.Struct, frozen=True, forbid_unknown_fields=True)
     references : sequence of str
         Literature references of the study.
     overrides : mapping of str to object
-        Values that the user has overridden.
+        Values that the user changed, for example with ``--set``.
     laboratory : mapping of str to float, optional
         Quantities of the rig, if the study has a rig.
     """
@@ -243,7 +248,7 @@ def build_scene_from_stored(
 def find_user_part_missing_from_file(
     declaration: StoredDeclaration, stored_loadings: Collection[str] = ()
 ) -> tuple[str, str] | None:
-    """Find a user-defined part that the results file does not contain.
+    """Find a user-defined part that is missing in the results file.
 
     Parameters
     ----------
@@ -255,7 +260,7 @@ def find_user_part_missing_from_file(
     Returns
     -------
     tuple of (str, str) or None
-        Slot and name of the first missing part, or None if no part is missing.
+        Field and name of the first missing part, or None if no part is missing.
     """
     rows: list[Mapping[str, Any]] = [declaration.base]
     for axis in declaration.axes:
@@ -355,10 +360,10 @@ def build_reduction(plain_reduction: Mapping[str, Any], path_in_file: str) -> Re
 def _find_class(
     declaration_key: str, base_class: Any, exporting_package: ModuleType, declared_name: str
 ) -> Any:
-    """Find a class of rsfstudy by its name in declarations.
+    """Look up an rsfstudy class by the name that declarations use for the class.
 
-    If the package that exports the classes has no class with this name, the function also searches
-    the modules of the named studies.
+    The function first searches the package that exports all classes of this kind. If there is no
+    class with this name, the function also searches the modules of the named studies.
     """
     for exported in exporting_package.__all__:
         getattr(exporting_package, exported)  # This loads the module of the class.
@@ -375,7 +380,7 @@ def _find_class(
 
 
 def _named_subclasses(base_class: Any) -> dict[str, Any]:
-    """Return the concrete subclasses in rsfstudy, by their names in files."""
+    """Return the concrete subclasses in rsfstudy, by the name used in files."""
     found: dict[str, Any] = {}
     for kind in base_class.__subclasses__():
         found |= _named_subclasses(kind)

@@ -1,9 +1,11 @@
-"""Comparison of fingerprints, which contain the settings and the code that affect results.
+"""Comparison and merging of fingerprints.
 
-The entry ``physics`` of a fingerprint contains one code digest for each module of rsfstudy that the
-measure and the parts of the scenes can reach. Two fingerprints agree if all modules that both of
-them contain have the same code. For example, a longer axis of laws may add the modules of further
-laws. Older fingerprints contain one digest of all modules.
+A fingerprint contains the settings and the code digests that affect results. The entry ``physics``
+contains one code digest for each module of rsfstudy that the measure and the parts of the scenes
+import directly or indirectly. Two fingerprints may contain different modules. For example, the
+fingerprint of a study with more laws contains the modules of these laws. The code of two
+fingerprints agrees if each module that both fingerprints contain has equal digests. Older
+fingerprints contain one digest of all modules.
 """
 
 from __future__ import annotations
@@ -35,9 +37,10 @@ def find_fingerprint_differences(
     Returns
     -------
     dict of str to tuple of (object, object)
-        Each entry that differs, with its values in the first and in the second fingerprint. The
-        value of a missing entry is None. If the code of modules differs, the name of the entry
-        lists the modules, for example ``"physics (slider.friction)"``.
+        Entries that differ, by name. Each value contains the entry of the first fingerprint and the
+        entry of the second fingerprint. None replaces a missing entry. If the code of modules
+        differs, the name of the entry lists these modules, for example ``"physics
+        (slider.friction)"``.
     """
     both: list[dict[str, Any]] = [json.loads(json.dumps(each)) for each in (first, second)]
     codes = [each.get(_MODULES) for each in both]
@@ -59,12 +62,12 @@ def find_fingerprint_differences(
 
 
 def merge_fingerprints(stored: Mapping[str, Any], current: Mapping[str, Any]) -> dict[str, Any]:
-    """Add the modules of a stored fingerprint to a fingerprint that agrees with it.
+    """Add the modules of the journal fingerprint to the fingerprint of a run.
 
     Parameters
     ----------
     stored, current : mapping of str to object
-        Fingerprints of the journal and of the run.
+        Fingerprints of the journal and of the run. The code of both fingerprints must agree.
 
     Returns
     -------

@@ -1,8 +1,8 @@
 """Coordinates of the lattice of a study.
 
-The coordinates contain the fields that vary along each axis, and the fixed scene fields as scalars.
-The values of the fields are taken from the scenes of a few cells, which ``CellPlan`` collects when
-it builds the scenes of all cells.
+Each field that varies along an axis becomes a coordinate of this axis. Each fixed scene field
+becomes a scalar coordinate. ``LatticeCoordinates`` reads the values of the fields from the scenes
+of a few cells. ``CellPlan`` collects these scenes when it builds the scenes of all cells.
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ def build_dimension_coordinates(study: Study) -> dict[str, np.ndarray]:
     Returns
     -------
     dict of str to ndarray
-        Labels, numbers or field values of the points of each axis, by dimension.
+        Labels, numbers or field values of the points of each axis, by name of the dimension.
     """
     return {axis.dimension: _dimension_values(axis) for axis in study.axes}
 
@@ -48,11 +48,12 @@ def _dimension_values(axis: Axis) -> np.ndarray:
 
 
 class LatticeCoordinates:
-    """Builder of the coordinates of a lattice.
+    """Builder of the coordinates of a lattice from the scenes of a few cells.
 
-    The coordinates include the dimension coordinates, the fields that vary along each axis, and the
-    fixed scene fields as scalars. The coordinates also include the tables of user-defined loadings,
-    and the coordinates of array outputs of the measure.
+    The coordinates include the dimension coordinates and the scene fields. A field that varies
+    along an axis has the dimension of this axis, and a fixed field is a scalar. The coordinates
+    also include the tables of user-defined loadings, and the coordinates of array outputs of the
+    measure.
 
     Parameters
     ----------
@@ -62,14 +63,15 @@ class LatticeCoordinates:
     Attributes
     ----------
     cell_numbers : frozenset of int
-        Numbers of the cells whose scenes determine the coordinates. Along each axis, the cells
-        represent all combinations of parts.
+        Numbers of the cells from whose scenes the coordinates are built. Along each axis, these
+        cells include every combination of parts.
     """
 
     def __init__(self, study: Study) -> None:
         self.study = study
         strides = np.cumprod([1, *study.shape[::-1]])[::-1][1:].tolist()
-        #: For each axis, the cell number that represents each point of the axis.
+        #: List with one entry per axis. Each entry contains one cell number for each point of the
+        #: axis.
         self._representative_cells: list[list[int]] = []
         for axis, stride in zip(study.axes, strides, strict=True):
             groups = axis.classify_rows()
@@ -117,7 +119,7 @@ class LatticeCoordinates:
 def _coordinates_of_axis(
     study: Study, axis: Axis, fields_of_points: list[dict[str, Any]]
 ) -> dict[str, Any]:
-    """Build the dimension coordinate of an axis and the fields that vary along the axis."""
+    """Build the dimension coordinate of an axis, and the fields along the axis."""
     coords: dict[str, Any] = {}
     if axis.labels is not None or axis.has_numbered_points:
         words = axis.dimension.replace("_", " ")
@@ -126,7 +128,8 @@ def _coordinates_of_axis(
             about = {"units": "1", "long_name": f"number of the {words}"}
             about |= {"drawn": json.dumps(axis.sampling_info)} if axis.sampling_info else {}
         coords[axis.dimension] = (axis.dimension, _dimension_values(axis), about)
-    # An axis shows its own values, even if the scenes of its first cells do not use them.
+    # The coordinate contains the values of the axis, even if the scenes of the first cells do not
+    # use these values.
     points: list[AxisRow] = [
         {**study.measure.plain_fields, **fields, **row}
         for fields, row in zip(fields_of_points, axis.rows, strict=True)
@@ -153,8 +156,8 @@ def _derived_coordinates(coordinates: Mapping[Any, Any]) -> Iterator[tuple[str, 
 def _to_storable_array(values: list[Any]) -> np.ndarray:
     """Convert the values of a field to an array that NetCDF can store.
 
-    Strings become an object array and Boolean values become int8. All other values become floats,
-    and None becomes NaN.
+    Strings are stored as an object array, and Boolean values as int8. All other values are stored
+    as floats, and None is stored as NaN.
     """
     if isinstance(_first_value_not_none(values), str):
         return np.array([value or "" for value in values], dtype=object)
@@ -164,24 +167,24 @@ def _to_storable_array(values: list[Any]) -> np.ndarray:
 
 
 def _first_value_not_none(values: list[Any]) -> Any:
-    """Return the first value that is not None, or None if all values are None."""
+    """Return the first value that is not None. If all values are None, return None."""
     return next((value for value in values if value is not None), None)
 
 
 def variable_attributes(
     variable_name: str, study_quantities: Mapping[str, Quantity], example_value: Any = None
 ) -> dict[str, Any]:
-    """Build the attributes of a variable from the vocabulary or the study.
+    """Build the attributes of a variable.
 
     Parameters
     ----------
     variable_name : str
         Name of the variable.
     study_quantities : mapping of str to Quantity
-        Quantities of the study that are not in the vocabulary.
+        Quantities that the study defines in addition to the quantities in the vocabulary.
     example_value : object, optional
-        One value of the variable. The type of this value determines if the variable has units or
-        flags.
+        Value of the variable at one point. The type of this value determines whether the variable
+        has units or flags.
 
     Returns
     -------

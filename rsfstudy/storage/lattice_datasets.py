@@ -1,7 +1,8 @@
 """Assembly of finished cells into a self-describing dataset.
 
-``assemble_dataset`` builds the variables and the root attributes. To write a Zarr store, the same
-functions are called for blocks of cells. The coordinates are built in ``lattice_coordinates``.
+``assemble_dataset`` assembles the dataset of a complete lattice. For Zarr stores, the functions
+that build the variables are called for one block of cells at a time. The module
+``lattice_coordinates`` builds the coordinates.
 """
 
 from __future__ import annotations
@@ -30,7 +31,8 @@ _COMMENT_ON_RIG_UNITS = (
     " Axes are in the units that they state; sigma_star, slip_distance and reference_velocity are "
     "the scales of each cell."
 )
-#: Root attributes that users can set with environment variables, for example ``RSFSTUDY_LICENSE``.
+#: Names of the root attributes that users can set with environment variables. For example, the
+#: variable ``RSFSTUDY_LICENSE`` sets the attribute ``license``.
 _CREDIT_ATTRIBUTES_FROM_ENVIRONMENT = (
     "creator_name",
     "creator_email",
@@ -74,8 +76,8 @@ def build_lattice_variables(
 ) -> dict[Any, tuple[tuple[str, ...], np.ndarray, dict[str, Any]]]:
     """Build the variables of a block of cells.
 
-    The variables are the outputs of the measure, and the status, message, wall time and number of
-    right-hand-side evaluations of each cell.
+    The variables include all outputs of the measure. They also include the status, the message, the
+    wall time and the number of right-hand-side evaluations of each cell.
 
     Parameters
     ----------
@@ -124,8 +126,8 @@ def root_attributes(
 ) -> dict[str, Any]:
     """Build the root attributes of a dataset.
 
-    The attributes follow the CF and ACDD conventions. The attributes also contain the declaration
-    of the study and the provenance of the run as JSON.
+    The attributes follow the CF and ACDD conventions. Two attributes contain the declaration of the
+    study and the provenance of the run as JSON.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Conversion of plain data, such as decoded JSON, to annotated types and dataclasses.
+"""Conversion of plain data, such as decoded JSON, to annotated types.
 
 We convert and check plain data with msgspec for three reasons. First, msgspec is a single package
 of 0.5 MB without dependencies, and its import takes 17 ms (pydantic: four packages, 10 MB, 50 ms;
@@ -29,7 +29,7 @@ def invalid_part_error(path_in_file: str, reason: str) -> DataError:
     path_in_file : str
         Path of the entry.
     reason : str
-        Reason, which follows the path in the message.
+        Reason why the entry is invalid. The message consists of the path and the reason.
 
     Returns
     -------
@@ -51,7 +51,7 @@ def convert_plain_data(plain_data: Any, annotated_type: Any, path_in_file: str) 
     plain_data : object
         Decoded JSON.
     annotated_type : type
-        Type or type annotation. If the type is a typed dictionary, unknown keys are dropped.
+        Type or type annotation. If the type is a typed dictionary, the function drops unknown keys.
     path_in_file : str
         Path of the value in the file, for error messages.
 
@@ -118,7 +118,7 @@ def build_from_plain_data(
     given_fields : mapping of str to object, optional
         Values of fields that need no conversion.
     integer_type : type, default: int
-        Type of the fields that are integers, for example with an upper limit.
+        Type to which integer fields are converted, for example an integer type with an upper limit.
 
     Returns
     -------
@@ -169,7 +169,7 @@ def convert_fields(
 
 
 def call_with_fields(constructor: Any, values: Mapping[str, Any], path_in_file: str) -> Any:
-    """Call a constructor with the values of stored fields.
+    """Call a constructor, and add the path in the file to its error messages.
 
     Parameters
     ----------

@@ -1,8 +1,8 @@
 """Reconstruction of a study from the declaration in its results file.
 
-``rebuild_study`` is the main function. A declaration contains only plain data, and no code from the
-results file is run. If a study contains user-defined code, the code is imported from the file that
-declares the study.
+``rebuild_study`` is the main function. A declaration contains only plain data, so no code from the
+results file is executed. If a study contains user-defined code, the code is imported from the
+Python file that declares the study.
 """
 
 from __future__ import annotations
@@ -34,15 +34,16 @@ from rsfstudy.vocabulary import find_coverage_content_type
 def rebuild_study(results: xr.Dataset, study_file: str | Path | None = None) -> Study:
     """Rebuild the study that produced a results dataset.
 
-    If a named study contains user-defined parts, the parts are imported from the module of that
-    study.
+    If a named study contains user-defined parts, the function imports the parts from the module of
+    the named study.
 
     Parameters
     ----------
     results : xarray.Dataset
         Results of a study.
     study_file : str or Path, optional
-        File that declares the study. The file is required if the study contains user-defined code.
+        Python file that declares the study. The file is required if the study contains user-defined
+        code.
 
     Returns
     -------
@@ -94,9 +95,9 @@ def rebuild_study(results: xr.Dataset, study_file: str | Path | None = None) -> 
 
 
 def study_of_dataset(results: xr.Dataset) -> Study:
-    """Rebuild the complete study that produced a dataset.
+    """Rebuild the study that produced a dataset, with all of its cells.
 
-    The study contains all cells, even if only some cells of the dataset are selected.
+    The rebuilt study contains all cells, even if the dataset is a selection of cells.
 
     Parameters
     ----------
@@ -126,9 +127,9 @@ def study_of_dataset(results: xr.Dataset) -> Study:
 def depends_on_user_code(results: xr.Dataset) -> bool:
     """Return True if user-defined code affected the results.
 
-    User-defined loadings are data rather than code, because the results contain their samples or
-    segments. If the results contain loadings, the function searches the axes and the base scene for
-    other user-defined parts.
+    User-defined loadings are not code, because the results contain the samples or segments of the
+    loadings. If the results contain user-defined loadings, the function searches the axes and the
+    base scene for other user-defined parts.
 
     Parameters
     ----------
@@ -173,8 +174,9 @@ def study_from_declaration(
     stored_loadings : mapping of str to UserPart
         User-defined loadings from the results file, by name.
     study_with_user_code : Study, optional
-        Study that contains the user-defined code. The measure, reductions and user-defined parts of
-        this study are used. The plain fields of the measure are taken from the declaration.
+        Study that contains the user-defined code. The rebuilt study has the measure, the reductions
+        and the user-defined parts of this study. The values of the measure fields are read from the
+        declaration.
 
     Returns
     -------
@@ -220,10 +222,11 @@ def _collect_known_user_parts(study: Study | None) -> Mapping[str, UserPart]:
 
 
 def find_primary_output(dataset: xr.Dataset) -> str | None:
-    """Find the name of the main result of a dataset.
+    """Find the name of the primary output of a dataset.
 
-    If rsfstudy has no measure with the declared name, or if the main result is not numeric, the
-    function returns the first numeric output with one value per cell.
+    The primary output is the output that the measure declares as its main result. If rsfstudy has
+    no measure with the declared name, or if the declared output is not numeric, the function
+    returns the first numeric output with one value per cell.
 
     Parameters
     ----------
@@ -233,7 +236,8 @@ def find_primary_output(dataset: xr.Dataset) -> str | None:
     Returns
     -------
     str or None
-        Name of the main result, or None if there is no numeric output with one value per cell.
+        Name of the primary output. The function returns None if no numeric output has one value per
+        cell.
     """
     cells = set(dataset["status"].dims)
     plain = [

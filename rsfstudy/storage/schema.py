@@ -1,8 +1,8 @@
-"""Schema of results files: attributes, provenance and variables.
+"""Schema and checks of results files: attributes, provenance and variables.
 
 ``check_results`` checks a file before any other function uses the file. Error messages contain the
-path of the invalid entry, for example ``declaration.claims[3].id``. The schema of the declaration
-is in ``declarations``.
+path of the invalid entry, for example ``declaration.claims[3].id``. The module ``declarations``
+contains the schema of the declaration.
 """
 
 from __future__ import annotations
@@ -24,8 +24,8 @@ from rsfstudy.storage.declarations import (
 from rsfstudy.storage.plain_data import convert_plain_data, invalid_part_error
 from rsfstudy.vocabulary import QUANTITY_BY_NAME
 
-#: Version of the file layout. Files without a version have layout 1, in which the digests of
-#: variables were stored as attributes.
+#: Version of the file layout. A file without a version number has layout 1. In layout 1, the digest
+#: of each variable was stored as an attribute of the variable.
 FILE_LAYOUT_VERSION = 2
 
 
@@ -41,7 +41,8 @@ class RootAttributes(TypedDict):
     completeness : str
         "complete", or the number of finished cells.
     reduced_despite : str
-        Number of failed cells that the reductions omit, or an empty string.
+        Number of failed cells that the reductions omit. The string is empty if the reductions omit
+        no cells.
     """
 
     id: str
@@ -53,8 +54,8 @@ class RootAttributes(TypedDict):
 class StoredFingerprint(TypedDict):
     """Code digests and versions that affect the results.
 
-    Other entries of a fingerprint are only compared with the entries of another fingerprint.
-    Therefore, the other entries need no declared type.
+    The other entries of a fingerprint need no declared type, because they are only compared with
+    the entries of another fingerprint.
     """
 
     own_code: str
@@ -70,7 +71,7 @@ class StoredProvenance(TypedDict):
     command : str
         Command line or Python call of the user.
     declared_in : str
-        File that declares the study, or an empty string.
+        File that declares the study. The string is empty if the study was not declared in a file.
     versions : mapping of str to str
         Versions of Python and of the main packages.
     fingerprint : StoredFingerprint
@@ -90,7 +91,7 @@ class StoredProvenance(TypedDict):
     machine: str
 
 
-#: NumPy dtype kinds that are allowed in variables, and their description.
+#: NumPy dtype kinds that variables may have, and a description of these kinds for error messages.
 _ALLOWED_DTYPE_KINDS = ("iufbOUT", "numbers or texts")
 _REQUIRED_VARIABLES = {
     "status": ("i", "whole numbers"),
@@ -235,7 +236,7 @@ def read_provenance(dataset: xr.Dataset) -> StoredProvenance:
 
 
 def read_scene_fields(dataset: xr.Dataset) -> dict[str, Any]:
-    """Read the fields of the scene that the attributes of a dataset describe.
+    """Read the scene fields from the attributes of a dataset.
 
     Parameters
     ----------

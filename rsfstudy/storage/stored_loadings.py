@@ -1,7 +1,6 @@
 """Storage of user-defined loadings in results files.
 
-A user-defined loading is data rather than code. The results file contains a table with the samples
-or segments of each loading.
+The results file contains a table of the samples or segments of each user-defined loading.
 """
 
 from __future__ import annotations
@@ -16,7 +15,7 @@ from rsfstudy.parts import Segment
 from rsfstudy.slider import Protocol, SampledHistory, UserLoading, UserPart, protocol
 from rsfstudy.storage.plain_data import invalid_part_error
 
-#: For each kind of loading table, the name of a row and the description of the columns.
+#: Name of the rows and description of the columns, for each kind of loading table.
 _DESCRIPTION_OF_SAMPLE_ROWS = (
     "sample",
     "time, load point velocity, fall and rate of normal stress",
@@ -26,7 +25,8 @@ _DESCRIPTION_OF_SEGMENT_ROWS = (
     "load point velocity and step, duration, and normal stress above sigma_star",
 )
 
-#: Attributes that distinguish sampled histories of velocity, normal stress and pore pressure.
+#: Names of the attributes that show whether a sampled history imposes velocity, normal stress or
+#: pore pressure.
 _FLAGS_OF_SAMPLED_HISTORIES = ("of_stress", "of_pressure")
 
 

@@ -32,7 +32,8 @@ from rsfstudy.study import Study
 #: Maximum number of values in a slab (32 MB of float64). A slab consists of complete rows along the
 #: first axis, and has at least one row.
 _MAX_VALUES_PER_SLAB = 4_000_000
-#: Options for writing a slab. The metadata are consolidated once, together with the reductions.
+#: Options for writing a slab. The metadata are not consolidated after each slab, but only once,
+#: when the reductions are written.
 _ZARR_WRITE_OPTIONS: Mapping[str, Any] = {"consolidated": False, "zarr_format": 3}
 
 #: Function that reads a slice of the cells, in row-major order.
@@ -160,7 +161,8 @@ def _write_lattice(
     row = math.prod(within)  # number of cells
     rows = min(length, max(1, _MAX_VALUES_PER_SLAB // (width * row)))
     coords = _convert_strings_to_object_dtype(xr.Dataset(coords=coordinates))
-    # The fill values are the values of pending cells, so a lost chunk is read as pending cells.
+    # The fill values are the values of pending cells. If a chunk is lost, its cells are therefore
+    # read as pending cells.
     pending = build_lattice_variables(
         study, CellColumns.build_pending_cells(1, width), (1,) * len(study.shape)
     )

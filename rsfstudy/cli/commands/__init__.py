@@ -1,21 +1,21 @@
-"""Commands of the command line, with one module per command.
+"""Modules of the commands of ``rsfstudy``. Each module defines one command.
 
 To add a command, write one module and add one line to ``MODULE_BY_COMMAND``. The module contains a
 function with the name of the module:
 
-- The decorators declare the arguments and options. The class ``Command`` of
-  ``rsfstudy.cli.command_group`` passes them to the function as one object.
+- The decorators of the function declare the arguments and options. The class ``Command`` of
+  ``rsfstudy.cli.command_group`` passes all arguments and options to the function as one object.
 - The docstring of the function is the help text.
-- The function computes a result, which includes the exit status, and then prints the result. If the
+- The function creates a result object, prints the result and returns the exit status. If the
   command has the option ``--json``, the result is a subclass of ``CommandResult``, and
   ``output_result`` prints the result as text or as JSON.
-- Functions import large libraries when they are called, because ``rsfstudy --help`` imports all
-  modules of this package. A command never imports another command.
+- Large libraries are imported inside the functions that use them, because ``rsfstudy --help``
+  imports all modules of this package. A command never imports the module of another command.
 """
 
 from __future__ import annotations
 
-#: Modules of the commands, by the name of the command. The help text lists the commands in this
+#: Module of each command, by the name of the command. The help text lists the commands in this
 #: order.
 MODULE_BY_COMMAND = {
     "list": "list_studies",

@@ -30,13 +30,15 @@ class Check(CommandResult):
     studies : sequence of StudyResults
         Results of the studies that have been run.
     verdicts : pandas.DataFrame or None
-        Verdicts on the claims. The value is None if no study has been run.
+        Table of the claims and their verdicts. The value is None if none of the studies has been
+        run.
     unapplied_claims : sequence of str, optional
-        Identifiers of the claims that should have been checked but do not apply.
+        Identifiers of the requested claims that do not apply to the results.
     skipped : mapping of str to str, optional
-        Reasons why studies without results are not expected to have results, by study.
+        Reason for skipping a study, by name of the study. The command reports a skipped study but
+        does not fail.
     not_run : sequence of str, optional
-        Names of the other studies without results.
+        Names of the studies that have no results and are not in ``skipped``.
     """
 
     studies: Sequence[StudyResults]
@@ -47,7 +49,11 @@ class Check(CommandResult):
 
     @property
     def exit_status(self) -> int:
-        """Failure if a verdict changed, a cell failed or a study or a claim was not checked."""
+        """Exit status of the command ``check``.
+
+        The status is 1 if a verdict changed, if a cell failed or has not been computed, or if a
+        study or a claim was not checked.
+        """
         moved = self.verdicts is not None and bool(self.verdicts["moved"].any())
         complete = all(one.is_complete for one in self.studies)
         failed = moved or not complete or self.unapplied_claims or self.not_run
@@ -82,8 +88,8 @@ class Check(CommandResult):
 def check(given: options.CommandOptions) -> int:
     """Compare results with published values.
 
-    NAME is a named study or a results file. The exit status is 1 if a verdict differs from the
-    expected verdict, if a cell failed, or if no claim applies to the results.
+    NAME is the name of a study, or a results file. The exit status is 1 if a verdict differs from
+    the expected verdict, if a cell failed, or if no claim applies to the results.
     """
     return output_result(_check_studies(given), _print_check, given.as_json)
 
@@ -114,7 +120,7 @@ def _check_studies(given: options.CommandOptions) -> Check:
 
 
 def _select_claims(verdicts: pd.DataFrame, claim_ids: Sequence[str]) -> pd.DataFrame:
-    """Return the verdicts on the requested claims, or all verdicts."""
+    """Return the verdicts on the requested claims. By default, return all verdicts."""
     for claim in claim_ids:
         if claim not in (choices := list(dict.fromkeys(verdicts["id"]))):
             raise InvalidValue("--claim", claim, "is not a claim of these results", choices=choices)

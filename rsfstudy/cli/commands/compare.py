@@ -22,8 +22,8 @@ if TYPE_CHECKING:
     from rsfstudy.reporting import TextTable
     from rsfstudy.storage import Comparison
 
-#: Maximum number of printed cells with different statuses, and maximum number of characters of a
-#: printed value.
+#: Maximum number of cells in the printed table of different statuses, and maximum length of a
+#: printed value in characters.
 _MAX_DIFFERING_CELLS, _MAX_VALUE_CHARACTERS = 10, 60
 
 
@@ -47,7 +47,7 @@ class FileComparison(CommandResult):
 
     @property
     def exit_status(self) -> int:
-        """Failure if a status or a number differs, or if there is no common cell."""
+        """Exit status. The status is 1 if the files differ or have no common cell."""
         return EXIT_STATUS_OK if self.differences.agrees else EXIT_STATUS_FAILED
 
     @property
@@ -93,7 +93,7 @@ class FileComparison(CommandResult):
 
 
 def _list_differences(differences: Mapping[str, tuple[Any, Any]]) -> list[dict[str, Any]]:
-    """Return one entry per difference for the JSON output."""
+    """Convert differences to a list of entries for the JSON output."""
     return [{"name": n, "first": a, "second": b} for n, (a, b) in differences.items()]
 
 
@@ -103,12 +103,12 @@ def _list_differences(differences: Mapping[str, tuple[Any, Any]]) -> list[dict[s
 @options.output_option
 @options.json_option
 def compare(given: options.CommandOptions) -> int:
-    """Compare two results files: declarations, versions and numbers.
+    """Compare the declarations, versions and numbers of two results files.
 
-    The results of two studies can be compared by name. Cells are matched by their coordinates. Two
-    numbers agree if they differ by no more than the sum of both error estimates. The exit status is
-    0 if all numbers and statuses agree. The exit status is 1 if a number or a status differs, or if
-    the files have no cell in common.
+    To compare the results of two named studies, pass the names of the studies. The command compares
+    cells with equal coordinates. Two numbers agree if they differ by no more than the sum of both
+    error estimates. The exit status is 0 if all numbers and statuses agree. The exit status is 1 if
+    a number or a status differs, or if the files have no cell in common.
     """
     from rsfstudy.api import find_results
     from rsfstudy.storage import StoredDataset
@@ -160,7 +160,7 @@ def _differences_table(title: str, differences: Mapping[str, tuple[Any, Any]]) -
 
 
 def _statuses_table(differing_statuses: pd.DataFrame) -> TextTable:
-    """Return a table of the first cells whose statuses in the two files differ."""
+    """Return a table of the first cells that have different statuses."""
     from rsfstudy.formatting import format_nonempty_fields
     from rsfstudy.reporting import TextTable
 
@@ -178,7 +178,7 @@ def _statuses_table(differing_statuses: pd.DataFrame) -> TextTable:
 
 
 def _rows_with_differences(agreement_table: pd.DataFrame) -> pd.DataFrame:
-    """Return the rows of the results that are not identical or that have error estimates."""
+    """Select the rows with different values or with error estimates."""
     from rsfstudy.vocabulary import find_coverage_content_type
 
     differs = agreement_table["identical"] < agreement_table["values"]
@@ -187,7 +187,7 @@ def _rows_with_differences(agreement_table: pd.DataFrame) -> pd.DataFrame:
 
 
 def _uncompared_lines(uncompared_variables: Mapping[str, str]) -> Iterator[str]:
-    """Yield one line per reason why variables are not compared."""
+    """Yield one line of text for each reason why variables are not compared."""
     for why in dict.fromkeys(uncompared_variables.values()):
         names = [name for name, reason in uncompared_variables.items() if reason == why]
         yield f"not compared, because {why}: {', '.join(names)}"

@@ -33,8 +33,8 @@ _UNIT_OPTION_NAMES = ("stress", "length", "time")
 def export(given: options.CommandOptions) -> int:
     """Export results or a motion to other programs.
 
-    The command writes a CSV table, a MATLAB file, or both. The table has one row per cell of a
-    study or per time of a motion.
+    The command writes a CSV table, a MATLAB file, or both. The CSV table of a study has one row per
+    cell. The CSV table of a motion has one row per time.
     """
     from rsfstudy.cli.export_files import to_csv, to_mat
     from rsfstudy.storage import read_dataset

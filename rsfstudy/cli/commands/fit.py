@@ -29,9 +29,9 @@ if TYPE_CHECKING:
 
     from rsfstudy.fitting import LoadingStep, Record
 
-#: Maximum number of steps of a record that are printed.
+#: Maximum number of steps that are printed for each record.
 _MAX_LISTED_STEPS = 24
-#: Options that are passed to ``rsfstudy.fit`` unchanged.
+#: Names of the options whose values are passed to ``rsfstudy.fit`` unchanged.
 _OPTIONS_PASSED_TO_FIT = (
     "stiffness", "slip_distance", "laws", "free", "together", "before", "after", "windows",
     "noise", "loading", "averaging", "low_pass", "posterior", "budget", "engine",
@@ -40,16 +40,16 @@ _OPTIONS_PASSED_TO_FIT = (
 
 @dataclass(frozen=True)
 class RecordFits(CommandResult):
-    """Fits of records.
+    """Result of the command ``fit``: records and their fits.
 
     Parameters
     ----------
     records : sequence of Record
         Records with their detected steps.
     dataset : xarray.Dataset
-        Fits.
+        Dataset of the fits.
     files : sequence of Path
-        Figure and data file.
+        Paths of the figure and the data file.
     """
 
     records: Sequence[Record]
@@ -58,7 +58,7 @@ class RecordFits(CommandResult):
 
     @property
     def exit_status(self) -> int:
-        """Failure if a fit has no values or no valid standard errors."""
+        """Exit status. The status is 1 if a fit has no values or no valid errors."""
         from rsfstudy.reporting import all_fits_are_valid
 
         return EXIT_STATUS_OK if all_fits_are_valid(self.dataset) else EXIT_STATUS_FAILED
@@ -83,7 +83,7 @@ class RecordFits(CommandResult):
 
 
 def _step_to_json(number: int, step: LoadingStep) -> dict[str, Any]:
-    """Return the entry of a step in the JSON output, in s, um/s and Pa."""
+    """Return the JSON entry of a step. The units are s, um/s and Pa."""
     names = "start", "end", "velocity_before", "velocity_after", "stress_before", "stress_after"
     return {"step": number, **{name: getattr(step, name) for name in names}}
 
@@ -204,13 +204,13 @@ def _make_comma_list_option(
 def fit(given: options.CommandOptions) -> int:
     """Fit friction parameters to velocity steps in RECORDS.
 
-    The command prints the detected steps and a table of a, b, D_c and their standard errors, which
-    include the correlation of the noise. The command also lists the parameters that the record does
-    not constrain, and writes a figure and a data file.
+    The command prints the detected steps and a table of a, b, D_c and their standard errors. The
+    standard errors account for the correlation of the noise. The command also lists the parameters
+    that the record does not constrain. It writes a figure and a data file.
 
-    The exit status is 1 if a fit has no values, values that are not verified or standard errors
-    that are not valid, and 2 for wrong usage. Otherwise the exit status is 0, even if a parameter
-    is not identified.
+    The exit status is 1 if a fit has no values, if its values are not verified, or if its standard
+    errors are not valid. The exit status is 2 if the command line is invalid. Otherwise the exit
+    status is 0, even if a parameter is not identified.
     """
     from rsfstudy.api import STIFFNESS_FROM_RECORD
     from rsfstudy.cli.data_files import check_output_may_be_replaced
@@ -289,6 +289,6 @@ def _print_steps(record: Record) -> None:
 
 
 def _format_normal_stresses_of_step(step: LoadingStep, is_shown: bool) -> dict[str, str]:
-    """Return the normal stresses of a step in MPa, or an empty dictionary."""
+    """Return the normal stresses of a step in MPa if they are shown."""
     stresses = {"sigma0 (MPa)": step.stress_before, "sigma1 (MPa)": step.stress_after}
     return {heading: f"{of * 1e-6:.6g}" for heading, of in stresses.items() if is_shown}

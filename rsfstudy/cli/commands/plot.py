@@ -28,9 +28,9 @@ from rsfstudy.errors import InvalidValue
 def plot(given: options.CommandOptions) -> int:
     """Draw the figure of a results file or of a motion.
 
-    NAME is a named study or a file with results or a motion. By default, the figure is written to
-    the directory of the file. If the study defines its own figure, pass the Python file of the
-    study with --study. The command executes this file.
+    NAME is the name of a study, or a file that contains results or a motion. By default, the
+    command writes the figure to the directory of the file. If the study defines its own figure,
+    pass the Python file of the study with --study. The command executes the Python file.
     """
     from rsfstudy.api import find_results
     from rsfstudy.cli.figure_files import default_figure_path
@@ -48,7 +48,7 @@ def plot(given: options.CommandOptions) -> int:
 
 
 def _draw_figure(results: Path, figure_path: Path, given: options.CommandOptions) -> list[Path]:
-    """Draw the figure of a file, and return the paths of the figures that were written."""
+    """Draw the figure of a results file, and return the paths of the new files."""
     from rsfstudy.cli import figure_files
     from rsfstudy.cli.study_options import read_results_file
     from rsfstudy.storage import StoredDataset
@@ -63,10 +63,10 @@ def _draw_figure(results: Path, figure_path: Path, given: options.CommandOptions
 
 
 def _figure_path_from_output_option(given: options.CommandOptions) -> Path | None:
-    """Return the path of ``--output`` if it is a figure file.
+    """Return the value of ``--output`` if it is the path of a figure file.
 
-    If the path is a directory, the function returns None. If the path has the suffix of another
-    file type, the path must be an existing directory.
+    If the value is a directory, the function returns None. If the value has a suffix that is not a
+    figure format, the value must be an existing directory.
     """
     output: Path | None = given.output
     ending = "" if output is None else output.suffix[1:].lower()

@@ -20,11 +20,11 @@ from rsfstudy.defaults import Defaults
     help="Path of the page.  [default: DIRECTORY/report.html]",
 )
 def report(given: options.CommandOptions) -> int:
-    """Write an HTML page with all results in a directory.
+    """Write an HTML page that shows all results in a directory.
 
-    The page contains verdicts, figures, slopes, failed cells and the provenance of each file. The
-    page is a single file that can be viewed in a browser or printed. The exit status is 1 if a
-    results file cannot be read. In this case, the page shows the reason.
+    For each file, the page contains the verdicts, the figure, the slopes, the failed cells and the
+    provenance. The page is a single file that can be viewed in a browser or printed. The exit
+    status is 1 if a results file cannot be read. In this case, the page shows the reason.
     """
     from rsfstudy.api import write_report
 

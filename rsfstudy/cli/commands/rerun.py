@@ -39,9 +39,10 @@ if TYPE_CHECKING:
 )
 @options.worker_options
 def rerun(given: options.CommandOptions) -> int:
-    """Compute a results file again, and compare all numbers.
+    """Recompute the results in a file, and compare all numbers.
 
-    The study is restored from the results file. The exit status is 1 if a number differs.
+    The command rebuilds the study from the results file. The exit status is 1 if a recomputed
+    number differs from the number in the file.
     """
     from rsfstudy.cli.study_options import open_worker_pool
 
@@ -81,7 +82,7 @@ def _print_agreement(agreement: pd.DataFrame) -> None:
 
 
 def _recompute_cell(given: options.CommandOptions) -> int:
-    """Compute one cell, and print its results next to the stored values."""
+    """Recompute one cell, and print the new values next to the stored values."""
     import numpy as np
 
     from rsfstudy.cli import assignment_parsing
@@ -109,7 +110,7 @@ def print_recomputed_cell(scene: Scene, outcome: Outcome, stored_values: xr.Data
     """Print a recomputed cell next to the stored values.
 
     The function prints the scene, a table of numbers, and the status of the cell. For an array, the
-    table contains the number of values and their range.
+    table shows the number of values and the range of the values.
 
     Parameters
     ----------
@@ -143,7 +144,7 @@ def _rows_of_cell(values: Mapping[str, Any], stored_values: xr.Dataset) -> Seque
 
 
 def _format_number_or_array(value: Any) -> str:
-    """Format a number in full, or an array as its size and its range."""
+    """Format a number with all digits, or an array as its size and range."""
     import numpy as np
 
     finite = np.asarray(value, dtype=float)[np.isfinite(np.asarray(value, dtype=float))]

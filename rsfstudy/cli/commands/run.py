@@ -29,7 +29,7 @@ _FILE_SUFFIX_BY_FORMAT = {"netcdf": "nc", "zarr": "zarr"}
 
 @dataclass(frozen=True)
 class StudyRun:
-    """Run of one study.
+    """Outcome of the run of one study.
 
     Parameters
     ----------
@@ -42,9 +42,9 @@ class StudyRun:
     verdicts : pandas.DataFrame, optional
         Verdicts on the claims, or None if the run was skipped or did not finish.
     problems : sequence of str, optional
-        Failed cells, changed verdicts, and a figure that could not be drawn.
+        Descriptions of failed cells, of changed verdicts, and of a figure that could not be drawn.
     files : sequence of Path, optional
-        Results file and figure.
+        Paths of the results file and the figure.
     message : str, optional
         Reason why the study was skipped, or error that ended the run.
     """
@@ -59,7 +59,7 @@ class StudyRun:
 
     @property
     def outcome(self) -> str:
-        """Outcome of the run: ok, failed, skipped or not_finished."""
+        """Label of the outcome: "ok", "failed", "skipped" or "not_finished"."""
         if self.seconds is None:
             return "skipped"
         if self.results is None:
@@ -85,13 +85,13 @@ class StudyRun:
 
 @dataclass(frozen=True)
 class Runs(CommandResult):
-    """Runs of one study or of all studies."""
+    """Result of the command ``run``: outcomes of one or more studies."""
 
     studies: Sequence[StudyRun]
 
     @property
     def exit_status(self) -> int:
-        """Failure if a run failed or did not finish."""
+        """Exit status. The status is 1 if a run failed or did not finish."""
         failed = any(one.outcome in ("failed", "not_finished") for one in self.studies)
         return EXIT_STATUS_FAILED if failed else EXIT_STATUS_OK
 
@@ -124,9 +124,10 @@ class Runs(CommandResult):
 def run(given: options.CommandOptions) -> int:
     """Run a study and write its results and its figure.
 
-    NAME is a named study or a Python file that declares a study. The command writes OUTPUT/NAME.nc
-    and the figure OUTPUT/NAME.png, and prints the reductions and the claims. If a run was
-    interrupted, the same command continues the run, because finished cells are kept.
+    NAME is the name of a study, or a Python file that declares a study. The command writes the
+    results OUTPUT/NAME.nc and the figure OUTPUT/NAME.png, and prints the reductions and the claims.
+    If the run is interrupted, enter the same command again to continue the run. The finished cells
+    are not computed again.
     """
     from rsfstudy.api import prepare_run_with_progress
     from rsfstudy.cli.study_options import (
@@ -168,7 +169,10 @@ def _skip_studies_without_engine(studies: Sequence[Study]) -> list[StudyRun]:
 
 
 def _print_expected_cost(study: Study, given: options.CommandOptions) -> None:
-    """Print the expected cost of a run with another accuracy, and a hint at a faster engine."""
+    """Print the estimated cost of a run if the user changed the accuracy.
+
+    If the compiled engine would be faster, the function also suggests this engine.
+    """
     from rsfstudy.cli import cost_estimates
     from rsfstudy.execution import CellPlan
     from rsfstudy.motion import Accuracy
@@ -191,8 +195,8 @@ def _run_studies_in_turn(
 ) -> int:
     """Run studies one after another, and continue after a failed study.
 
-    The sequence ends early only after Ctrl-C or a signal. The table of the studies is printed in
-    any case.
+    After Ctrl-C or a signal, the function does not run the remaining studies. The function always
+    prints a table with one row per study.
     """
     runs: list[StudyRun] = []
     try:
@@ -218,7 +222,8 @@ def _run_study(
 ) -> StudyRun:
     """Compute a study, draw its figure, and print a report.
 
-    If all studies are run, the report is short. With ``--json``, no report is printed.
+    The report is short if the command runs all studies. With ``--json``, the function does not
+    print a report.
     """
     from rsfstudy.cli.figure_files import default_figure_path, draw_and_save_figure
     from rsfstudy.cli.study_results import StudyResults
@@ -267,7 +272,7 @@ def _print_report(done: StudyRun) -> None:
 
 
 def _print_short_report(done: StudyRun) -> None:
-    """Print a short report of the run of one of several studies.
+    """Print a short report of a study, for a run of several studies.
 
     The report has one line for each table of the full report. Failed cells and verdicts that differ
     from the expected verdicts are listed individually.

@@ -24,10 +24,10 @@ _SUFFIXES_OF_RESULTS_FILES = (".nc", ".zarr")
 def show(given: options.CommandOptions) -> int:
     """Show a study before a run, or summarise a results file.
 
-    For the name or the file of a study, the command prints the axes, the fixed fields, the measure
-    and the expected cost. The cost is the measured time if OUTPUT contains cells of an earlier run.
-    For a results file, the command prints the results, their provenance, and a command that
-    reproduces each failed cell.
+    If you pass the name or the Python file of a study, the command prints the axes, the fixed
+    fields, the measure and the expected cost. If OUTPUT contains cells of an earlier run, the cost
+    is based on their measured times. If you pass a results file, the command prints the results and
+    their provenance. It also prints a command that reproduces each failed cell.
     """
     from rsfstudy.cli import study_options
     from rsfstudy.cli.file_summaries import FileSummary, print_file_summary

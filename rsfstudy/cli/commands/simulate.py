@@ -21,8 +21,8 @@ if TYPE_CHECKING:
 
     from rsfstudy import Rig, Scene
 
-#: Exit status if the slip rate of a motion exceeds the instability norm without inertia and without
-#: radiation damping.
+#: Exit status for a motion that has neither inertia nor radiation damping and whose slip rate
+#: exceeds the instability norm.
 _EXIT_STATUS_UNPHYSICAL_MOTION = 3
 
 
@@ -63,9 +63,9 @@ def simulate(given: options.CommandOptions) -> int:
 
     The figure shows friction and slip rate along the motion, and the path in the phase plane.
 
-    The exit status is 1 if the motion ends early, and 2 for wrong usage. The exit status is 3 if
-    the slip rate exceeds the instability norm without inertia and without radiation damping,
-    because the motion is then unphysical. Otherwise the exit status is 0.
+    The exit status is 1 if the motion ends early, and 2 if the command line is invalid. A motion
+    without inertia and without radiation damping is unphysical if its slip rate exceeds the
+    instability norm. In this case, the exit status is 3. Otherwise the exit status is 0.
     """
     from rsfstudy.cli.data_files import check_output_may_be_replaced
     from rsfstudy.execution import provenance_attributes
@@ -91,7 +91,7 @@ def _exit_status_of_motion(motion: xr.Dataset) -> int:
 
 
 def _build_scene_and_rig(given: options.CommandOptions) -> tuple[Scene, Rig | None]:
-    """Build the scene, and the rig if the options define a rig."""
+    """Build a scene from the options. Also build a rig if the options define one."""
     from rsfstudy.cli import assignment_parsing as parsing
 
     fields = parsing.parse_scene_field_assignments(given.settings)

@@ -29,7 +29,7 @@ class Verification(CommandResult):
 
     @property
     def exit_status(self) -> int:
-        """Failure if a file does not have the required number of digits."""
+        """Exit status. The status is 1 if a file has too few correct digits."""
         passed = all(one.has_required_digits for one in self.comparisons)
         return EXIT_STATUS_OK if passed else EXIT_STATUS_FAILED
 
@@ -98,11 +98,11 @@ def _comparison_to_json(file: Path, comparison: AnswerComparison) -> dict[str, A
 )
 @options.json_option
 def verify(given: options.CommandOptions) -> int:
-    """Compare solutions of another code with reference solutions.
+    """Compare the solutions of a different code with reference solutions.
 
-    For each quantity, the command prints the number of correct digits, the first row with a larger
-    difference, and a possible explanation. The last line summarises all files. The exit status is 1
-    if a problem is not passed.
+    For each quantity, the command prints the number of correct digits. If the number of correct
+    digits is too small in some rows, the command also prints the first of these rows and a possible
+    explanation. The last line summarises all files. The exit status is 1 if a file does not pass.
     """
     from rsfstudy.cli import assignment_parsing
     from rsfstudy.referee import compare_file_with_known_answer
@@ -121,7 +121,7 @@ def verify(given: options.CommandOptions) -> int:
 
 
 def _print_verification(result: Verification) -> None:
-    """Print the agreement of each quantity, and a possible cause of differences."""
+    """Print the correct digits of each quantity, and possible explanations."""
     from rsfstudy.referee import summarise_comparisons
 
     for file, one in zip(result.files, result.comparisons, strict=True):
@@ -141,8 +141,9 @@ def _print_verification(result: Verification) -> None:
 def _write_agreement_figure(comparisons: Sequence[AnswerComparison], figure_path: Path) -> None:
     """Draw the number of agreeing digits of each quantity.
 
-    If a single file is compared and its problem has an index column, the abscissa is the index.
-    Otherwise the abscissa is the number of the problem.
+    If the function compares a single file and the problem has an index column, such as time, the
+    figure shows the digits against this column. Otherwise the figure shows the digits against the
+    number of the problem.
     """
     import numpy as np
 
