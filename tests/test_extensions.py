@@ -248,7 +248,7 @@ def test_without_the_study_file(outside, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     drawn = call_main("plot", figure)
     assert drawn.returncode == 0
-    assert "drawn as maps or lines. plot = 'stiffness_map': is no figure of" in drawn.stderr
+    assert "plot = 'stiffness_map': is not a figure of" in " ".join(drawn.stderr.split())
     assert "--study" in drawn.stderr
     as_lines = Path(figure).with_suffix(".png").read_bytes()
     assert call_main("plot", figure, "--study", outside["own_figure"].study).stderr == ""

@@ -33,13 +33,9 @@ from rsfstudy.motion.accuracy import Accuracy
 from rsfstudy.motion.engines import COMPILED, SCIPY
 from rsfstudy.parts import LAW, Law, NormalStress, Temperature, number
 from rsfstudy.quantities import Quantity
-from rsfstudy.slider import (
-    critical_stiffness,
-    linear_growth_rates,
-    steady_friction_minus_reference,
-    steady_sliding,
-)
 from rsfstudy.slider.equations import equations_between_ruptures
+from rsfstudy.slider.stability import critical_stiffness, linear_growth_rates
+from rsfstudy.slider.steady_state import steady_friction_minus_reference, steady_sliding
 from rsfstudy.status import Status
 
 CONSTANT = {"normal_stress": "constant", "a": 0.01, "mu_star": 0.6}

@@ -111,6 +111,9 @@ class SceneBase(HtmlTableMixin):
     def as_dict(self) -> dict[str, Any]:
         """Return the fields as plain Python values.
 
+        The fields do not include a slot with its default, such as an isothermal temperature, if
+        the slot was added after the first file format.
+
         Returns
         -------
         dict of str to object

@@ -24,7 +24,7 @@ from time_domain_reference import TimeDomainMotion
 from rsfstudy import Accuracy, Scene
 from rsfstudy.errors import InvalidValue
 from rsfstudy.measures import StepResponse
-from rsfstudy.motion import COMPILED, SCIPY
+from rsfstudy.motion.engines import COMPILED, SCIPY
 from rsfstudy.status import Status
 
 EFFECTS = ("flash", "heating", "pressurisation")
