@@ -4,6 +4,7 @@ import ast
 import importlib
 import subprocess
 import sys
+import tomllib
 import warnings
 from collections.abc import Iterator
 from graphlib import CycleError, TopologicalSorter
@@ -51,6 +52,12 @@ def imported_names(path: Path) -> Iterator[tuple[str, str]]:
 
 def exported_names(package: str) -> list[str]:
     return list(getattr(importlib.import_module(f"rsfstudy.{package}"), "__all__", ()))
+
+
+def test_a_wheel_contains_every_package():
+    declared = tomllib.loads((ROOT.parent / "pyproject.toml").read_text())
+    folders = {module_name(path) for path in ROOT.rglob("__init__.py")}
+    assert {*declared["tool"]["setuptools"]["packages"]} == folders | {"rsfstudy.named_studies"}
 
 
 def test_imports_of_other_packages_use_their_surfaces():
