@@ -29,8 +29,7 @@ if TYPE_CHECKING:
     from rsfstudy.study import Study
 
 _PACKAGE_DIRECTORY = Path(__file__).parent.parent
-#: Subpackages of rsfstudy whose code affects the results of cells. The package ``parts`` is not
-#: included, because it only exports names of ``slider``.
+#: Subpackages of rsfstudy whose code affects the results of cells.
 _PACKAGES_AFFECTING_CELL_RESULTS = (
     "slider",
     "parts",
