@@ -44,8 +44,8 @@ class RowSelection:
     thin : int, default: 1
         Thinning factor. After the filter, every ``thin``-th row is kept.
     filter : str, default: ""
-        Filter for friction or stress with its averaging time or corner frequency, such as "mean 1
-        s" or "butterworth_2 2 Hz".
+        Filter for friction or stress with its averaging time or corner frequency, such as
+        "mean 1 s" or "butterworth_2 2 Hz".
 
     Raises
     ------
@@ -190,8 +190,8 @@ def parse_filter(text: str) -> Filter | None:
     Parameters
     ----------
     text : str
-        Kind of filter, and averaging time or corner frequency, such as "mean 1 s" or "butterworth_2
-        2 Hz".
+        Kind of filter, and averaging time or corner frequency, such as "mean 1 s" or
+        "butterworth_2 2 Hz".
 
     Returns
     -------

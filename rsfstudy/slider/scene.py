@@ -152,8 +152,8 @@ class Scene(SceneFunctions, SceneQuantities):
     radiation_damping : float, default: 0.0
         Damping coefficient :math:`\eta V_*/\sigma_*`, which is the damping stress due to seismic
         waves at :math:`V_*`. A scene has either inertia or radiation damping. A slider with inertia
-        corresponds to a damping coefficient of the stiffness, multiplied by :math:`T V_*/(2 \pi
-        D_c)`.
+        corresponds to a damping coefficient of the stiffness, multiplied by
+        :math:`T V_*/(2 \pi D_c)`.
     oscillation_amplitude : float, default: 0.0
         Amplitude of an oscillation of imposed normal stress in :math:`\sigma_*`. If the driving
         stress is inclined, :math:`\sigma_3` oscillates. The field does not apply to constant normal

@@ -71,9 +71,9 @@ class ShearHeating(Temperature):
         :math:`H = \sigma_* D_c/(\rho c w T_*)`, without cooling. Here :math:`\rho c` is the
         volumetric heat capacity and :math:`w` is the width of the shear zone.
     cooling : float, default: 1.0
-        Cooling rate :math:`C = c_{th} D_c/V_*`, for example with :math:`c_{th} =
-        \alpha_{th}/w_h^2`, where :math:`\alpha_{th}` is the thermal diffusivity and :math:`w_h` is
-        the effective width of the heat loss.
+        Cooling rate :math:`C = c_{th} D_c/V_*`, for example with
+        :math:`c_{th} = \alpha_{th}/w_h^2`, where :math:`\alpha_{th}` is the thermal diffusivity and
+        :math:`w_h` is the effective width of the heat loss.
     direct_activation : float, default: 0.0
         Activation term :math:`q_a = Q_a/(R T_*)` of the direct effect.
     evolution_activation : float, default: 0.0
@@ -83,8 +83,8 @@ class ShearHeating(Temperature):
     -----
     In steady sliding, :math:`\vartheta = (H/C) (\mu s V/V_* - \mu_*)`. If :math:`Q_a = Q_b = Q`, a
     higher temperature has the same effect as a lower slip rate. Friction is then rate weakening at
-    low slip rates, and rate strengthening at slip rates at which heating exceeds about :math:`R
-    T^2/Q`.
+    low slip rates, and rate strengthening at slip rates at which heating exceeds about
+    :math:`R T^2/Q`.
 
     References
     ----------
