@@ -1,4 +1,4 @@
-"""Scenes, references and claims of the studies with heat."""
+"""Scenes, references and claims that the studies of heat share."""
 
 from collections.abc import Callable, Sequence
 from typing import Any
@@ -19,7 +19,8 @@ PRESSURE_REFERENCES = [
     f"{RICE}, J. Geophys. Res. 111, B05311",
     "Segall and Rice (2006), J. Geophys. Res. 111, B09316",
 ]
-#: Source of values that were computed with other equations and another integrator.
+#: Source of expected values that were computed independently, with different equations and a
+#: different integrator.
 INDEPENDENT = "independent integration, or closed form, in other variables"
 
 #: Fault with flash heating, with the parameters of the benchmark problem SCEC TPV104.
@@ -43,8 +44,9 @@ HEATED_FAULT = Scene(
     heating=0.001,
     cooling=0.1,
 )
-#: Fault with thermal pressurisation. The pressurisation factor is 1, so the undrained pressure per
-#: D_c of slip at unit friction, E, is the field ``heating``.
+#: Fault with thermal pressurisation. E is the undrained increase of pore pressure due to a slip of
+#: D_c at a friction coefficient of 1. The pressurisation factor is 1, so E is equal to the field
+#: ``heating``.
 PRESSURISED_FAULT = HEATED_FAULT.with_(
     fluid="thermal", pressurisation=1.0, drainage=0.05, heating=0.01, cooling=0.01
 )
@@ -69,7 +71,7 @@ def known_value_claim(
     variable : str
         Name of the variable.
     where : dict
-        Point of the lattice.
+        Coordinates of the cell in the lattice.
     published : float
         Expected value.
     relative_tolerance : float
@@ -93,7 +95,7 @@ def known_value_claim(
 
 
 def closest_to(target: float) -> Callable[[Sequence[float]], float]:
-    """Return a function that selects the axis value with the smallest distance.
+    """Return a function that selects the axis value closest to a target.
 
     Parameters
     ----------
@@ -103,6 +105,6 @@ def closest_to(target: float) -> Callable[[Sequence[float]], float]:
     Returns
     -------
     callable
-        Function of the axis values, which returns one of them.
+        Function that takes the axis values, and returns the axis value closest to the target.
     """
     return lambda values: min(values, key=lambda value: abs(value - target))

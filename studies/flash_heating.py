@@ -21,7 +21,7 @@ _WEAK, _EXPONENT, _WEAKENING = 0.2, 8.0, 0.004
 
 
 def closed_form(row: xr.Dataset) -> tuple[np.ndarray, np.ndarray]:
-    """Compute the critical stiffness from minus the slope of the steady friction.
+    """Compute the critical stiffness from the slope of the steady friction.
 
     Parameters
     ----------

@@ -3,9 +3,10 @@
 With flash heating, the friction coefficient in a rupture decreases almost to the friction of
 weakened contacts, f_w. For V_w = 10^5 V_*, the static stress drop increases from 0.07 sigma_*
 without flash heating to 0.87 (mu_* - f_w), and the recurrence interval increases in proportion to
-it. If the weakening velocity is ten times lower, the stress drop is complete. When the slip rate is
-highest, only a twentieth of the static stress drop has been released. The lattice also contains V_w
-= 10^9 V_*, for which flash heating has no effect.
+the stress drop. If the weakening velocity is ten times lower, the static stress drop is almost
+equal to mu_* - f_w. At the time of the highest slip rate, only a twentieth of the static stress
+drop has been released. The lattice also contains V_w = 10^9 V_*, for which flash heating has no
+effect.
 """
 
 import numpy as np

@@ -1,12 +1,13 @@
 """Steady friction and critical stiffness of a fault that is heated by slip.
 
 If both activation energies are equal, a higher temperature has the same effect as a lower slip
-rate. At low slip rates, heating is negligible, and the steady friction decreases with slip rate.
-Above the slip rate at which the temperature is higher by about R T^2/Q, the temperature rises so
-fast with slip rate that the steady friction increases. This slip rate is proportional to the
-cooling rate. At a slip rate of V_*, slow cooling raises the critical stiffness, because the direct
-effect of a higher temperature is weakening. With fast cooling, the temperature follows the slip
-rate, and the critical stiffness is slightly below (b - a) sigma_*/D_c.
+rate. At low slip rates, heating is negligible, and the steady friction decreases with slip rate. At
+the transition slip rate, the temperature rise is about R T^2/Q. Above the transition slip rate, the
+temperature increases so steeply with slip rate that the steady friction increases. The transition
+slip rate is proportional to the cooling rate. If the slip rate is V_* and cooling is slow, the
+critical stiffness is higher than without heat, because the direct effect of a higher temperature
+weakens the fault. With fast cooling, the temperature follows the slip rate, and the critical
+stiffness is slightly below (b - a) sigma_*/D_c.
 """
 
 import math
@@ -63,7 +64,8 @@ def transition_rate(cooling: float) -> float:
         turning = (_B - _A) * _ACTIVATION / (1.0 + rise) ** 2 * over * rate
         return turning * friction - (_B - _A)
 
-    # Friction decreases again at temperatures far above T_*, so the first sign change is needed.
+    # Friction has its minimum at the first sign change, because friction decreases again at
+    # temperatures far above T_*.
     logs = np.linspace(0.0, 15.0, 301)
     rising = [x for x in logs.tolist() if excess(x) > 0.0]
     return math.exp(brentq(excess, 0.0, rising[0])) if rising and rising[0] > 0.0 else math.nan
@@ -80,7 +82,8 @@ def shown_cooling_rates(values: Sequence[float]) -> list[float]:
     Returns
     -------
     list of float
-        Powers of ten from 0.1, or all cooling rates if there are none.
+        Cooling rates that are powers of ten, from 0.1. If there are no such cooling rates, the list
+        contains all cooling rates.
     """
     return [v for v in values if v in (0.1, 1.0, 10.0, 100.0)] or list(values)
 
@@ -124,7 +127,7 @@ def stiffness_claim(cooling: float, value: float) -> Claim:
 
 
 def transition_claim(factor: float, change: str) -> Claim:
-    """Return a claim on the slip rate at which weakening changes to strengthening (H9).
+    """Return a claim on the transition from weakening to strengthening (H9).
 
     Parameters
     ----------

@@ -1,11 +1,11 @@
-"""Critical stiffness with thermal pressurisation, against heating, cooling and drainage.
+"""Critical stiffness as a function of heating, cooling and drainage.
 
 Frictional heat raises the pore pressure, which weakens the fault until heat and fluid have flowed
-out. Without cooling and drainage, the critical stiffness is b - a + mu_* (mu_* + a) E in units of
-sigma_*/D_c, to first order in E, the undrained pressure by slip of D_c at unit friction. A fault
-with heating of E = 0.03 is unstable on springs that are three times as stiff as without heating. If
-fluid drains while the fault slips by much less than D_c, the critical stiffness is b - a. Fast
-cooling with fast drainage even stabilises the fault slightly.
+out. E is the undrained increase of pore pressure due to a slip of D_c at a friction coefficient of
+1. Without cooling and drainage, the critical stiffness is b - a + mu_* (mu_* + a) E in units of
+sigma_*/D_c, to first order in E. For E = 0.03, the critical stiffness is three times as high as
+without heating. If the fluid drains before the fault has slipped by a considerable fraction of D_c,
+the critical stiffness is b - a. Fast cooling with fast drainage even stabilises the fault slightly.
 """
 
 import numpy as np
@@ -27,7 +27,7 @@ def quartic_threshold(factor: float, cooling: float, drainage: float) -> float:
     Parameters
     ----------
     factor : float
-        Undrained pressure E by slip of D_c at unit friction.
+        Undrained increase E of pore pressure due to a slip of D_c at a friction coefficient of 1.
     cooling, drainage : float
         Cooling rate C and drainage rate C_h.
 

@@ -1,11 +1,12 @@
 """Stick-slip cycles with thermal pressurisation.
 
-The static stress drop increases with E, the undrained pressure by slip of D_c at unit friction. For
-small E, the drop is that of a drained fault. For E = 0.01, the pressure in a rupture removes most
-of the effective normal stress, and the stress drop is almost seven times as large under the slip
-law. After such a rupture, the pressure drains and the strength recovers, so the slowest slip rate
-is lower by several decades. Steady temperatures at the slip rate of a rupture are extremely large,
-so the distance from steady sliding does not contain the temperature.
+E is the undrained increase of pore pressure due to a slip of D_c at a friction coefficient of 1.
+The static stress drop increases with E. For small E, the stress drop is the same as for a drained
+fault. For E = 0.01, the pore pressure in a rupture removes most of the effective normal stress.
+With the slip law, the stress drop is then almost seven times as large as for a drained fault. After
+such a rupture, the fluid drains and the strength recovers, so the lowest slip rate of the cycle is
+several orders of magnitude lower. The test for a repeating cycle ignores the temperature, because
+the steady temperature at the slip rate of a rupture is extremely large.
 """
 
 from rsfstudy import Accuracy, Axis, Claim, Figure, Panel, Study

@@ -133,30 +133,31 @@ def events(
     Parameters
     ----------
     record : str, Path, mapping, pandas.DataFrame, xarray.Dataset or Record, optional
-        Path of a file, or an object in memory, as in `read_record`. The record needs shear stress
-        or friction, and time or displacement. The shear stress of a Record is the product of
-        friction and normal stress, or friction if the record has no normal stress.
+        Path of a file, or an object in memory, as in `read_record`. The record must contain shear
+        stress or friction. It must also contain time or displacement. The shear stress of a Record
+        is the product of friction and normal stress, or friction if the record has no normal
+        stress.
     columns : mapping of str to str or tuple, optional
-        Heading and units of the columns ``time``, ``displacement``, ``slip`` (of the fault),
-        ``shear_stress``, ``friction`` and ``normal_stress``, as in `read_record`. By default,
-        common headings are recognised.
+        Heading and units of each column, as in `read_record`. The columns are ``time``,
+        ``displacement``, ``slip`` (of the fault), ``shear_stress``, ``friction`` and
+        ``normal_stress``. By default, common headings are recognised.
     time, displacement, shear_stress : array_like of shape (n,), optional
         Arrays to use instead of ``record``. If an array has the attribute ``units``, the results
         have the same units. Otherwise, the results have no attribute ``units``.
     normal_stress : quantity, optional
-        Normal stress by which friction is multiplied, for example "20 MPa", if the record contains
-        friction, and neither shear stress nor normal stress.
+        Normal stress by which friction is multiplied, for example "20 MPa". Pass this argument if
+        the record contains friction, but neither shear stress nor normal stress.
     stiffness : quantity, optional
         Stiffness between the fault and the point at which displacement is measured. The stiffness
         is a change of shear stress divided by a change of displacement. The value is a string such
         as "0.05 MPa/um", or a number in the units of the record. If displacement was measured at
         the load point, pass the stiffness of the rig. If displacement is the slip of the fault,
-        pass ``inf``. By default, displacement must be the slip of the fault, and the function tests
-        this assumption.
+        pass ``inf``. By default, the function assumes that displacement is the slip of the fault,
+        and tests this assumption.
     sign : {1, -1}, optional
-        Sign that shear stress in the direction of slip has in the record. Shear stress is
-        multiplied by the sign, so that shear stress falls during events. The default is -1 if all
-        samples of shear stress are negative, and 1 otherwise.
+        Sign of shear stress in the record. Pass -1 if shear stress in the direction of slip is
+        negative. Shear stress is multiplied by the sign, so that it falls during events. The
+        default is -1 if all samples of shear stress are negative, and 1 otherwise.
     **reading : object
         Options ``decimal``, ``sheet``, ``area``, ``rows``, ``begin``, ``end``, ``thin`` and
         ``filter`` of `read_record`. The filter is applied to shear stress.
@@ -167,16 +168,16 @@ def events(
         Variables along the dimension ``event``, in the units of the record. ``time`` is the
         beginning of the event. If the record has no time, ``displacement`` is the displacement at
         the beginning of the event, and ``duration`` and ``interval`` are displacements. The other
-        variables are ``duration``, ``interval`` (time since the previous event),
-        ``stress_before``, ``stress_after``, ``static_stress_drop`` and ``cut`` (0 for complete
-        events, 1 if the record begins within the event, 2 if the record ends within the event, 3 if
-        both apply). If time and displacement are known, the dataset also has ``slip``,
-        ``peak_slip_rate`` between neighbouring samples, and ``dynamic_stress_drop``. Quantities
-        that are not larger than the noise are NaN. For each variable, ``<name>_error`` is the half
-        width of a 95 % confidence interval. The scalar ``noise`` is the standard deviation of the
-        noise, and ``smallest_drop`` is the smallest drop that can be detected. The attribute
-        ``sign_of_shear_stress`` contains the sign that was used, and the attribute ``processing``
-        the selection of rows and the filter.
+        variables are ``duration``, ``interval`` (time since the previous event), ``stress_before``,
+        ``stress_after``, ``static_stress_drop`` and ``cut`` (0 for complete events, 1 if the record
+        begins within the event, 2 if the record ends within the event, 3 if both apply). If time
+        and displacement are known, the dataset also has ``slip``, ``peak_slip_rate`` between
+        neighbouring samples, and ``dynamic_stress_drop``. Quantities that are not larger than the
+        noise are NaN. For each variable, ``<name>_error`` is the half width of a 95 % confidence
+        interval. The scalar ``noise`` is the standard deviation of the noise, and ``smallest_drop``
+        is the smallest drop that can be detected. The attribute ``sign_of_shear_stress`` contains
+        the sign that was used. The attribute ``processing`` describes the selection of rows and the
+        filter.
 
     Raises
     ------
@@ -189,40 +190,42 @@ def events(
     NoResultWarning
         If displacement does not increase faster during the drops than before and after the drops.
         In this case, ``slip``, ``peak_slip_rate`` and ``dynamic_stress_drop`` are NaN, and the
-        attribute ``comment`` of ``slip`` contains the reason. The function also warns if it finds
-        no drop although stress falls by more than ten times ``smallest_drop``. In this case, the
-        attribute ``comment`` of the dataset contains the size of the decrease and
+        attribute ``comment`` of ``slip`` contains the reason. The warning is also issued if no drop
+        is detected although stress decreases by more than ten times ``smallest_drop``. In this
+        case, the attribute ``comment`` of the dataset contains the size of the decrease and
         ``smallest_drop``.
 
     Notes
     -----
-    The detection compares the mean stress of a window with the mean stress of the next window, at
-    every sample. The window lengths are 4, 8, 16 and more sampling intervals, up to a hundredth of
-    the record. The noise is estimated from the most frequent differences between the mean stresses
-    of neighbouring windows, because most of these differences occur during loading. The noise may
-    be correlated over times that are short compared with the longest window, and drops may occupy
-    up to 40 % of the record. The detection threshold corresponds to one false detection in 10,000
-    records of Gaussian noise. If sampling intervals differ by more than a factor of three, as in
-    triggered bursts, the samples are first averaged over equal intervals of time.
+    At every sample, the function compares the mean stresses of two windows, one before the sample
+    and one after the sample. The window lengths are 4, 8, 16 and more sampling intervals, up to a
+    hundredth of the record. The noise is estimated from the most frequent differences between the
+    mean stresses of neighbouring windows, because most of these differences occur during loading.
+    The noise may be correlated over times that are short compared with the longest window, and
+    drops may occupy up to 40 % of the record. The detection threshold corresponds to one false
+    detection in 10,000 records of Gaussian noise. If sampling intervals differ by more than a
+    factor of three, as in triggered bursts, the samples are first averaged over equal intervals of
+    time.
 
     Three straight lines are then fitted to the samples before, during and after each drop. The
     intersections of the lines are the beginning of the event, where stress is highest, and the end
     of the event, where stress is lowest.
 
-    A drop of size ``smallest_drop`` is missed once in 1,000 cases, provided that the time between
-    the drop and any other drop is longer than the longest window. If the noise is white and the
-    record has at least 3,200 samples, ``smallest_drop`` is less than three standard deviations of
-    the noise. If the noise is correlated, ``smallest_drop`` is larger. Spikes of single samples are
-    not Gaussian noise and may cause false detections. A relaxation of stress within a window, for
-    example during a hold of the load point, is also detected as a drop.
+    The probability of missing a drop of the size ``smallest_drop`` is 1 in 1,000, provided that no
+    other drop is closer to the drop than the length of the longest window. If the noise is white
+    and the record has at least 3,200 samples, ``smallest_drop`` is less than three standard
+    deviations of the noise. If the noise is correlated, ``smallest_drop`` is larger. Spikes of
+    single samples are not Gaussian noise and may cause false detections. A relaxation of stress
+    within a window, for example during a hold of the load point, is also detected as a drop.
 
     To compute slip, the function divides shear stress by ``stiffness``, and subtracts the quotient
     from displacement. If ``stiffness`` is not passed, the function uses displacement as slip only
     if displacement increases faster during the drops than before and after the drops. The increase
     of displacement during the drops must exceed the increase in equally long intervals around the
     drops by 10 %, and by three standard deviations of the noise of displacement. The displacement
-    of a load point does not pass this test. Displacement is read a few samples away from each drop,
-    because noise of shear stress causes errors in the times of the drop.
+    of a load point does not pass this test. The function reads displacement a few samples before
+    and after each drop, because noise in shear stress causes errors in the start and end times of
+    the drop.
 
     Examples
     --------
@@ -335,7 +338,7 @@ def _check_record_samples(variable_name: str, values: Any) -> np.ndarray:
 
 
 def _name_displacement(dataset: xr.Dataset) -> xr.Dataset:
-    """Rename the times of a catalogue whose record contains displacement in place of time."""
+    """Rename the times of a catalogue if the record contains no time."""
     words = {
         "time": "displacement at which the event begins",
         "duration": "displacement during the event",

@@ -42,8 +42,8 @@ from rsfstudy.rig import Rig, convert_to_si
 from rsfstudy.slider import Scene
 from rsfstudy.study import Study
 
-#: Default free parameters. Parameters that do not exist in a law are ignored in the fits of the
-#: law.
+#: Default free parameters. If a law does not have a parameter, the fits of this law ignore the
+#: parameter.
 DEFAULT_FREE_PARAMETERS = (
     "a",
     "b",
@@ -60,7 +60,7 @@ _EVOLUTION_EFFECT_PARAMETERS = ("b", "b1", "b2")
 _REMEDY_FOR_WRONG_STATE_PARAMETERS = (
     "One state has b; two states have b1, b2, slip_distance and slip_distance_2."
 )
-#: Value of the argument ``stiffness`` for a stiffness that is measured in the records.
+#: Value of the argument ``stiffness`` that requests a measurement of the stiffness in the records.
 STIFFNESS_FROM_RECORD = "from record"
 #: Initial guess of the slip distance, as a fraction of the load point displacement after a step.
 _SLIP_DISTANCE_GUESS_OVER_DISPLACEMENT = 0.05
@@ -112,16 +112,16 @@ def fit(
         Records to fit, as returned by ``rsfstudy.read_record``.
     rig : Rig, optional
         Rig that recorded the data. The stiffness of the rig is the stiffness of the model, and the
-        slip distance of the rig is the initial guess. If the record has no normal stress, the
+        slip distance of the rig is the initial guess. If a record contains no normal stress, the
         normal stress of the rig is used.
     laws : sequence of str, default: ("slip", "slowness")
         State evolution laws. A separate fit is computed for each law.
     free : sequence of str, optional
         Names of the free parameters: ``a``, ``b`` (``b1``, ``b2`` and ``slip_distance_2`` for laws
         with two states), ``slip_distance``, ``mu_star``, ``stiffness``, ``alpha``, ``law_exponent``
-        (for the law "family"), ``step_time``, ``trend1``, ``trend2`` and so on. Parameters that do
-        not exist in a law are ignored in the fits of the law. By default, the free parameters are
-        ``a``, the ``b`` and the slip distance of each state, ``mu_star`` and ``trend1``.
+        (for the law "family"), ``step_time``, ``trend1``, ``trend2`` and so on. If a law does not
+        have a parameter, the fits of this law ignore the parameter. By default, the free parameters
+        are ``a``, the ``b`` and the slip distance of each state, ``mu_star`` and ``trend1``.
     steps : sequence of int, optional
         Numbers of the steps to fit, starting from 1. ``record.steps()`` lists the steps. By
         default, all steps are fitted.
@@ -172,13 +172,12 @@ def fit(
         portions of the records (see ``Record.stiffness``), and the standard errors of the
         parameters include the standard error of this stiffness. Stiffness in MPa/um is divided by
         the mean normal stress in the window before each step. If ``free`` contains "stiffness", the
-        argument is the initial guess. In a joint fit, the stiffness in 1/um refers to the first
-        window, and is scaled by
-        normal stress for the other windows.
+        argument is the initial guess. In a joint fit, a stiffness in 1/um applies to the first
+        window. For the other windows, the stiffness is scaled by the ratio of the normal stresses.
     slip_distance : quantity, optional
         Initial guess of the slip distance, such as "10 um", or a number in um. The fit tries five
-        values from a tenth to ten times this guess. The default is 5 % of the load point
-        displacement after the step.
+        values from a tenth to ten times this guess. By default, the initial guess is 5 % of the
+        load point displacement after the step.
     engine : {"scipy", "python", "compiled"} or type, optional
         Engine that integrates the motions (see ``rsfstudy.run``). The default is "compiled" if
         Numba is installed, and "scipy" otherwise.
@@ -201,9 +200,9 @@ def fit(
         Fits along the dimension ``law``, and along ``step`` and ``record`` if there are several
         steps or records. Lengths are in um and velocities in um/s.
 
-        - For each parameter, ``<name>`` is the best-fit value, ``<name>_stderr`` the standard
-          error, ``<name>_low`` and ``<name>_high`` the ends of the 95 % confidence interval, and
-          ``<name>_error`` the numerical error. ``a_minus_b`` is the difference of a and b.
+        - For each parameter, ``<name>`` is the best-fit value, ``<name>_stderr`` is the standard
+          error, ``<name>_low`` and ``<name>_high`` are the ends of the 95 % confidence interval,
+          and ``<name>_error`` is the numerical error. ``a_minus_b`` is the difference of a and b.
         - ``covariance`` and ``correlation`` have the dimensions ``parameter`` and
           ``other_parameter``.
         - The noise is described by ``noise_size``, ``noise_order``, ``effective_samples`` and
@@ -385,7 +384,8 @@ def _initial_stiffness(
 ) -> tuple[float, float, float]:
     """Return the initial stiffness of the fit.
 
-    A stiffness in MPa/um is returned as ``machine``, and a stiffness in 1/um as ``ratio``.
+    If the stiffness is in MPa/um, the function returns it as ``machine``. If the stiffness is in
+    1/um, the function returns it as ``ratio``.
 
     Returns
     -------
@@ -438,7 +438,7 @@ def _measure_stiffness(records: Sequence[Record]) -> tuple[float, float, float]:
     Raises
     ------
     InvalidValue
-        If the records have no portion in which the fault is locked.
+        If the records contain no locked portion.
     """
     stressed = all("normal_stress" in record.columns for record in records)
     name = "machine_stiffness" if stressed else "stiffness"
@@ -563,7 +563,7 @@ def _describe_filter(averaging: Any, low_pass: str) -> str:
 def _find_common_filter(records: Sequence[Record], stated_filter: str) -> str:
     """Return the filter that was applied to the friction of all records.
 
-    A filter that was applied while a record was read is part of the record.
+    If a record was filtered when it was read, the function uses the filter of the record.
     """
     filters = {record.filter for record in records if record.filter}
     if not filters:

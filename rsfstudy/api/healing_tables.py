@@ -17,10 +17,11 @@ from rsfstudy.rig import read_record
 
 #: Variables of a motion from which healing is measured.
 _MOTION_VARIABLES = ("log10_slip_rate", "load_point_displacement", "friction_coefficient")
-#: Friction has a peak if it falls after the peak by more than this multiple of the relative
-#: tolerance of the motion.
+#: Friction has a peak if friction falls after its maximum by more than this multiple of the
+#: relative tolerance of the motion.
 _MIN_FALL_AFTER_PEAK_OVER_RTOL = 10.0
-#: Largest relative difference between the load point velocities of a segment, due to rounding.
+#: Largest relative difference between load point velocities that are treated as equal, because the
+#: difference is due to rounding.
 _VELOCITY_ROUNDING = 1e-6
 
 
@@ -31,7 +32,7 @@ def healing(record: Record | xr.Dataset | str | Path, **reading: Any) -> xr.Data
     Parameters
     ----------
     record : Record, xarray.Dataset, str or Path
-        Record of an experiment, or the path of its file, or a motion from ``rsfstudy.simulate``.
+        Record of an experiment, path of the file of a record, or motion from ``rsfstudy.simulate``.
     **reading : object
         Keyword arguments of ``rsfstudy.read_record`` if ``record`` is a path.
 
@@ -45,12 +46,12 @@ def healing(record: Record | xr.Dataset | str | Path, **reading: Any) -> xr.Data
     Raises
     ------
     InvalidValue
-        If the record contains no hold of the load point, or if it cannot be read.
+        If the record contains no hold of the load point, or if the record cannot be read.
 
     See Also
     --------
     rsfstudy.plot_healing : Plot the table.
-    rsfstudy.measures.Healing : Healing of a scene as the measure of a study.
+    rsfstudy.measures.Healing : Measure of studies for the healing of a scene.
 
     Examples
     --------
@@ -133,8 +134,9 @@ def _measure_motion_hold(
 ) -> tuple[list[float], list[float]]:
     """Measure a hold of a motion.
 
-    The row numbers are the first row of the hold, the last row of the hold, and the last row of the
-    reloading. Friction has a peak if it falls by more than ``min_fall`` afterwards.
+    The row numbers refer to the first row of the hold, the last row of the hold, and the last row
+    of the reloading. Friction has a peak if friction falls by more than ``min_fall`` after its
+    maximum.
 
     Returns
     -------
@@ -164,8 +166,8 @@ def _find_constant_velocity_segments(
     Returns
     -------
     list of (int, int, float)
-        First row, last row and load point velocity of each segment. The first item is the steady
-        sliding before the motion.
+        First row, last row and load point velocity of each segment. The first item represents the
+        steady sliding before the motion.
     """
     lasts = np.diff(time)
     moves = lasts > 16.0 * np.spacing(np.abs(time[1:]))

@@ -236,7 +236,7 @@ class InterpolatedMotionRows:
         Parameters
         ----------
         row : int
-            Row next to the extreme.
+            Row next to the maximum or minimum.
         column : int
             Column of the values.
         sign : {1.0, -1.0}

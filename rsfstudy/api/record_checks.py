@@ -10,10 +10,10 @@ import numpy as np
 from rsfstudy.errors import InvalidValue
 from rsfstudy.fitting import LoadingStep, Record, displacement_is_slip, noise_variance
 
-#: A decrease of the load point displacement between two rows is a reset to zero if the decrease
-#: exceeds three limits: a multiple of the noise of displacement, a multiple of the changes between
-#: the neighbouring rows, and a fraction of the range of displacement. The noise is estimated only
-#: if the record has more than 20 rows.
+#: Factors of the three limits for a reset of the load point displacement to zero. A decrease of
+#: displacement between two rows is a reset if the decrease exceeds a multiple of the noise of
+#: displacement, a multiple of the changes between the neighbouring rows, and a fraction of the
+#: range of displacement. The noise is estimated only if the record has more than 20 rows.
 (
     _MIN_DISPLACEMENT_RESET_OVER_NOISE,
     _MIN_DISPLACEMENT_RESET_OVER_EXTENT,
@@ -68,7 +68,8 @@ def check_displacement_is_not_slip(
     step_numbers : sequence of int
         Numbers of the steps to fit.
     ratio, machine : float
-        Stiffness divided by normal stress in 1/um, and stiffness in Pa/um. One of the values is 0.
+        Stiffness. ``ratio`` is the stiffness divided by normal stress in 1/um, and ``machine`` is
+        the stiffness in Pa/um. One of the two values is 0.
 
     Raises
     ------

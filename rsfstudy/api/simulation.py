@@ -97,8 +97,9 @@ def simulate(
         All other arguments are keyword-only. A positional argument raises ``InvalidValue``.
     duration : float, optional
         Duration in D_c/V_*. By default, the motion includes the whole loading. If the last segment
-        of the loading has no end, it continues for 20 D_c of load point displacement, or for 50
-        D_c/V_* if the load point is held. If the loading has only one segment, the default is 50.
+        of the loading has no end, the motion includes 20 D_c of load point displacement in this
+        segment, or 50 D_c/V_* if the load point is held. If the loading has only one segment, the
+        default is 50.
     times : array_like of shape (n,), optional
         Increasing times in D_c/V_* at which to return the motion, instead of ``duration``. With
         inertia, slip rate adjusts to a step within the inertial time. If a requested time is within
@@ -116,10 +117,11 @@ def simulate(
         Engine that integrates the motion. "compiled" is much faster, and requires Numba. A
         user-defined stepper is passed as a class.
     integrator : Integrator, optional
-        Argument of ``Measure.compute``, which a user-defined measure passes to ``simulate``. The
-        integrator replaces ``rtol``, ``budget`` and ``engine``. The right-hand side evaluations are
-        added to the count of the cell. If the motion cannot continue, the cell ends with the status
-        of the motion. The former arguments ``accuracy`` and ``meter`` are deprecated.
+        Integrator of a study cell. In a user-defined measure, pass the argument ``integrator`` of
+        the method ``compute``. The integrator replaces ``rtol``, ``budget`` and ``engine``. The
+        right-hand side evaluations are added to the count of the cell. If the motion cannot
+        continue, the cell ends with the status of the motion. The former arguments ``accuracy`` and
+        ``meter`` are deprecated.
 
     Returns
     -------
@@ -128,8 +130,8 @@ def simulate(
         in sigma_*, slip in D_c, time in D_c/V_* and slip rate in V_*.
 
         - ``slip``, ``log10_slip_rate`` and ``state_variable`` describe the slider. For laws with
-          several states, ``state_1``, ``state_2`` and so on are the states without the changes that
-          normal stress causes. If normal stress does not affect the states, the sum of the states
+          several states, ``state_1``, ``state_2`` and so on are the states, excluding changes due
+          to normal stress. If normal stress does not affect the states, the sum of the states
           is ``state_variable``.
         - ``shear_stress`` is the spring stress. With radiation damping, the damping stress at V_*
           is subtracted from the spring stress, so that spring stress equals frictional stress in
@@ -139,11 +141,11 @@ def simulate(
         - ``load_point_displacement`` and ``friction_coefficient`` are the values that a laboratory
           rig measures. The friction coefficient is spring stress divided by the difference of
           normal stress and the pore pressure outside the fault.
-        - ``porosity`` and ``pore_pressure`` exist for a dilatant fluid, and ``pore_pressure`` for a
-          thermal fluid.
+        - ``porosity`` and ``pore_pressure`` exist if the fluid is dilatant. If the fluid is
+          thermal, ``pore_pressure`` exists, and ``porosity`` exists only with dilatancy.
         - ``temperature_rise`` exists if the temperature changes.
-        - ``regime`` is the code of the equations of motion. The attribute ``flag_meanings`` of
-          ``regime`` lists the names of the codes.
+        - ``regime`` is an integer code for the equations of motion that were used. The attribute
+          ``flag_meanings`` of ``regime`` lists the names of the codes.
         - ``instability_time`` exists if the scene has neither inertia nor radiation damping, and
           the slip rate exceeds the limit of the slip rate (instability norm).
 

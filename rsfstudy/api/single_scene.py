@@ -43,15 +43,15 @@ def critical_step(
     of : str, default: "load_velocity_ratio"
         Quantity that is stepped: "load_velocity_ratio", "displacement_step" or
         "normal_stress_step". "velocity_step" is an alias of "load_velocity_ratio". After a step of
-        displacement or normal stress, the load point is held unless the scene specifies
+        displacement or normal stress, the load point does not move, unless the scene specifies
         ``load_velocity_ratio``. Steps of normal stress require a normal stress that is "imposed" or
         "variable". If a decrease of normal stress triggers the instability, pass
         ``direction="down"``.
     direction : {"up", "down"}, default: "up"
         Direction of the step.
     rtol : float, default: 1e-7
-        Relative tolerance of the critical step: of :math:`V_0/V_* - 1`, of the displacement, or of
-        the logarithm of the normal stress ratio.
+        Relative tolerance of the critical step. The tolerance applies to :math:`V_0/V_* - 1`, to
+        the displacement, or to the logarithm of the normal stress ratio.
     engine : {"scipy", "python", "compiled"} or type, default: "scipy"
         Engine that integrates the motions. "compiled" is much faster, and requires Numba. A
         user-defined stepper is passed as a class.
@@ -260,8 +260,8 @@ def _measure_scene_to_dataset(
     """Compute a measure of a scene, and return the outputs as a dataset.
 
     The variables have the same names as in the results of studies. Outputs without a value are NaN.
-    If ``is_nested`` is True, another measure uses the results, so the function does not emit
-    warnings, and adds its evaluations to the count of the integrator.
+    If ``is_nested`` is True, the results are used by a different measure. In this case, the
+    function does not emit warnings, and its evaluations are added to the count of the integrator.
     """
     check_scene(scene)
     check_integrator(integrator)

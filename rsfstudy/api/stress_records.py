@@ -1,4 +1,4 @@
-"""Shear stress of laboratory records, as the detection of events needs it."""
+"""Shear stress of laboratory records for event detection."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from rsfstudy.rig import (
     read_columns,
 )
 
-#: Columns that the detection of events can use.
+#: Columns that are used for event detection.
 _USABLE_COLUMNS = UsableColumns(
     ("time", "slip", "displacement", "shear_stress", "friction", "normal_stress"),
     shear_stress_suffices=True,
@@ -31,8 +31,8 @@ class StressRecord(NamedTuple):
     Parameters
     ----------
     variables : mapping of str to array_like or None
-        Arrays ``time``, ``displacement`` and ``shear_stress``. The units of an array are its
-        attribute ``units``.
+        Arrays ``time``, ``displacement`` and ``shear_stress``. The attribute ``units`` of an array
+        contains its units.
     has_time : bool, default: True
         False if the record contains displacement in place of time.
     is_slip : bool, default: False
@@ -59,9 +59,9 @@ def read_stress_record(
     columns : mapping of str to str or tuple, or None
         Heading and units of columns by name.
     normal_stress : quantity
-        Normal stress by which friction is multiplied, or None.
+        Normal stress by which friction is multiplied. None if the normal stress is unknown.
     options : ReadingOptions
-        Options of reading.
+        Reading options.
 
     Returns
     -------
@@ -75,7 +75,7 @@ def read_stress_record(
     """
     whole = options == ReadingOptions() and columns is None
     if whole and isinstance(record, xr.Dataset) and {"time", "shear_stress"} <= {*record.variables}:
-        # Motions have scales in place of units.
+        # Simulated motions have unit scales instead of units.
         names = ("time", "displacement", "shear_stress")
         return StressRecord({name: record.get(name) for name in names})
     found, table, processing = read_columns(record, columns, _USABLE_COLUMNS, options)

@@ -16,7 +16,7 @@ from rsfstudy.cli.options import (
 )
 from rsfstudy.errors import InvalidValue
 
-#: Options that are passed unchanged to the functions that read records.
+#: Names of command-line options that are passed unchanged to the functions that read records.
 _OPTIONS_PASSED_UNCHANGED = ("decimal", "sheet", "area", "begin", "end", "thin", "filter")
 
 

@@ -44,9 +44,10 @@ _MAX_WEAKENING_OVER_SPRING_UNLOADING = 0.5
 def compute_peak_excess_over_instability_norm(scene: Scene, integrator: Integrator) -> float:
     """Compute the height of the highest ln V peak above the instability norm.
 
-    If the effect of inertia is small, the motion is integrated only up to the instability norm. The
-    returned excess is then the squared rate of change of ln V at the norm. The rate of change of ln
-    V at the norm is zero at the boundary between stable and unstable steps.
+    The peak is the highest value of ln V in the motion. If the effect of inertia is small, the
+    motion is integrated only up to the instability norm. The function then returns the squared rate
+    of change of ln V at the instability norm in place of the height of the peak. At the boundary
+    between stable and unstable steps, this rate of change is zero.
 
     Parameters
     ----------
@@ -58,8 +59,8 @@ def compute_peak_excess_over_instability_norm(scene: Scene, integrator: Integrat
     Returns
     -------
     float
-        Excess of ln V over the instability norm. The excess is negative if the slip rate does not
-        reach the norm.
+        Highest value of ln V minus the value at the instability norm. The result is negative if the
+        slip rate does not reach the instability norm.
 
     Raises
     ------
@@ -126,8 +127,9 @@ def _stays_below_norm(scene: Scene, point: MotionPoint) -> bool:
     friction approaches its steady state at the present slip rate. If b > 0, the steady state rises
     as ln V decreases, so the state continues to strengthen friction.
 
-    Pore pressure and heat raise ln V by at most the loss of strength due to them, divided by a. At
-    the increased ln V, the states must weaken friction more slowly than spring stress decreases.
+    The loss of strength due to pore pressure and heat, divided by a, is an upper bound of the
+    increase of ln V due to these two effects. If ln V is increased by this bound, the states must
+    weaken friction more slowly than the spring stress decreases.
     """
     _value, slope, shift, shift_slope = scene.friction_relation(point.psis)(point.frictional_stress)
     states, evolve = range(scene.parts.law.state_count), scene.state_evolution_function()
@@ -151,12 +153,12 @@ def _stays_below_norm(scene: Scene, point: MotionPoint) -> bool:
 
 
 def _bound_pore_pressure_effect(scene: Scene, point: MotionPoint) -> tuple[float, float]:
-    """Compute an upper bound of the increase of ln V by pore pressure and heat.
+    """Compute an upper bound of the increase of ln V due to pore pressure and heat.
 
     The function returns the upper bound, and the smallest decrease of the state by stress and
-    temperature. The upper bound is infinite if no bound is found. An increase of ln V is an upper
-    bound if the highest pore pressure and temperature at the increased ln V reduce strength by less
-    than a times the increase.
+    temperature. The upper bound is infinite if no bound is found. A trial increase of ln V is an
+    upper bound under one condition: at the increased ln V, the highest pore pressure and the
+    highest temperature reduce strength by less than the product of a and the trial increase.
     """
     value, _slope, shift, _ = scene.friction_relation(point.psis)(point.frictional_stress)
     if not scene.parts.fluid.unknowns and not scene.parts.temperature.unknowns:
@@ -177,7 +179,7 @@ def _bound_unknowns(
 ) -> tuple[tuple[float, ...], tuple[float, ...]]:
     """Return states with the highest pressure and the extreme temperatures.
 
-    The slip rate of the future motion must not exceed the argument.
+    The slip rate of the future motion must not exceed the slip rate that is passed to the function.
     """
     fluid, temperature = scene.parts.fluid, scene.parts.temperature
     hottest, coldest, range_of_rise = list(point.psis), list(point.psis), 0.0

@@ -77,9 +77,8 @@ def apply_running_mean(
 ) -> np.ndarray:
     """Compute the running mean of each column of an array.
 
-    The function interpolates the columns linearly
-    between the rows, and assumes that they are constant before the first row and after the last
-    row.
+    Between the rows, the function interpolates the columns linearly. Before the first row and after
+    the last row, the columns are assumed to be constant.
 
     Parameters
     ----------
@@ -90,7 +89,7 @@ def apply_running_mean(
     averaging_time : float
         Averaging time in s.
     centre : float, default: 0.0
-        Time in s from a row to the centre of its averaging time.
+        Time in s from a row to the centre of the averaging interval of the row.
 
     Returns
     -------

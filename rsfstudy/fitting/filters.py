@@ -32,8 +32,9 @@ FILTER_KINDS = (MEAN, TRAILING_MEAN, *LOW_PASS_ORDERS)
     _FILTER_SETTLING_PERIODS,
     _MAX_FILTER_GRID_POINTS,
 ) = 8, 60, 3.0, 400_000
-#: Settings for filtering recorded rows by a low-pass filter: the smallest number of points per
-#: period of the corner frequency, and the largest number of points.
+#: Settings for applying a low-pass filter to recorded rows. The first value is the smallest number
+#: of interpolation points per period of the corner frequency. The second value is the largest
+#: number of interpolation points.
 _ROW_POINTS_PER_CORNER_PERIOD, _MAX_ROW_POINTS = 20, 20_000_000
 
 
@@ -149,7 +150,7 @@ class Filter:
         return np.asarray(np.interp(time, at, sosfilt(sections, samples, zi=begin)[0]))
 
     def complete_rows(self, time: np.ndarray) -> slice:
-        """Return the rows whose averaging time lies within the record.
+        """Return the rows whose averaging interval lies within the record.
 
         Parameters
         ----------
@@ -159,12 +160,13 @@ class Filter:
         Returns
         -------
         slice
-            Rows with a complete running mean. For low-pass filters, all rows.
+            Rows whose running mean is complete. If the filter is a low-pass filter, the slice
+            contains all rows.
 
         Raises
         ------
         InvalidValue
-            If no row has a complete averaging time.
+            If the averaging interval of every row extends beyond the record.
         """
         if self.kind in LOW_PASS_ORDERS:
             return slice(0, len(time))
@@ -184,18 +186,19 @@ class Filter:
         time : ndarray, shape (rows,)
             Times of the rows in s, in increasing order.
         values : ndarray, shape (rows,)
-            Recorded values. The values are linear between the rows.
+            Recorded values. The function interpolates linearly between the rows.
 
         Returns
         -------
         ndarray, shape (rows,)
-            Filtered values. Running means are correct in `complete_rows`.
+            Filtered values. Running means are correct only in the rows that `complete_rows`
+            returns.
 
         Raises
         ------
         InvalidValue
-            If a low-pass filter passes all frequencies that the rows resolve, or needs too many
-            points.
+            If the corner frequency of a low-pass filter is too high for the sampling interval, or
+            if the filter needs too many interpolation points.
         """
         if self.kind not in LOW_PASS_ORDERS:
             centre = 0.0 if self.kind == MEAN else -0.5 * self.size
@@ -220,7 +223,7 @@ class Filter:
         return np.asarray(np.interp(time, at, sosfilt(sections, samples, zi=begin)[0]))
 
     def _averaging_times(self) -> tuple[float, float]:
-        """Return the averaging times in s before and after a row."""
+        """Return the parts of the averaging time in s before and after a row."""
         return (0.5 * self.size, 0.5 * self.size) if self.kind == MEAN else (self.size, 0.0)
 
     def _running_mean_time_offsets(self, time: np.ndarray) -> np.ndarray:

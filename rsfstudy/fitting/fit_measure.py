@@ -87,8 +87,8 @@ class Fit(Measure):
     records : tuple of Record
         Records to choose from. The options ``record`` and ``together`` select the fitted records.
     free : tuple of str, default: ("a", "b", "slip_distance", "mu_star", "trend1")
-        Names of the free parameters (see ``rsfstudy.fitting.PARAMETERS``). The other parameters
-        have the values of the scene.
+        Names of the free parameters (see ``rsfstudy.fitting.PARAMETERS``). The other parameters are
+        fixed at their values in the scene.
     slip_distance_guess : float, default: 10.0
         Slip distance D_c in um, which is the unit of slip in the scene. If D_c is a free parameter,
         this value is the initial guess.
@@ -100,9 +100,9 @@ class Fit(Measure):
     step : int, default: 1
         Number of the step to fit, starting from 1.
     together : tuple of (str, int), optional
-        Record names and step numbers of a joint fit, which replace ``record`` and ``step``. Three
-        parameters have a separate value for each step: the friction before the step (``mu_star_1``,
-        ``mu_star_2``, ...), the trend, and the step time.
+        Record names and step numbers of a joint fit. This option replaces ``record`` and ``step``.
+        Three parameters have a separate value for each step: the friction before the step
+        (``mu_star_1``, ``mu_star_2``, ...), the trend, and the step time.
     before, after : float, default: 0.0
         Load point displacements in um to fit before and after the step. If ``before`` is 0, the
         window begins halfway between the previous step and this step, or at the beginning of the
@@ -467,7 +467,7 @@ class Fit(Measure):
         Returns
         -------
         search : FitProblem
-            Problem with the model of all windows.
+            Least-squares problem for the model of all windows.
         found : FitSolution
             Solution of the problem.
 
@@ -506,7 +506,7 @@ class Fit(Measure):
         Parameters
         ----------
         problem : FitProblem
-            Problem with the model of all windows.
+            Least-squares problem for the model of all windows.
         solution : FitSolution
             Solution of the problem.
 

@@ -383,7 +383,7 @@ class FitWindow:
 
 @lru_cache(maxsize=256)
 def _find_start_of_linear_friction(record: Record, start_time: float, end_time: float) -> float:
-    """Find the time from which friction of a record before a step is linear."""
+    """Find the time at which the linear part of friction before a step begins."""
     return find_start_of_linear_friction(
         record.time, record.columns["friction"], start_time, end_time
     )

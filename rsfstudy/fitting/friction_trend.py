@@ -12,7 +12,8 @@ from rsfstudy.fitting.linear_friction_before_step import find_start_of_linear_fr
 from rsfstudy.fitting.local_regression import compute_weighted_mean, fit_linear_model
 from rsfstudy.fitting.velocity_steps import LoadingStep
 
-#: The window of steady sliding begins at this fraction of the time since the previous step.
+#: The window of steady sliding before a step begins at this fraction of the time between the
+#: previous step and the step.
 _WINDOW_START_FRACTION = 0.5
 #: Largest and smallest number of rows of a window.
 _MAX_ROWS, MIN_ROWS = 4000, 12
@@ -28,8 +29,9 @@ def select_steady_rows(
     time, friction : ndarray, shape (rows,)
         Times in s and friction.
     start_time, end_time : float
-        End of the previous step, or start of the record, and start of the step, in s. If a step
-        precedes, the rows begin halfway between the two steps at the earliest.
+        Limits of the rows in s. ``start_time`` is the end of the previous step, or the start of the
+        record if there is no previous step. ``end_time`` is the start of the step. If there is a
+        previous step, rows in the first half of the interval are not selected.
 
     Returns
     -------
@@ -79,7 +81,7 @@ def fit_trend(
 def _iterate_sliding_intervals(
     time: np.ndarray, steps: Sequence[LoadingStep]
 ) -> Iterator[tuple[float, float, float]]:
-    """Iterate over the intervals between steps in which the load point moves forward.
+    """Iterate over the intervals of forward load point motion between steps.
 
     Each item contains the start and the end of the interval in s, and the velocity in um/s.
     """

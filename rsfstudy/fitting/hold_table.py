@@ -31,7 +31,7 @@ HOLD_QUANTITIES = (
     Quantity("relaxation", r"$\Delta\mu_c$", "1", "change of friction during the hold"),
     Quantity("peak_displacement", "", "um", "load point displacement from reloading to the peak"),
 )
-#: Number of quantities of a hold that have no error.
+#: Number of quantities in the table that have no error estimate.
 _EXACT_QUANTITY_COUNT = 4
 
 
@@ -47,9 +47,11 @@ def build_hold_table(
     Parameters
     ----------
     exact_values : ndarray, shape (holds, 4)
-        Quantities without errors: begin, duration, and velocities before and after.
+        Quantities without errors: start and duration of each hold, and load point velocities before
+        and after each hold.
     values, errors : ndarray, shape (holds, 5)
-        The other quantities and their errors.
+        Friction before the hold, peak friction, healing, relaxation and peak displacement, and
+        their errors.
     healing_covariance : ndarray, shape (holds, holds)
         Covariance matrix of healing.
     error_suffix : str, default: "stderr"
@@ -98,7 +100,7 @@ def fit_healing_rate(
     Parameters
     ----------
     durations, healing : ndarray, shape (holds,)
-        Durations in s and healing. Holds without healing are left out.
+        Durations in s and healing. Holds whose healing is NaN are ignored.
     covariance : ndarray, shape (holds, holds)
         Covariance matrix of healing.
 
@@ -111,7 +113,7 @@ def fit_healing_rate(
         Standard error of the slope. The error follows from the covariance matrix, or from the
         scatter of healing about the line if the scatter is larger.
     intercept : float
-        Healing of the line at a duration of 1 s.
+        Healing at a hold duration of 1 s, computed from the line.
     """
     known = np.isfinite(healing)
     x, y = np.log10(durations[known]), healing[known]

@@ -6,9 +6,10 @@ and :math:`\mu_p` the peak friction after reloading. As in the measure ``Healing
 :math:`\mu_h - \mu_0`, and healing is :math:`\mu_p - \mu_0`.
 
 The three frictions are estimated jointly by generalised least squares with correlated noise.
-:math:`\mu_0` is the mean of the straight portion before the hold, :math:`\mu_h` is the end of a
-polynomial in the logarithm of the hold time, and :math:`\mu_p` is the maximum of a polynomial in
-time. The common linear trend of friction with load point displacement is subtracted.
+:math:`\mu_0` is the mean friction of the linear portion before the hold. :math:`\mu_h` is the value
+of a polynomial in the logarithm of the hold time at the end of the hold. :math:`\mu_p` is the
+maximum of a polynomial in time. The common linear trend of friction with load point displacement is
+subtracted.
 """
 
 from __future__ import annotations
@@ -39,26 +40,27 @@ from rsfstudy.fitting.velocity_steps import LoadingStep, noise_variance
 #: The load point is at rest if its velocity is at most this fraction of the velocities before and
 #: after the hold.
 MAX_HOLD_OVER_SLIDING_VELOCITY = 0.01
-#: Friction has peaked if it has fallen by this number of standard deviations of the noise below its
-#: running maximum. The running median of the second number of rows removes spikes.
+#: The first value is the number of standard deviations of the noise by which friction must fall
+#: below its running maximum after a peak. The second value is the number of rows in the running
+#: median that removes spikes.
 _MIN_FALL_AFTER_PEAK_SIGMAS, _RUNNING_MEDIAN_ROWS = 6.0, 5
-#: Half widths of the windows around a peak in rows, and number of rows of the windows at the end of
-#: a hold.
+#: Half widths in rows of the windows around a peak, and numbers of rows of the windows at the end
+#: of a hold.
 _PEAK_HALF_WIDTHS = tuple(np.unique(np.rint(3.0 * 1.25 ** np.arange(50)).astype(int)).tolist())
 _HOLD_END_ROWS = tuple(np.unique(np.rint(6.0 * 1.4 ** np.arange(40)).astype(int)).tolist())
-#: Degrees of the polynomials that the windows are tested with, and degrees of the polynomials that
-#: the estimates use.
+#: Degrees of polynomials, for the peak and for the end of a hold. In each pair, the first degree is
+#: used to select the window, and the second degree is used to estimate friction.
 _PEAK_DEGREES, _HOLD_END_DEGREES = (2, 4), (1, 2)
-#: Number of times that the window of a peak is centred on the peak.
+#: Number of iterations in which the window around a peak is centred on the estimated peak.
 _PEAK_CENTRING_PASSES = 4
 #: The noise is estimated from rows before the hold whose sampling interval differs from the
-#: interval after the hold by at most this factor. If there are too few such rows, the noise is
-#: estimated from the second half of the rows after the hold.
+#: sampling interval after the hold by at most this factor. If there are too few such rows, the
+#: noise is estimated from the second half of the rows after the hold.
 _MAX_SAMPLING_INTERVAL_RATIO = 2.0
 
 
 class Hold(NamedTuple):
-    """Hold of the load point, with the times of its windows.
+    """Hold of the load point, with the adjacent rows and steps.
 
     Parameters
     ----------
@@ -94,7 +96,7 @@ class Estimate(NamedTuple):
     weights : ndarray, shape (parameters,)
         Derivatives of the quantity with respect to the coefficients.
     other_variance : float, default: 0.0
-        Variance that the covariance matrix of the coefficients does not include.
+        Additional variance of the quantity, which does not depend on the coefficients.
     trend_derivative : float, default: 0.0
         Derivative of the quantity with respect to the trend.
     """
@@ -205,7 +207,7 @@ class HoldFit:
         self.time, self.hold, self.displacement_variance = time, hold, displacement_variance
         late = np.maximum(time - hold.reload.middle, 0.0)
         early = np.minimum(time - hold.stop.middle, 0.0)
-        #: Load point displacement relative to the displacement of the hold.
+        #: Load point displacement minus the displacement during the hold.
         self.moved = hold.stop.velocity_before * early + hold.reload.velocity_after * late
         self.level = friction - trend * self.moved
         self.rows_after = np.flatnonzero((time > hold.reload.middle) & (time < hold.window_end))
@@ -258,7 +260,7 @@ class HoldFit:
 
     @cached_property
     def _reference(self) -> LinearFit:
-        """Fit of rows without a peak, whose noise is used to select windows."""
+        """Fit of rows without a peak. Its noise is used to select windows."""
         rows, after = self.hold.rows_before, self.rows_after
         if len(after) > 1:
             gaps = np.gradient(self.time)
@@ -298,8 +300,9 @@ class HoldFit:
     def _choose_rows_of_peak(self) -> tuple[np.ndarray, bool]:
         """Return the rows of the window around the peak of friction.
 
-        The array of rows is empty if friction has no peak. The second value is True if a parabola
-        describes friction in the window.
+        The function returns two values. The first value is the array of rows, which is empty if
+        friction has no peak. The second value is True if a parabola describes friction in the
+        window.
         """
         after, level = self.rows_after, self.level
         chosen, is_adequate = after[:0], False

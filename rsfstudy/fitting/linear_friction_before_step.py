@@ -32,7 +32,7 @@ _MAX_CORRELATION_OF_ROW_MEANS = 0.98
 def find_start_of_linear_friction(
     record_time: np.ndarray, record_friction: np.ndarray, start_time: float, end_time: float
 ) -> float:
-    """Find the time from which friction before a step is linear.
+    """Find the time at which the linear part of friction before a step begins.
 
     The earlier rows before a step are discarded if two conditions are met. First, two separate
     lines must fit friction far better than a single line. The comparison of the two fits accounts

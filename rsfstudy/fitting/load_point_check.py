@@ -5,10 +5,11 @@ from __future__ import annotations
 import numpy as np
 from scipy.optimize import minimize_scalar
 
-#: Maximum number of rows that are compared, and number of times at which the velocity may change.
+#: Maximum number of rows in the comparison, and number of trial times for the change of velocity.
 _MAX_ROWS, _TRIAL_TIMES = 400, 40
-#: The displacement is slip if the squared residuals of slip plus elastic shortening are smaller
-#: than the squared residuals of displacement by this factor.
+#: Two straight lines are fitted to the displacement, and to the displacement plus elastic
+#: shortening. If the second sum of squared residuals is less than this fraction of the first sum,
+#: the displacement is the slip of the fault.
 _MAX_RATIO_OF_SQUARES = 0.1
 
 
@@ -17,14 +18,15 @@ def displacement_is_slip(
 ) -> bool:
     """Return True if a displacement is the slip of the fault.
 
-    A load point moves at a constant velocity before and after a velocity step. If the displacement
-    is the slip of the fault, slip plus the elastic shortening of the machine moves at constant
-    velocities, and the displacement itself does not.
+    The velocity of a load point is constant before a velocity step, and again constant after the
+    step. If the displacement is the slip of the fault, the displacement itself does not have
+    constant velocities. In this case, the sum of the displacement and the elastic shortening of the
+    machine has constant velocities.
 
     Parameters
     ----------
     time, displacement : ndarray, shape (rows,)
-        Times and displacements between the steps before and after a velocity step.
+        Times and displacements from the previous step to the next step around a velocity step.
     shortening : ndarray, shape (rows,)
         Elastic shortening of the machine: shear stress divided by stiffness, in the units of the
         displacement.
@@ -32,8 +34,8 @@ def displacement_is_slip(
     Returns
     -------
     bool
-        True if the sum of displacement and shortening fits two straight lines much better than the
-        displacement does.
+        True if two straight lines fit the sum of displacement and shortening much better than they
+        fit the displacement.
 
     Examples
     --------

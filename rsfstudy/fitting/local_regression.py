@@ -37,7 +37,8 @@ _NOISE_ESTIMATION_PASSES = 2
 #: than this number of noise variances. The limit is the 99.9 % quantile of the chi-squared
 #: distribution with two degrees of freedom.
 _MAX_SQUARES_REDUCTION_BY_HIGHER_TERMS = 13.8
-#: Number of successive windows that may be rejected by chance before a longer window is accepted.
+#: Number of successive windows that may be rejected by chance. If more windows are rejected in
+#: succession, longer windows are not tested.
 _MAX_REJECTED_WINDOWS = 1
 #: Smallest standard deviation of the noise, relative to the range of the values.
 _MIN_NOISE_SD_OVER_RANGE = 1e-9
@@ -122,7 +123,8 @@ def compute_weighted_mean(values: np.ndarray, stderrs: np.ndarray) -> tuple[floa
         Weighted mean.
     stderr : float
         Standard error of the mean. If the values scatter more than their standard errors, the
-        standard error is enlarged by the ratio (Birge ratio).
+        standard error of the mean is multiplied by the ratio of the scatter to the standard errors
+        (Birge ratio).
 
     Examples
     --------
@@ -156,7 +158,7 @@ def choose_polynomial_window(
     degree : int
         Degree of the polynomial.
     reference : LinearFit
-        Fit of other rows with the same noise.
+        Fit of other rows of the record, which have the same noise.
 
     Returns
     -------
@@ -228,7 +230,7 @@ def find_polynomial_maximum(coefficients: np.ndarray) -> float:
 
 
 def _residual_squares(columns: np.ndarray, degree: int) -> float:
-    """Return the sum of squared residuals of the last column."""
+    """Fit the last column, and return the sum of squared residuals."""
     basis = np.linalg.qr(columns[:, : degree + 1])[0]
     left = columns[:, -1] - basis @ (basis.T @ columns[:, -1])
     return float(left @ left)

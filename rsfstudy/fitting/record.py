@@ -249,8 +249,8 @@ class Record:
     def holds(self) -> xr.Dataset:
         """Measure frictional healing and relaxation in all holds of the record.
 
-        A hold is an interval in which the load point is at rest, or slower than 1 % of the
-        velocities before and after.
+        A hold is an interval in which the load point is at rest, or moves at less than 1 % of its
+        velocities before and after the interval.
 
         Returns
         -------
@@ -258,12 +258,12 @@ class Record:
             Table with the dimension ``hold``. The variables are ``begins`` and ``duration`` in s,
             ``velocity_before`` and ``velocity_after`` in um/s, ``friction_before``,
             ``peak_friction``, ``healing``, ``relaxation``, and ``peak_displacement`` in um. For
-            each quantity from ``friction_before`` on, ``<name>_stderr`` is the standard error. The
-            scalar ``healing_rate`` is the increase of healing per decade of hold duration, and
-            ``healing_rate_stderr`` its standard error. ``trend`` is the trend of friction in 1/um
-            that is subtracted. If friction has no peak after a hold, or if the record has too few
-            rows, the values are NaN. The healing rate is NaN if the record contains fewer than two
-            hold durations.
+            ``friction_before`` and the quantities after it, ``<name>_stderr`` is the standard
+            error. The scalar ``healing_rate`` is the increase of healing per decade of hold
+            duration, and ``healing_rate_stderr`` is the standard error of the healing rate.
+            ``trend`` is the trend of friction in 1/um. The trend is subtracted from friction. If
+            friction has no peak after a hold, or if the record has too few rows, the values are
+            NaN. The healing rate is NaN if the record contains fewer than two hold durations.
 
         See Also
         --------
@@ -300,9 +300,9 @@ class Record:
     def stiffness(self) -> xr.Dataset:
         """Measure the stiffness of the machine in the locked portions of the record.
 
-        The fault is almost locked after the load point has started, stopped or reversed. The
-        stiffness is the slope of friction against load point displacement in these portions,
-        corrected for the slip of the fault.
+        A locked portion is a part of the record in which the fault is almost locked, because the
+        load point has just started, stopped or reversed. The stiffness is the slope of friction
+        against load point displacement in the locked portions, corrected for the slip of the fault.
 
         Returns
         -------

@@ -1,8 +1,8 @@
 r"""Stiffness of the machine from the portions of a record in which the fault is locked.
 
 If the load point starts, stops or reverses, the fault is almost locked until friction has changed
-considerably, and the slope of friction against load point displacement is the stiffness
-:math:`k` divided by the normal stress. The fault slips a little at the slip rate :math:`V`:
+considerably. The slope of friction against load point displacement is then the stiffness :math:`k`
+divided by the normal stress. The fault slips a little at the slip rate :math:`V`:
 
 .. math:: d\mu/dx = k (1 - v), \qquad v = V/V_l,
 
@@ -51,8 +51,8 @@ RELOADING, UNLOADING, INITIAL_LOADING = "reloading", "unloading", "initial loadi
 _MIN_SLOPE_FRACTION = {RELOADING: 0.6, UNLOADING: 0.3, INITIAL_LOADING: 0.6}
 #: Smallest ratio of a slope to its standard error, and smallest number of rows of a portion.
 _MIN_SLOPE_SIGMAS, _MIN_PORTION_ROWS = 12.0, 10
-#: Slopes are computed in windows in which friction changes by this fraction of its change in the
-#: portion.
+#: Slopes are computed in windows. In each window, friction changes by this fraction of the change
+#: of friction in the whole portion.
 _SLOPE_WINDOW_RISE = 0.15
 #: Largest number of rows of a portion. The rows of longer portions are thinned.
 _MAX_PORTION_ROWS = 3000
@@ -70,10 +70,13 @@ _BOUNDS_OF_LOG_RATE_RATIO, _BOUNDS_OF_LOG_A, _BOUNDS_OF_STATE_CHANGE = (
 )
 #: Number of times that the noise and the parameters are estimated in turn.
 _NOISE_ESTIMATION_PASSES = 3
-#: Number of rows after a step from which its displacement is computed. A step is immediate if the
-#: displacement during the step deviates by at most the second number of standard deviations.
+#: The first value is the number of rows after a step that are used to extrapolate the load point
+#: displacement back to the step. The second value is a number of standard deviations of the noise.
+#: A step is immediate if the recorded displacements during the step deviate from the displacements
+#: of an immediate step by at most this number of standard deviations.
 _ROWS_AFTER_STEP, _MAX_DEVIATION_OF_IMMEDIATE_STEP = 20, 5.0
-#: Largest relative standard error of a stiffness that is used.
+#: Largest relative standard error of the stiffness of a portion. Portions with larger errors are
+#: ignored.
 _MAX_RELATIVE_STDERR = 0.25
 
 
@@ -225,7 +228,7 @@ def find_portions(
 def _find_end_of_step(
     time: np.ndarray, displacement: np.ndarray, step: LoadingStep, noise_sd: float
 ) -> float:
-    """Return the time in s from which the load point velocity is constant after a step.
+    """Return the time in s after which the load point velocity is constant.
 
     If a record has few rows before an immediate step, the detected step lasts longer than the
     actual step.
@@ -249,7 +252,7 @@ def _find_end_of_step(
 
 
 def _cut_at_slip(portion: Portion) -> Portion | None:
-    """Cut a portion where the fault begins to slip.
+    """Remove the rows of a portion after the fault begins to slip.
 
     The result is None if friction does not change considerably at the beginning of the portion.
     """

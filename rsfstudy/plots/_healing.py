@@ -25,9 +25,9 @@ from rsfstudy.plots._style import (
     style_context,
 )
 
-#: Height of a panel in mm, and largest number of rows of a record that are drawn.
+#: Height of a panel in mm, and largest number of record rows to draw.
 _PANEL_HEIGHT_MM, _MAX_DRAWN_ROWS = 60.0, 20_000
-#: Half length of the error bars, in standard errors.
+#: Number of standard errors in half the length of an error bar.
 _ERROR_BAR_STDERRS = 2.0
 
 
@@ -43,8 +43,9 @@ def plot_healing(table: xr.Dataset, record: Record | None = None) -> Figure:
         ``relaxation`` along ``hold``, their errors, and the scalars ``healing_rate``,
         ``healing_rate_stderr`` and ``healing_intercept``.
     record : Record, optional
-        Record of the holds. The first panel shows its friction with the values before each hold and
-        at each peak. By default, the figure has no such panel.
+        Record that contains the holds. If you pass a record, the first panel shows the recorded
+        friction, the friction before each hold, and the peak friction after each hold. By default,
+        the figure does not have this panel.
 
     Returns
     -------
@@ -85,7 +86,7 @@ def plot_healing(table: xr.Dataset, record: Record | None = None) -> Figure:
 
 
 def _draw_record(table: xr.Dataset, record: Record, axes: Axes) -> None:
-    """Draw friction against load point displacement, with the measured frictions."""
+    """Draw friction against load point displacement, and mark the measured values."""
     moved, friction = record.columns["displacement"], record.columns["friction"]
     thinned = slice(None, None, max(1, len(record) // _MAX_DRAWN_ROWS))
     axes.plot(moved[thinned], friction[thinned], ".", color="0.7", markersize=1.5, label="record")

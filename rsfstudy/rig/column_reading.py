@@ -1,6 +1,7 @@
-"""Common part of all functions that read records: options, columns and rows.
+"""Options, columns and rows that all functions for reading records share.
 
-`read_columns` reads the columns that a question can use from a source in any format.
+The functions `read_record`, `events` and `history` use different columns of a file. `read_columns`
+reads the columns that one of these functions can use, from a source in any format.
 """
 
 from __future__ import annotations
@@ -18,7 +19,7 @@ from rsfstudy.rig.row_selection import RowSelection
 from rsfstudy.rig.units import compute_conversion_factor, convert_to_si, find_size_of_units
 from rsfstudy.rig.usual_headings import UsableColumns, check_finite, read_selected_columns
 
-#: Exponents of base units (see ``units``) in the units of force.
+#: Exponents of the base units in a unit of force (see the module ``units``).
 _EXPONENTS_OF_FORCE = (1, 1, -2, 0, 0)
 #: Columns that may contain a force instead of a stress.
 _STRESS_COLUMNS = ("shear_stress", "normal_stress")
@@ -26,16 +27,16 @@ _STRESS_COLUMNS = ("shear_stress", "normal_stress")
 
 @dataclass(frozen=True)
 class ReadingOptions(RowSelection):
-    """Options of reading that all functions for records share.
+    """Reading options that all functions for records share.
 
-    The other options are described in `RowSelection`.
+    The class `RowSelection` describes the options that are not listed here.
 
     Parameters
     ----------
     decimal : {".", ","}, default: "."
         Decimal separator of a text file.
     sheet : str, default: ""
-        Sheet of a workbook, or group of a TDMS file. By default, the first one is read.
+        Sheet of a workbook, or group of a TDMS file. By default, the first sheet or group is read.
     area : quantity, optional
         Area of the fault, such as "25 cm2". Forces are divided by the area.
     """
@@ -46,7 +47,7 @@ class ReadingOptions(RowSelection):
 
     @classmethod
     def parse(cls, function_name: str, keywords: Mapping[str, Any]) -> ReadingOptions:
-        """Create the options from the keywords of a function.
+        """Create the options from the keyword arguments of a function.
 
         Parameters
         ----------
@@ -80,7 +81,7 @@ class ReadingOptions(RowSelection):
 
 
 class ColumnsOfSource(NamedTuple):
-    """Columns that a question can use.
+    """Selected columns of a source, with their table.
 
     Parameters
     ----------
@@ -89,7 +90,7 @@ class ColumnsOfSource(NamedTuple):
     table : Table
         Table from which the columns were read.
     processing : list of str
-        Descriptions of the selection of rows.
+        Descriptions of the row selection that was applied.
     """
 
     columns: dict[str, Column]
@@ -103,7 +104,7 @@ def read_columns(
     usable: UsableColumns,
     options: ReadingOptions,
 ) -> ColumnsOfSource:
-    """Read the columns of a source that a question can use.
+    """Read the columns of a source that a function can use.
 
     Parameters
     ----------
@@ -112,9 +113,9 @@ def read_columns(
     selected_columns : mapping of str to str or tuple, or None
         Heading and units of columns by name.
     usable : UsableColumns
-        Columns that the question can use.
+        Columns that the function can use.
     options : ReadingOptions
-        Options of reading.
+        Reading options.
 
     Returns
     -------

@@ -1,6 +1,6 @@
 """Columns of tables, and selections of columns.
 
-A selection of a column contains the heading of the column, its units, a scale and an offset.
+A column selection contains the heading and the units of the column, a scale and an offset.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ import numpy as np
 from rsfstudy._deprecation import add_former_member_names
 from rsfstudy.errors import InvalidValue
 
-#: Header of a table in the examples of error messages.
+#: Table header that error messages show as an example.
 EXAMPLE_OF_TABLE_HEADER = "velocity (um/s), distance (um), a (1)"
 _NUMBER_PATTERN = r"\s*((?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*"
 #: Pattern of a heading that is followed by a scale and an offset.
@@ -82,7 +82,7 @@ def check_heading_lengths(headings: Iterable[str], file_description: str) -> Non
     Raises
     ------
     InvalidValue
-        If a heading is too long. The error message contains the number of the column.
+        If a heading is too long. The error message contains the column number.
     """
     for column, heading in enumerate(headings, start=1):
         try:
@@ -120,8 +120,9 @@ def parse_column_spec(column_choice: Any, headings: Collection[str]) -> ColumnSp
     Parameters
     ----------
     column_choice : str or sequence
-        A sequence of heading, units, scale and offset, or a string such as ``lp (um) * 0.1 + 5``.
-        The units in brackets are optional, even if the heading in the file contains units.
+        Column selection. The selection is a sequence of heading, units, scale and offset, or a
+        string such as ``lp (um) * 0.1 + 5``. The units in brackets are optional, even if the
+        heading in the file contains units.
     headings : collection of str
         Headings of the file.
 
@@ -133,7 +134,7 @@ def parse_column_spec(column_choice: Any, headings: Collection[str]) -> ColumnSp
     Raises
     ------
     InvalidValue
-        If the selection has another type, or if the heading is too long.
+        If the selection is neither a string nor a sequence, or if the heading is too long.
     """
     if not isinstance(column_choice, str):
         return _parse_column_spec_given_as_list(column_choice)

@@ -1,4 +1,4 @@
-"""Physical units of one dataset, in one object."""
+"""Conversion of a dataset to physical units."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from rsfstudy.rig.dataset_scales import UnitScale
 
 
 class DatasetUnits:
-    """Units of a dataset: scales, conversions and names of variables.
+    """Unit scales and unit conversions of a dataset.
 
     Parameters
     ----------
@@ -24,13 +24,13 @@ class DatasetUnits:
     SCALES_ATTRIBUTE: ClassVar[str] = dataset_scales.NAME_OF_SCALES_ATTRIBUTE
     #: Units of stress, length and time in tables and figures of rigs.
     DISPLAY_UNITS: ClassVar[Mapping[str, str]] = dataset_scales.DISPLAY_BASE_UNITS
-    #: Prefix of the names of dimensionless fields beside axes with units of the same name.
+    #: Prefix of the name of a dimensionless field if an axis in physical units has the same name.
     DIMENSIONLESS_PREFIX: ClassVar[str] = dataset_scales.DIMENSIONLESS_PREFIX
 
     dimensional_name = staticmethod(dataset_scales.convert_to_dimensional_name)
 
     def __init__(self, dataset: xr.Dataset) -> None:
-        """Refer to a dataset."""
+        """Store a reference to the dataset."""
         self._dataset = dataset
 
     def convert(self, stress: str, length: str, time: str, **si_scales: float) -> xr.Dataset:
@@ -41,7 +41,8 @@ class DatasetUnits:
         stress, length, time : str
             Requested units.
         **si_scales : float
-            Scales that the dataset does not contain, as `read_si_scales` takes them.
+            Scales that the dataset does not contain, in the form of the arguments of
+            `read_si_scales`.
 
         Returns
         -------
@@ -104,11 +105,11 @@ class DatasetUnits:
         Returns
         -------
         dict of str to xarray.Variable
-            Slip rate and its error estimate by their names.
+            Slip rate and its error estimate, by variable name.
         """
         return dataset_scales.slip_rate_from_log(self._dataset, variable_name, factor, units)
 
     @property
     def are_unexpected_by_figures(self) -> bool:
-        """True if the results do not have the units of the figures of studies."""
+        """True if the units of the results differ from the units in study figures."""
         return dataset_scales.has_units_unexpected_by_its_figures(self._dataset)

@@ -56,8 +56,8 @@ def history(
         reads. The column ``time`` is required. The column ``displacement`` or ``velocity``
         describes the load point. If both columns are missing, the load point moves at :math:`V_*`.
         The optional column ``normal_stress`` contains the normal stress. The optional column
-        ``pore_pressure`` contains the pore pressure minus the pore pressure before the record.
-        Other columns are ignored.
+        ``pore_pressure`` contains the pore pressure relative to the pore pressure before the start
+        of the record. Other columns are ignored.
     rig : Rig, optional
         Rig for the conversion of units. By default, all data are dimensionless: times in
         ``D_c/V_*``, displacements in ``D_c``, velocities in ``V_*`` and stresses in ``sigma_*``.
@@ -82,9 +82,8 @@ def history(
     InvalidValue
         If units are missing, if a value is missing or not finite, if time does not increase, or if
         the normal stress is not positive. The error message contains the line and column of the
-        file, or the number of the sample. A history in which the load point moves backwards causes
-        no error. Only scenes with ``regularised=True`` accept a history in which the load point
-        moves backwards.
+        file, or the number of the sample. If the load point moves backwards, the function does not
+        raise an error, but the history can only be used in scenes with ``regularised=True``.
 
     Notes
     -----

@@ -25,7 +25,7 @@ def expand_range(argument_name: str, text: str, range_text: str) -> list[float] 
     argument_name : str
         Name of the argument for error messages.
     text : str
-        Complete argument, which error messages quote.
+        Complete argument, for error messages.
     range_text : str
         Range as ``first:last:count`` or ``first:last:count:log``, optionally followed by units.
 

@@ -83,7 +83,7 @@ def read_record(
     decimal : {".", ","}, default: "."
         Decimal separator of a text file.
     sheet : str, default: ""
-        Sheet of a workbook, or group of a TDMS file. By default, the first one is read.
+        Sheet of a workbook, or group of a TDMS file. By default, the first sheet or group is read.
     area : quantity, optional
         Area of the fault, for example ``"25 cm2"``. If a column contains a force instead of a
         stress, the force is divided by the area.
@@ -94,12 +94,12 @@ def read_record(
         Time or load point displacement at which the selected rows begin and end, for example
         ``"100 s"`` or ``"2 mm"``. A number is a time in s.
     thin : int, default: 1
-        Number that selects every ``thin``-th row. Rows are selected after the filter.
+        Thinning factor. After the filter, every ``thin``-th row is kept.
     filter : str, default: ""
         Filter that is applied to friction, for example ``"mean 1 s"`` (running mean centred at each
         row), ``"trailing_mean 1 s"``, ``"first_order 2 Hz"``, ``"butterworth_2 2 Hz"`` or
-        ``"butterworth_4 2 Hz"``. `rsfstudy.fit` applies the same filter to the model. Rows without
-        a complete averaging time are left out.
+        ``"butterworth_4 2 Hz"``. `rsfstudy.fit` applies the same filter to the model. Rows whose
+        averaging interval extends beyond the record are removed.
 
     Returns
     -------
@@ -165,7 +165,7 @@ def _convert_to_record_units(name: str, found: ColumnsOfSource) -> np.ndarray:
 
 
 def _check_required_columns(found: ColumnsOfSource) -> None:
-    """Raise ``InvalidValue`` if columns are missing that every record needs."""
+    """Raise ``InvalidValue`` if a required column of a record is missing."""
     names, table = found.columns, found.table
     moved = {"displacement", "slip"} & {*names}
     rubbed = {"friction", "shear_stress"} & {*names}
@@ -181,7 +181,7 @@ def _check_required_columns(found: ColumnsOfSource) -> None:
 def _add_derived_columns(
     record_values: dict[str, np.ndarray], normal_stress: Any, stiffness: Any
 ) -> None:
-    """Add a stated normal stress, friction, and load point displacement from slip."""
+    """Add the columns normal stress, friction and load point displacement."""
     if normal_stress is not None and "normal_stress" not in record_values:
         stated = convert_to_si("normal_stress", normal_stress, "Pa")
         record_values["normal_stress"] = np.full(len(record_values["time"]), stated)

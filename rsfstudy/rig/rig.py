@@ -96,9 +96,9 @@ class Rig(HtmlTableMixin):
     reference_temperature : quantity, optional
         Absolute temperature :math:`T_*` of steady sliding at :math:`V_*` in K.
     heat_loss_width : quantity, optional
-        Width :math:`w_h` from which heat flows out, in m. The default is the width of the shear
-        zone. If heat flows through rock with the thickness :math:`L` on each side, use
-        :math:`w_h = \sqrt{w L/2}`.
+        Effective width :math:`w_h` of the heat loss in m, which determines the cooling rate. The
+        default is the width of the shear zone. If heat flows through rock with the thickness
+        :math:`L` on each side, use :math:`w_h = \sqrt{w L/2}`.
     direct_activation_energy, evolution_activation_energy : quantity, optional
         Activation energies :math:`Q_a` and :math:`Q_b` of the direct effect and of the evolution
         effect in J/mol.
@@ -111,7 +111,7 @@ class Rig(HtmlTableMixin):
     InvalidValue
         If a value is not a quantity, if a value is not positive, if units are incompatible, if both
         mass and period are given, if a mass is given without a stiffness, if only one of shear
-        modulus and density is given, or if a quantity of shear heating is missing.
+        modulus and density is given, or if a quantity that shear heating requires is missing.
 
     Notes
     -----

@@ -72,7 +72,7 @@ RIG_QUANTITIES: Mapping[str, RigQuantity] = {
         "Pa/K", 1e3, 1e8, r"$\Lambda_p$", "undrained pore pressure over temperature"
     ),
 }
-#: Quantities that shear heating needs, and further quantities of heat.
+#: Quantities that shear heating requires, and optional quantities for shear heating.
 HEAT_QUANTITIES = (
     "thermal_diffusivity", "heat_capacity", "shear_zone_width", "reference_temperature"
 )  # fmt: skip
@@ -212,7 +212,7 @@ def check_rig_quantities_are_consistent(rig_values: Mapping[str, Any]) -> None:
     ------
     InvalidValue
         If both mass and period are given, if a mass is given without a stiffness, if only one of
-        shear modulus and density is given, or if a quantity of shear heating is missing.
+        shear modulus and density is given, or if a quantity that shear heating requires is missing.
     """
     if "mass" in rig_values and "period" in rig_values:
         rule = f"give mass or period (here {rig_values['period']:g} s), not both"
@@ -270,7 +270,7 @@ def in_display_units(
 def derive_scene_fields_from_rig(
     rig_values: Mapping[str, Any], *, with_heat: bool = True
 ) -> dict[str, Any]:
-    """Compute the scene fields that a rig determines.
+    """Compute the scene fields that follow from the rig quantities.
 
     Parameters
     ----------

@@ -83,7 +83,7 @@ class LatticeScenesOnRig:
                     raise InvalidValue(along.dimension, dict(row), rule, remedy="State it.")
 
     def _derive_fields(self, rig_values: Mapping[str, Any]) -> dict[str, Any]:
-        """Compute the fields that the rig determines, without heat if the base ignores it."""
+        """Compute scene fields from the rig, without heat if the base has no heat."""
         hot = self.base_scene.parts.temperature.name != "isothermal"
         return derive_scene_fields_from_rig(rig_values, with_heat=hot)
 

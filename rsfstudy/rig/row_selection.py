@@ -19,7 +19,8 @@ from rsfstudy.rig.units import (
     split_number_and_units,
 )
 
-#: Kinds of quantities that limit the rows, by the exponents of units (see ``units``).
+#: Columns that may limit the rows, indexed by the exponents of their units (see the module
+#: ``units``).
 _COLUMN_BY_EXPONENTS: Mapping[tuple[int, ...], str] = {
     (0, 0, 1, 0, 0): "time",
     (0, 1, 0, 0, 0): "displacement",
@@ -38,17 +39,18 @@ class RowSelection:
     rows : (int, int), optional
         Numbers of the first and the last row, counted from 1. By default, all rows are read.
     begin, end : quantity, optional
-        Time or load point displacement of the first and the last row, such as "100 s" or "2 mm". A
-        number is a time in s.
+        Time or load point displacement at which the selected rows begin and end, such as "100 s" or
+        "2 mm". A number is a time in s.
     thin : int, default: 1
-        Distance of the rows that remain. Each ``thin``-th row remains after the filter.
+        Thinning factor. After the filter, every ``thin``-th row is kept.
     filter : str, default: ""
-        Filter of friction or stress with its size, such as "mean 1 s" or "butterworth_2 2 Hz".
+        Filter for friction or stress with its averaging time or corner frequency, such as
+        "mean 1 s" or "butterworth_2 2 Hz".
 
     Raises
     ------
     InvalidValue
-        If an option has another type, or if the filter is unknown.
+        If the type of an option is wrong, or if the filter is unknown.
     """
 
     rows: Sequence[int] | None = None
@@ -107,7 +109,7 @@ class RowSelection:
         return cut, [f"rows {first + 1} to {last} of {count}"]
 
     def _find_row(self, name: str, limit: Any, columns: Mapping[str, Column]) -> int:
-        """Return the index of the first row, or the index after the last row."""
+        """Convert a limit to the index of the first row, or to the end index."""
         if isinstance(limit, bool) or not isinstance(limit, int | float | str):
             raise InvalidValue(name, limit, "is no time or displacement", remedy=_REMEDY_FOR_LIMITS)
         text = limit if isinstance(limit, str) else f"{limit!r} s"
@@ -135,7 +137,7 @@ class RowSelection:
     def smooth(
         self, columns: Mapping[str, np.ndarray], filtered_names: Sequence[str]
     ) -> tuple[dict[str, np.ndarray], list[str]]:
-        """Filter friction or stress, and keep each ``thin``-th row.
+        """Filter friction or stress, and keep every ``thin``-th row.
 
         Parameters
         ----------
@@ -147,14 +149,16 @@ class RowSelection:
         Returns
         -------
         columns : dict of str to ndarray
-            Filtered and thinned columns. Rows without a complete averaging time are left out.
+            Filtered and thinned columns. Rows whose averaging interval extends beyond the record
+            are removed.
         processing : list of str
             Descriptions of the filter and of the thinning.
 
         Raises
         ------
         InvalidValue
-            If the record has no time, or if the filter does not fit the sampling intervals.
+            If the record has no time, or if the filter is not compatible with the sampling
+            intervals.
         """
         found, processing = dict(columns), []
         if chosen := parse_filter(self.filter):
@@ -186,7 +190,8 @@ def parse_filter(text: str) -> Filter | None:
     Parameters
     ----------
     text : str
-        Kind of filter and its size, such as "mean 1 s" or "butterworth_2 2 Hz".
+        Kind of filter, and averaging time or corner frequency, such as "mean 1 s" or
+        "butterworth_2 2 Hz".
 
     Returns
     -------
@@ -196,7 +201,7 @@ def parse_filter(text: str) -> Filter | None:
     Raises
     ------
     InvalidValue
-        If the kind is unknown, or if the size has other units.
+        If the kind is unknown, or if the units are not units of time or frequency.
     """
     if not text:
         return None

@@ -1,4 +1,4 @@
-"""Tables of numbers with units, from files.
+"""Reading of tables of numbers with units from files.
 
 `read_table` is the main function.
 """
@@ -34,7 +34,7 @@ def read_table(
     r"""Read columns of a CSV file or of a text file.
 
     The columns may be separated by commas, semicolons, tabs or blanks. Files in other formats are
-    read as by `rsfstudy.read_record`.
+    read with the same readers as in `rsfstudy.read_record`.
 
     Parameters
     ----------
@@ -43,9 +43,9 @@ def read_table(
     columns : mapping of str to (str, str) or str, optional
         Heading and units of each column, for example ``{"time": ("t", "s")}`` or ``{"time": "t
         (s)"}``. By default, all columns are read, and the first line must contain their names and
-        units, as in ``velocity (um/s), distance (um)``. You can also pass a function with two
-        arguments, a list of headings and a description of the location of the headings. The
-        function must return a mapping of column names to column selections.
+        units, as in ``velocity (um/s), distance (um)``. You can also pass a function that takes two
+        arguments: the list of headings, and a string that describes the location of the headings.
+        The function must return a mapping of column names to column selections.
     decimal : {".", ","}, default: "."
         Decimal separator of a text file.
 

@@ -349,7 +349,7 @@ def _convert_pint_quantity(quantity_name: str, value: Any, quantity: Any, units:
 
 
 def find_size_of_units(units: str) -> SiFactorAndExponents | None:
-    """Return the conversion factor and the kind of units that need no pint.
+    """Return the conversion factor and the exponents of common units.
 
     Parameters
     ----------

@@ -1,6 +1,6 @@
-"""Selection of the columns of records by their usual headings.
+"""Selection of record columns by common headings.
 
-The questions ``read_record``, ``events`` and ``history`` need different columns of the same files.
+The functions ``read_record``, ``events`` and ``history`` use different columns of the same files.
 """
 
 from __future__ import annotations
@@ -30,16 +30,16 @@ UNITS_AND_FACTORS_OF_RECORD_COLUMNS = {
 }
 #: Units of columns in the examples of error messages. Columns that are not listed are in MPa.
 _USUAL_UNITS = {"time": "s", "displacement": "um", "slip": "um", "velocity": "um/s"}
-#: Spellings of units without dimension.
+#: Spellings of the unit of dimensionless columns.
 _NO_UNITS = ("1", "-", ".", "none")
-#: For each column, the columns that replace it.
+#: Columns that can replace a column, indexed by the name of the replaced column.
 _ALTERNATIVES = {
     "displacement": "slip",
     "slip": "displacement",
     "friction": "shear_stress",
     "shear_stress": "friction",
 }
-#: For each column, the pattern that matches the start of common headings.
+#: Patterns that match the start of common headings, indexed by column name.
 _PATTERNS_OF_USUAL_HEADINGS = {
     "time": r"t(ime)?\b|time|zeit|temps|tiempo|tempo",
     "displacement": r"(load.*)?disp|lp(\b|_?disp)|l\.?p\.? disp|load.?point",
@@ -53,16 +53,16 @@ _PATTERNS_OF_USUAL_HEADINGS = {
 
 
 class UsableColumns(NamedTuple):
-    """Columns that a question can use.
+    """Columns that a function for records can use.
 
     Parameters
     ----------
     names : tuple of str
-        Names of the columns, in the order in which they are found by their headings. A column is
-        not searched if a column that replaces it was found before: ``slip`` replaces
-        ``displacement``, and ``shear_stress`` replaces ``friction``, and conversely.
+        Names of the columns, in the order of the search. The function searches the headings for
+        each column. ``slip`` and ``displacement`` replace each other, and so do ``shear_stress``
+        and ``friction``. If one column of a pair has been found, the other column is not searched.
     shear_stress_suffices : bool, default: False
-        If True, ``normal_stress`` is not searched if ``shear_stress`` was found.
+        If True and ``shear_stress`` has been found, ``normal_stress`` is not searched.
     """
 
     names: tuple[str, ...]
@@ -87,7 +87,7 @@ def find_factor_to_record_units(column_name: str, units: str) -> float:
     Raises
     ------
     InvalidValue
-        If the units do not fit the column.
+        If the units are not compatible with the column.
     """
     si, ours = UNITS_AND_FACTORS_OF_RECORD_COLUMNS[column_name]
     if not units:
@@ -100,7 +100,7 @@ def find_factor_to_record_units(column_name: str, units: str) -> float:
 def read_selected_columns(
     table: Table, selected_columns: Mapping[str, Any] | None, usable: UsableColumns
 ) -> dict[str, Column]:
-    """Read the columns that the user selected, and usable columns with usual headings.
+    """Read the selected columns, and usable columns with common headings.
 
     Parameters
     ----------
@@ -110,7 +110,7 @@ def read_selected_columns(
         Heading and units of columns by name. If the value is None and the arrays in memory have no
         units, all columns are read.
     usable : UsableColumns
-        Columns that the question can use.
+        Columns that the function can use.
 
     Returns
     -------
@@ -120,8 +120,8 @@ def read_selected_columns(
     Raises
     ------
     InvalidValue
-        If a column is unknown to the question, if a selected column does not exist, if several
-        columns have usual headings of a usable column, or if a column has no units.
+        If the name of a column is unknown, if a selected column does not exist, if the headings of
+        several columns match the same usable column, or if a column has no units.
     """
     for name in selected_columns or ():
         _check_column_name(name, usable.names)
@@ -173,7 +173,7 @@ def _read_column_with_units(
 
 
 def has_time_column(source: Any) -> bool:
-    """Return True if a table has a column with a usual heading for time.
+    """Return True if a table has a column with a common heading for time.
 
     Parameters
     ----------
@@ -183,13 +183,13 @@ def has_time_column(source: Any) -> bool:
     Returns
     -------
     bool
-        True if the table is a record. Protocols have durations or distances in place of times.
+        True if the table is a record. A protocol contains durations or distances instead of times.
     """
     return bool(_find_usual_heading("time", read_source(source)))
 
 
 def _find_usual_heading(column_name: str, table: Table) -> dict[str, str]:
-    """Find the column with a usual heading for a quantity.
+    """Find the column with a common heading for a quantity.
 
     If several headings match, headings with compatible units take precedence. Among headings with
     compatible units, a heading that is equal to the name of the quantity takes precedence. The
@@ -226,7 +226,7 @@ def _has_compatible_units(column_name: str, units: str) -> bool:
 
 
 def missing_columns_error(table: Table, rule: str) -> InvalidValue:
-    """Return the error for a table in which required columns were not found.
+    """Return the error for a table without the required columns.
 
     Parameters
     ----------

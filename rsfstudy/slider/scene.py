@@ -53,7 +53,7 @@ class Scene(SceneFunctions, SceneQuantities):
     scene is immutable, and its values are checked when it is created. Quantities are dimensionless,
     with stress in :math:`\sigma_*`, slip in :math:`D_c`, time in :math:`D_c/V_*` and slip rate in
     :math:`V_*`. The method ``as_dict``, which returns the values of the fields, is inherited from
-    ``SceneBase`` in ``slider.scene_assembly``.
+    ``SceneBase`` in ``slider.scene_base``.
 
     Parameters
     ----------
@@ -62,18 +62,20 @@ class Scene(SceneFunctions, SceneQuantities):
         ``rsfstudy.slider.laws``, or a user-defined class. The fields of a user-defined class become
         fields of the scene.
     normal_stress : str or type, default: "variable"
-        Normal stress condition. "constant" is constant normal stress. "imposed" is the normal
-        stress that the loading imposes. "variable" is normal stress coupled to shear stress by a
-        driving stress that is inclined at the angle ``phi``. A user-defined class is also accepted.
+        Normal stress condition. With "constant", normal stress is constant. With "imposed", the
+        loading determines the normal stress. With "variable", the driving stress is inclined at the
+        angle ``phi``, and normal stress changes with shear stress. A user-defined class is also
+        accepted.
     fluid : str or type, default: "drained"
-        Pore fluid. "drained" is constant pore pressure. With "dilatant", pore pressure falls when
-        the slip rate increases. With "thermal", pore pressure rises when the fault heats up. A
+        Pore fluid. With "drained", pore pressure is constant. With "dilatant", pore pressure falls
+        when the slip rate increases. With "thermal", pore pressure rises when the fault heats up. A
         user-defined class is also accepted. Stress is normalised by the effective normal stress of
-        steady sliding at :math:`V_*`. Pore pressure is measured from the pressure of the
-        surroundings, which is also its initial value and which a history of pore pressure changes.
+        steady sliding at :math:`V_*`. Pore pressure is relative to the pressure of the surroundings
+        before the loading. The pore pressure is initially equal to the pressure of the
+        surroundings, which can be changed by a history of pore pressure.
     temperature : str or type, default: "isothermal"
-        Temperature. "isothermal" is constant temperature. With "shear_heating", the work of the
-        shear stress heats the fault. A user-defined class is also accepted.
+        Temperature. With "isothermal", temperature is constant. With "shear_heating", the work of
+        the shear stress heats the fault. A user-defined class is also accepted.
     a : float, default: 0.0145
         Direct effect parameter.
     mu_star : float, default: 0.76
@@ -94,7 +96,7 @@ class Scene(SceneFunctions, SceneQuantities):
         Threshold of instability. A motion is unstable if :math:`V T/(2 \pi D_c)` reaches the
         threshold.
     initial_stress : float, default: 0.0
-        Initial shear stress, measured from the stress of steady sliding at :math:`V_*`, in
+        Initial shear stress minus the shear stress of steady sliding at :math:`V_*`, in
         :math:`\sigma_*`. The initial stress applies before the first step of the loading.
     initial_state : float, default: 0.0
         Initial state variable :math:`\Theta`, which is zero in steady sliding at :math:`V_*`.
@@ -117,9 +119,10 @@ class Scene(SceneFunctions, SceneQuantities):
     weakening_velocity_ratio : float, default: 1e5
         Weakening velocity :math:`V_w/V_*` of the law with flash heating.
     weakened_friction : float, default: 0.2
-        Friction coefficient far above the weakening velocity.
+        Friction coefficient at slip rates far above the weakening velocity.
     weakening_exponent : float, default: 8.0
-        Sharpness of the transition at the weakening velocity.
+        Exponent :math:`n` of the law with flash heating. With a larger exponent, the transition at
+        the weakening velocity is sharper.
     b1_over_a : float, default: 1.0
         Ratio :math:`b_1/a` of the first state, for laws with two states. Laws with two states do
         not have the field ``b_over_a``. Negative values are allowed.
@@ -147,9 +150,10 @@ class Scene(SceneFunctions, SceneQuantities):
     inertia : bool, default: False
         If True, the slider has mass.
     radiation_damping : float, default: 0.0
-        Damping coefficient :math:`\eta V_*/\sigma_*`, the stress that seismic waves radiate at
-        :math:`V_*`. A scene has either inertia or radiation damping. The impedance of spring and
-        mass is the stiffness, multiplied by :math:`T V_*/(2 \pi D_c)`.
+        Damping coefficient :math:`\eta V_*/\sigma_*`, which is the damping stress due to seismic
+        waves at :math:`V_*`. A scene has either inertia or radiation damping. A slider with inertia
+        corresponds to a damping coefficient of the stiffness, multiplied by
+        :math:`T V_*/(2 \pi D_c)`.
     oscillation_amplitude : float, default: 0.0
         Amplitude of an oscillation of imposed normal stress in :math:`\sigma_*`. If the driving
         stress is inclined, :math:`\sigma_3` oscillates. The field does not apply to constant normal
@@ -197,9 +201,10 @@ class Scene(SceneFunctions, SceneQuantities):
     displacement_between_steps : float, default: 20.0
         Load point displacement between successive velocity steps in :math:`D_c`.
     heating : float, default: 1e-3
-        Relative rise of absolute temperature by a slip of :math:`D_c` at unit shear stress.
+        Rise of the absolute temperature, relative to :math:`T_*`, due to a slip of :math:`D_c` at a
+        shear stress of :math:`\sigma_*` without cooling.
     cooling : float, default: 1.0
-        Cooling rate :math:`c_{th} D_c/V_*` of a fault with shear heating.
+        Cooling rate :math:`c_{th} D_c/V_*`, for scenes with shear heating.
     direct_activation, evolution_activation : float, default: 0.0
         Activation terms :math:`Q/(R T_*)` of the direct effect and of the evolution effect.
     dynamics : type, optional

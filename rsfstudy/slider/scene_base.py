@@ -30,7 +30,7 @@ from rsfstudy.slider.scene_assembly import (
 from rsfstudy.slider.scene_caching import cached_attribute
 from rsfstudy.slider.slider_parameters import ALTERNATIVE_STIFFNESS_FIELDS
 
-#: Names of scene attributes that ``dir`` does not list, because only the package uses them.
+#: Names of internal scene attributes, which ``dir`` does not list.
 _ATTRIBUTES_HIDDEN_FROM_DIR = frozenset(
     {
         "field_index",
@@ -111,8 +111,8 @@ class SceneBase(HtmlTableMixin):
     def as_dict(self) -> dict[str, Any]:
         """Return the fields as plain Python values.
 
-        The fields do not include a slot with its default, such as an isothermal temperature, if
-        the slot was added after the first file format.
+        Some slots, such as ``temperature``, did not exist in the first file format. If such a slot
+        has its default value, the dictionary does not contain the slot.
 
         Returns
         -------
@@ -184,9 +184,9 @@ class SceneBase(HtmlTableMixin):
     def with_(self, **changes: Any) -> Self:
         """Return a copy of the scene with new values of some fields.
 
-        The method checks the new values. If a change replaces a part, the copy does not have the
-        fields of the previous part that the new part lacks. If you set ``stiffness``, the copy has
-        no ``stiffness_ratio``, and vice versa.
+        The method checks the new values. If a change replaces a part of the scene, fields that do
+        not exist in the new part are dropped. If you set ``stiffness``, the copy has no
+        ``stiffness_ratio``, and vice versa.
 
         Parameters
         ----------

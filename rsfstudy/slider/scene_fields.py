@@ -1,6 +1,6 @@
-"""Fields of scenes: names, quantities, types, defaults and checks, in one object.
+"""Names, quantities, types, defaults and checks of scene fields.
 
-Other packages read about the fields of scenes through the class ``SceneFields``. The functions are
+The class ``SceneFields`` is the interface to the scene fields for other packages. The functions are
 defined in the modules ``part_registry``, ``scene_assembly`` and ``field_name_hints``.
 """
 
@@ -22,14 +22,14 @@ class SceneFields:
     NAMES = part_registry.SCENE_FIELD_NAMES
     QUANTITIES = part_registry.SCENE_FIELD_QUANTITIES
     TYPES = part_registry.SCENE_FIELD_TYPES
-    #: Fields whose values are parts, and fields that select a part by their values.
+    #: Fields whose values are parts, and fields that determine which part is used.
     SLOT_NAMES = part_registry.SLOT_NAMES
     SELECTING_A_PART = part_registry.PART_SELECTING_FIELDS
-    #: Slots of a scene, with the parts that fill them.
+    #: Slots of a scene, and the available parts for each slot.
     SLOTS = part_registry.SLOTS
     #: Values that are omitted from stored scenes.
     OMITTED_DEFAULTS = part_registry.OMITTED_DEFAULTS
-    #: Fields of which a scene has at most one, because each determines the stiffness.
+    #: Alternative fields for the stiffness. A scene has at most one of these fields.
     ALTERNATIVE_STIFFNESS = slider_parameters.ALTERNATIVE_STIFFNESS_FIELDS
 
     names_of_part = staticmethod(parts.field_names)

@@ -1,7 +1,7 @@
 """Methods of scenes: equations of motion, steady sliding and stability.
 
-The methods are functions of other modules whose first argument is a scene. Modules below ``scene``
-call the functions directly, because they cannot import the class ``Scene``.
+The methods are functions of other modules whose first argument is a scene. Modules that ``scene``
+imports call the functions directly, because they cannot import the class ``Scene``.
 """
 
 from __future__ import annotations
@@ -55,5 +55,5 @@ class SceneFunctions:
     largest_linear_growth_rate = stability.largest_linear_growth_rate
 
     def __dir__(self) -> list[str]:
-        """Return the public attributes without the methods of this class."""
+        """Return the public attributes, except for the methods of this class."""
         return [name for name in super().__dir__() if name not in vars(SceneFunctions)]

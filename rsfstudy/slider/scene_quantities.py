@@ -41,7 +41,7 @@ class SceneQuantities(SceneBase):
 
     @cached_attribute
     def pressure_source(self) -> Fluid | Loading | FluidWithBoundaryPressure:
-        """Part with an unknown that changes the effective normal stress.
+        """Part whose unknowns change the effective normal stress.
 
         If the loading has unknowns, the pressure source is the loading. Otherwise, the pressure
         source is the fluid. If both the loading and the fluid have unknowns, the pressure source

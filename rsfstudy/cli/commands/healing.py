@@ -34,7 +34,7 @@ class HealingResult(CommandResult):
     table : xarray.Dataset
         Table of the holds.
     stiffness : xarray.Dataset
-        Stiffness that is measured in the record.
+        Stiffness of the machine, measured in the record.
     files : sequence of Path
         Figure and data file.
     """
@@ -46,7 +46,7 @@ class HealingResult(CommandResult):
 
     @property
     def exit_status(self) -> int:
-        """Failure if no hold has a peak of friction on reloading."""
+        """Return a failure status if no hold has a peak of friction on reloading."""
         has_peak = bool(self.table["healing"].notnull().any())
         return EXIT_STATUS_OK if has_peak else EXIT_STATUS_FAILED
 

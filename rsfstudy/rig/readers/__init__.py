@@ -1,8 +1,9 @@
 """Readers of tables in files and in memory.
 
-Each module of the package reads a family of formats. A reader consists of two functions: the first
-function recognises a source by its first bytes or by its type, and the second function converts the
-source to a ``Table``. To add a format, write the two functions, and add them to ``READERS``.
+Each module of this package reads one group of file formats. A reader consists of two functions: the
+first function recognises a source by its first bytes or by its type, and the second function
+converts the source to a ``Table``. To add a format, write the two functions, and add them to
+``READERS``.
 """
 
 from __future__ import annotations
@@ -58,7 +59,7 @@ def read_source(origin: Any, *, decimal: str = ".", sheet: str = "") -> Table:
     decimal : {".", ","}, default: "."
         Decimal separator of text files.
     sheet : str, default: ""
-        Sheet of a workbook, or group of a TDMS file. By default, the first one is read.
+        Sheet of a workbook, or group of a TDMS file. By default, the first sheet or group is read.
 
     Returns
     -------
@@ -70,7 +71,7 @@ def read_source(origin: Any, *, decimal: str = ".", sheet: str = "") -> Table:
     DataError
         If the file does not exist or cannot be read, or if its format is unknown.
     InvalidValue
-        If the object has another type, or if the decimal separator is unknown.
+        If the type of the object is not supported, or if the decimal separator is unknown.
     """
     if decimal not in (".", ","):
         raise InvalidValue("decimal", decimal, "is unknown", choices=(".", ","))

@@ -41,7 +41,8 @@ def read_arrays(source: Source) -> Table:
     Parameters
     ----------
     source : Source
-        Arrays by heading. If no heading contains units, the arrays have the default units.
+        Mapping of headings to arrays, or DataFrame. If no heading contains units, the arrays are in
+        the default units.
 
     Returns
     -------
@@ -186,7 +187,7 @@ def _build_table(source: Any, keys: list[Any], headings: list[str]) -> Table:
 
 
 def _to_floats_and_units(column_name: str, values: Any) -> tuple[np.ndarray, str]:
-    """Convert an array to floats, and return the units that its type implies.
+    """Convert an array to floats, and return the units that follow from its type.
 
     Masked values become NaN. Times are converted to seconds. Dates are converted to seconds since
     the first date.

@@ -14,14 +14,15 @@ from typing import Any
 from rsfstudy.errors import DataError
 from rsfstudy.rig.readers.source import Source
 
-#: Functions that open a compressed file, by the first bytes of the file.
+#: Functions that open compressed files, indexed by the first bytes of the file.
 _OPENERS: dict[bytes, Callable[[Any], Any]] = {
     b"\x1f\x8b": gzip.open,
     b"BZh": bz2.open,
     b"\xfd7zXZ\0": lzma.open,
 }
-#: Maximum number of decompressed bytes, and of decompressed bytes per compressed byte. The second
-#: limit applies to files that are longer than a mebibyte after decompression.
+#: Maximum number of bytes after decompression, and maximum ratio of the sizes after and before
+#: decompression. The maximum ratio applies only to files that are longer than a mebibyte after
+#: decompression.
 _MAX_DECOMPRESSED_BYTES, _MAX_COMPRESSION_RATIO = 2**31, 200
 _MIN_BYTES_OF_RATIO = 2**20
 
@@ -37,8 +38,8 @@ def is_compressed(source: Source) -> bool:
     Returns
     -------
     bool
-        True if the reader can decompress the file. The content of a compressed file is not
-        decompressed again.
+        True if the reader can decompress the file. If a compressed file contains another compressed
+        file, only the outer file is decompressed.
     """
     return source.content is None and source.signature.startswith((*_OPENERS,))
 
@@ -59,7 +60,7 @@ def decompress(source: Source) -> Source:
     Raises
     ------
     DataError
-        If the file is damaged, or if the content is much larger than a text would be.
+        If the file is damaged, or if the decompressed content exceeds the limits of size.
     """
     data = source.read_bytes()
     opener = next(of for mark, of in _OPENERS.items() if data.startswith(mark))

@@ -1,7 +1,7 @@
 """Numeric arrays in MATLAB files of versions 5 to 7.
 
-The functions check all lengths. ``scipy.io.loadmat`` would read the same files, but a damaged file
-can crash the interpreter there.
+The functions check all lengths in the file. They are used in place of ``scipy.io.loadmat``, because
+a damaged file can crash the Python interpreter in ``scipy.io.loadmat``.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-#: Types of numbers by the type code of a data element.
+#: Types of numbers, indexed by the type codes of data elements.
 _NUMBER_TYPES = {
     1: "i1", 2: "u1", 3: "i2", 4: "u2", 5: "i4", 6: "u4", 7: "f4", 9: "f8", 12: "i8", 13: "u8",
 }  # fmt: skip
@@ -21,7 +21,7 @@ _MATRIX, _COMPRESSED = 14, 15
 #: Class codes of structures and of numeric arrays.
 _STRUCTURE, _NUMERIC_CLASSES = 2, range(6, 16)
 _HEADER_BYTES, _TAG_BYTES = 128, 8
-#: Limits of nested structures and of decompressed bytes.
+#: Maximum depth of nested structures, and maximum number of decompressed bytes.
 _MAX_DEPTH, _MAX_DECOMPRESSED_BYTES = 4, 2**31
 
 
@@ -43,8 +43,8 @@ def read_numeric_arrays(data: bytes) -> dict[str, np.ndarray]:
     Returns
     -------
     dict of str to ndarray
-        Arrays by the names of their variables. Fields of structures have names such as
-        ``data.time``. Other variables are left out.
+        Arrays by variable name. Fields of structures have names such as ``data.time``. Variables
+        that are not numeric are ignored.
 
     Raises
     ------
@@ -78,7 +78,7 @@ def _decompress(content: bytes) -> bytes:
 def _split_elements(data: bytes, order: str) -> Iterator[_Element]:
     """Yield the data elements in a sequence of bytes.
 
-    The end of the last element need not be padded.
+    The last element may lack the padding at its end.
     """
     start = 0
     while start + _TAG_BYTES <= len(data):
@@ -121,7 +121,8 @@ def _read_matrix(element: _Element, order: str, prefix: str) -> dict[str, np.nda
 def _read_structure(parts: list[_Element], order: str, name: str) -> dict[str, np.ndarray]:
     """Read the numeric arrays in the fields of a structure.
 
-    The elements are flags, dimensions, name, length of field names, field names, and fields.
+    A structure consists of the following elements: flags, dimensions, name, length of the field
+    names, field names, and fields.
     """
     if len(parts) < 5 or len(parts[3].content) < 4:
         raise ValueError(f"the structure {name!r} has no fields")

@@ -15,7 +15,7 @@ from rsfstudy.rig.readers.missing_libraries import missing_library_error
 from rsfstudy.rig.readers.source import Source, Table, build_table_of_arrays
 
 _SIGNATURE_5, _SIGNATURE_7_3 = b"MATLAB 5.0", b"MATLAB 7.3"
-#: Maximum number of nested structures, and of columns of a matrix.
+#: Maximum depth of nested structures, and maximum number of columns of a matrix.
 _MAX_DEPTH, _MAX_COLUMNS = 4, 200
 
 
@@ -49,12 +49,13 @@ def read_matlab(source: Source) -> Table:
     Returns
     -------
     Table
-        Columns of the longest length that several arrays have.
+        Columns of equal length. If the arrays differ in length, the longest length that several
+        arrays share is used.
 
     Raises
     ------
     DataError
-        If the file is damaged, or if h5py is needed and not installed.
+        If the file is damaged, or if the file requires h5py and h5py is not installed.
     InvalidValue
         If the file contains no numeric arrays.
     """

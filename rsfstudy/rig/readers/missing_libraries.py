@@ -7,16 +7,16 @@ from rsfstudy.rig.readers.source import Source
 
 
 def missing_library_error(source: Source, format_name: str, extra: str, library: str) -> DataError:
-    """Return the error for a file that an optional library reads.
+    """Return the error for a file that requires an uninstalled library.
 
     Parameters
     ----------
     source : Source
         File.
     format_name : str
-        Name of the format with its article.
+        Name of the format with an indefinite article.
     extra : str
-        Name of the optional dependency of rsfstudy.
+        Name of the optional dependency group (extra) of rsfstudy.
     library : str
         Name of the library.
 

@@ -18,7 +18,7 @@ from rsfstudy.errors import DataError, InvalidValue
 from rsfstudy.rig.columns import HEADING_PATTERN, Column, ColumnSpec, check_heading_lengths
 from rsfstudy.rig.units import find_size_of_units
 
-#: Number of bytes at the beginning of a file by which its format is recognised.
+#: Number of bytes at the beginning of a file that are used to recognise the format.
 _BYTES_OF_FILE_SIGNATURE = 8192
 
 
@@ -33,8 +33,8 @@ class Source:
     decimal : {".", ","}, default: "."
         Decimal separator of text files.
     sheet : str, default: ""
-        Name of a part of the file: a sheet of a workbook, or a group of a TDMS file. If the string
-        is empty, the first part is read.
+        Name of a sheet of a workbook, or name of a group of a TDMS file. If the string is empty,
+        the first sheet or group is read.
     content : bytes, optional
         Bytes of the file. By default, the bytes are read from the path. Readers of compressed files
         pass the decompressed bytes.
@@ -92,7 +92,7 @@ class Source:
 
 @dataclass(frozen=True, eq=False)
 class Table:
-    """Columns of a source, whose numbers are converted when a column is selected.
+    """Columns of a source, which are converted to numbers when selected.
 
     Parameters
     ----------
@@ -101,15 +101,16 @@ class Table:
     location : str
         Location of the headings for error messages.
     load_values : callable
-        Function that converts the numbers of a column. Its arguments are the index of the column
-        and the name of the quantity. It returns a ``Column``. The units of the column are empty
-        unless the type of the numbers implies the units.
+        Function that converts the numbers of a column. The function takes the index of the column
+        and the name of the quantity, and returns a ``Column``. The units of the column are an empty
+        string unless the units follow from the type of the numbers.
     has_headings : bool, default: True
         False if the columns have no headings. In this case, the headings are numbers from 1.
     default_units : bool, default: False
-        True if no column has units, so that the columns have the default units of the question.
+        True if no column has units. The columns are then in the default units.
     has_only_columns : bool, default: False
-        True if all headings have to be names of columns that the question can use.
+        True if an unknown heading is an error, because each heading must be the name of a usable
+        column.
 
     Raises
     ------
@@ -126,7 +127,7 @@ class Table:
     _indices: dict[str, list[int]] = field(default_factory=dict, init=False)
 
     def __post_init__(self) -> None:
-        """Check the lengths of the headings, and index them with and without their units."""
+        """Check the lengths of the headings, and build the index of headings."""
         check_heading_lengths(self.headings, self.location)
         names: dict[str, list[int]] = {}
         for index, heading in enumerate(self.headings):
@@ -190,8 +191,8 @@ class Table:
         quantity_name : str
             Name of the quantity for error messages.
         selection : ColumnSpec
-            Heading of the column with units, scale and offset. Units of the selection are used in
-            place of unknown or missing units in the file.
+            Heading of the column with units, scale and offset. If the units in the file are missing
+            or unknown, the units of the selection are used.
 
         Returns
         -------
@@ -220,7 +221,7 @@ class Table:
 
 
 def _differ_in_size(units: str, other_units: str) -> bool:
-    """Return True if known units of the same kind have different conversion factors."""
+    """Return True if two compatible units have different conversion factors."""
     one, other = find_size_of_units(units), find_size_of_units(other_units)
     return one is not None and other is not None and one[1] == other[1] and one[0] != other[0]
 

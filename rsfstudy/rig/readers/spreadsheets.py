@@ -19,17 +19,18 @@ from rsfstudy.rig.readers.text_layout import detect_layout
 from rsfstudy.rig.units import parse_number
 
 _ZIP_SIGNATURE, _OLE_SIGNATURE = b"PK\x03\x04", b"\xd0\xcf\x11\xe0\xa1\xb1\x1a\xe1"
-#: Files that a zip archive contains if it is a workbook.
+#: Names of files that identify a zip archive as a workbook.
 _FILES_OF_WORKBOOKS = ("xl/workbook.xml", "xl/workbook.bin", "content.xml")
-#: Libraries that read workbooks, with the name of the engine of pandas.
+#: Libraries that read workbooks, and the names of the corresponding pandas engines.
 _ENGINES = {"python_calamine": "calamine", "openpyxl": "openpyxl"}
-#: Endings of the names of workbooks. A damaged archive is recognised by its name.
+#: File name extensions of workbooks. The extension identifies a workbook if the zip archive is
+#: damaged.
 _ENDINGS_OF_WORKBOOKS = (".xlsx", ".xlsm", ".xlsb", ".ods")
 #: Maximum number of bytes of an unpacked workbook.
 _MAX_UNPACKED_BYTES = 2**31
-#: Number of rows in which the header is detected.
+#: Number of rows at the beginning of a sheet that are searched for the header.
 _ROWS_OF_HEAD = 1000
-#: Character that separates the cells of a row for the detection of the header.
+#: Character that joins the cells of a row to a line of text for the detection of the header.
 _MARK = "\t"
 
 
@@ -74,7 +75,7 @@ def read_workbook(source: Source) -> Table:
     DataError
         If no library for workbooks is installed, or if the file is damaged.
     InvalidValue
-        If the workbook has no sheet of the given name.
+        If the workbook has no sheet with the given name.
     """
     engines = [engine for library, engine in _ENGINES.items() if importlib.util.find_spec(library)]
     if not engines:
@@ -101,7 +102,7 @@ def read_workbook(source: Source) -> Table:
 def _list_archive(source: Source) -> list[tuple[str, int]]:
     """Return the names and the unpacked sizes of the files in a zip archive.
 
-    The list is empty if the file is no zip archive, or is damaged.
+    The list is empty if the file is damaged or is not a zip archive.
     """
     if not source.signature.startswith(_ZIP_SIGNATURE):
         return []

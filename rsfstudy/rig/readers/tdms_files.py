@@ -19,7 +19,7 @@ from rsfstudy.rig.readers.source import (
 )
 
 _SIGNATURE = b"TDSm"
-#: Properties of a channel with its units and its sampling interval.
+#: Names of the channel properties that contain the units and the sampling interval.
 _PROPERTIES_OF_UNITS = ("unit_string", "NI_UnitDescription", "units", "unit")
 _PROPERTY_OF_INTERVAL = "wf_increment"
 
@@ -60,7 +60,7 @@ def read_tdms(source: Source) -> Table:
     DataError
         If npTDMS is not installed, or if the file is damaged.
     InvalidValue
-        If the file has no group of the given name.
+        If the file has no group with the given name.
     """
     try:
         nptdms = importlib.import_module("nptdms")

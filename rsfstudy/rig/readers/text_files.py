@@ -25,24 +25,24 @@ from rsfstudy.rig.units import parse_number
 
 #: Characters of tables that pandas can parse.
 _CHARACTERS_OF_PLAIN_NUMERIC_TABLES = b"0123456789+-eE \t\r\n"
-#: Smallest number of bytes in which the layout of a file is detected. The detection continues to
-#: the end of the line.
+#: Number of bytes at the beginning of a file that are used to detect the layout. The last line is
+#: always used completely.
 _MIN_BYTES_OF_HEAD = 2**18
 #: Largest fraction of control characters in a text file.
 _MAX_FRACTION_OF_CONTROL_CHARACTERS = 0.01
 _CONTROL_CHARACTER_PATTERN = re.compile(rb"[\x00-\x08\x0e-\x1a\x1c-\x1f]")
-#: Byte order marks of UTF-16, and the encodings of UTF-16 without a byte order mark by the parity
-#: of the positions of zero bytes.
+#: Byte order marks of UTF-16. If a UTF-16 file has no byte order mark, the encoding depends on
+#: whether the zero bytes are at even or odd positions.
 _UTF_16_MARKS = (b"\xff\xfe", b"\xfe\xff")
 _UTF_16_ENCODINGS = ("utf-16-be", "utf-16-le")
 #: Options of pandas that convert decimal numbers to the nearest floating-point numbers. Newer
-#: versions of pandas do so by default.
+#: versions of pandas use the same conversion by default.
 _IS_EXACT_BY_DEFAULT = (*map(int, pd.__version__.split(".")[:2]),) >= (3, 1)
 _EXACT: dict[str, Any] = {} if _IS_EXACT_BY_DEFAULT else {"float_precision": "round_trip"}
 
 
 class _Rows(NamedTuple):
-    """Rows of a text file, as numbers or as fields.
+    """Rows of a text file, as numbers or as strings.
 
     Parameters
     ----------
@@ -50,7 +50,7 @@ class _Rows(NamedTuple):
         Numbers of all fields, as an array of shape (rows, columns), or None if a field is not a
         finite number.
     fields : list of list of str
-        Fields of each row if ``numbers`` is None.
+        Fields of each row as strings. This list is used if ``numbers`` is None.
     line_numbers : ndarray of int
         Line number of each row.
     """
@@ -137,7 +137,7 @@ def read_text(source: Source) -> Table:
 
 
 def _find_utf_16_encoding(head: bytes) -> str:
-    """Return the encoding of UTF-16 text without a byte order mark, or an empty string."""
+    """Detect the encoding of UTF-16 text without a byte order mark."""
     pairs = len(head) // 2
     for encoding, zeros, others in zip(
         _UTF_16_ENCODINGS, (head[::2], head[1::2]), (head[1::2], head[::2]), strict=True
@@ -168,8 +168,8 @@ def _convert_to_utf_8(data: bytes, name: str) -> bytes:
 def _read_plain_rows(data: bytes, layout: TextLayout, decimal: str) -> _Rows | None:
     """Read a table that contains only finite numbers and delimiters.
 
-    The function returns None if the table contains other characters. A table with other characters
-    has to be read line by line.
+    If the table contains other characters, the function returns None, and the table must be read
+    line by line.
     """
     start = _find_start_of_line(data, layout.body_line)
     delimiter = r"\s+" if layout.delimiter == BLANKS else layout.delimiter
@@ -203,7 +203,7 @@ def _find_start_of_line(data: bytes, line_number: int) -> int:
 
 
 def _read_fields(data: bytes, layout: TextLayout) -> _Rows:
-    """Read the fields of each row, without blank lines and comments."""
+    """Read the fields of each row, and skip blank lines and comments."""
     body = data[_find_start_of_line(data, layout.body_line) :].decode()
     first = layout.body_line
     found: list[list[str]] = []
@@ -251,7 +251,7 @@ class _FieldConverter(NamedTuple):
     quantity_name : str
         Name of the quantity for error messages.
     column : Column
-        Column whose location is used in error messages.
+        Column that provides the location of a field for error messages.
     decimal : {".", ","}
         Decimal separator.
     """

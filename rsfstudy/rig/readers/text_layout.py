@@ -1,8 +1,8 @@
 """Detection of the delimiter, the header and the first row of a text file.
 
 The detection compares the fields of the first lines. A line that contains mostly numbers is a row
-of the table. The header is the last line of text before the first row that has as many fields as
-the rows.
+of the table. The header is the last line of text that precedes the first row and has the same
+number of fields as the rows.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from rsfstudy.errors import InvalidValue
 from rsfstudy.rig.readers.source import merge_headings_with_units
 from rsfstudy.rig.units import find_size_of_units, parse_number
 
-#: Name of the delimiter of columns that are separated by one or more blanks.
+#: Delimiter of files in which one or more blanks separate the columns.
 BLANKS = " "
 #: First characters of comment lines.
 COMMENT_MARKS = ("#", "%")
@@ -28,7 +28,7 @@ _MAX_NUMBER_LENGTH = 50
 _SEPARATOR_LINE_PATTERN = re.compile(r'"?sep=(.)"?', re.IGNORECASE)
 _DECIMAL_COMMA_PATTERN = re.compile(r"[-+]?[0-9]*,[0-9]+(?:[eE][-+]?[0-9]+)?")
 _RULE_PATTERN = re.compile(r"[-=_+|* \t]{3,}")
-#: Names of units that are no known units of rsfstudy, but often stand below headings.
+#: Names of units that often occur below headings, although rsfstudy cannot convert them.
 _OTHER_UNITS = frozenset(
     ("", "-", ".", "1", "none", "v", "mv", "bit", "bits", "counts", "degc", "°c", "c", "hz", "nr")
 )
@@ -137,9 +137,9 @@ def detect_layout(lines: Sequence[str], decimal: str) -> TextLayout:
 
 
 def _find_separator_line(lines: Sequence[str]) -> tuple[int, str]:
-    """Return the number of lines before the table, and the delimiter that a line states.
+    """Return the number of lines before the table, and the declared delimiter.
 
-    The line ``sep=;`` is written by spreadsheet programs.
+    Spreadsheet programs declare the delimiter in a line such as ``sep=;``.
     """
     for number, line in enumerate(lines):
         if line.strip():
@@ -149,7 +149,7 @@ def _find_separator_line(lines: Sequence[str]) -> tuple[int, str]:
 
 
 def _is_row_of_numbers(fields: Sequence[str], decimal: str) -> bool:
-    """Return True if more than half of the fields that are not empty are numbers."""
+    """Return True if more than half of the non-empty fields are numbers."""
     texts = [text for text in fields if text]
     if decimal == ",":
         texts = [text if "." in text else text.replace(",", ".", 1) for text in texts]
@@ -188,7 +188,7 @@ def _find_header(
         if number >= first_line and (fields := _split_header(line, delimiter, size))
     ]
     whole = [(number, fields) for number, fields in texts if len(fields) == size]
-    # Comments and single words before a table without headings are no header.
+    # A comment or a single word before the table is not a header.
     whole = whole or [
         (number, fields)
         for number, fields in texts
@@ -206,9 +206,10 @@ def _find_header(
 
 
 def _split_header(line: str, delimiter: str, size: int) -> list[str]:
-    """Split a line of text into headings, if possible as many as the rows have fields.
+    """Split a line of text into headings.
 
-    The list is empty if the line contains no text or a number.
+    If possible, the number of headings equals the number of fields of a row. The list is empty if
+    the line contains no text, or if the line contains a number.
     """
     text = line.strip().lstrip("".join(COMMENT_MARKS)).strip()
     if not text or _RULE_PATTERN.fullmatch(text):
@@ -225,7 +226,7 @@ def _split_header(line: str, delimiter: str, size: int) -> list[str]:
 
 
 def _split_in_several_ways(text: str, delimiter: str) -> Iterator[list[str]]:
-    """Yield the fields of a header for several delimiters, beginning with the given one."""
+    """Split a header at several delimiters, beginning with the given delimiter."""
     if delimiter == BLANKS:
         yield from _split_at_blanks(text)
     for mark in (delimiter, "\t", ";", ","):
@@ -237,7 +238,7 @@ def _split_in_several_ways(text: str, delimiter: str) -> Iterator[list[str]]:
 
 
 def _split_at_blanks(text: str) -> Iterator[list[str]]:
-    """Yield the fields of a header whose headings and units are separated by blanks."""
+    """Split a header in which blanks separate the headings and the units."""
     words = text.split()
     yield _merge_brackets(words)
     yield re.split(r"(?<=[)\]])\s+", text)
@@ -268,7 +269,7 @@ def _are_units(fields: Sequence[str]) -> bool:
 
 
 def _layout_without_numbers(lines: Sequence[str], first_line: int, stated: str) -> TextLayout:
-    """Return the layout of a file in which no line contains mostly numbers.
+    """Return the layout of a file without rows of numbers.
 
     The header is the first line that is not blank.
     """

@@ -1,4 +1,4 @@
-"""Names of file formats that no reader reads, with their remedies."""
+"""Names of unsupported file formats, and remedies for error messages."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from rsfstudy.rig.readers.source import Source
 
 _READ_IT = "Read the file in Python, and pass a mapping of arrays or a DataFrame"
 _EXPORT_IT = "Export the table as a CSV file"
-#: Name and remedy of formats, by the first bytes of the files.
+#: Names and remedies of unsupported formats, indexed by the first bytes of a file.
 _FORMATS = {
     b"\x93NUMPY": ("a file of NumPy", f"{_READ_IT}: numpy.load."),
     b"PAR1": ("a Parquet file", f"{_READ_IT}: pandas.read_parquet."),
@@ -30,7 +30,7 @@ _FORMATS = {
 
 
 def is_known_but_unreadable(source: Source) -> bool:
-    """Return True if the format of a file is known, but no reader reads it.
+    """Return True if the format of a file is known but unsupported.
 
     Parameters
     ----------
@@ -40,13 +40,13 @@ def is_known_but_unreadable(source: Source) -> bool:
     Returns
     -------
     bool
-        True if the first bytes of the file belong to one of these formats.
+        True if the first bytes of the file identify an unsupported format.
     """
     return source.signature.startswith((*_FORMATS,))
 
 
 def refuse_format(source: Source) -> NoReturn:
-    """Raise an error that names the format of a file and the remedy.
+    """Raise an error that contains the format of a file and the remedy.
 
     Parameters
     ----------

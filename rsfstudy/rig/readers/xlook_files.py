@@ -13,14 +13,15 @@ from rsfstudy.rig.readers.source import Source, Table, merge_headings_with_units
 #: headers.
 _HEADER_BYTES, _COLUMN_HEADER_BYTES, _MAX_COLUMNS = 36, 84, 32
 _DATA_START_BYTE = _HEADER_BYTES + _COLUMN_HEADER_BYTES * _MAX_COLUMNS
-#: Formats that can be read, for the error of files in other formats.
+#: List of supported formats for the error message about other formats.
 _FORMATS = "text, Excel, MATLAB, TDMS, NetCDF and xlook"
 
 
 def is_binary(source: Source) -> bool:
     """Return True if the beginning of a file contains a null byte.
 
-    Files of xlook have no signature. Other binary formats have to be recognised before.
+    The xlook format has no signature. The other binary formats must therefore be tested before this
+    function is called.
 
     Parameters
     ----------
@@ -30,7 +31,7 @@ def is_binary(source: Source) -> bool:
     Returns
     -------
     bool
-        True if the file may be a file of xlook.
+        True if the file may be an xlook file.
     """
     return b"\0" in source.signature[:_DATA_START_BYTE]
 
@@ -39,8 +40,8 @@ def read_xlook(source: Source) -> Table:
     """Read a binary xlook file.
 
     The file is big-endian. The file contains a file header, column headers of 84 bytes each, and
-    one float32 array per column. The column ``time`` of xlook files contains sampling intervals,
-    which the function sums.
+    one float32 array per column. In xlook files, the column ``time`` contains sampling intervals.
+    The function replaces this column by the cumulative sum of the intervals.
 
     Parameters
     ----------
@@ -55,7 +56,7 @@ def read_xlook(source: Source) -> Table:
     Raises
     ------
     DataError
-        If the file is not a file of xlook, or ends too early.
+        If the file is not an xlook file, or if the file is truncated.
     """
     data, path = source.read_bytes(), source.origin
     used = int.from_bytes(data[24:28], "big")

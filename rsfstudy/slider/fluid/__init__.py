@@ -64,7 +64,7 @@ class Fluid(Part):
 
     @property
     def pressurisation_factor(self) -> float:
-        """Undrained pore pressure in sigma_* per unit of the temperature rise."""
+        """Undrained pore pressure in sigma_* for a temperature rise of 1."""
         return 0.0
 
     def highest_pressure(self, log_slip_rate: float, states: Numbers) -> float:
@@ -86,7 +86,7 @@ class Fluid(Part):
         return math.inf
 
 
-#: Pore pressure of the built-in fluids.
+#: Unknown for the pore pressure of the built-in fluids.
 PORE_PRESSURE_QUANTITY = Quantity(
     "pore_pressure",
     r"$(p-p_\infty)/\sigma_*$",

@@ -27,10 +27,10 @@ def porosity_and_pressure_rates(
 ) -> Numbers:
     r"""Compute the rates of porosity and pore pressure.
 
-    See ``Fluid`` for the arguments. The states are the porosity :math:`(\varphi - \varphi_0)/(\beta
-    \sigma_*)` and the pore pressure :math:`P`. The function reads the dilatancy
-    :math:`\epsilon/(\beta \sigma_*)` from ``p[FLUID]`` and the drainage :math:`c^* D_c/V_*` from
-    ``p[FLUID + 1]``.
+    The class ``Fluid`` describes the arguments. The states are the porosity
+    :math:`(\varphi - \varphi_0)/(\beta \sigma_*)` and the pore pressure :math:`P`. The function
+    reads the dilatancy :math:`\epsilon/(\beta \sigma_*)` from ``p[FLUID]`` and the drainage
+    :math:`c^* D_c/V_*` from ``p[FLUID + 1]``.
 
     Notes
     -----

@@ -1,7 +1,7 @@
 """Thermal pressurisation with drainage, and optionally with dilatancy (Rice 2006).
 
-The fluid in the pores expands more than the pores when the fault heats up. The pore pressure rises
-until fluid flows out to the surroundings.
+When the fault heats up, the pore fluid expands more than the pore space. The pore pressure
+therefore rises, and fluid flows out to the surroundings.
 """
 
 from __future__ import annotations
@@ -72,16 +72,17 @@ def steady_pressure(log_slip_rate: float, p: Numbers) -> Numbers:
 
 @dataclass(frozen=True, kw_only=True)
 class ThermalFluid(Fluid):
-    r"""Pore fluid that expands by heat, with drainage to the surroundings.
+    r"""Pore fluid with thermal pressurisation and drainage.
 
-    The heat is that of the part ``temperature``, which must be ``"shear_heating"``.
+    The fluid expands when the temperature of the fault rises. The field ``temperature`` of the
+    scene must be ``"shear_heating"``.
 
     Parameters
     ----------
     pressurisation : float, default: 1.0
-        Pressurisation factor :math:`\Lambda_p T_*/\sigma_*`, the undrained increase of pore
-        pressure in :math:`\sigma_*` if the temperature rises by :math:`T_*`. Here
-        :math:`\Lambda_p` is the increase of pressure per kelvin.
+        Pressurisation factor :math:`\Lambda_p T_*/\sigma_*`, where :math:`\Lambda_p` is the
+        undrained increase of pore pressure per kelvin. If the temperature rises by :math:`T_*`
+        without drainage, the pore pressure in :math:`\sigma_*` increases by this factor.
     drainage : float, default: 1.0
         Drainage rate :math:`c^* D_c/V_*`.
     dilatancy : float, default: 0.0
@@ -97,8 +98,8 @@ class ThermalFluid(Fluid):
         \frac{dP}{dt} = \frac{\Lambda_p T_*}{\sigma_*} \frac{d\vartheta}{dt} - c^* P
           - \frac{d\varphi}{dt}.
 
-    At a constant friction coefficient :math:`\mu`, and without cooling and drainage, the pressure
-    is :math:`P = 1 - \exp(-\mu E \delta)` after the slip :math:`\delta` of a rigid slider, with
+    If the friction coefficient :math:`\mu` is constant and the fault neither cools nor drains, the
+    pore pressure after the slip :math:`\delta` is :math:`P = 1 - \exp(-\mu E \delta)`, with
     :math:`E = H \Lambda_p T_*/\sigma_*`.
 
     References
@@ -122,12 +123,12 @@ class ThermalFluid(Fluid):
 
     @property
     def unknowns(self) -> tuple[Quantity, ...]:  # type: ignore[override]
-        """Pore pressure, after the porosity if the fault dilates."""
+        """Unknowns of the fluid: the porosity if the fault dilates, and the pressure."""
         return DilatantFluid.unknowns if self.dilatancy else (PORE_PRESSURE_QUANTITY,)
 
     @property
     def auxiliary_rates(self) -> Function:  # type: ignore[override]
-        """Function that computes the rates of the unknowns, without heating."""
+        """Function that computes the rates of the unknowns, except for heating."""
         return porosity_and_pressure_rates if self.dilatancy else pressure_rate
 
     @property
@@ -136,7 +137,7 @@ class ThermalFluid(Fluid):
         return steady_porosity_and_pressure if self.dilatancy else steady_pressure
 
     def highest_pressure(self, log_slip_rate: float, states: Numbers) -> float:
-        """Compute an upper bound of the future pore pressure without heating.
+        """Compute an upper bound of the future pore pressure, except for heating.
 
         See ``Fluid.highest_pressure``.
         """
@@ -146,7 +147,7 @@ class ThermalFluid(Fluid):
 
     @property
     def pressurisation_factor(self) -> float:
-        """Undrained pore pressure in sigma_* per unit of the temperature rise."""
+        """Undrained pore pressure in sigma_* for a temperature rise of 1."""
         return self.pressurisation
 
     @property
@@ -157,8 +158,8 @@ class ThermalFluid(Fluid):
     def parameter_values(self, scene: SceneView) -> Numbers:
         """Return the dilatancy and the drainage rate.
 
-        See ``Part.parameter_values``. The pressurisation factor is among the parameters of the
-        temperature.
+        See ``Part.parameter_values``. The pressurisation factor is a parameter of the part
+        ``temperature``.
         """
         return self.dilatancy, self.drainage
 

@@ -1,7 +1,7 @@
 """The slip law with flash heating of contact asperities (Rice 2006).
 
-Above a weakening velocity, frictional heat weakens the contacts during their short lifetime, and
-the steady friction coefficient falls towards a low value.
+At slip rates above the weakening velocity, frictional heat weakens the contacts between the two
+sides of the fault. The steady friction coefficient then decreases to a low value.
 """
 
 from __future__ import annotations
@@ -42,8 +42,8 @@ def steady_state(log_slip_rate: float, p: Numbers) -> float:
           D = \left[\frac{1 + (V_*/V_w)^n}{1 + (V/V_w)^n}\right]^{1/n}.
 
     The numerator of :math:`D` makes the friction coefficient exactly :math:`\mu_*` at :math:`V_*`.
-    The function evaluates :math:`\Theta_{\mathrm{ss}} = -b \ln(V/V_*) + (\mu_{LV} - f_w)(D - 1)`,
-    in which no digits cancel at slip rates far below :math:`V_w`.
+    The function evaluates :math:`\Theta_{\mathrm{ss}} = -b \ln(V/V_*) + (\mu_{LV} - f_w)(D - 1)`.
+    This form avoids cancellation at slip rates far below :math:`V_w`.
     """
     b, exponent = p[LAW], p[LAW + 3]
     power = exponent * (log_slip_rate - p[LAW + 2])
@@ -81,7 +81,7 @@ def steady_states(log_slip_rate: float, state_shift: float, p: Numbers) -> Numbe
     log_slip_rate : float
         Natural logarithm of the slip rate, :math:`\ln(V/V_*)`.
     state_shift : float
-        Decrease of the state variable due to stress.
+        Stress-induced decrease of the state variable.
     p : tuple of float
         Parameters of the scene.
 
@@ -97,15 +97,15 @@ def steady_states(log_slip_rate: float, state_shift: float, p: Numbers) -> Numbe
 class FlashHeatingLaw(Law):
     r"""Slip law with flash heating at high slip rates.
 
-    In scenes without inertia and radiation damping, the slip rate of a rupture is unbounded, as
-    with any law. Use flash heating with one of these effects.
+    In a scene without inertia and radiation damping, the slip rate of a rupture is unbounded. Use
+    this law in scenes with inertia or radiation damping.
 
     Parameters
     ----------
     weakening_velocity_ratio : float, default: 1e5
-        Ratio :math:`V_w/V_*` of the weakening velocity to the reference velocity. Far above
-        :math:`V_w`, the steady friction coefficient approaches ``weakened_friction`` as
-        :math:`V_w/V`.
+        Ratio :math:`V_w/V_*` of the weakening velocity to the reference velocity. At slip rates far
+        above :math:`V_w`, the steady friction coefficient exceeds ``weakened_friction`` by an
+        amount proportional to :math:`V_w/V`.
     weakened_friction : float, default: 0.2
         Friction coefficient :math:`f_w` of weakened contacts, which is less than :math:`\mu_*`.
     weakening_exponent : float, default: 8.0
@@ -165,7 +165,7 @@ class FlashHeatingLaw(Law):
         return ("flash_heating", *super().effects)
 
     def check(self, scene: SceneView) -> None:
-        """Check that contacts become weaker than at the reference velocity.
+        """Check that weakened contacts have less friction than mu_*.
 
         See ``Part.check``.
         """

@@ -1,9 +1,9 @@
 r"""Temperature of the fault.
 
-Each module of this package defines one choice. The function ``discover_parts`` finds the modules
-automatically. The unknown is the temperature rise :math:`\vartheta = (T - T_*)/T_*`, relative to
-the absolute temperature :math:`T_*` of steady sliding at :math:`V_*`. If the friction depends on
-temperature,
+Each module of this package defines one temperature model. The function ``discover_parts`` finds the
+modules automatically. The unknown is the temperature rise :math:`\vartheta = (T - T_*)/T_*`,
+relative to the absolute temperature :math:`T_*` of steady sliding at :math:`V_*`. If the friction
+depends on temperature,
 
 .. math::
 
@@ -33,10 +33,10 @@ from rsfstudy.slider.scene_view import SceneView
 
 @dataclass(frozen=True, kw_only=True)
 class Temperature(Part):
-    r"""Base class of the choices for the temperature of the fault.
+    r"""Base class of the temperature models of the fault.
 
-    A temperature that changes declares one unknown, the temperature rise, in ``unknowns``, and
-    defines the following function as a static method:
+    If the temperature changes, the subclass declares one unknown, the temperature rise, in
+    ``unknowns``. The subclass also defines the following function as a static method:
 
     - ``temperature_rate(log_slip_rate, rise, friction, normal_stress, fraction, parameters)``
       returns the change of the temperature rise per unit slip in :math:`D_c`, multiplied by
@@ -46,8 +46,9 @@ class Temperature(Part):
       followed by the other fields that the class declares with ``number``. The rate must be zero if
       the fault slides steadily at :math:`V_*` with a temperature rise of zero.
 
-    The temperature rise of a rupture may be extremely large, so it never counts for the distance
-    from steady sliding, which determines whether a motion has settled.
+    A motion has settled if the unknowns are close to their values in steady sliding. The
+    temperature rise is never part of this comparison, because the temperature rise in a rupture may
+    be extremely large.
 
     Examples
     --------
@@ -67,7 +68,7 @@ class Temperature(Part):
 
     @classmethod
     def required_functions(cls) -> tuple[str, ...]:
-        """Return the names of the functions that the part must define.
+        """Return the names of the functions that the subclass must define.
 
         Returns
         -------
@@ -81,7 +82,7 @@ class Temperature(Part):
     def activation(self) -> tuple[float, float]:
         """Activation terms of the direct effect and of the evolution effect.
 
-        The base class returns two zeros, because its friction does not depend on temperature.
+        In the base class, friction does not depend on temperature, and both terms are zero.
         """
         return 0.0, 0.0
 
@@ -91,7 +92,7 @@ class Temperature(Part):
         Parameters
         ----------
         scene : Scene
-            Scene that the temperature belongs to.
+            Scene that contains the temperature model.
         rise : float
             Current temperature rise.
         power : float

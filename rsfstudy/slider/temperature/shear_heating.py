@@ -62,7 +62,7 @@ def temperature_rate(
 
 @dataclass(frozen=True, kw_only=True)
 class ShearHeating(Temperature):
-    r"""Fault that is heated by the work of the shear stress, and cools at a rate.
+    r"""Temperature of a fault with shear heating and a constant cooling rate.
 
     Parameters
     ----------
@@ -72,8 +72,8 @@ class ShearHeating(Temperature):
         volumetric heat capacity and :math:`w` is the width of the shear zone.
     cooling : float, default: 1.0
         Cooling rate :math:`C = c_{th} D_c/V_*`, for example with
-        :math:`c_{th} = \alpha_{th}/w_h^2` for the thermal diffusivity :math:`\alpha_{th}` and the
-        width :math:`w_h` from which heat flows out.
+        :math:`c_{th} = \alpha_{th}/w_h^2`, where :math:`\alpha_{th}` is the thermal diffusivity and
+        :math:`w_h` is the effective width of the heat loss.
     direct_activation : float, default: 0.0
         Activation term :math:`q_a = Q_a/(R T_*)` of the direct effect.
     evolution_activation : float, default: 0.0
@@ -81,9 +81,10 @@ class ShearHeating(Temperature):
 
     Notes
     -----
-    In steady sliding, :math:`\vartheta = (H/C) (\mu s V/V_* - \mu_*)`. Where heating by
-    :math:`R T^2/Q` separates the slip rates, rate weakening changes to rate strengthening if
-    :math:`Q_a = Q_b = Q`, because higher temperatures have the same effect as lower slip rates.
+    In steady sliding, :math:`\vartheta = (H/C) (\mu s V/V_* - \mu_*)`. If :math:`Q_a = Q_b = Q`, a
+    higher temperature has the same effect as a lower slip rate. Friction is then rate weakening at
+    low slip rates, and rate strengthening at slip rates at which heating exceeds about
+    :math:`R T^2/Q`.
 
     References
     ----------
@@ -159,8 +160,9 @@ class ShearHeating(Temperature):
     def rise_bounds(self, scene: SceneView, rise: float, power: float) -> tuple[float, float]:
         """Compute bounds of the future temperature rise.
 
-        See ``Temperature.rise_bounds``. The temperature approaches the steady temperature of the
-        power, which lies between that without slip and that of the largest power.
+        See ``Temperature.rise_bounds``. At each time, the temperature approaches the steady
+        temperature at the current power. The steady temperature lies between the steady temperature
+        without slip and the steady temperature at the largest power.
         """
         over_cooling = self.heating / self.cooling
         lowest = -over_cooling * scene.mu_star
