@@ -31,7 +31,7 @@ from rsfstudy.vocabulary import QUANTITY_BY_NAME
 
 ROOT = Path(__file__).parent.parent
 SLIDER = ROOT / "rsfstudy" / "slider"
-SLOTS = ("laws", "normal_stress", "fluid", "dynamics", "loading")
+SLOTS = ("laws", "normal_stress", "fluid", "dynamics", "loading", "temperature")
 
 
 class Page(HTMLParser):
@@ -186,3 +186,14 @@ def test_every_public_name_has_an_entry(pages):
         f"{DatasetAccessor.__module__}.DatasetAccessor.{name}" for name in members
     } <= page.anchors
     assert {"Law", "Measure", "Loading", "Reduction", "Stepper"} <= words_in(page.text)
+
+
+def test_starting_points_of_changes_exist():
+    """The files and functions that the page on extensions names exist."""
+    text = (ROOT / "studies" / "pages" / "own_studies.md").read_text()
+    table = text.partition("<!-- starting points -->")[2].partition("To add a command")[0]
+    found = re.findall(r"`([a-z_/]+\.(?:py|csv))(?:: (\w+))?`", table)
+    assert len(found) >= 15
+    for path, function in found:
+        source = (ROOT / "rsfstudy" / path).read_text()
+        assert not function or f"def {function}(" in source, path
