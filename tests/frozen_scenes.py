@@ -166,6 +166,7 @@ CONSTANT = {"normal_stress": "constant", "a": 0.05}
 VARIABLE = {"normal_stress": "variable", "phi": 75.0, "alpha": 0.3, "a": 0.05}
 IMPOSED, DILATANT = {"normal_stress": "imposed", "a": 0.05}, {"fluid": "dilatant"}
 LESS_DILATANT = {**DILATANT, "dilatancy": 1e-3}
+SHEAR_HEATING = {"temperature": "shear_heating"}
 WITH_INERTIA, WITH_LONG_PERIOD = {"inertia": True}, {"inertia": True, "period": 5e3}
 DAMPING = {"radiation_damping": 1e-3}
 STEP_UP = {"load_velocity_ratio": 2.0, "stiffness_ratio": 1.3}
@@ -244,6 +245,22 @@ MOTIONS: dict[str, Motion | Track] = {
     ),
     "slowness, dilatant, slips": frozen_motion(
         "slowness", CONSTANT, LESS_DILATANT, UNSTABLE_STEP_UP, rows=9
+    ),
+    # Heat.
+    "flash heating": frozen_motion(
+        "flash_heating", VARIABLE, STEP_UP, weakening_velocity_ratio=10.0, weakened_friction=0.5
+    ),
+    "slip, shear heating": frozen_motion(
+        "slip",
+        CONSTANT,
+        SHEAR_HEATING,
+        STEP_UP,
+        direct_activation=0.5,
+        evolution_activation=1.0,
+        cooling=10.0,
+    ),
+    "slowness, thermal, damped": frozen_motion(
+        "slowness", VARIABLE, SHEAR_HEATING, DAMPING, STEP_UP, fluid="thermal"
     ),
     # Radiation damping, for each law.
     "slip, damped": frozen_motion("slip", CONSTANT, DAMPING, UNSTABLE_STEP_UP),

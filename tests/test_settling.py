@@ -11,7 +11,6 @@ from rsfstudy import Scene
 from rsfstudy.errors import InvalidValue
 from rsfstudy.limit_cycles.limit_cycle import LimitCycle
 from rsfstudy.measure_base.settling_checks import steady_sliding_is_linearly_stable
-from rsfstudy.motion import segment_chains
 from rsfstudy.motion.accuracy import Accuracy
 from rsfstudy.motion.engines import COMPILED, PYTHON, SCIPY
 from rsfstudy.motion.events import EventKind, approach_to_steady_state, rise
@@ -142,7 +141,7 @@ def test_stability_is_computed_at_the_first_settling_event(fluid, level, monkeyp
         scenes.append(scene)
         return largest_linear_growth_rate(scene, log_slip_rate)
 
-    monkeypatch.setattr(segment_chains, "largest_linear_growth_rate", growth_rate)
+    monkeypatch.setattr(Scene, "largest_linear_growth_rate", growth_rate)
     scene = Scene(**CYCLES, fluid=fluid)
     events_until_third_rise(scene, approach_to_steady_state(level))
     assert bool(scenes) == (fluid is Dissipation)
