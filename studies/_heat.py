@@ -60,7 +60,7 @@ def known_value_claim(
     published: float,
     relative_tolerance: float,
 ) -> Claim:
-    """Return the claim that a result agrees with a value of known accuracy.
+    """Return a claim that compares a result with a reference value.
 
     Parameters
     ----------

@@ -153,8 +153,8 @@ def compute_excess_over_instability_norm(scene: Scene, integrator: Integrator) -
 def _max_log_slip_rate_of_closed_orbit(scene: Scene, integrator: Integrator) -> float:
     """Compute the largest value of ln V on a closed orbit.
 
-    The largest ln V on the orbit is the peak that is closest to the start of the motion, either
-    before or after the start. If the motion starts with a decreasing slip rate, the motion is
+    The largest ln V on the orbit is a maximum of ln V next to the start of the motion. The maximum
+    may precede or follow the start. If the motion starts with a decreasing slip rate, the motion is
     integrated backwards in time to the previous peak. The rest of the orbit may reach slip rates of
     1e-40 V_*, at which an integration would lose all digits.
     """

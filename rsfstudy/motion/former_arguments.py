@@ -100,7 +100,7 @@ def replace_accuracy_and_meter(
 
 
 def _adapt_former_compute(measure_class: type) -> None:
-    """Let the method ``compute`` of a measure take an integrator.
+    """Adapt the method ``compute`` of a measure to take an integrator.
 
     A method with the former parameters ``scene``, ``accuracy`` and ``meter`` is replaced by a
     method that takes an integrator. The class is modified in place.

@@ -64,7 +64,7 @@ class _Places(NamedTuple):
 
 
 def build_replacements(scene: SceneView, isothermal: Mapping[str, Any]) -> dict[str, Any]:
-    """Build the friction functions that the temperature of a scene changes.
+    """Build the friction functions that depend on the temperature of a scene.
 
     Parameters
     ----------

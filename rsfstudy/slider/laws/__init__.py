@@ -331,7 +331,7 @@ class Law(LawBase):
     b_over_a: float = number(2.0, "$b/a$", "1", "ratio of evolution effect to direct effect")
 
     def parameter_values(self, scene: SceneView) -> Numbers:
-        """Return b as the first parameter of the law.
+        """Return the parameters of the law. The first parameter is b.
 
         If ``b_over_a`` is zero, the method returns a negligible positive value, because equations
         divide by b.
