@@ -219,7 +219,6 @@ def test_no_encoding_of_a_store_prevents_netcdf(tmp_path):
 
     Older versions of xarray cannot write the string dtype of Zarr stores.
     """
-    pytest.importorskip("zarr")
     stored = run(STABILITY, output=tmp_path, format="zarr")
     dtypes = [variable.encoding.get("dtype") for variable in stored.variables.values()]
     assert "T" not in [dtype.kind for dtype in dtypes if dtype is not None]
@@ -227,7 +226,6 @@ def test_no_encoding_of_a_store_prevents_netcdf(tmp_path):
 
 def test_xarray_opens_a_store_without_warnings(tmp_path):
     """The metadata are consolidated, as xarray expects."""
-    pytest.importorskip("zarr")
     stored = run(STABILITY, output=tmp_path, format="zarr")
     with warnings.catch_warnings():
         warnings.simplefilter("error")

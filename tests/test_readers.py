@@ -161,8 +161,6 @@ def test_units_that_contradict_the_file_are_refused(tmp_path: Path) -> None:
 # ---- binary formats ------------------------------------------------------------------------------
 @pytest.mark.parametrize("library", ["openpyxl", "python_calamine"])
 def test_workbooks(library: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    pytest.importorskip("openpyxl")
-    pytest.importorskip(library)
     monkeypatch.setattr(spreadsheets, "_ENGINES", {library: spreadsheets._ENGINES[library]})
     path = tmp_path / "run.xlsx"
     frame = pd.DataFrame(dict(zip(HEADINGS, DATA.values(), strict=True)))
@@ -201,7 +199,7 @@ def test_matlab_files(tmp_path: Path) -> None:
 
 
 def test_matlab_files_of_version_7_3(tmp_path: Path) -> None:
-    h5py = pytest.importorskip("h5py")
+    h5py = importlib.import_module("h5py")
     path = tmp_path / "run.mat"
     with h5py.File(path, "w", userblock_size=512) as file:
         for name, values in DATA.items():
@@ -213,7 +211,7 @@ def test_matlab_files_of_version_7_3(tmp_path: Path) -> None:
 
 
 def test_tdms_files(tmp_path: Path) -> None:
-    nptdms = pytest.importorskip("nptdms")
+    nptdms = importlib.import_module("nptdms")
     path = tmp_path / "run.tdms"
     names = [heading.partition(" (")[0] for heading in HEADINGS]
     waveform = {"wf_increment": 0.25}

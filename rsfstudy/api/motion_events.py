@@ -76,14 +76,14 @@ def find_motion_events(
     rows = InterpolatedMotionRows(times, np.column_stack(rest), math.log10(slip_rate))
     found = [rows.measure_event(*ends) for ends in rows.iterate_event_row_spans()]
     about = {name: motion[name].attrs for name in names}
-    told = build_event_catalogue(found, about).assign_attrs(slip_rate_threshold=slip_rate)
+    catalogue = build_event_catalogue(found, about).assign_attrs(slip_rate_threshold=slip_rate)
     if "slip_rate" in motion and motion.sizes["time"]:  # The motion has units.
         rate = motion["slip_rate"]
         size = float(rate[0]) / 10.0 ** float(motion["log10_slip_rate"][0])
-        told = told.assign(
-            DatasetUnits(told).slip_rate_from_log("peak_log10_slip_rate", size, rate.units)
+        catalogue = catalogue.assign(
+            DatasetUnits(catalogue).slip_rate_from_log("peak_log10_slip_rate", size, rate.units)
         )
-    return told
+    return catalogue
 
 
 class InterpolatedMotionRows:

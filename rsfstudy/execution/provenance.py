@@ -98,9 +98,9 @@ def code_fingerprint(
 def digest_reachable_modules(measure: Measure, scenes: Iterable[Scene]) -> dict[str, str]:
     """Compute the code digests of the modules that a measure and scenes use.
 
-    The modules are those that the measure and the parts of the scenes import directly or
-    indirectly. A user-defined measure may use any module of rsfstudy, so in this case all modules
-    are included. A user-defined part may use any module of ``slider``.
+    The digests include all modules that the measure and the parts of the scenes import, directly
+    or through other modules. A user-defined measure may use any module of rsfstudy, so in this
+    case all modules are included. A user-defined part may use any module of ``slider``.
 
     Parameters
     ----------

@@ -173,7 +173,8 @@ def select_event_specs(
 def drop_settling_if_unstable(scene: Scene, motion: Iterator[Event]) -> Iterator[Event]:
     """Yield the events of a motion, without settling events at unstable steady sliding.
 
-    The stability is computed at the first settling event, because most motions have none.
+    The stability is computed only if the motion has a settling event. Most motions do not have
+    settling events.
 
     Parameters
     ----------

@@ -130,7 +130,8 @@ def read_selected_columns(
             _check_column_name(name, usable.names)
         return {name: table.read_column(name, ColumnSpec(name)) for name in table.headings}
     found = dict(selected_columns or {})
-    # A stated normal stress belongs to a stress that the user selects.
+    # If the user selects a column of friction or shear stress, the column of normal stress is used
+    # only if the user selects it too.
     has_stress = not {"friction", "shear_stress"}.isdisjoint(found)
     for name in usable.names if table.has_headings else ():
         if name == "normal_stress" and (

@@ -120,7 +120,7 @@ def pack_friction_parameter_values(scene: SceneView) -> Numbers:
 
 
 def temperature_parameter_values(scene: SceneView) -> Numbers:
-    """Return the parameters of the temperature, which follow those of the law.
+    """Return the parameters of the temperature of the fault.
 
     Parameters
     ----------

@@ -198,10 +198,10 @@ class FieldIndex(NamedTuple):
     part_index_by_field : mapping of str to int
         Index of the part that owns each field.
     rejecting_part_class_by_field : mapping of str to type
-        Mapping whose keys are the fields that none of the parts has. The value of each key is the
-        class of the part that rejects the field.
+        Class of the part that rejects a field, by name of the field. The mapping contains the
+        fields that do not belong to any part of the scene.
     values_of_inactive_fields : mapping of str to object
-        Values that the scene returns for the fields that none of its parts has.
+        Values of the fields that do not belong to any part of the scene.
     inapplicable_fields : frozenset of str
         Names of the fields that have no meaning in the scene, regardless of their value. Fields
         that would select another part are not included.

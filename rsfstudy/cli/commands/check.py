@@ -30,8 +30,7 @@ class Check(CommandResult):
     studies : sequence of StudyResults
         Results of the studies that have been run.
     verdicts : pandas.DataFrame or None
-        Table of the claims and their verdicts. The value is None if none of the studies has been
-        run.
+        Table of the claims and their verdicts, or None if there are no results.
     unapplied_claims : sequence of str, optional
         Identifiers of the requested claims that do not apply to the results.
     skipped : mapping of str to str, optional
