@@ -39,6 +39,7 @@ def cycle_claim(variable: str, velocity: float, friction: float, value: float) -
         Claim on the variable.
     """
     where = {"weakening_velocity_ratio": velocity, "weakened_friction": friction}
+    # The dynamic stress drop is a small difference, whose error estimate is 5e-7 of its value.
     tolerance = 1e-6 if variable == "dynamic_stress_drop" else 1e-7
     statement = f"V_w = {velocity:g} V_*, f_w = {friction:g}: {variable.replace('_', ' ')}"
     return known_value_claim("H5", statement, variable, where, value, tolerance)
