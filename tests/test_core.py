@@ -213,7 +213,7 @@ def test_inertia_is_integrated_only_where_it_acts():
 
     def until(event):
         regimes.append((event.regime, event.point.log_slip_rate + math.log(fast.inertial_time)))
-        return len(regimes) > 1500
+        return len(regimes) > 60
 
     follow_until(fast, 1e-7, until)
     switch = 0.5 * math.log(Accuracy(1e-7).max_inertia_weight * fast.a / fast.stiffness)
