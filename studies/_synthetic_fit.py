@@ -183,9 +183,9 @@ class SyntheticFit(Measure):
             Output(name, "", "1", text, dims=("parameter",), error=name == self.primary_output)
             for name, text in _PARAMETER_OUTPUTS
         ]
-        text = "Akaike's criterion, in which the noise counts"
+        text = "Akaike information criterion, including the noise model"
         order = Output("noise_order", "", "1", "order of the autoregressive process of the noise")
-        return (*by, Output("criterion", "", "1", text), order, _FLAGGED_OUTPUT)
+        return (*by, Output("aic", "", "1", text), order, _FLAGGED_OUTPUT)
 
     @property
     def inner_coordinates(self) -> Mapping[str, np.ndarray]:
@@ -326,7 +326,7 @@ class SyntheticFit(Measure):
             for n in self.free
         ]
         values: dict[str, OutputValue] = {name: each[shown] for name, each in by_parameter.items()}
-        values |= {"criterion": found.aic, "noise_order": found.noise_model.autoregressive_order}
+        values |= {"aic": found.aic, "noise_order": found.noise_model.autoregressive_order}
         return values | {"flagged": float(bool(reasons))}
 
     def _window_segments(self) -> list[list[_ProtocolSegment]]:

@@ -358,7 +358,7 @@ study = Study(
             tolerance=0.5,
             reason="'by one order of magnitude'",
             expected="differs",
-            because=(
+            difference_reason=(
                 "peaks are 10^13.335 and 10^8.952 V_*. Without mass every part of the stress the "
                 "spring carries beyond the state's strength goes into slip rate, e-fold for each "
                 "a sigma; with mass it goes into acceleration. The gap is one order for V_0 = 19 "
@@ -371,7 +371,7 @@ study = Study(
             source=f"{PAPER}, section 4, Fig. 12",
             variable="peak_log10_slip_rate",
             where={**LARGEST_STEP, "peak": 2, "inertia": True},
-            minus={**LARGEST_STEP, "peak": 2, "inertia": False},
+            baseline={**LARGEST_STEP, "peak": 2, "inertia": False},
             published=0.0,
             tolerance=5e-5,
             reason="5 % of the difference in stress, as for other masses; paths are considered "

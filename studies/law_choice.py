@@ -190,7 +190,7 @@ study = Study(
         Axis("seed", list(range(RECORDS))),
     ],
     measure=SyntheticFit(noise="white"),
-    reductions=[LawChoiceShares("chosen", "criterion")],
+    reductions=[LawChoiceShares("chosen", "aic")],
     claims=[
         *(
             all_records_decide_claim(law, design, NOISE_SIZES[0])

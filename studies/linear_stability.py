@@ -83,7 +83,7 @@ def steepness_claim(phi: float, gentler: float) -> Claim:
         source=f"{PAPER}, section 2.2, Fig. 2",
         variable="stiffness_slope",
         where={"mass": NO_MASS, "phi": phi},
-        minus={"mass": NO_MASS, "phi": gentler},
+        baseline={"mass": NO_MASS, "phi": gentler},
         published=0.0,
     )
 
@@ -256,8 +256,8 @@ study = Study(
             source=f"{PAPER}, eqs. 7 and 8",
             variable="critical_stiffness",
             where={"mass": NO_MASS, "phi": 50.0, "load_velocity_ratio": 100.0},
-            minus_variable="critical_stiffness_explicit",
-            minus={"mass": NO_MASS, "phi": 50.0, "load_velocity_ratio": 100.0},
+            baseline_variable="critical_stiffness_explicit",
+            baseline={"mass": NO_MASS, "phi": 50.0, "load_velocity_ratio": 100.0},
             published=0.0,
             tolerance=1e-15,
             reason="an identity; the tolerance covers rounding",

@@ -130,7 +130,7 @@ study = Study(
         ProportionalFit(
             name="zeta",
             of="critical_velocity_ratio",
-            minus=1.0,
+            intercept=1.0,
             on="a_over_b_minus_a",
             within=(0.25, 1.0),
         ),
@@ -176,7 +176,7 @@ study = Study(
             source=f"{PAPER}, Fig. 5",
             variable="zeta",
             where={"case": STRONG_NORMAL_STRESS_EFFECT},
-            minus={"case": WEAK_NORMAL_STRESS_EFFECT},
+            baseline={"case": WEAK_NORMAL_STRESS_EFFECT},
             published=0.0,
         ),
         variable_normal_stress_claim(0.25, 0.07),

@@ -177,7 +177,8 @@ study = Study(
             reason="'very close'; the tolerance is approximately the size of the symbols in the "
             "figure",
             expected="differs",
-            because="it is lower by 5.7 %, half of that at alpha = 0.56; by 6 % above k_cr",
+            difference_reason="it is lower by 5.7 %, half of that at alpha = 0.56, and by 6 % "
+            "above k_cr",
         ),
         eq_11_claim(
             1.0, 1.0, 1e-7, "exact; a finite norm leaves exp[-10.9 (b/a - 1)] = 7e-9 of it"

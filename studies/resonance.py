@@ -146,7 +146,7 @@ def resonance_claim(law: str, period: float) -> Claim:
         source="linear theory: resonance at omega D_c/V = sqrt((b - a)/a) as k falls to k_cr",
         variable="gain",
         where={**at, "oscillation_period": RESONANCE_PERIOD},
-        minus={**at, "oscillation_period": period},
+        baseline={**at, "oscillation_period": period},
         published=0.0,
     )
 
@@ -212,7 +212,7 @@ def failure_order_claim(softer: float, stiffer: float) -> Claim:
         source="changes of ln V grow as the gain, which is larger nearer to critical stiffness",
         variable="failing_amplitude",
         where={**at, "stiffness_ratio": softer},
-        minus={**at, "stiffness_ratio": stiffer},
+        baseline={**at, "stiffness_ratio": stiffer},
         published=0.0,
     )
 

@@ -172,7 +172,7 @@ study = Study(
             where={"law": "slip", "normal_stress": "variable", "load_velocity_ratio": 1e-4},
             published=0.0,
             expected="differs",
-            because=(
+            difference_reason=(
                 "the jump itself is smaller downward, since strength grows more slowly the higher "
                 "the stress; the text reads it off curves of stress less its future steady value"
             ),

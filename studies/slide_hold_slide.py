@@ -214,7 +214,7 @@ study = Study(
                 source="with the slip law a slider heals by the slip of its hold alone",
                 variable="healing_per_decade",
                 where={"case": SLIP, "stiffness": stiff * a},
-                minus={"case": SLIP, "stiffness": soft * a},
+                baseline={"case": SLIP, "stiffness": soft * a},
                 published=0.0,
             )
             for soft, stiff in ((1.5, 3.0), (3.0, 10.0), (10.0, 30.0))
@@ -225,7 +225,7 @@ study = Study(
             source="with the slip law relaxation never ends",
             variable="relaxation",
             where={"case": SLIP, "stiffness": 3.0 * a, "hold_time": LONGEST_HOLD_TIME},
-            minus={"case": SLIP, "stiffness": 3.0 * a, "hold_time": 1e6},
+            baseline={"case": SLIP, "stiffness": 3.0 * a, "hold_time": 1e6},
             published=0.0,
         ),
     ],

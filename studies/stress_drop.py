@@ -296,7 +296,7 @@ study = Study(
             source=f"{PAPER}, section 3.5",
             variable="static_slope",
             where={"law": "slowness", "case": VARIABLE_CASE, "stiffness_ratio": 0.8},
-            minus={"law": "slowness", "case": CONSTANT_CASE, "stiffness_ratio": 0.8},
+            baseline={"law": "slowness", "case": CONSTANT_CASE, "stiffness_ratio": 0.8},
             published=0.0,
         ),
         Claim.above(
@@ -305,7 +305,7 @@ study = Study(
             source="He et al. (2003), cited in section 3.5",
             variable="static_slope_scaled",
             where={"law": "slowness", "case": CONSTANT_CASE, "stiffness_ratio": 0.4},
-            minus={"law": "slowness", "case": CONSTANT_CASE, "stiffness_ratio": 0.8},
+            baseline={"law": "slowness", "case": CONSTANT_CASE, "stiffness_ratio": 0.8},
             published=0.05,
             reason="an inequality; the bound is much larger than the standard errors",
         ),

@@ -81,7 +81,7 @@ study = Study(
             source=f"{RICE}, and {INDEPENDENT}",
             variable="static_stress_drop",
             where={"law": "slip", "heating": 0.01},
-            minus={"law": "slip", "heating": 1e-4},
+            baseline={"law": "slip", "heating": 1e-4},
             published=0.37,
         ),
     ],

@@ -150,7 +150,7 @@ def normal_stress_effect_claim(law: str) -> Claim:
         source="Linker and Dieterich (1992): a fall of normal stress strengthens the state",
         variable="critical_normal_stress_step",
         where={**where, "case": IMPOSED_WITH_ALPHA},
-        minus={**where, "case": IMPOSED_WITHOUT_ALPHA},
+        baseline={**where, "case": IMPOSED_WITHOUT_ALPHA},
         published=-0.5 * base.a * (0.5 / EFFECTIVE_FRICTION - 0.5 / base.mu_star),
         reason="an inequality: the bound is half of the first-order result",
     )

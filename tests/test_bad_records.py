@@ -106,10 +106,10 @@ def test_what_a_record_does_not_tell(
     assert found.rhs_evaluations.item() < 3e7
     # The limits of an unbounded parameter differ from its value by at least the standard error,
     # even if other parameters are at their bounds.
-    ends = np.array([found.mu_star_low.item(), found.mu_star_high.item()])
+    ends = np.array([found.mu_star_ci_low.item(), found.mu_star_ci_high.item()])
     assert not (np.abs(ends - found.mu_star.item()) < found.mu_star_stderr.item()).any()
-    assert (found.b_low.item(), found.b_high.item()) == (-1.0, 1.0)
-    assert found.a_high.item() == 1.0
+    assert (found.b_ci_low.item(), found.b_ci_high.item()) == (-1.0, 1.0)
+    assert found.a_ci_high.item() == 1.0
 
 
 def test_friction_that_is_zeroed_is_told() -> None:

@@ -217,7 +217,7 @@ def test_run_all_goes_on_whatever_becomes_of_a_study(catalogued, tmp_path, monke
     ended = rows(ran.stdout)
     assert {name: row[-1] for name, row in ended.items()} == {
         "failing": "1 cell_raised",
-        "moving": "C1 moved",
+        "moving": "verdict of C1 changed",
         "undrawn": "no figure",
         "taken": "not finished",
         "fine": "ok",
@@ -234,7 +234,7 @@ def test_run_all_goes_on_whatever_becomes_of_a_study(catalogued, tmp_path, monke
         "taken": "not_finished",
         "fine": "ok",
     }
-    assert found["moving"]["problems"] == ["C1 moved"]
+    assert found["moving"]["problems"] == ["verdict of C1 changed"]
     assert "taken.cells.sqlite" in found["taken"]["message"]
     assert found["taken"]["results"] is None
 

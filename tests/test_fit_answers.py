@@ -193,7 +193,7 @@ def test_basalt_is_what_the_page_tells() -> None:
         rsfstudy.fit(one, noise=noise, engine="compiled", **options).squeeze()
         for noise in ("ar", "white")
     )
-    rows = int(fit.rows_fitted), float(fit.effective_samples)
+    rows = int(fit.rows_fitted), float(fit.n_eff)
     assert rows == (2863, pytest.approx(643.0, abs=1.0))
     for name in ("a", "b", "slip_distance"):
         assert float(fit[f"{name}_stderr"] / usual[f"{name}_stderr"]) == pytest.approx(2.2, abs=0.3)

@@ -245,4 +245,4 @@ def test_the_page_says_how_good_its_fit_is(tmp_path, monkeypatch):
         assert abs(float(right[name]) - true) < 2.0 * float(right[f"{name}_stderr"]), name
     off = float(wrong.slip_distance) - TRUE["slip_distance"]
     assert 7.0 < off / float(wrong.slip_distance_stderr) < 9.0
-    assert float(wrong.criterion - right.criterion) == pytest.approx(48.6, abs=0.5)
+    assert float(wrong.aic - right.aic) == pytest.approx(48.6, abs=0.5)

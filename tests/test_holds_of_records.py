@@ -173,7 +173,7 @@ def test_fit_counts_the_error_of_a_measured_stiffness(monkeypatch: pytest.Monkey
         for factor in (1.0, np.exp(-spread), np.exp(spread))
     )
     assert float(measured["window_stiffness_stderr"]) == pytest.approx(3e-3 * spread)
-    assert measured.rsf.fit_table()["k_std"][0] == pytest.approx(3e-3 * spread)
+    assert measured.rsf.fit_table()["k_stderr"][0] == pytest.approx(3e-3 * spread)
     for name in ("a", "b", "slip_distance"):
         added = float(measured[f"{name}_stderr"]) ** 2 - float(exact[f"{name}_stderr"]) ** 2
         moved = 0.5 * float(stiffer[name] - softer[name])

@@ -32,7 +32,11 @@ from rsfstudy.study.claims import Claim, build_verdict_table
 
 X = np.array([0.25, 0.5, 1.0, 2.0, 4.0])
 FIT = ProportionalFit(
-    name="zeta", of="critical_velocity_ratio", on="a_over_b_minus_a", minus=1.0, within=(0.25, 1.0)
+    name="zeta",
+    of="critical_velocity_ratio",
+    on="a_over_b_minus_a",
+    intercept=1.0,
+    within=(0.25, 1.0),
 )
 
 
@@ -201,13 +205,13 @@ def claim(**fields) -> Claim:
 def test_verdicts(relation, value, verdict):
     table = build_verdict_table(lattice(np.full(5, value)), [claim(relation=relation)], {})
     assert table.verdict[0] == verdict
-    assert table.moved[0] == (verdict != "reproduced")
+    assert table.verdict_changed[0] == (verdict != "reproduced")
 
 
 def test_an_expected_difference_does_not_move():
-    off = [claim(published=3.0, expected="differs", because="a misprint")]
-    assert not build_verdict_table(lattice(np.full(5, 2.0)), off, {}).moved[0]
-    assert build_verdict_table(lattice(np.full(5, 3.0)), off, {}).moved[0]
+    off = [claim(published=3.0, expected="differs", difference_reason="a misprint")]
+    assert not build_verdict_table(lattice(np.full(5, 2.0)), off, {}).verdict_changed[0]
+    assert build_verdict_table(lattice(np.full(5, 3.0)), off, {}).verdict_changed[0]
 
 
 PENDING = lattice(np.full(5, 2.0), np.full(5, Status.PENDING))
@@ -233,7 +237,7 @@ PENDING = lattice(np.full(5, 2.0), np.full(5, Status.PENDING))
 def test_where_claims_apply(dataset, of, overrides, verdict):
     table = build_verdict_table(dataset, [claim(**of)], overrides)
     assert table.verdict[0] == verdict
-    assert table.moved[0] == (verdict in ("differs", "undecided"))
+    assert table.verdict_changed[0] == (verdict in ("differs", "undecided"))
 
 
 # ---- boundaries, levels, closed forms, paths ----------------------------------------------------

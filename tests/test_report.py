@@ -131,7 +131,7 @@ def test_it_tells_verdicts_failures_and_what_cannot_be_read(written):
     place, ran, text = written
     said = " ".join(" ".join(Page(text).texts).split())
     assert "1 reproduced" in said
-    assert "1 integration_failed, C1 moved" in said
+    assert "1 integration_failed, verdict of C1 changed" in said
     assert "differs, expected reproduced" in said
     assert "rsfstudy rerun 'failed here.nc' --cell law=slip --cell b_over_a=2.0" in said
     assert r"</p><script>alert(1)</script> & \x1b[31m" in said  # Markup in messages is escaped.

@@ -120,7 +120,7 @@ def test_a_law_that_holds_a_number_stays_one_of_numbers():
 
     An example is V_0/V_* = 1 + zeta a/(b - a).
     """
-    made = apply_reductions(lattice(), (ProportionalFit("zeta", OF, on="number", minus=1.0),))
+    made = apply_reductions(lattice(), (ProportionalFit("zeta", OF, on="number", intercept=1.0),))
     assert "scale" not in made["zeta"].attrs | made["zeta_misfit"].attrs
     np.testing.assert_array_equal(convert_to_display_units(made)["zeta"], made["zeta"])
 

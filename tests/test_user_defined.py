@@ -76,7 +76,7 @@ def test_a_reduction_that_returns_no_dataset_is_refused():
 @pytest.mark.parametrize(
     ("kind", "wrong", "meant"),
     [
-        (ProportionalFit, {"name": "z", "of": "x", "minu": 1.0}, "minus"),
+        (ProportionalFit, {"name": "z", "of": "x", "intercep": 1.0}, "intercept"),
         (Largest, {"name": "z", "of": "x", "off": "x"}, "of"),
         (CriticalStep, {"directions": "up"}, "direction"),
         (Axis, {"dimension": "a", "values": [1.0], "unit": {}}, "units"),

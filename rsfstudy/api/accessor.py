@@ -15,6 +15,7 @@ from xarray.backends import BackendEntrypoint
 from rsfstudy._deprecation import add_former_member_names
 from rsfstudy.error_boundary import error_boundary
 from rsfstudy.errors import DataError
+from rsfstudy.former_data_names import rename_former_variables
 
 # Other modules are imported inside the methods, because xarray imports this module even if it opens
 # a file that rsfstudy has not written.
@@ -62,7 +63,7 @@ class DatasetAccessor:
         dataset : xarray.Dataset
             Dataset to access.
         """
-        self._dataset = dataset
+        self._dataset = rename_former_variables(dataset)
 
     @error_boundary
     def _repr_html_(self) -> str:

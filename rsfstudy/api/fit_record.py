@@ -201,14 +201,16 @@ def fit(
         steps or records. Lengths are in um and velocities in um/s.
 
         - For each parameter, ``<name>`` is the best-fit value, ``<name>_stderr`` is the standard
-          error, ``<name>_low`` and ``<name>_high`` are the ends of the 95 % confidence interval,
-          and ``<name>_error`` is the numerical error. ``a_minus_b`` is the difference of a and b.
+          error, ``<name>_ci_low`` and ``<name>_ci_high`` are the ends of the 95 % confidence
+          interval, and ``<name>_error`` is the numerical error. ``a_minus_b`` is the difference of
+          a and b.
         - ``covariance`` and ``correlation`` have the dimensions ``parameter`` and
           ``other_parameter``.
-        - The noise is described by ``noise_size``, ``noise_order``, ``effective_samples`` and
-          ``whiteness``, the p-value of a test for remaining autocorrelation.
-        - ``fitted_friction``, ``residual`` and ``innovation`` (whitened residual) have the
-          dimension ``row`` and are NaN outside the window.
+        - The noise is described by ``noise_sd`` (standard deviation), ``noise_order``, ``n_eff``
+          (effective sample size) and ``p_value``, the p-value of a test for remaining
+          autocorrelation. ``aic`` is the Akaike information criterion.
+        - ``fitted_friction``, ``residual`` and ``whitened_residual`` have the dimension ``row`` and
+          are NaN outside the window.
         - ``status`` is ``not_identified`` if the record does not constrain a parameter, and
           ``errors_not_valid`` if only the standard errors are invalid. ``message`` contains the
           reason.

@@ -458,9 +458,9 @@ def check(dataset: xr.Dataset | str | Path) -> pd.DataFrame:
     -------
     pandas.DataFrame
         Table with one row per claim. The columns include the published value ``published``, the
-        computed value ``ours``, ``tolerance``, the ``reason`` for the tolerance, ``verdict`` and
-        ``moved``. ``moved`` is True if the verdict differs from the expected verdict. If overrides
-        change the conditions of a claim, the claim does not apply.
+        value ``computed``, ``tolerance``, the ``reason`` for the tolerance, ``verdict`` and
+        ``verdict_changed``, which is True if the verdict differs from the expected verdict. If
+        overrides change the conditions of a claim, the claim does not apply.
 
     Raises
     ------

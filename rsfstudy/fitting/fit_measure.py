@@ -155,11 +155,11 @@ class Fit(Measure):
     record have the shape (rows,). The outputs ``covariance`` and ``correlation`` have the shape
     (parameters, parameters).
 
-    For each parameter, ``<name>_stderr`` is the standard error, ``<name>_low`` and ``<name>_high``
-    are the ends of the 95 % confidence interval, and ``<name>_error`` is the numerical error. If
-    the record does not constrain a parameter, the status is ``not_identified``, and the message
-    names the parameter. The confidence interval of an unconstrained parameter extends to the bounds
-    of the search, or is NaN if the search has no bounds for this parameter.
+    For each parameter, ``<name>_stderr`` is the standard error, ``<name>_ci_low`` and
+    ``<name>_ci_high`` are the ends of the 95 % confidence interval, and ``<name>_error`` is the
+    numerical error. If the record does not constrain a parameter, the status is ``not_identified``,
+    and the message names the parameter. The confidence interval of an unconstrained parameter
+    extends to the bounds of the search, or is NaN if the search has no bounds for this parameter.
 
     The standard errors account for correlated noise [1]_. Fits of velocity steps are described in
     [2]_ and [3]_.
@@ -429,7 +429,7 @@ class Fit(Measure):
             for name in self.parameters
         }
         for name, (low, high) in ends.items():
-            values[f"{name}_low"], values[f"{name}_high"] = low, high
+            values[f"{name}_ci_low"], values[f"{name}_ci_high"] = low, high
         if self.posterior:
             values |= posterior.sample_posterior_parameters(search, found, self.posterior)
         if unidentified:
@@ -568,18 +568,18 @@ class Fit(Measure):
         values |= {
             "a_minus_b": fit_solution.parameter_values["a"] - b,
             "a_minus_b_stderr": math.sqrt(max(variance_of_rate, 0.0)),
-            "noise_size": fit_solution.noise_sd,
+            "noise_sd": fit_solution.noise_sd,
             "outliers": len(fit_solution.outlier_rows),
             "friction_quantum": fit_solution.friction_rounding_quantum,
             "noise_order": fit_solution.noise_model.autoregressive_order,
-            "effective_samples": fit_solution.noise_model.effective_sample_size,
+            "n_eff": fit_solution.noise_model.effective_sample_size,
             "degrees_of_freedom": fit_solution.degrees_of_freedom,
-            "whiteness": ljung_box_p_value(
+            "p_value": ljung_box_p_value(
                 fit_solution.whitened_residuals, fit_solution.noise_model.autoregressive_order
             ),
             "r_squared": 1.0 - float(np.var(fit_solution.residuals)) / variance,
             "rows_fitted": len(rows),
-            "criterion": fit_solution.aic,
+            "aic": fit_solution.aic,
             "covariance": covariance,
             "correlation": correlation,
         }
@@ -588,7 +588,7 @@ class Fit(Measure):
             "fitted_friction_stderr": fit_solution.fitted_friction_stderr,
             "detrended_friction": fit_solution.model_friction,
             "residual": fit_solution.residuals,
-            "innovation": fit_solution.all_whitened_residuals,
+            "whitened_residual": fit_solution.all_whitened_residuals,
         }
         for name in (about.name for about in RECORD_COLUMNS[:3]):
             whole = [record.columns[name] for record in self._records_with_first_rows]

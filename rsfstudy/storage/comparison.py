@@ -19,6 +19,7 @@ import xarray as xr
 from rsfstudy._deprecation import add_former_member_names
 from rsfstudy.error_boundary import wrap_methods_in_error_boundary
 from rsfstudy.errors import InvalidValue
+from rsfstudy.former_data_names import rename_former_fields
 from rsfstudy.status import Status
 from rsfstudy.storage.fingerprints import find_fingerprint_differences
 from rsfstudy.storage.rebuild_from_file import find_primary_output
@@ -234,7 +235,10 @@ def compare_results(first: xr.Dataset, second: xr.Dataset) -> Comparison:
     alone = [int(_finished_cell_mask(dataset).sum() - known.sum()) for dataset in both]
     return Comparison(
         declaration=find_fingerprint_differences(
-            *(dict(_flatten_declaration(json.loads(d.attrs["declaration"]))) for d in both)
+            *(
+                dict(_flatten_declaration(rename_former_fields(json.loads(d.attrs["declaration"]))))
+                for d in both
+            )
         ),
         origin=find_fingerprint_differences(
             *(_read_versions_and_machine(dataset) for dataset in both)

@@ -25,6 +25,7 @@ import xarray as xr
 
 from rsfstudy.error_boundary import find_stacklevel_of_user_code
 from rsfstudy.errors import DataError, RsfStudyError, RsfStudyWarning, shorten_text
+from rsfstudy.former_data_names import rename_former_variables
 from rsfstudy.netcdf_encoding import copy_with_cf_encoding, encoding_without_fill_values
 from rsfstudy.path_checks import check_path
 from rsfstudy.storage import content_digest, schema
@@ -251,7 +252,7 @@ def read_dataset(path: Path) -> xr.Dataset:
         raise
     except Exception as error:  # HDF5, Zarr and xarray raise errors of many types.
         raise DataError(f"{where} cannot be read: {shorten_text(error)}") from error
-    dataset = copy_with_cf_encoding(dataset)
+    dataset = rename_former_variables(copy_with_cf_encoding(dataset))
     try:
         check_variable_attributes(dataset)
         if schema.is_of_single_scene(dataset):

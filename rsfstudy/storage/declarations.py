@@ -18,6 +18,7 @@ import msgspec
 from rsfstudy import measures, reductions
 from rsfstudy.axes import Axis
 from rsfstudy.errors import InvalidValue
+from rsfstudy.former_data_names import rename_former_fields
 from rsfstudy.measures import Measure
 from rsfstudy.motion import Accuracy
 from rsfstudy.reductions import Reduction
@@ -188,7 +189,8 @@ def parse_declaration(plain_data: Any) -> StoredDeclaration:
     DataError
         If an entry is missing, unknown or invalid.
     """
-    declared = convert_plain_data(plain_data, StoredDeclaration, "declaration")
+    current = rename_former_fields(plain_data)
+    declared = convert_plain_data(current, StoredDeclaration, "declaration")
     # Other fields of measures and reductions are checked when a study is built.
     convert_plain_data(declared.measure, _StoredMeasure, "declaration.measure")
     convert_plain_data(declared.reductions, list[_StoredReduction], "declaration.reductions")
@@ -350,8 +352,6 @@ def build_reduction(plain_reduction: Mapping[str, Any], path_in_file: str) -> Re
         If a field is missing, unknown or invalid.
     """
     values: dict[str, Any] = dict(plain_reduction)
-    if values["kind"] == "spread":  # Older files use this name.
-        values |= {"kind": "range", "over": values.pop("on", "")}
     kind = _find_class("reduction", Reduction, reductions, values.pop("kind"))
     made: Reduction = build_from_plain_data(values, kind, path_in_file, integer_type=_Count)
     return made

@@ -25,8 +25,9 @@ from rsfstudy.storage.plain_data import convert_plain_data, invalid_part_error
 from rsfstudy.vocabulary import QUANTITY_BY_NAME
 
 #: Version of the file layout. A file without a version number has layout 1. In layout 1, the digest
-#: of each variable was stored as an attribute of the variable.
-FILE_LAYOUT_VERSION = 2
+#: of each variable was stored as an attribute of the variable. In layouts 1 and 2, some variables
+#: of fits and some fields of claims and reductions had other names (module ``former_data_names``).
+FILE_LAYOUT_VERSION = 3
 
 
 class RootAttributes(TypedDict):

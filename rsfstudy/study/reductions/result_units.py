@@ -68,7 +68,7 @@ def describe_reduction_results(
                 reduction_results[name].attrs.get("comment", "") + why
             )
         # A fit with a fixed dimensionless intercept applies to dimensionless values.
-        scale = "" if varied or scale == "1" or vars(reduction).get("minus") else scale
+        scale = "" if varied or scale == "1" or vars(reduction).get("intercept") else scale
         about = find_quantity(name, found)
         if not end and name not in stated and (about.units, about.scale) != (units, scale):
             about = Quantity(name, "", units, name.replace("_", " "))  # same name, other quantity

@@ -40,7 +40,7 @@ class SobolIndices(Reduction):
     ----------
     name : str
         Prefix of the names of the results, which are ``<name>_first_order`` and ``<name>_total``.
-        The bounds of their confidence intervals have the suffixes ``_low`` and ``_high``. The
+        The bounds of their confidence intervals have the suffixes ``_ci_low`` and ``_ci_high``. The
         results have the dimension ``input``, whose labels are the sampled quantities.
     of : str
         Name of the variable whose variance is analysed.
@@ -69,7 +69,7 @@ class SobolIndices(Reduction):
     >>> indices = SobolIndices(name="sobol", of="drop")(dataset)
     >>> indices["input"].values.tolist()
     ['a', 'b']
-    >>> "sobol_total_high" in indices
+    >>> "sobol_total_ci_high" in indices
     True
     """
 
@@ -87,8 +87,9 @@ class SobolIndices(Reduction):
         for order in _SOBOL_INDEX_NAMES:
             text = f"{order.replace('_', '-')} Sobol index of {self.of.replace('_', ' ')}"
             yield f"{self.name}_{order}", text
-            for end in ("low", "high"):
-                yield f"{self.name}_{order}_{end}", f"{end} end of the 95 % interval of the {text}"
+            for end, word in (("ci_low", "lower"), ("ci_high", "upper")):
+                about = f"{word} end of the 95 % confidence interval of the {text}"
+                yield f"{self.name}_{order}_{end}", about
 
     def __call__(self, dataset: xr.Dataset) -> xr.Dataset:
         """Compute the indices for each point along the other dimensions.
