@@ -90,7 +90,7 @@ class Triggered(Measure):
         # indistinguishable.
         if answer != again or is_neutrally_stable(scene, integrator.result_tolerance(10.0)):
             return Outcome(
-                Status.UNVERIFIED, message="the tolerance decides: ask for a smaller rtol"
+                Status.UNVERIFIED, message="the result depends on the tolerance. Use a smaller rtol"
             )
         values = {"unstable": float(answer), "unstable_error": 0.0}
         return Outcome(
