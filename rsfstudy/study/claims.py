@@ -128,16 +128,16 @@ class Claim:
         """Check the arguments."""
         for name in _TEXT_FIELDS:
             if not isinstance(getattr(self, name), str):
-                rule = f"must be a text, in claim {self.id}"
+                rule = f"must be a string, in claim {self.id}"
                 raise InvalidValue(name, getattr(self, name), rule)
         if self.relation not in CLAIM_RELATIONS:
             raise InvalidValue("relation", self.relation, "is unknown", choices=CLAIM_RELATIONS)
         if self.relation == "equals" and self.reason == TOLERANCE_REASON_OF_INEQUALITY:
-            rule = f"must tell why the tolerance is {self.tolerance}, in claim {self.id}"
+            rule = f"must give the reason for the tolerance {self.tolerance}, in claim {self.id}"
             raise InvalidValue("reason", self.reason, rule)
         if self.expected not in _EXPECTED_VERDICTS:
             raise InvalidValue(
-                "expected", self.expected, "is no verdict", choices=_EXPECTED_VERDICTS
+                "expected", self.expected, "is not an expected verdict", choices=_EXPECTED_VERDICTS
             )
         for name in ("published", "tolerance"):
             value = getattr(self, name)
@@ -149,7 +149,7 @@ class Claim:
                 raise InvalidValue(name, getattr(self, name), rule)
             for value in getattr(self, name).values():
                 if not isinstance(value, str) and not _is_number(value):
-                    rule = f"must be a text or a number, in claim {self.id}"
+                    rule = f"must be a string or a number, in claim {self.id}"
                     raise InvalidValue(name, value, rule)
 
     @classmethod
@@ -211,14 +211,14 @@ class Claim:
         variables, coordinates = map(str, dataset.data_vars), [str(n) for n in dataset.coords]
         for variable in filter(None, (self.variable, self.baseline_variable)):
             if variable not in dataset:
-                rule = f"is no variable of the results, in claim {self.id}"
+                rule = f"is not a variable of the results, in claim {self.id}"
                 raise InvalidValue("variable", variable, rule, choices=sorted(variables))
         for name in [*self.where, *self.baseline]:
             if name not in coordinates:
-                rule = f"is no coordinate of the results, in claim {self.id}"
+                rule = f"is not a coordinate of the results, in claim {self.id}"
                 raise InvalidValue("where", name, rule, choices=sorted(coordinates))
         if self.verdict(dataset)[1] == NOT_APPLICABLE_VERDICT:
-            rule = f"is no place of the lattice, in claim {self.id}"
+            rule = f"is not a point of the lattice, in claim {self.id}"
             raise InvalidValue("where", {**self.where, **self.baseline}, rule)
 
     def verdict(self, dataset: xr.Dataset) -> tuple[float, str]:

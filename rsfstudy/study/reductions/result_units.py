@@ -63,7 +63,7 @@ def describe_reduction_results(
         )
         across = {*of.dims} - {*reduction_results[name].dims} | {vars(reduction).get("along")}
         if varied := find_varying_scale(dataset, f"{of.attrs.get('scale')} {scale}", across):
-            why = f"; of cells in units of {varied}, which varies"
+            why = f"; combines cells in units of {varied}, which varies between the cells"
             reduction_results[name].attrs["comment"] = (
                 reduction_results[name].attrs.get("comment", "") + why
             )

@@ -119,14 +119,14 @@ class SobolIndices(Reduction):
             if not bool(bad.isel(dict(zip(others, place, strict=True)))) and np.ptp(values) > 0.0:
                 found[place] = _indices_with_intervals(values.reshape(-1, d + 2).T)
         lost = int(of.isnull().sum())
-        about = {"comment": f"samples drawn anew {_BOOTSTRAP_RESAMPLES} times for the intervals"}
+        about = {"comment": f"confidence intervals from {_BOOTSTRAP_RESAMPLES} bootstrap resamples"}
         if lost:
             about["refused"] = (
-                f"{lost} of {of.size} cells have no number, and the indices need all: narrower "
-                "distributions, away from where answers end, may have them"
+                f"{lost} of {of.size} cells have no value, but the indices require all cells. Use "
+                "narrower distributions"
             )
         elif np.isnan(found).any():
-            about["refused"] = f"cells failed, or {self.of} is the same everywhere"
+            about["refused"] = f"cells failed, or {self.of} has the same value in all cells"
         names = iter(name for name, _text in self._result_descriptions())
         return xr.Dataset(
             {
@@ -140,13 +140,16 @@ class SobolIndices(Reduction):
     def _sampled_inputs(self, dataset: xr.Dataset) -> list[str]:
         """Return the names of the sampled quantities."""
         if self.over not in dataset[self.of].dims:
-            raise InvalidValue("over", self.over, f"is no dimension of {self.of}")
+            raise InvalidValue("over", self.over, f"is not a dimension of {self.of}")
         drawn: dict[str, Any] = json.loads(dataset[self.over].attrs.get("drawn", "{}"))
         inputs = list(drawn.get("of", ()))
         points, rest = divmod(dataset.sizes[self.over], len(inputs) + 2)
         if drawn.get("method") != "saltelli" or rest or points & (points - 1):
-            rule = "was not drawn for Sobol indices, or only a part of it is here"
-            remedy = "Draw it by Axis.samples(..., n, method='saltelli'), n a power of two."
+            rule = "was not drawn for Sobol indices, or is incomplete"
+            remedy = (
+                "Draw the samples with Axis.samples(..., n, method='saltelli'), where n is "
+                "a power of two."
+            )
             raise InvalidValue("over", self.over, rule, remedy=remedy)
         return inputs
 
