@@ -202,26 +202,26 @@ class Fit(Measure):
     name: ClassVar[str] = "fit"
     typical_work = 250_000
     dimensions = (
-        Quantity("parameter", "", "", "parameter that is fitted"),
-        Quantity("other_parameter", "", "", "parameter that is fitted"),
+        Quantity("parameter", "", "", "fitted parameter"),
+        Quantity("other_parameter", "", "", "fitted parameter"),
         Quantity("row", "", "1", "row of the record"),
-        Quantity("record", "", "", "record that is fitted"),
+        Quantity("record", "", "", "fitted record"),
         Quantity("step", "", "1", "number of the step in the record"),
-        Quantity("before", "", "um", "load point displacement that is fitted before the step"),
-        Quantity("after", "", "um", "load point displacement that is fitted after the step"),
-        Quantity("part", "", "1", "part of what follows the step that is fitted"),
+        Quantity("before", "", "um", "fitted load point displacement before the step"),
+        Quantity("after", "", "um", "fitted load point displacement after the step"),
+        Quantity("part", "", "1", "fitted fraction of the record after the step"),
         Quantity("noise", "", "", "model of the noise"),
-        Quantity("loading", "", "", "where the loading is taken from"),
-        Quantity("filter", "", "", "filter that friction passed before it was recorded"),
+        Quantity("loading", "", "", "source of the loading"),
+        Quantity("filter", "", "", "filter that was applied to friction before recording"),
     )
 
     def __post_init__(self) -> None:
         """Validate the options."""
         if not self.records:
-            raise InvalidValue("records", self.records, "must hold a record at least")
+            raise InvalidValue("records", self.records, "must contain at least one record")
         names = [record.name for record in self.records]
         if len(set(names)) < len(names):
-            raise InvalidValue("records", names, "must have names that differ")
+            raise InvalidValue("records", names, "must have different names")
         check_free_parameters(self.free)
         for name, step in self._fitted_record_names_and_steps:
             if name not in names:
@@ -232,12 +232,12 @@ class Fit(Measure):
             if not 0.0 <= getattr(self, name) < math.inf:
                 raise InvalidValue(name, getattr(self, name), "must be 0 or more, in um")
         if not 0.0 < self.part <= 1.0:
-            raise InvalidValue("part", self.part, "must be above 0, and 1 at most")
+            raise InvalidValue("part", self.part, "must be greater than 0 and at most 1")
         check_fields_positive(self, "slip_distance_guess", "slip_distance_2_guess")
         if self.loading not in LOADING_KINDS:
             raise InvalidValue("loading", self.loading, "is unknown", choices=LOADING_KINDS)
         if "step_time" in self.free and self.loading == "recorded":
-            rule = "is that of a loading by steps"
+            rule = "is only defined for a loading by steps"
             raise InvalidValue("free", "step_time", rule, remedy="Leave it out.")
         check_noise_name(self.noise)
         Filter.parse(self.filter)
@@ -364,8 +364,8 @@ class Fit(Measure):
         InvalidValue
             Always, because the description contains only hashes of the records.
         """
-        rule = "are fitted, and the file has no more than digests of them"
-        remedy = "Fit them again: show FILE tells the command."
+        rule = "are required for the fit, but the file contains only their digests"
+        remedy = "Fit the records again. The command show FILE prints the command of the fit."
         raise InvalidValue("records", [*described["records"]], rule, remedy=remedy)
 
     @cached_property

@@ -29,7 +29,7 @@ _SCALAR_OUTPUTS = (
     Output("load_point_noise", "", "um", "standard deviation of the noise of the load point"),
     Output("rows_fitted", "", "1", "number of rows in the window"),
     Output("normal_stress_before", r"$\sigma_*$", "Pa", "mean normal stress before the step"),
-    Output("window_stiffness", "$k$", "um-1", "stiffness over normal stress before the step"),
+    Output("window_stiffness", "$k$", "um-1", "stiffness divided by normal stress before the step"),
     Output(
         "window_stiffness_stderr", "", "um-1", "standard error of the stiffness, if it is fixed"
     ),

@@ -96,15 +96,17 @@ def write_dataset(dataset: xr.Dataset, path: Path) -> xr.Dataset:
             file.write(_DIGEST_TRAILER_PREFIX + _hash_file_contents(beside, beside.stat().st_size))
         with xr.open_dataset(beside, engine="netcdf4") as back:
             if not stored.identical(back.load()):
-                raise DataError(f"{path} was not written: what was read back differs.")
+                raise DataError(
+                    f"{path} was not written, because the data that were read back differ."
+                )
         with open(beside, "rb") as file:
             os.fsync(file.fileno())
         os.replace(beside, path)
     except (OSError, RuntimeError) as error:
         # HDF5 reports a full disk as a RuntimeError.
         raise DataError(
-            f"cannot write {path}: {error}. Nothing was replaced; make room, or choose another "
-            "--output."
+            f"cannot write {path}: {error}. No file was replaced. Free some disk space, or choose "
+            "another --output."
         ) from error
     finally:
         with contextlib.suppress(OSError):  # The error above reports an invalid directory.
@@ -190,7 +192,9 @@ def _check_store_digest(path: Path) -> bool:
     if _STORE_DIGEST_ATTRIBUTE in attributes and attributes[_STORE_DIGEST_ATTRIBUTE] != _hash_store(
         path
     ):
-        raise DataError(f"{path} is damaged, or was edited: its files are not what was written.")
+        raise DataError(
+            f"{path} is damaged or was edited, because its files do not match the digest."
+        )
     return _STORE_DIGEST_ATTRIBUTE in attributes
 
 
@@ -206,7 +210,9 @@ def _check_file_digest(path: Path) -> bool:
     if not trailer.startswith(_DIGEST_TRAILER_PREFIX):
         return False
     if trailer != _DIGEST_TRAILER_PREFIX + _hash_file_contents(path, size):
-        raise DataError(f"{path} is damaged, or was edited: its bytes are not what was written.")
+        raise DataError(
+            f"{path} is damaged or was edited, because its contents do not match the digest."
+        )
     return True
 
 
@@ -262,7 +268,9 @@ def read_dataset(path: Path) -> xr.Dataset:
     except DataError as error:
         raise DataError(f"{where}: {error}") from error
     if not sealed and not (path.is_dir() and "layout" not in dataset.attrs):
-        said = f"{where} has no digest: another program saved it, and may have changed it"
+        said = (
+            f"{where} has no digest, because another program saved the file and may have changed it"
+        )
         warnings.warn(said, RsfStudyWarning, stacklevel=find_stacklevel_of_user_code())
     return dataset
 
@@ -275,13 +283,16 @@ def _check_readable_path(path: Path, file_description: str) -> None:
     check_path("file", path)
     if not path.exists():
         raise DataError(
-            f"{file_description} does not exist. Run the study first, or name another file."
+            f"{file_description} does not exist. Run the study first, or pass the path of another "
+            "file."
         )
     if path.is_dir() and not (path / "zarr.json").is_file():
-        raise DataError(f"{file_description} is a directory, and no Zarr store.")
+        raise DataError(f"{file_description} is a directory, but not a Zarr store.")
     for part in path.rglob("*") if path.is_dir() else [path]:
         if not (part.is_file() or part.is_dir()) or (part != path and part.is_symlink()):
-            raise DataError(f"{shorten_text(part)} is no file, but a pipe, a device or a link.")
+            raise DataError(
+                f"{shorten_text(part)} is a pipe, a device or a link, and not a regular file."
+            )
 
 
 def _check_zarr_codecs(path: Path) -> None:
@@ -291,8 +302,8 @@ def _check_zarr_codecs(path: Path) -> None:
         for codec in about.get("codecs", []):
             if codec["name"] not in _ALLOWED_ZARR_CODECS:
                 raise DataError(
-                    f"{path} was not written by rsfstudy: {file.parent.name} is coded by "
-                    f"{codec['name']!r}, which may run code."
+                    f"{path} was not written by rsfstudy: {file.parent.name} uses the codec "
+                    f"{codec['name']!r}, which could run arbitrary code."
                 )
 
 

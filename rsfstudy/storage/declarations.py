@@ -33,7 +33,7 @@ from rsfstudy.storage.plain_data import (
 )
 from rsfstudy.study import Claim, load_study, study_names
 
-MISSING_STUDY_FILE_REMEDY = "Name the file that declares it: --study FILE (study=)."
+MISSING_STUDY_FILE_REMEDY = "Pass the file that defines it: --study FILE (study=)."
 #: Maximum number of claims of a study. Checking a larger number of claims would take minutes.
 _MAX_CLAIMS = 10_000
 #: Type of the integer fields of measures and reductions. The range is limited because a larger
@@ -99,7 +99,7 @@ class StoredAxis(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
             named = Axis(self.dimension, self.values, self.units, self.drawn)
         except InvalidValue as error:
             path = f"declaration.axes.{self.dimension}"
-            raise invalid_part_error(path, f"is refused ({error})") from error
+            raise invalid_part_error(path, f"is invalid ({error})") from error
         if not user_parts:
             return named
         rows = [SceneFields.replace_names_by_user_parts(row, user_parts) for row in named.rows]
