@@ -165,7 +165,7 @@ def test_what_is_refused_is_named_by_its_path(at, change, complaint, tiny, tmp_p
         ("status", "whole numbers", "status is -77 in a cell"),
         ("wall_time", "along nothing", r"wall_time lies along \(\), and status along"),
         ("message", "whole numbers", "message holds int64, and must hold texts"),
-        ("case", "removed", "case is no coordinate along the dimension of its name"),
+        ("case", "removed", "case is not a dimension coordinate"),
     ],
 )
 def test_a_variable_that_is_refused_is_named(name, how, complaint, tiny, tmp_path):
@@ -180,7 +180,7 @@ def test_a_variable_that_is_refused_is_named(name, how, complaint, tiny, tmp_pat
         ("reductions.0.within", replaced([1]), r"reductions\[0\].within is refused .*of length 2"),
         ("axes.1.values", replaced([1.0, 2.0]), "has 2 points in the declaration, and 3 in the"),
         ("axes.1.values", replaced([1.0, 2.0, 3.0]), "load_velocity_ratio is not that axis of the"),
-        ("plot", replaced("a\0b"), "declaration makes no study .*must be a text"),
+        ("plot", replaced("a\0b"), "declaration makes no study .*must be a string"),
     ],
 )
 def test_a_rerun_refuses_what_makes_no_study_by_its_path(at, change, complaint, tiny, tmp_path):

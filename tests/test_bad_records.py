@@ -66,7 +66,11 @@ def test_slip_that_is_given_as_load_point_displacement_is_told() -> None:
 
 def test_filters_of_a_record_are_filters_of_its_fit() -> None:
     record = rsfstudy.read_record(GOOD, filter="mean 1 s")
-    with pytest.raises(InvalidValue, match="filter = 'mean 2.0': follows another filter. Leave"):
+    with pytest.raises(
+        InvalidValue,
+        match="filter = 'mean 2.0': cannot be applied, because the "
+        "record was read with filter=. Leave",
+    ):
         fitted(record, averaging="2 s")
     other = rsfstudy.read_record(GOOD, name="other")
     with pytest.raises(InvalidValue, match="filter = ..mean 1.0..: differs between the records"):

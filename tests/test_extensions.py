@@ -443,14 +443,18 @@ def test_a_cell_of_a_notebook_that_is_run_twice():
 
 def test_two_parts_of_one_scene_share_no_field():
     other = made(name="gripping", grip=number(1.0, "", "1", "another"))
-    with pytest.raises(InvalidValue, match="parts = 'gripping, sticky': have a field of one name"):
+    with pytest.raises(
+        InvalidValue, match="parts = 'gripping, sticky': have fields with the same name"
+    ):
         Scene(law=other, dynamics=Sticky)
 
 
 @pytest.mark.parametrize("name", ["status", "slip", "steady_friction", "a_over_b_minus_a"])
 def test_a_field_that_would_be_mistaken_in_a_file(name):
     part = made(name="mistaken", **{name: number(1.0, "", "1", "another")})
-    with pytest.raises(InvalidValue, match=f"field = '{name}': is the name of something else"):
+    with pytest.raises(
+        InvalidValue, match=f"field = '{name}': is already used for another quantity"
+    ):
         study_of("n", LinearStability(), Axis("phi", [60]), base=Scene(law=part))
 
 
@@ -493,7 +497,9 @@ def test_parts_along_zipped_axes_reach_the_workers(cluster, tmp_path):
     np.testing.assert_array_equal(here.grip, [np.nan, 5.0, np.nan])
     np.testing.assert_array_equal(here.is_odd, [np.nan, np.nan, 1.0])
     assert here.grip.attrs["units"] == "m"
-    assert here.dynamics.attrs["long_name"] == "what balances the spring besides friction"
+    assert here.dynamics.attrs["long_name"] == (
+        "force that balances the spring in addition to friction"
+    )
     there = run(study, client=cluster, output=tmp_path)
     have_same_numbers(rsfstudy.open(tmp_path / "zipped.nc"), here)
     have_same_numbers(there, here)

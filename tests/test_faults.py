@@ -61,8 +61,12 @@ WRONG = {
         ("too many", "cell_raised", "has the shape (3,) and must have ()"),
         ("text", "cell_raised", "must be a real number"),
         ("masked", "cell_raised", "must be a real number"),
-        ("number for message", "cell_raised", "must be a text"),
-        ("pending", "cell_raised", "must say what became of the cell"),
+        ("number for message", "cell_raised", "must be a string"),
+        (
+            "pending",
+            "cell_raised",
+            "has the status pending, but must have the status of a computed cell",
+        ),
         ("surrogate", "cell_raised", r"OSError: no \udc80 file"),
         ("nul", "cell_raised", r"ValueError: bad\0byte [/red]"),
         ("generator", "cell_raised", "GeneratorExit"),
@@ -110,7 +114,7 @@ def lost(*words, **options):
     """Run a study and check the warnings about a lost worker."""
     with (
         pytest.warns(UserWarning, match="a worker ended: the cells it held"),
-        pytest.warns(UserWarning, match="cell b_over_a = .* failed, .*The run goes on"),
+        pytest.warns(UserWarning, match="cell b_over_a = .* failed, .*The run continues"),
     ):
         return run_with_failures(*words, **options)
 

@@ -282,7 +282,7 @@ def test_any_variable_on_request():
     dataset = lattice(ANGLES, RATES)
     drawn = rsfstudy.plot(dataset, "steady_friction")
     assert any("friction coefficient" in text.replace("\n", " ") for text in texts(drawn))
-    with pytest.raises(InvalidValue, match="variable = 'friction': is no number"):
+    with pytest.raises(InvalidValue, match="variable = 'friction': is not a number"):
         rsfstudy.plot(dataset, "friction")
     with pytest.raises(InvalidValue, match="variable = 'message'"):
         rsfstudy.plot(dataset, "message")
@@ -317,7 +317,7 @@ def test_a_style_of_the_users_own(tmp_path):
         ({"font.size": "large-ish"}, "'large-ish': is not a valid value of font.size: Could not"),
         ("unknown.mplstyle", "unknown.mplstyle, line 2: style = 'font.sise': is not a setting"),
         ("text.mplstyle", "text.mplstyle, line 1: style = 'root': is not"),
-        ("latin.mplstyle", "cannot be read: it is not text in UTF-8"),
+        ("latin.mplstyle", "cannot be read: the file is not encoded in UTF-8"),
         (["ggplot", "folder.mplstyle"], "is a directory"),
     ],
 )

@@ -341,7 +341,7 @@ def test_a_cell_computed_by_other_code_says_so(small, tmp_path):
     place = {"case": "constant", "b_over_a": "2.5"}
     with pytest.warns(UserWarning, match="physics: older then, .* now"):
         rsfstudy.recompute_cell(tmp_path / "other.nc", place)
-    with pytest.raises(InvalidValue, match="inf.* is not on its axis"):
+    with pytest.raises(InvalidValue, match="inf.* is not a point of its axis"):
         rsfstudy.recompute_cell(small, {**place, "b_over_a": "inf"})
     words = [f"--cell={name}={value}" for name, value in place.items()]
     told = call_main("rerun", tmp_path / "other.nc", *words)

@@ -166,7 +166,7 @@ def test_laws_of_one_and_of_two_states_are_fitted_beside_each_other() -> None:
     ("free", "error"),
     [
         (("a", "b"), "names no evolution effect of law='two_slip_states'"),
-        (("a", "law_exponent"), "is no parameter with law='slip' or law='two_slip_states'"),
+        (("a", "law_exponent"), "is not a parameter with law='slip' or law='two_slip_states'"),
         (("slip_distance_2",), "names no parameter of law='slip'"),
     ],
 )
@@ -304,7 +304,7 @@ def test_the_scene_of_a_fit_moves_as_fitted() -> None:
         synthetic_record(seed=4), laws=["slowness"], free=("a", "mu_star"), **FIT_OPTIONS | held
     )
     assert some.squeeze().rsf.scene.b == pytest.approx(0.013, rel=1e-12)
-    with pytest.raises(InvalidValue, match="normal_stress = None: is not in the record"):
+    with pytest.raises(InvalidValue, match="normal_stress = None: is missing from the record"):
         _ = fit.rsf.rig
 
 

@@ -198,7 +198,8 @@ def test_summary_has_one_line_per_step_that_is_not_fitted() -> None:
     pieces = [*build_summary_tables_and_sentences(fits)]
     lines = [piece for piece in pieces if isinstance(piece, str) and "is not fitted" in piece]
     assert lines == [
-        "step 2 is not fitted: the window begins in a hold: a fit begins with steady sliding"
+        "step 2 is not fitted: the window begins in a hold, but a fit must begin with steady "
+        "sliding"
     ]
     captions = [piece.caption for piece in pieces if hasattr(piece, "caption")]
     assert sum("step 1" in caption for caption in captions) == 1

@@ -105,7 +105,10 @@ def test_pipes_are_neither_read_nor_replaced(words, tmp_path, monkeypatch):
     for name in pipes:
         os.mkfifo(name)
     status, said = run_command(shlex.split(words))
-    assert (status, "is a directory, a pipe or a device. Name a file." in said) == (2, True)
+    assert (
+        status,
+        "is a directory, a pipe or a device. Pass the path of a regular file." in said,
+    ) == (2, True)
     assert all(Path(name).is_fifo() for name in pipes)
 
 

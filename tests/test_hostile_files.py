@@ -132,10 +132,10 @@ def tiny() -> xr.Dataset:
     ("name", "attributes", "rule"),
     [
         ("critical_stiffness", {"long_name": 5}, "critical_stiffness.long_name is 5, and must be"),
-        ("critical_stiffness", {"units": 1}, "critical_stiffness.units is 1, and must be a text"),
-        ("critical_stiffness", {"scale": [1, 2]}, "scale is .*and must be a text"),
+        ("critical_stiffness", {"units": 1}, "critical_stiffness.units is 1, and must be a string"),
+        ("critical_stiffness", {"scale": [1, 2]}, "scale is .*and must be a string"),
         ("critical_stiffness", {"units": " (" * 50_000}, "units has 100,000 characters"),
-        ("status", {"flag_meanings": 3}, "status.flag_meanings is 3, and must be a text"),
+        ("status", {"flag_meanings": 3}, "status.flag_meanings is 3, and must be a string"),
         ("status", {"flag_values": [0, 1]}, "status.flag_values must be numbers, one for each"),
         ("status", {"flag_values": "many"}, "status.flag_values must be numbers, one for each"),
     ],
@@ -156,7 +156,7 @@ def test_attributes_of_a_motion_are_checked(tmp_path: Path) -> None:
     motion = rsfstudy.simulate(rsfstudy.Scene(load_velocity_ratio=2.0), duration=1.0, rtol=1e-3)
     motion["slip"].attrs["long_name"] = 5
     dataset_files.write_dataset(motion, tmp_path / "motion.nc")
-    with pytest.raises(DataError, match="slip.long_name is 5, and must be a text"):
+    with pytest.raises(DataError, match="slip.long_name is 5, and must be a string"):
         dataset_files.read_dataset(tmp_path / "motion.nc")
 
 

@@ -175,7 +175,9 @@ def test_workbooks(library: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
     frame = frame.astype(object)
     frame.loc[3, HEADINGS[1]] = "off"
     frame.to_excel(path, index=False)
-    with pytest.raises(InvalidValue, match="line 5, column 2: displacement = 'off': is no number"):
+    with pytest.raises(
+        InvalidValue, match="line 5, column 2: displacement = 'off': is not a number"
+    ):
         rsfstudy.read_record(path)
 
 
@@ -224,7 +226,9 @@ def test_tdms_files(tmp_path: Path) -> None:
             file.write_segment([nptdms.ChannelObject("plain", name, values, properties=about)])
     check(path)
     check(path, sheet="plain")
-    with pytest.raises(InvalidValue, match="sheet = 'x': is no group with channels. Choices: wave"):
+    with pytest.raises(
+        InvalidValue, match="sheet = 'x': is not a group with channels. Choices: wave"
+    ):
         rsfstudy.read_record(path, sheet="x")
 
 
@@ -339,8 +343,8 @@ def test_rows_are_selected(options: dict[str, Any], kept: slice, tmp_path: Path)
         ({"rows": (0, 5)}, "rows = .0, 5.: must be the numbers of the first and the last row"),
         ({"rows": (5, 3)}, "rows = .5, 3.: must be"),
         ({"rows": (500, 600)}, "selects no row: the record has 40 rows"),
-        ({"begin": "2 MPa"}, "begin = '2 MPa': is no time or displacement"),
-        ({"begin": "x"}, "begin = 'x': is no time or displacement"),
+        ({"begin": "2 MPa"}, "begin = '2 MPa': is neither a time nor a displacement"),
+        ({"begin": "x"}, "begin = 'x': is neither a time nor a displacement"),
         ({"begin": "1 h"}, "begin = '1 h': lies outside the record, 0 to 9.75 s"),
         ({"thin": 0}, "thin = 0: must be a whole number from 1"),
         ({"filter": "median 1 s"}, "filter = 'median 1 s': is unknown. .*mean, trailing_mean"),
@@ -389,7 +393,9 @@ def test_filters_have_their_response(kind: str, gain: complex, spread: float) ->
     assert record.processing == (f"friction filtered by {kind}",)
     lost = round(size / 0.3) if "mean" in kind else 0
     assert len(record) == pytest.approx(len(time) - lost, abs=2 if lost else 0)
-    with pytest.raises(InvalidValue, match="cannot follow the filter of the record"):
+    with pytest.raises(
+        InvalidValue, match="cannot be applied, because the record is already filtered"
+    ):
         rsfstudy.read_record(record, filter=kind)
 
 
@@ -418,7 +424,9 @@ def test_what_a_record_lacks_is_named(tmp_path: Path) -> None:
     for names in (["time", "shear_stress"], ["displacement", "shear_stress"]):
         with pytest.raises(InvalidValue, match="rsfstudy.events does not need"):
             rsfstudy.read_record({name: DATA[name] for name in names})
-    with pytest.raises(InvalidValue, match="does not name friction or shear stress"):
+    with pytest.raises(
+        InvalidValue, match="has no recognised heading for friction or shear stress"
+    ):
         rsfstudy.read_record({name: DATA[name] for name in ("time", "displacement")})
 
 

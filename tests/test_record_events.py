@@ -85,5 +85,5 @@ def test_events_of_a_record_as_fits_read_it() -> None:
     plain = rsfstudy.events(time=made.time, shear_stress=made.stress)
     np.testing.assert_allclose(found.static_stress_drop, plain.static_stress_drop, rtol=1e-6)
     assert found.static_stress_drop.attrs["units"] == "MPa"
-    with pytest.raises(InvalidValue, match="is no record"):
+    with pytest.raises(InvalidValue, match="is not a record"):
         rsfstudy.events([1.0, 2.0])

@@ -396,7 +396,7 @@ def test_over_a_closed_form():
     np.testing.assert_allclose(result.over_closed_form, 1.0 + X, rtol=1e-14)
     assert "Gu et al. (1984)" in result.over.attrs["comment"]
     assert "over" not in form(dataset.drop_vars("b_over_a"))
-    with pytest.raises(InvalidValue, match="is no closed form"):
+    with pytest.raises(InvalidValue, match="is not a closed-form solution"):
         ClosedFormRatio(name="over", of="critical_velocity_ratio", form="net_weakenin")
 
 

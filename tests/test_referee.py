@@ -444,7 +444,7 @@ def test_a_problem_of_ones_own(text, tmp_path):
         ('"slowness"', '"sloth"', "is unknown"),
         ("[1, 2, 5,", "[2, 1, 5,", "must increase"),
         ("[1, 2, 5,", '["one", 2, 5,', "must be a number, not a text"),
-        ('"slowness"', "5", "law = 5: must be a text, not a whole number"),
+        ('"slowness"', "5", "law = 5: must be a string, not a whole number"),
         ('["friction", "slip_rate", "theta"]', "[]", "must list at least one quantity"),
         ("a = 0.01", "a = 0", "a = 0: must be positive"),
         ("times =", "digits = 99\ntimes =", "digits = 99: must lie between 1 and 15"),
@@ -506,7 +506,7 @@ def test_the_example_passes_a_third_with_plain_scipy(tmp_path):
     again = call_main("problems", place)
     assert (again.returncode, " ".join(again.stderr.split())[-42:]) == (
         2,
-        "there already. Name a new one: nothing is replaced."[-42:],
+        "there already. Choose a new directory, because existing files are not replaced."[-42:],
     )
 
 

@@ -159,10 +159,10 @@ def test_python_names_the_page_and_refuses_what_is_none(tmp_path):
         rsfstudy.report(tmp_path / "in", tmp_path / "all.txt")
     assert rsfstudy.report(tmp_path / "in", page) == page  # A report can be overwritten.
     page.write_text("<!DOCTYPE html><p>mine</p>")
-    with pytest.raises(InvalidValue, match="is there already, and no report"):
+    with pytest.raises(InvalidValue, match="already exists and is not a report"):
         rsfstudy.report(tmp_path / "in", page)
     assert "mine" in page.read_text()
-    with pytest.raises(InvalidValue, match="is no directory"):
+    with pytest.raises(InvalidValue, match="is not a directory"):
         rsfstudy.report(tmp_path / "nowhere")
 
 

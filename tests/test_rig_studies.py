@@ -258,7 +258,7 @@ def test_one_scale_for_several_rigs_is_refused(cycles):
     one = cycles.isel(sigma_star=0, slip_distance=1)
     xr.testing.assert_allclose(RIG.in_units(one), one.rsf.to_si(), rtol=1e-12)
     plain = run(study_of("x", LinearStability(), Axis("b_over_a", [2.0])))
-    with pytest.raises(InvalidValue, match="is not in the dataset"):
+    with pytest.raises(InvalidValue, match="is required, because the dataset does not contain it"):
         plain.rsf.in_units()
 
 

@@ -198,7 +198,7 @@ def test_processes_that_are_lost_are_started_anew(monkeypatch, tmp_path):
 
     def mapper(task, batches):
         if lost:
-            raise RunError("the Dask scheduler is lost")
+            raise RunError("the connection to the Dask scheduler is lost")
         yield from worker_pool.compute_serially(task, batches)
 
     def start(_processes, file):

@@ -37,8 +37,8 @@ def written(tmp_path, text: str) -> str:
 @pytest.mark.parametrize(
     ("text", "complaint"),
     [
-        ("study = 1", "declares no study"),
-        ("", "declares no study"),
+        ("study = 1", "does not define a study"),
+        ("", "does not define a study"),
         ("x = 1\nx +", "line 2: invalid syntax"),
         ("\n\n1 / 0", "raises ZeroDivisionError, line 3: division by zero"),
         ("from rsfstudy import Scene\nScene(alfa=1)", "line 2: field = 'alfa'"),

@@ -65,7 +65,8 @@ def find_motion_events(
     for name in names:
         if name not in motion or motion[name].dims != ("time",):
             raise DataError(
-                f"{name} is not there, along time: it is no motion as simulate gives it"
+                f"{name} is missing, or does not have the dimension time. The dataset is not a "
+                "motion from simulate"
             )
     times, *rest = (np.asarray(motion[name], dtype=float) for name in names)
     if slip_rate is None:

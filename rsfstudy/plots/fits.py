@@ -212,7 +212,7 @@ def _correlation_title(dataset: xr.Dataset) -> str:
     laws = [str(law) for law in dataset["law"].values]
     if len(laws) == 1:
         return f"Correlation: {describe_point(dataset.isel(law=0), 'law')}"
-    return f"Correlation: {laws[0]} below, {laws[1]} above".replace("_", " ")
+    return f"Correlation: {laws[0]} (lower), {laws[1]} (upper)".replace("_", " ")
 
 
 def _parameter_symbol(parameter_name: str) -> str:

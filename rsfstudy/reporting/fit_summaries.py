@@ -248,7 +248,7 @@ def _iterate_fit_remarks(fit: xr.Dataset) -> Iterator[str]:
             for of in drawn.dropna("parameter").transpose("parameter", ...)
         )
         time = f"{fit['autocorrelation_time'].item():.2g} steps"
-        yield f"{law}: 95 % of the posterior: {each} (autocorrelation time {time})"
+        yield f"{law}: 95 % credible intervals: {each} (autocorrelation time {time})"
     p_value = fit["p_value"].item()
     if math.isfinite(p_value):
         order, rows = int(fit["noise_order"]), int(fit["rows_fitted"])
