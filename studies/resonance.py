@@ -355,7 +355,7 @@ figure = Figure(
             large_amplitude_panel,
             y=partial(settled_values, "departure_from_linear"),
             overlays=[horizontal_line(MAX_LINEAR_DEVIATION)],
-            y_label="Relative departure from linear theory",
+            y_label="Relative difference from linear theory",
         ),
     ],
     height=50.0,

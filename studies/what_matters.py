@@ -194,7 +194,7 @@ figure = Figure(
 
 study = Study(
     name="what_matters",
-    title="Sobol indices of three headlines under uncertain a, b - a and stiffness",
+    title="Sobol indices of three results for uncertain a, b - a and stiffness",
     summary=Study.caption(__doc__),
     base=Scene(normal_stress="constant", inertia=True, stiffness=0.006),
     axes=[

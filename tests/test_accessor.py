@@ -77,9 +77,9 @@ def test_an_answer_knows_its_scene_and_why_it_has_no_number():
     (row,) = step.rsf.failures().to_dict("records")
     assert row["status"] == "unstable_at_any_step"
     for ask in (lambda: step.rsf.study, step.rsf.check):
-        with pytest.raises(DataError, match="is of one scene"):
+        with pytest.raises(DataError, match="contains a single scene"):
             ask()
-    with pytest.raises(DataError, match="no motion as simulate gives it"):
+    with pytest.raises(DataError, match="not a motion from simulate"):
         step.rsf.plot()
 
 
@@ -131,7 +131,7 @@ def test_a_foreign_dataset_is_refused():
     rsf = xr.Dataset({"temperature": ("x", [1.0])}).rsf
     asks = rsf.check, rsf.plot, rsf.failures, lambda: rsf.to_si(**SI)
     for ask in (*asks, lambda: rsf.scene, lambda: rsf.study):
-        with pytest.raises(DataError, match="is not of rsfstudy.*rsfstudy.simulate"):
+        with pytest.raises(DataError, match="was not created by rsfstudy.*rsfstudy.simulate"):
             ask()
 
 

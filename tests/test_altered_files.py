@@ -163,7 +163,7 @@ def test_what_is_refused_is_named_by_its_path(at, change, complaint, tiny, tmp_p
     [
         ("status", "removed", "status is missing"),
         ("status", "whole numbers", "status is -77 in a cell"),
-        ("wall_time", "along nothing", r"wall_time lies along \(\), and status along"),
+        ("wall_time", "along nothing", r"wall_time has the dimensions \(\), but status has"),
         ("message", "whole numbers", "message holds int64, and must hold texts"),
         ("case", "removed", "case is not a dimension coordinate"),
     ],
@@ -245,7 +245,7 @@ def test_a_pipe_is_not_waited_for(tmp_path, monkeypatch):
     for words in (["show", "pipe.nc"], ["check", "pipe.zarr"], ["run", "pipe.py"]):
         code, said = run_command(words)
         assert code in (1, 2)
-        assert "is no file, but a" in said
+        assert "is not a regular file" in said
     words = ["run", str(FAULTY_STUDY_FILE), "--serial", "--quiet", "--fresh", "--output", "."]
     code, said = run_command(words)
     assert (code, "wrote" in said) == (0, True)

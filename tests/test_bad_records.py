@@ -47,9 +47,9 @@ def fitted(record: dict[str, np.ndarray] | Record, **options: Any) -> xr.Dataset
 
 def test_columns_that_are_mistaken_are_told() -> None:
     moved, friction = GOOD["displacement"], GOOD["friction"]
-    with pytest.raises(InvalidValue, match="displacement = .* Reverse its sign"):
+    with pytest.raises(InvalidValue, match="displacement = .* Reverse the sign"):
         fitted(GOOD | {"displacement": -moved})
-    with pytest.raises(InvalidValue, match="displacement = .* which column is which"):
+    with pytest.raises(InvalidValue, match="displacement = .* select other columns"):
         fitted(GOOD | {"displacement": friction, "friction": moved})
 
 

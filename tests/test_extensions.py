@@ -352,11 +352,11 @@ ANOTHER = number(1.0, "", "1", "another")
 #: Bodies of invalid classes, by error message.
 NO_LAW = {
     "must be a frozen dataclass": [{"frozen": False}],
-    "must be named by a Python identifier": [{"name": None}, {"name": "my law"}],
-    "takes the name": [{"name": "slowness"}, {"name": "inertia"}, {"name": "doubled"}],
+    "must have a Python identifier": [{"name": None}, {"name": "my law"}],
+    "has the name": [{"name": "slowness"}, {"name": "inertia"}, {"name": "doubled"}],
     "states no evolution": [{"evolution": None}, {"evolution": lambda x, state, p: -x}],
-    "says neither what it is": [{"c": field(default=1.0)}],
-    "something else": [
+    "has neither a description": [{"c": field(default=1.0)}],
+    "is already the name": [
         {name: ANOTHER} for name in ("phi", "a", "b_over_a", "stiffness", "b", "parts", "loading")
     ],
 }
@@ -373,7 +373,7 @@ def test_classes_that_fill_no_slot(rule):
 @pytest.mark.parametrize(
     ("body", "complaint"),
     [
-        ({}, r"changes by .* per D_c in steady sliding.*Write steady_states\("),
+        ({}, r"changes by .* per D_c in steady sliding.*Define steady_states\("),
         ({"steady_states": lambda x, shift, p: (shift - 0.9 * p[LAW] * x,)}, ""),
         (
             {

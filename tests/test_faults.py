@@ -54,11 +54,11 @@ WRONG = {
         ("raises", "cell_raised", "ZeroDivisionError: in the cell"),
         ("runs out of memory", "cell_raised", "MemoryError"),
         ("recurses", "cell_raised", "RecursionError"),
-        ("spends", "work_budget_spent", "--budget 2000000 (budget=) allows more"),
+        ("spends", "work_budget_spent", "--budget 2000000 (budget=)"),
         ("nan", "not_finite", "total = nan"),
         ("no outcome", "cell_raised", "must be an Outcome with a Status"),
         ("undeclared", "cell_raised", "'totla': is not declared. Did you mean 'total'?"),
-        ("too many", "cell_raised", "has the shape (3,) and must have ()"),
+        ("too many", "cell_raised", "has the shape (3,), but must have the shape ()"),
         ("text", "cell_raised", "must be a real number"),
         ("masked", "cell_raised", "must be a real number"),
         ("number for message", "cell_raised", "must be a string"),
@@ -113,7 +113,7 @@ def sturdy(tmp_path_factory):
 def lost(*words, **options):
     """Run a study and check the warnings about a lost worker."""
     with (
-        pytest.warns(UserWarning, match="a worker ended: the cells it held"),
+        pytest.warns(UserWarning, match="a worker ended. Its"),
         pytest.warns(UserWarning, match="cell b_over_a = .* failed, .*The run continues"),
     ):
         return run_with_failures(*words, **options)
@@ -124,7 +124,7 @@ def test_a_cell_that_kills_its_worker(sturdy, monkeypatch):
     monkeypatch.setattr(CellBatchIterator, "compute_next_batch_size", lambda _self: 4)
     dataset = lost(faulty_study("segfaults", at=(2.5,)), client=sturdy[0])
     only_one_failed(dataset, "worker_lost")
-    assert "more memory than a worker may use" in dataset.message.values[1]
+    assert "insufficient memory" in dataset.message.values[1]
 
 
 def test_a_cell_that_raises_keyboard_interrupt_on_a_worker(cluster):
@@ -191,7 +191,7 @@ def test_a_cell_that_is_slow_on_the_clock_alone_is_not_ended(sturdy):
 
 @pytest.mark.parametrize("fault", ["raises", "nan"])
 def test_if_everything_fails_at_the_start_the_run_stops_and_says_why(fault, tmp_path):
-    with pytest.raises(RunError, match=r"the first \d+ cells all failed, .*keep_going=True"):
+    with pytest.raises(RunError, match=r"the first \d+ cells all failed. .*keep_going=True"):
         run(faulty_study(fault, cells=100), output=tmp_path)
     partial = rsfstudy.open(tmp_path / "faulty.partial.nc")
     tried = partial.status != int(Status.PENDING)

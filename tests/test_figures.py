@@ -198,7 +198,7 @@ def test_where_no_line_fits_the_figure_says_so(tmp_path_factory):
     dataset, _path = named_results("stress_drop", tmp_path_factory)
     for axes in plots.draw_figure(dataset).axes[1:4:2]:
         labels = set(axes.get_legend_handles_labels()[1])
-        curved = [label for label in labels if "no line fits" in label]
+        curved = [label for label in labels if "no linear fit" in label]
         assert [label.split(":")[0] for label in curved] == [r"$\phi$ = 50"]
         fitted = [line for line in axes.lines if line.get_linestyle() != "None"]
         assert len(fitted) == len(labels) - len(curved)
@@ -346,7 +346,7 @@ def test_styles_are_checked_and_never_imported(style, message, tmp_path, monkeyp
     ],
 )
 def test_a_style_in_which_nothing_can_be_drawn_is_named(settings, tmp_path):
-    message = r"^style = \{.*: a figure cannot be drawn in it: .* Draw it without this style"
+    message = r"^style = \{.*: a figure cannot be drawn in this style: .* Draw the figure without this style"
     with pytest.raises(InvalidValue, match=message):
         plots.save_figure(lattice(RATES), tmp_path / "figure.png", style=settings)
     assert not list(tmp_path.iterdir())

@@ -126,7 +126,7 @@ def test_a_rerun_says_what_it_lacks(written):
     for words in ((), ("--cell", "step=1")):
         ran = call_main("rerun", str(here / "fit.nc"), "--serial", *words)
         assert ran.returncode == 2
-        assert "Fit them again" in " ".join(ran.stderr.split())
+        assert "Fit the records again" in " ".join(ran.stderr.split())
 
 
 def test_a_file_that_is_not_there_is_told():

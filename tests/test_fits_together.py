@@ -367,5 +367,7 @@ def test_a_chain_that_is_too_short_is_refused() -> None:
 
 def test_a_posterior_without_emcee_says_what_to_install(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "emcee", None)
-    with pytest.raises(InvalidValue, match=r"needs emcee.*pip install 'rsfstudy\[posterior\]'"):
+    with pytest.raises(
+        InvalidValue, match=r"requires the package emcee.*pip install 'rsfstudy\[posterior\]'"
+    ):
         rsfstudy.fit(synthetic_record(seed=4), posterior=1, **FIT_OPTIONS)

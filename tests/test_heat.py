@@ -493,7 +493,7 @@ def test_a_temperature_step_of_a_rigid_slider_is_an_integral():
         ({**HOT, "law": "two_slip_states", "stiffness": 0.01}, "laws with one state"),
         ({**HOT, "heating": 0.2}, "colder than absolute zero"),
         ({**HOT, "regularised": True, "stiffness": 0.01}, "regularised"),
-        ({**HOT, "cooling": 0.0}, "Nearly adiabatic"),
+        ({**HOT, "cooling": 0.0}, "nearly adiabatic"),
         ({"law": "flash_heating", "weakened_friction": 0.9}, "must be less than mu_star"),
         ({"temperature": "hot"}, "isothermal"),
     ],
@@ -647,7 +647,7 @@ def test_a_rig_needs_all_quantities_of_shear_heating():
     incomplete = {n: v for n, v in RIG.items() if n != "shear_zone_width"}
     with pytest.raises(InvalidValue, match="needs shear_zone_width"):
         rsfstudy.Rig(**incomplete)
-    with pytest.raises(InvalidValue, match="units of another kind"):
+    with pytest.raises(InvalidValue, match="incompatible with"):
         rsfstudy.Rig(**{**RIG, "heat_capacity": "2.4 MJ/m^3"})
 
 

@@ -211,5 +211,5 @@ def test_figure_of_healing() -> None:
     table = rsfstudy.healing(record)
     assert len(rsfstudy.plot_healing(table, record).axes) == 2
     assert len(rsfstudy.plot_healing(table).axes) == 1
-    with pytest.raises(DataError, match="no table of holds"):
+    with pytest.raises(DataError, match="not a table of holds"):
         rsfstudy.plot_healing(xr.Dataset())

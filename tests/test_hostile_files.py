@@ -165,14 +165,14 @@ def test_texts_along_a_motion_are_refused(tmp_path: Path) -> None:
     size = motion["slip"].size
     motion["shear_stress"] = (motion["slip"].dims, np.array(["x"] * size, dtype=object))
     dataset_files.write_dataset(motion, tmp_path / "motion.nc")
-    with pytest.raises(DataError, match="shear_stress is .*, and must be numbers"):
+    with pytest.raises(DataError, match="shear_stress is .*, but must be numeric"):
         dataset_files.read_dataset(tmp_path / "motion.nc")
 
 
 @pytest.mark.parametrize("name", ["normal_stress_ratio", "frictional_stress", "time"])
 def test_a_motion_without_a_variable_that_is_drawn_names_it(name: str) -> None:
     motion = rsfstudy.simulate(rsfstudy.Scene(load_velocity_ratio=2.0), duration=1.0, rtol=1e-3)
-    with pytest.raises(DataError, match="(normal_stress|frictional_stress|time) is missing: it"):
+    with pytest.raises(DataError, match="(normal_stress|frictional_stress|time) is missing. The"):
         rsfstudy.plot_motion(motion.drop_vars(name))
 
 

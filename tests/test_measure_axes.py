@@ -133,7 +133,9 @@ def test_a_field_that_decides_the_shape_is_refused():
         "inner_coordinates": property(lambda self: {"place": np.arange(float(self.times))}),
     })  # fmt: skip
     assert scaled(Axis("factor", [1.0, 2.0]), measure=kind()).shape == (2, 2)
-    with pytest.raises(InvalidValue, match="'times': decides which numbers.*Make a study of each"):
+    with pytest.raises(
+        InvalidValue, match="'times': changes which results.*Create a separate study for each"
+    ):
         scaled(Axis("times", [1.0, 2.0]), measure=kind())
 
 

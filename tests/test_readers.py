@@ -138,13 +138,13 @@ def test_decimal_commas_are_named(text: str, tmp_path: Path) -> None:
 @pytest.mark.parametrize("text", ["", "\n\n", "just words\n", "# a comment\n"])
 def test_a_text_without_numbers_is_refused(text: str, tmp_path: Path) -> None:
     (tmp_path / "run.txt").write_text(text)
-    with pytest.raises(InvalidValue, match="has no header|does not name time"):
+    with pytest.raises(InvalidValue, match="has no header|no recognised headings for time"):
         rsfstudy.read_record(tmp_path / "run.txt")
 
 
 def test_a_file_without_header_asks_for_numbers(tmp_path: Path) -> None:
     (tmp_path / "run.txt").write_text(lines_of("\t"))
-    with pytest.raises(InvalidValue, match=r"states no headings.* 'time=1 \(s\),displacement=2"):
+    with pytest.raises(InvalidValue, match=r"has no headings.* 'time=1 \(s\),displacement=2"):
         rsfstudy.read_record(tmp_path / "run.txt")
     with pytest.raises(InvalidValue, match="column = '5': is not in the table"):
         rsfstudy.read_record(tmp_path / "run.txt", {**BY_NUMBER, "time": "5 (s)"})
@@ -168,7 +168,9 @@ def test_workbooks(library: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
         frame.to_excel(book, sheet_name="notes", index=False, startrow=3, startcol=1)
         frame.iloc[:, :2].to_excel(book, sheet_name="other", index=False)
     check(path)
-    with pytest.raises(InvalidValue, match="sheet 'other', line 1: header = .* does not name fric"):
+    with pytest.raises(
+        InvalidValue, match="sheet 'other', line 1: header = .* no recognised heading for fric"
+    ):
         rsfstudy.read_record(path, sheet="other")
     with pytest.raises(InvalidValue, match="sheet = 'x': is not in the workbook. Choices: notes"):
         rsfstudy.read_record(path, sheet="x")
@@ -193,7 +195,7 @@ def test_matlab_files(tmp_path: Path) -> None:
     check(tmp_path / "nested.mat", columns)
     savemat(tmp_path / "matrix.mat", {"data": np.column_stack([*DATA.values()])})
     check(tmp_path / "matrix.mat", BY_NUMBER)
-    with pytest.raises(InvalidValue, match="does not name time"):
+    with pytest.raises(InvalidValue, match="no recognised headings for time"):
         rsfstudy.read_record(tmp_path / "matrix.mat")
     (tmp_path / "cut.mat").write_bytes((tmp_path / "run.mat").read_bytes()[:300])
     with pytest.raises(DataError, match="cut.mat: cannot be read as a MATLAB file"):
@@ -350,7 +352,7 @@ def test_rows_are_selected(options: dict[str, Any], kept: slice, tmp_path: Path)
         ({"filter": "median 1 s"}, "filter = 'median 1 s': is unknown. .*mean, trailing_mean"),
         ({"filter": "mean 20 s"}, "averages over more than the record, 9.75 s"),
         ({"filter": "first_order 3 Hz"}, "passes all frequencies below 2 Hz"),
-        ({"filter": "first_order 3 s"}, "has units of another kind"),
+        ({"filter": "first_order 3 s"}, "has units that are incompatible"),
     ],
 )
 def test_selections_that_cannot_be_made(options: dict[str, Any], told: str) -> None:
@@ -422,7 +424,7 @@ def test_a_negative_normal_stress_is_named() -> None:
 
 def test_what_a_record_lacks_is_named(tmp_path: Path) -> None:
     for names in (["time", "shear_stress"], ["displacement", "shear_stress"]):
-        with pytest.raises(InvalidValue, match="rsfstudy.events does not need"):
+        with pytest.raises(InvalidValue, match="use rsfstudy.events"):
             rsfstudy.read_record({name: DATA[name] for name in names})
     with pytest.raises(
         InvalidValue, match="has no recognised heading for friction or shear stress"
@@ -458,7 +460,7 @@ def test_events_of_files_with_usual_headings(tmp_path: Path) -> None:
     assert half.attrs["processing"] == f"rows 1 to {len(MADE.time) // 2} of {len(MADE.time)}"
     with pytest.raises(InvalidValue, match="does not name shear stress or friction"):
         rsfstudy.events({"Time (s)": MADE.time})
-    with pytest.raises(InvalidValue, match="does not name time or displacement"):
+    with pytest.raises(InvalidValue, match="no recognised headings for time or displacement"):
         rsfstudy.events({"Friction (1)": MADE.stress})
 
 
@@ -485,7 +487,7 @@ def test_events_of_stress_against_displacement() -> None:
         np.testing.assert_allclose(1e3 * found[name], expected, rtol=1e-6, atol=1e-9)
         assert found[name].units == "mm"
         assert "time" not in found[name].long_name
-    with pytest.raises(InvalidValue, match="displacement = .*must increase.*without time needs"):
+    with pytest.raises(InvalidValue, match="displacement = .*must increase.*without time requires"):
         rsfstudy.events({**data, "Displacement (mm)": -MADE.time})
 
 

@@ -233,7 +233,7 @@ def test_slip_is_turned_into_displacement_of_the_load_point(
 
 def test_slip_without_stiffness_is_refused() -> None:
     arrays = {"time": TIME, "slip": MOVED, "friction": 0.6 + 0.0 * TIME}
-    with pytest.raises(InvalidValue, match=r"slip = .*needs a stiffness.*read_record"):
+    with pytest.raises(InvalidValue, match=r"slip = .*requires a stiffness.*read_record"):
         rsfstudy.read_record(arrays)
     with pytest.raises(InvalidValue, match=r"stiffness = '0.04 MPa/um': needs a normal stress"):
         rsfstudy.read_record(arrays, stiffness="0.04 MPa/um")

@@ -232,7 +232,7 @@ PENDING = lattice(np.full(5, 2.0), np.full(5, Status.PENDING))
          {"variable": "zeta", "where": {}, "published": 1.0},
          {"b_over_a": [2.0]}, "not applicable"),
     ],
-    ids=["dimensions", "no place", "scene", "axis", "not known yet", "reduced", "changed axis"],
+    ids=["dimensions", "not a point", "scene", "axis", "not known yet", "reduced", "changed axis"],
 )  # fmt: skip
 def test_where_claims_apply(dataset, of, overrides, verdict):
     table = build_verdict_table(dataset, [claim(**of)], overrides)

@@ -153,7 +153,7 @@ def test_published_curves_pass_to_the_last_place_that_is_written(number):
     ran = call_main("verify", RSFMODEL / name, "--problem", number, "--columns", columns)
     assert (ran.returncode, ran.stderr) == (0, "")
     count = len(of(number).quantities)
-    assert ran.stdout.count("to the last place that is written") == count
+    assert ran.stdout.count("all written decimal places") == count
     assert f"1 problem of 24, {7 if number == 4 else 8} digits" in ran.stdout
 
 
@@ -172,7 +172,7 @@ def test_published_curves_pass_to_the_last_place_that_is_written(number):
                 "friction": told["friction"]
                 + p.radiation_damping * told["slip_rate"] / p.rig.normal_stress
             },
-            "friction is that of the spring",
+            "friction is computed from the spring stress",
         ),
     ],
 )
@@ -191,7 +191,7 @@ def test_conventions_of_what_is_told_explain_a_difference(number, wrong, explana
         (13, {"radiation_damping": "9e6 Pa s/m"}, "damping is twice as much"),
         (12, {"theta": "100 s"}, "theta_0 is D_c/V_*, and not as stated"),
         (12, {"theta": "1e5 s"}, "theta_0 is D_c/V(0)"),
-        (11, {"regularised": False}, "a logarithm for arcsinh"),
+        (11, {"regularised": False}, "a logarithm instead of arcsinh"),
         (15, {"alpha": 0.0}, "alpha is left out"),
         (5, {"law": "slip"}, "the law is the slip law"),
     ],
@@ -368,7 +368,7 @@ def test_files_and_problems_that_are_not_there_are_said_so():
     assert (ran.returncode, "problem = 'no': is none" in ran.stderr) == (2, True)
 
 
-# ---- problems of one's own -----------------------------------------------------------------------
+# ---- user-defined problems ---------------------------------------------------------------------------
 #: A scene of another code, with all values in SI units.
 STEP = """
 title = "Velocity step of another code"
@@ -423,7 +423,7 @@ def test_a_problem_of_ones_own(text, tmp_path):
     file = write(tmp_path / "mine.csv", problem.column_headings, told)
     ran = call_main("verify", file, "--problem", path)
     assert (ran.returncode, ran.stderr) == (0, "")
-    assert re.search(r"1 problem of one's own, (8|9|10|11|12) digits", ran.stdout)
+    assert re.search(r"1 user-defined problem, (8|9|10|11|12) digits", ran.stdout)
     given = {"slip_rate": rows[0]["slip_rate"] * 1.01}
     spoilt = [[{**row, **given}[name] for row in rows] for name in problem.column_names]
     assert (
@@ -437,9 +437,9 @@ def test_a_problem_of_ones_own(text, tmp_path):
 @pytest.mark.parametrize(
     ("old", "new", "error"),
     [
-        ("a = 0.01\n", "", "must state a"),
-        ('theta = "4 s"', "", "must state slip_rate and theta"),
-        ('"4 s"', '["4 s", "5 s"]', "must state 1, one for each b"),
+        ("a = 0.01\n", "", "must contain a"),
+        ('theta = "4 s"', "", "must contain slip_rate and theta"),
+        ('"4 s"', '["4 s", "5 s"]', "must contain 1, one for each b"),
         ("times = [1, 2, 5, 10, 20, 50]", "", "must list the times"),
         ('"slowness"', '"sloth"', "is unknown"),
         ("[1, 2, 5,", "[2, 1, 5,", "must increase"),
@@ -450,8 +450,8 @@ def test_a_problem_of_ones_own(text, tmp_path):
         ("times =", "digits = 99\ntimes =", "digits = 99: must lie between 1 and 15"),
         ("times =", "number = 1\ntimes =", "key = 'number': is unknown"),
         ("[[loading]]", "[loading]", "must be a list, not a table"),
-        ('"slowness"', '"two_slip_states"', "must state b_2"),
-        ("mu_star", "phi = 60.0\nmu_star", "has no meaning beside phi"),
+        ('"slowness"', '"two_slip_states"', "must contain b_2"),
+        ("mu_star", "phi = 60.0\nmu_star", "has no meaning with phi"),
     ],
 )
 def test_what_is_no_problem_is_refused(old, new, error, tmp_path):

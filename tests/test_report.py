@@ -145,7 +145,7 @@ def test_it_tells_verdicts_failures_and_what_cannot_be_read(written):
 
 
 def test_python_names_the_page_and_refuses_what_is_none(tmp_path):
-    with pytest.raises(DataError, match="holds no results"):
+    with pytest.raises(DataError, match="contains no results"):
         rsfstudy.report(tmp_path)
     motion = rsfstudy.simulate(
         Scene(load_velocity_ratio=2.0, normal_stress="constant"), duration=0.1

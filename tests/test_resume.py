@@ -263,8 +263,8 @@ def test_a_full_disk_while_cells_are_computed(tmp_path, monkeypatch):
         ran = call_main("run", FAULTY_STUDY_FILE, "--serial", "--output", tmp_path)
     said = " ".join(ran.stderr.split())
     assert ran.returncode == 1
-    assert "cannot add to" in said
-    assert "the same command goes on from there" in said
+    assert "cannot write to" in said
+    assert "Run the same command again to resume" in said
     kept = count_journal_cells(tmp_path / "faulty.cells.sqlite")
     assert 0 < kept < 2000
     whole = run(faulty_study(cells=2000))
@@ -284,7 +284,7 @@ def test_a_full_disk_while_the_result_is_written(tmp_path, monkeypatch):
         ran = call_main("run", FAULTY_STUDY_FILE, "--serial", "--output", tmp_path)
     said = " ".join(ran.stderr.split())
     assert ran.returncode == 1
-    assert "Nothing was replaced" in said
+    assert "No file was replaced" in said
     assert f"{CELLS} of {CELLS} cells are finished and kept" in said
     assert (tmp_path / "faulty.nc").read_bytes() == old
     goes_on(tmp_path, CELLS)
@@ -353,7 +353,7 @@ def test_where_more_work_is_allowed_answers_are_kept_and_the_rest_is_tried_again
     few = {"b_over_a": [2.0], "output": tmp_path}
     spent = run_with_failures(SMALL_STUDY, budget=300, **few)
     assert (spent.status == int(Status.WORK_BUDGET_SPENT)).all()
-    assert "--budget 1200 (budget=) allows more" in spent.message.values.flat[0]
+    assert "--budget 1200 (budget=)" in spent.message.values.flat[0]
     answered = run(SMALL_STUDY, budget=100_000, **few)
     assert (answered.status == int(Status.OK)).all()
     again = run(SMALL_STUDY, budget=200_000, **few)

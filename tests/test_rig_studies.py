@@ -253,7 +253,7 @@ def test_one_scale_for_several_rigs_is_refused(cycles):
     with pytest.raises(InvalidValue, match="5e.06 to 2e.07 Pa") as refused:
         cycles.rsf.to_si(normal_stress="5 MPa")
     assert refused.value.name == "normal_stress"
-    with pytest.raises(InvalidValue, match="contradicts that of the dataset"):
+    with pytest.raises(InvalidValue, match="differs from the value in the dataset"):
         RIG.in_units(cycles)
     one = cycles.isel(sigma_star=0, slip_distance=1)
     xr.testing.assert_allclose(RIG.in_units(one), one.rsf.to_si(), rtol=1e-12)
