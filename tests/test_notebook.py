@@ -16,7 +16,7 @@ CONCLUDED = """
 assert errors["ratio"].loc[["a", "b", "slip_distance", "trend1"]].between(2.0, 2.5).all()
 assert 1.3 < errors["ratio"]["mu_star"] < 1.7  # the noise is quieter before the step
 assert errors["ratio"].loc[["a", "b", "slip_distance"]].between(2.15, 2.35).all()
-assert abs(rows - 2863) < 10 and abs(worth - 643) < 20
+assert abs(rows - 2863) < 10 and abs(n_eff - 643) < 20
 ratios = [float(fixed[f"{n}_stderr"][0] / fixed_white[f"{n}_stderr"][0]) for n in FREE[:3]]
 assert 4.0 < min(ratios) and max(ratios) < 6.5
 assert float(fixed.a[0]) < 0.75 * float(honest.a)

@@ -368,7 +368,7 @@ def test_files_and_problems_that_are_not_there_are_said_so():
     assert (ran.returncode, "problem = 'no': is none" in ran.stderr) == (2, True)
 
 
-# ---- user-defined problems ---------------------------------------------------------------------------
+# ---- user-defined problems ----------------------------------------------------------------------
 #: A scene of another code, with all values in SI units.
 STEP = """
 title = "Velocity step of another code"

@@ -213,7 +213,8 @@ def test_a_sample_beyond_what_is_meaningful_is_told_before_work_starts(monkeypat
     rows = sampled.axes[1].rows
     by_a = sum(row["a"] <= 0.0 for row in rows)
     lost = sum(row["a"] <= 0.0 or row["mu_star"] <= 0.0 for row in rows)
-    told = rf"^{lost} of 64 points of the axis sample \({lost / 64:.2g}\) give invalid scenes because of a .{by_a}"
+    told = rf"^{lost} of 64 points of the axis sample \(fraction {lost / 64:.2g}\) give invalid "
+    told += rf"scenes because of a \({by_a}\)"
     with pytest.raises(InvalidValue, match=told):
         run(sampled)
     lengths = Axis.samples({"slip_distance": norm(1.0, 1.0)}, 8, 1, units={"slip_distance": "um"})
