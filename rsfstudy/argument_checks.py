@@ -35,7 +35,7 @@ _MISSING_DIMENSION_MESSAGE_PATTERN = re.compile(
 )
 #: Descriptions of simple types for error messages.
 _TYPE_DESCRIPTIONS: Mapping[Any, str] = {
-    str: "a text",
+    str: "a string",
     bool: "True or False",
     int: "a whole number",
     float: "a number",

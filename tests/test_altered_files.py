@@ -147,10 +147,10 @@ def way_to(at: str) -> tuple[str | int, ...]:
         ("declaration.claims.0.id", removed, r"declaration.claims\[0\].id is missing"),
         ("declaration.claims.0.tolerance", replaced(10**400),
          "declaration.*(Number out of range|must be a number|int too large)"),
-        ("declaration.base.phi", replaced(95.0), "declaration.base.phi is refused .*between 0"),
+        ("declaration.base.phi", replaced(95.0), "declaration.base.phi is invalid .*between 0"),
         ("declaration.novel", replaced(1), "declaration.novel is unknown"),
         ("provenance.versions.numpy", replaced(2),
-         r"provenance.versions\[...\] is refused .Expected `str`"),
+         r"provenance.versions\[...\] is invalid .Expected `str`"),
     ],
 )  # fmt: skip
 def test_what_is_refused_is_named_by_its_path(at, change, complaint, tiny, tmp_path):
@@ -164,7 +164,7 @@ def test_what_is_refused_is_named_by_its_path(at, change, complaint, tiny, tmp_p
         ("status", "removed", "status is missing"),
         ("status", "whole numbers", "status is -77 in a cell"),
         ("wall_time", "along nothing", r"wall_time has the dimensions \(\), but status has"),
-        ("message", "whole numbers", "message holds int64, and must hold texts"),
+        ("message", "whole numbers", "message contains int64, but must contain strings"),
         ("case", "removed", "case is not a dimension coordinate"),
     ],
 )
@@ -177,7 +177,7 @@ def test_a_variable_that_is_refused_is_named(name, how, complaint, tiny, tmp_pat
     ("at", "change", "complaint"),
     [
         ("measure.novel", replaced(1), "declaration.measure.novel is unknown"),
-        ("reductions.0.within", replaced([1]), r"reductions\[0\].within is refused .*of length 2"),
+        ("reductions.0.within", replaced([1]), r"reductions\[0\].within is invalid .*of length 2"),
         ("axes.1.values", replaced([1.0, 2.0]), "has 2 points in the declaration, and 3 in the"),
         ("axes.1.values", replaced([1.0, 2.0, 3.0]), "load_velocity_ratio is not that axis of the"),
         ("plot", replaced("a\0b"), "declaration makes no study .*must be a string"),

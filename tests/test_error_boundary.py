@@ -254,7 +254,7 @@ def test_constructors_convert_numpy_numbers():
 def test_types_are_described_in_words():
     from collections.abc import Sequence
 
-    assert describe_type(str | None) == "a text or None"
+    assert describe_type(str | None) == "a string or None"
     assert describe_type(Sequence[int]) == "a list in which each item is a whole number"
     assert describe_type(xr.Dataset) == "an xarray.Dataset"
 

@@ -73,7 +73,7 @@ def find_motion_events(
         loads = [segment.load_velocity for segment in scene().parts.loading.segments]
         slip_rate = _EVENT_SLIP_RATE_OVER_LOAD_VELOCITY * max([1.0, *loads])
     if not 0.0 < slip_rate < math.inf:
-        raise InvalidValue("slip_rate", slip_rate, "must be positive and finite, over V_*")
+        raise InvalidValue("slip_rate", slip_rate, "must be positive and finite (in units of V_*)")
     rows = InterpolatedMotionRows(times, np.column_stack(rest), math.log10(slip_rate))
     found = [rows.measure_event(*ends) for ends in rows.iterate_event_row_spans()]
     about = {name: motion[name].attrs for name in names}

@@ -159,7 +159,7 @@ class CriticalStep(Measure):
             raise InvalidValue(
                 "of",
                 self.of,
-                "is not a field that the measure can step",
+                "is not a step that the measure can compute",
                 choices=STEP_FAMILY_BY_QUANTITY,
             )
         if self.direction not in STEP_DIRECTIONS:

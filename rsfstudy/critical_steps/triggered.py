@@ -60,7 +60,9 @@ class Triggered(Measure):
     name: ClassVar[str] = "triggered"
     primary_output = "unstable"
     typical_work = 800
-    outputs = (Output("unstable", "", "1", "whether the step triggers instability", error=True),)
+    outputs = (
+        Output("unstable", "", "1", "1 if the step triggers instability, otherwise 0", error=True),
+    )
     needs_time: ClassVar[tuple[bool, ...]] = (False,)
 
     def compute(self, scene: Scene, integrator: Integrator) -> Outcome:

@@ -47,7 +47,7 @@ _OUTPUTS_PER_RECORD_ROW = tuple(
         ("fitted_friction_stderr", "", "1", "standard error of the fitted friction"),
         ("detrended_friction", r"$\mu$", "1", "fitted friction without the trend"),
         ("residual", "", "1", "recorded friction minus fitted friction"),
-        ("whitened_residual", "", "1", "whitened residual over its standard deviation"),
+        ("whitened_residual", "", "1", "whitened residual divided by its standard deviation"),
     )
 )
 #: Suffixes and descriptions of the outputs that belong to each parameter in addition to its value.

@@ -98,8 +98,8 @@ def describe_asymmetric_intervals(
         if max(below, above) > _MAX_CONFIDENCE_INTERVAL_ASYMMETRY * min(below, above):
             low, high = interval_ends[name]
             reasons.append(
-                f"the 95 % interval of {name} is asymmetric ({low:.3g} to {high:.3g}), so "
-                f"standard errors do not describe it. Specify {name} instead of fitting it, or "
+                f"the 95 % confidence interval of {name} is asymmetric ({low:.3g} to {high:.3g}), "
+                f"so standard errors do not describe it. Specify {name} instead of fitting it, or "
                 "sample faster"
             )
     return tuple(reasons)

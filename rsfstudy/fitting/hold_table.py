@@ -21,7 +21,7 @@ from rsfstudy.quantities import Quantity
 
 #: Quantities of a hold, in the order of the columns of the table.
 HOLD_QUANTITIES = (
-    Quantity("begins", "$t$", "s", "time at which the hold begins"),
+    Quantity("begins", "$t$", "s", "time at the beginning of the hold"),
     Quantity("duration", "$t_h$", "s", "duration of the hold"),
     Quantity("velocity_before", "$V_0$", "um s-1", "load point velocity before the hold"),
     Quantity("velocity_after", "$V_1$", "um s-1", "load point velocity after the hold"),

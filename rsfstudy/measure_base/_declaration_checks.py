@@ -196,7 +196,7 @@ def _describe_value_type(value: object) -> str:
     if isinstance(value, bool):
         return "a flag"
     if isinstance(value, str):
-        return "a text"
+        return "a string"
     return "a number" if isinstance(value, int | float) else "something else"
 
 

@@ -454,7 +454,7 @@ class Measure(ConstructorKeywordCheckMixin):
         if not isinstance(outcome.values, Mapping):
             raise InvalidValue("measured", outcome.values, "must map names to numbers")
         if not isinstance(outcome.message, str):
-            raise InvalidValue("message", type(outcome.message).__name__, "must be a text")
+            raise InvalidValue("message", type(outcome.message).__name__, "must be a string")
         if outcome.status is Status.PENDING:
             raise InvalidValue(
                 "measured",
@@ -573,10 +573,16 @@ def _check_names_declared_by_measure(measure: Measure) -> None:
             raise InvalidValue("variable", name, rule)
     for name, dims in variables.items():
         if not isinstance(dims, tuple | list) or len(set(dims)) < len(dims):
-            raise InvalidValue("dimensions", dims, f"of {name!r} must be names without repetition")
+            raise InvalidValue(
+                "dimensions", dims, f"must be names without repetition, for the output {name!r}"
+            )
         for dim in dims:
             if dim not in measure.inner_coordinates:
-                raise InvalidValue("dimension", dim, f"of {name!r} has no coordinate values")
+                raise InvalidValue(
+                    "dimension",
+                    dim,
+                    f"has no coordinate values, but the output {name!r} has this dimension",
+                )
     known = {*names, *measure.plain_fields}
     for about in measure.quantities:
         if not isinstance(about, Quantity) or about.name not in known:

@@ -80,7 +80,7 @@ _NAMES_OF_LAWS_WITH_THETA_AS_STATE = (
 #: descriptions of types for error messages of rsfstudy.
 _TYPE_ERROR_PATTERN = re.compile(r"Expected `(\w+)`, got `(\w+)`(?: - at `\$(.*)`)?")
 _READABLE_NAME_BY_TYPE_NAME = {
-    "array": "a list", "object": "a table", "str": "a text", "int": "a whole number",
+    "array": "a list", "object": "a table", "str": "a string", "int": "a whole number",
     "float": "a number", "bool": "true or false", "null": "nothing", "date": "a date",
 }  # fmt: skip
 #: Maximum number of digits of an answer, and maximum number of requested peaks.

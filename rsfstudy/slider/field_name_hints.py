@@ -62,7 +62,7 @@ _HINT_BY_WRONG_FIELD_NAME: Mapping[str, str] = {
     ),
     **_map_names_to_same_value(
         "tau tau0 tau_0",
-        "Write initial_stress, which is the difference from steady sliding over sigma_*.",
+        "Write initial_stress, which is the difference from steady sliding divided by sigma_*.",
     ),
     **_map_names_to_same_value(
         "theta theta0 theta_0", "Write initial_state, which is b ln(theta/theta_*)."

@@ -96,7 +96,7 @@ class StoredProvenance(TypedDict):
 _ALLOWED_DTYPE_KINDS = ("iufbOUT", "numbers or strings")
 _REQUIRED_VARIABLES = {
     "status": ("i", "whole numbers"),
-    "message": ("OUT", "texts"),
+    "message": ("OUT", "strings"),
     "rhs_evaluations": ("iu", "whole numbers"),
     "wall_time": ("f", "numbers"),
 }

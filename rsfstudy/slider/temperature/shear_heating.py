@@ -96,7 +96,7 @@ class ShearHeating(Temperature):
         1e-3,
         r"$\sigma_* D_c/(\rho c w T_*)$",
         "1",
-        "temperature rise over T_star due to slip of D_c at unit shear stress",
+        "temperature rise due to slip of D_c at unit shear stress, divided by T_star",
         rule=NON_NEGATIVE,
         omit_if_default=True,
     )

@@ -143,7 +143,7 @@ class LinearFit(Reduction):
         span = "all {on}" if self.within is None else "{0:g} <= {on} <= {1:g}"
         span = span.format(*(self.within or ()), on=self.on)
         law = self.formula.format(**vars(self))
-        result = self.results(f"least squares of {law} over {span}", found)
+        result = self.results(f"least-squares fit of {law} for {span}", found)
         return result.drop_vars([c for c in result.coords if dimension in result[c].dims])
 
     def derivatives(self, dataset: xr.Dataset) -> DerivativesByVariable:
