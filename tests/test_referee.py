@@ -365,7 +365,7 @@ def test_files_and_problems_that_are_not_there_are_said_so():
     ran = call_main("verify", "nowhere.csv", "--problem", "1", "--columns", "time=t (s)")
     assert (ran.returncode, "there is no file nowhere.csv" in ran.stderr) == (1, True)
     ran = call_main("verify", "nowhere.csv")
-    assert (ran.returncode, "problem = 'no': is none" in ran.stderr) == (2, True)
+    assert (ran.returncode, "problem = 'no': is not the number of a problem" in ran.stderr) == (2, True)
 
 
 # ---- user-defined problems ----------------------------------------------------------------------

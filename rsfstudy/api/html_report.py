@@ -150,7 +150,7 @@ def write_report(
         raise InvalidValue("directory", str(directory), "is not a directory")
     page = place / "report.html" if output is None else output_directory(output)
     if page is None or page.suffix != ".html" or page.is_dir():
-        raise InvalidValue("output", str(output), "must be a file that ends in .html")
+        raise InvalidValue("output", str(output), "must be a path with the suffix .html")
     check_regular_file("output", page)
     try:
         if page.exists() and _HTML_GENERATOR_META_TAG not in page.read_bytes()[:1000]:
