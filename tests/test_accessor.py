@@ -91,9 +91,11 @@ def test_results_know_their_study_and_each_cell_its_scene(results):
         cell = results.sel(law=law, stiffness_ratio=stiffness)
         assert cell.rsf.scene == STUDY.scene(number)
         assert cell.rsf.study.size == 4
-    with pytest.raises(InvalidValue, match=r"stiffness_ratio = \[0.8, 1.2\]: leaves the cell open"):
+    with pytest.raises(
+        InvalidValue, match=r"stiffness_ratio = \[0.8, 1.2\]: does not select a single cell"
+    ):
         _ = results.sel(law="slip").rsf.scene
-    with pytest.raises(InvalidValue, match=r"law = \[\]: leaves the cell open"):
+    with pytest.raises(InvalidValue, match=r"law = \[\]: does not select a single cell"):
         _ = results.isel(law=0, stiffness_ratio=0, drop=True).rsf.scene
     elsewhere = results.isel(law=0, stiffness_ratio=0).assign_coords(stiffness_ratio=7.0)
     with pytest.raises(InvalidValue, match=r"stiffness_ratio = .*7.0.*: is not on that axis"):
@@ -112,7 +114,7 @@ def test_failures_name_the_cells_without_a_number(results):
 
 def test_only_whole_results_are_drawn_and_checked_in_their_own_units(results):
     for ask in ("check", "plot"):
-        with pytest.raises(DataError, match="of these law is selected"):
+        with pytest.raises(DataError, match="but law has been selected"):
             getattr(results.sel(law="slip").rsf, ask)()
     converted = results.rsf.to_si(**SI)
     assert converted.rsf.check().verdict.tolist() == ["not applicable"]

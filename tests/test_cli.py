@@ -311,7 +311,7 @@ def test_wrong_usage_of_a_later_study_is_told_before_any_work(catalogued, tmp_pa
     ("duration", "budget", "status", "said"),
     [
         ("100", 5000, 0, ""),
-        ("116", 5000, 3, "warning: beyond the instability norm from 114.5"),
+        ("116", 5000, 3, "warning: the slip rate exceeds the instability norm after 114.5"),
         ("100", 200, 1, ""),
     ],
 )

@@ -59,7 +59,7 @@ def test_a_runaway_is_followed_to_its_end(engine):
     assert met == [50.0, 150.0, 250.0]
     with (
         pytest.warns(IncompleteWarning, match="slip_rate_unbounded"),
-        pytest.warns(NoResultWarning, match="beyond the instability norm"),
+        pytest.warns(NoResultWarning, match="exceeds the instability norm"),
     ):
         motion = rsfstudy.simulate(scene, engine=engine)
     assert float(motion.log10_slip_rate[-1]) == pytest.approx(120.0, abs=1e-6)

@@ -116,7 +116,7 @@ def test_outliers_are_left_out_and_named() -> None:
     assert found.status.item() == Status.OK
     assert int(found.outliers) == 3
     assert np.isnan(found.whitened_residual.values[[100, 222, 390]]).all()
-    assert "3 outliers were left out: rows 101, 223, 391" in found.message.item()
+    assert "3 outliers were omitted: rows 101, 223, 391" in found.message.item()
     clean = rsfstudy.fit(
         record_with(synthetic.correlated_noise(400, 0.0, 3e-4, 3)), **options
     ).squeeze()

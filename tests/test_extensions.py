@@ -327,7 +327,7 @@ def test_a_scene_of_ones_own_parts():
         ({"law": "doubeld"}, "law = 'doubeld': is unknown. Did you mean 'doubled'"),
         ({"dynamics": Sticky, "inertia": True}, "inertia = True: has no meaning for sticky"),
         ({"law": Sticky}, "law = .*no class that fills the slot law. Derive a class from"),
-        ({"law": int}, "law = <class 'int'>: is no class that fills the slot"),
+        ({"law": int}, "law = <class 'int'>: is not a class that defines the"),
     ],
 )
 def test_scenes_that_are_refused(given, rule):
@@ -354,7 +354,7 @@ NO_LAW = {
     "must be a frozen dataclass": [{"frozen": False}],
     "must have a Python identifier": [{"name": None}, {"name": "my law"}],
     "has the name": [{"name": "slowness"}, {"name": "inertia"}, {"name": "doubled"}],
-    "states no evolution": [{"evolution": None}, {"evolution": lambda x, state, p: -x}],
+    "does not define evolution": [{"evolution": None}, {"evolution": lambda x, state, p: -x}],
     "has neither a description": [{"c": field(default=1.0)}],
     "is already the name": [
         {name: ANOTHER} for name in ("phi", "a", "b_over_a", "stiffness", "b", "parts", "loading")
@@ -380,7 +380,7 @@ def test_classes_that_fill_no_slot(rule):
                 "evolution": lambda x, state, p: -(state - 0.1 * p[LAW] + p[LAW] * x),
                 "steady_states": lambda x, shift, p: (shift + p[LAW] * (0.1 - x),),
             },
-            "has states that add up to 0.*at V_[*]",
+            "has states with the sum 0.*at V_[*]",
         ),
         (
             {

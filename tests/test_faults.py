@@ -154,7 +154,7 @@ def test_a_cell_that_computes_for_ever(sturdy, monkeypatch):
     monkeypatch.setattr(worker_pool, "_MAX_WORKER_DEATHS_PER_CELL", 1)
     dataset = lost(faulty_study("spins in C", at=(2.5,)), client=client, time_limit=0.5)
     only_one_failed(dataset, "time_limit_spent")
-    assert "no answer within 0.5 s of CPU time" in dataset.message.values[1]
+    assert "the cell exceeded 0.5 s of CPU time" in dataset.message.values[1]
     assert "--time-limit" in dataset.message.values[1]
     assert "faulty_study.py" in log.read_text()  # The log contains the location in the code.
 
@@ -293,7 +293,7 @@ def test_a_cell_is_that_of_the_file_and_not_of_the_study_as_it_is_now(tmp_path):
     (tmp_path / "other.py").write_text(
         FAULTY_STUDY_FILE.read_text().replace('name="faulty"', 'name="other"')
     )
-    with pytest.raises(InvalidValue, match="'other', and the results are of 'faulty'"):
+    with pytest.raises(InvalidValue, match="'other', but the results belong to the study 'faulty'"):
         rsfstudy.recompute_cell(
             tmp_path / "faulty.nc", {"b_over_a": 8}, study=tmp_path / "other.py"
         )
@@ -311,8 +311,8 @@ def test_reductions_draw_on_what_there_is_when_told_to_and_say_so():
     found = apply_reductions(lattice(), FIT, despite_failures=True)
     assert float(found.slope) == pytest.approx(1.0, rel=1e-14)
     assert int(found.slope_points) == 5
-    assert found.slope.despite == "1 failed cells are left out"
-    assert found.attrs["reduced_despite"] == "1 failed cells are left out"
+    assert found.slope.despite == "1 failed cells are omitted"
+    assert found.attrs["reduced_despite"] == "1 failed cells are omitted"
     # The lattice is unchanged.
     assert found.status.values[2] == Status.CELL_RAISED
     whole = apply_reductions(lattice(failing=(99.0,)), FIT, despite_failures=True)
@@ -341,7 +341,7 @@ def test_workers_that_never_come(monkeypatch):
     with (
         LocalCluster(n_workers=0, **QUIET_CLUSTER_OPTIONS) as cluster,
         Client(cluster) as client,
-        pytest.warns(UserWarning, match=r"has no worker: waiting 0\.4 s for one"),
-        pytest.raises(RunError, match=r"no worker for 0\.4 s: start some"),
+        pytest.warns(UserWarning, match=r"has no worker. The run waits 0\.4 s for a worker"),
+        pytest.raises(RunError, match=r"no worker for 0\.4 s. Start workers"),
     ):
         run(faulty_study(), client=client)

@@ -131,7 +131,7 @@ def test_a_rerun_says_what_it_lacks(written):
 
 def test_a_file_that_is_not_there_is_told():
     ran = call_main("fit", "nowhere.csv", *FIT)
-    assert (ran.returncode, ran.stderr.strip()) == (1, "error: there is no file nowhere.csv")
+    assert (ran.returncode, ran.stderr.strip()) == (1, "error: the file nowhere.csv does not exist")
 
 
 def test_files_of_others_are_not_replaced(written, tmp_path):

@@ -45,7 +45,9 @@ def test_a_heading_is_bounded_before_it_is_parsed(units: str, tmp_path: Path) ->
     with pytest.raises(InvalidValue, match="at most 200 characters"):
         rsfstudy.read_record({"t": [0, 1]}, columns={"time": units, "displacement": "t (um)"})
     stated = {"slip_distance": "10 um", "reference_velocity": "1 um/s"}
-    with pytest.raises(InvalidValue, match="no quantity, because it has more than 200 characters"):
+    with pytest.raises(
+        InvalidValue, match="not a quantity, because it has more than 200 characters"
+    ):
         rsfstudy.Rig(normal_stress=f"5 MPa {units}x", **stated)
 
 
@@ -196,7 +198,9 @@ def test_a_name_that_no_file_can_have_is_refused_by_its_rule(name: str) -> None:
 
 
 def test_the_name_of_a_study_leaves_room_for_its_files() -> None:
-    with pytest.raises(InvalidValue, match="must have at most 200 bytes, because it names files"):
+    with pytest.raises(
+        InvalidValue, match="must have at most 200 bytes, because it is used in file names"
+    ):
         rsfstudy.Study(name="ä" * 101, title="", base=TINY.base, axes=TINY.axes,
                        measure=TINY.measure)  # fmt: skip
     with warnings.catch_warnings():

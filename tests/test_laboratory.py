@@ -174,7 +174,9 @@ def test_each_cell_is_converted_by_its_own_reference_rate():
     np.testing.assert_allclose(found.max_slip_rate_error, error, rtol=1e-12)
     assert "D_c/V_* = 100 to 125 s" in found.attrs["scales"]
     for scalar in (1e-2, "0.008 1/s"):
-        with pytest.raises(InvalidValue, match="contradicts that of the dataset, 0.008 to 0.01 1"):
+        with pytest.raises(
+            InvalidValue, match="differs from the value in the dataset, 0.008 to 0.01 1"
+        ):
             rsfstudy.to_si(results, normal_stress=SIGMA, slip_distance=D_C, reference_rate=scalar)
     one = results.isel(reference_rate=1)
     stated = rsfstudy.to_si(one, normal_stress=SIGMA, slip_distance=D_C, reference_rate="0.008 1/s")

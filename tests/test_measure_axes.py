@@ -152,7 +152,9 @@ def test_cells_are_found_again_by_the_fields_of_their_measure(tmp_path):
     assert computed_by(scaled(measure=Scaled(factor=4.0)), tmp_path) == 0
     assert computed_by(scaled(measure=Scaled(factor=8.0)), tmp_path) == 2
     assert run(scaled(measure=Scaled(factor=4.0)), output=tmp_path).total[0] == 8.0
-    with pytest.raises(DataError, match="holds cells computed differently: measure: .*table"):
+    with pytest.raises(
+        DataError, match="contains cells that were computed with other settings .measure: .*table"
+    ):
         run(scaled(measure=Scaled(table=(2.0,))), output=tmp_path)
 
 
@@ -177,7 +179,7 @@ def test_claims_and_selection_reach_a_place_on_the_axis():
     assert rsfstudy.check(run(declared.with_(direction="up"))).verdict.tolist() == [
         "not applicable"
     ]
-    with pytest.raises(InvalidValue, match="is no place of the lattice, in claim X1"):
+    with pytest.raises(InvalidValue, match="is not a point of the lattice, in claim X1"):
         run(replace(declared, claims=[replace(claim, where={"direction": "left"})]))
 
 

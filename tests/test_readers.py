@@ -344,14 +344,14 @@ def test_rows_are_selected(options: dict[str, Any], kept: slice, tmp_path: Path)
     [
         ({"rows": (0, 5)}, "rows = .0, 5.: must be the numbers of the first and the last row"),
         ({"rows": (5, 3)}, "rows = .5, 3.: must be"),
-        ({"rows": (500, 600)}, "selects no row: the record has 40 rows"),
+        ({"rows": (500, 600)}, "selects no row, because the record has 40 rows"),
         ({"begin": "2 MPa"}, "begin = '2 MPa': is neither a time nor a displacement"),
         ({"begin": "x"}, "begin = 'x': is neither a time nor a displacement"),
-        ({"begin": "1 h"}, "begin = '1 h': lies outside the record, 0 to 9.75 s"),
+        ({"begin": "1 h"}, "begin = '1 h': is outside the record, which covers 0 to 9.75 s"),
         ({"thin": 0}, "thin = 0: must be a whole number from 1"),
         ({"filter": "median 1 s"}, "filter = 'median 1 s': is unknown. .*mean, trailing_mean"),
-        ({"filter": "mean 20 s"}, "averages over more than the record, 9.75 s"),
-        ({"filter": "first_order 3 Hz"}, "passes all frequencies below 2 Hz"),
+        ({"filter": "mean 20 s"}, "averages over a time that is longer than the record, 9.75 s"),
+        ({"filter": "first_order 3 Hz"}, "only contains frequencies below 2 Hz"),
         ({"filter": "first_order 3 s"}, "has units that are incompatible"),
     ],
 )
@@ -458,9 +458,11 @@ def test_events_of_files_with_usual_headings(tmp_path: Path) -> None:
     half = rsfstudy.events(path, rows=(1, len(MADE.time) // 2))
     assert 0 < half.sizes["event"] < EVENTS.sizes["event"]
     assert half.attrs["processing"] == f"rows 1 to {len(MADE.time) // 2} of {len(MADE.time)}"
-    with pytest.raises(InvalidValue, match="does not name shear stress or friction"):
+    with pytest.raises(
+        InvalidValue, match="has no recognised heading for shear stress or friction"
+    ):
         rsfstudy.events({"Time (s)": MADE.time})
-    with pytest.raises(InvalidValue, match="no recognised headings for time or displacement"):
+    with pytest.raises(InvalidValue, match="no recognised heading for time or displacement"):
         rsfstudy.events({"Friction (1)": MADE.stress})
 
 

@@ -68,7 +68,9 @@ def test_stress_that_varies_without_drops_is_reported() -> None:
     time = 0.02 * np.arange(10_000)
     wave = 5.0 + np.cos(2.0 * np.pi * time / 150.0)
     noise = np.random.default_rng(6).normal(size=len(time))
-    with pytest.warns(NoResultWarning, match="no drop was found, although stress falls by 2.0"):
+    with pytest.warns(
+        NoResultWarning, match="no drop was detected, although stress decreases by 2.0"
+    ):
         found = rsfstudy.events(time=time, shear_stress=wave + 0.02 * noise)
     assert found.sizes["event"] == 0
     assert "times the smallest detectable drop" in found.attrs["comment"]

@@ -189,10 +189,10 @@ def test_conventions_of_what_is_told_explain_a_difference(number, wrong, explana
     [
         (12, {"radiation_damping": "9e6 Pa s/m"}, "damping is twice as much"),
         (13, {"radiation_damping": "9e6 Pa s/m"}, "damping is twice as much"),
-        (12, {"theta": "100 s"}, "theta_0 is D_c/V_*, and not as stated"),
+        (12, {"theta": "100 s"}, "theta_0 is D_c/V_* instead of the given value"),
         (12, {"theta": "1e5 s"}, "theta_0 is D_c/V(0)"),
         (11, {"regularised": False}, "a logarithm instead of arcsinh"),
-        (15, {"alpha": 0.0}, "alpha is left out"),
+        (15, {"alpha": 0.0}, "alpha is omitted"),
         (5, {"law": "slip"}, "the law is the slip law"),
     ],
 )
@@ -335,7 +335,7 @@ def test_zeros_agree_in_nothing_and_overflows_are_refused(tmp_path):
     huge = filed(tmp_path / "01.csv", 1, slip_rate=zeros + 400.0)
     huge.write_text(huge.read_text().replace("slip_rate (m/s)", "log10_slip_rate (1)"))
     ran = call_main("verify", huge)
-    said = "line 2, column 3: log10_slip_rate = 400.0: must be a number, of 100 at most"
+    said = "line 2, column 3: log10_slip_rate = 400.0: must be a number of at most 100"
     assert (ran.returncode, said in " ".join(ran.stderr.split())) == (2, True)
     ran = call_main("verify", huge, "--digits", "nan")
     assert (ran.returncode, "--digits = nan" in ran.stderr) == (2, True)
@@ -363,9 +363,12 @@ def test_what_is_no_answer_is_refused(spoil, error, tmp_path):
 def test_files_and_problems_that_are_not_there_are_said_so():
     """Missing files and unknown problems have different exit statuses."""
     ran = call_main("verify", "nowhere.csv", "--problem", "1", "--columns", "time=t (s)")
-    assert (ran.returncode, "there is no file nowhere.csv" in ran.stderr) == (1, True)
+    assert (ran.returncode, "the file nowhere.csv does not exist" in ran.stderr) == (1, True)
     ran = call_main("verify", "nowhere.csv")
-    assert (ran.returncode, "problem = 'no': is not the number of a problem" in ran.stderr) == (2, True)
+    assert (ran.returncode, "problem = 'no': is not the number of a problem" in ran.stderr) == (
+        2,
+        True,
+    )
 
 
 # ---- user-defined problems ----------------------------------------------------------------------

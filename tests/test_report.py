@@ -187,7 +187,10 @@ def test_it_tells_answers_that_are_none_and_draws_what_is_in_other_units(tmp_pat
     text = rsfstudy.report(tmp_path).read_text()
     assert ' yellow">3 locked<' in text
     assert ' yellow">no limit cycle<' in text
-    assert "no figure: there is no motion, and nothing to draw. no_limit_cycle: " in text
+    assert (
+        "no figure: the dataset contains no motion, so there is nothing to draw. no_limit_cycle: "
+        in text
+    )
     with plots.style_context():
         wide = f"--inches: {_style.figure_size(2, 1)[0]:.3g}"
     assert [about["style"] for about in Page(text).all("img")] == [wide] * 3

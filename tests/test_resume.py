@@ -124,7 +124,7 @@ def test_a_worker_is_killed(held):
     run.let_through()
     code, out, said = wait_for_command(run.process)
     assert code == 0, out
-    assert "warning: a worker ended: the cells it held (" in said
+    assert "warning: a worker ended. Its " in said
     assert len(said.splitlines()) == 1, said
     have_same_numbers(rsfstudy.open("faulty", run.output), uninterrupted())
 
@@ -150,7 +150,7 @@ def test_a_signal_ends_a_run_in_order(options, number, status, why, held):
     assert code == status
     assert f"error: faulty: {why}. " in said
     assert not psutil.wait_procs(left, timeout=HANG_TIMEOUT)[1]
-    assert f"of {CELLS} cells are finished and kept in" in said
+    assert f"of {CELLS} cells are finished and stored in" in said
     assert len(said.splitlines()) == 1, said
     partial = rsfstudy.open(run.output / "faulty.partial.nc")
     done = int((partial.status == 0).sum())
@@ -190,7 +190,7 @@ def test_ctrl_c_while_the_workers_start(tmp_path):
     os.killpg(process.pid, signal.SIGINT)
     code, _out, said = wait_for_command(process)
     assert code == 1
-    assert "0 of 4 cells are finished and kept in" in said
+    assert "0 of 4 cells are finished and stored in" in said
     assert len(said.splitlines()) == 1, said
 
 

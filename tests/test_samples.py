@@ -92,7 +92,7 @@ def test_the_first_samples_are_a_sample_still():
     assert not whole.with_(a=0.012).axes[0].sampling_info
     with pytest.raises(InvalidValue, match="sample = 16.0: .* from 0 to 15"):
         whole.with_(sample=16)
-    with pytest.raises(InvalidValue, match="a = .*all of its points take one value"):
+    with pytest.raises(InvalidValue, match="a = .*must be a single value for all points"):
         whole.with_(a=[0.01, 0.02])
 
 
@@ -279,7 +279,7 @@ def test_the_error_of_a_standard_deviation_is_honest_of_few_samples(n):
     assert 0.98 < float(found["sd_stderr"].mean()) / np.sqrt(1.0 - c4**2) < 1.2
     pair = apply_reductions(measured(values[:3, :2]), (StandardDeviation("sd", "y"),))
     assert np.isnan([pair["sd"], pair["sd_stderr"]]).all()
-    assert pair["sd"].attrs["refused"] == "needs 3 samples with a number"
+    assert pair["sd"].attrs["refused"] == "requires at least 3 samples with a value"
 
 
 def test_failed_samples_are_refused_and_shares_tell_of_them():
@@ -315,11 +315,11 @@ def test_a_run_warns_of_what_reductions_refuse():
 def test_too_few_samples_for_a_quantile():
     found = apply_reductions(measured(np.arange(18.0)), (Quantile("q", "y", level=0.05),))
     assert np.isnan(found["q"])
-    assert found["q"].attrs["refused"] == "needs 19 samples with a number"
+    assert found["q"].attrs["refused"] == "requires at least 19 samples with a value"
     for level in (1.0, "half"):
         with pytest.raises(InvalidValue, match=f"level = .*{level}.*: must be between 0 and 1"):
             Quantile("q", "y", level=level)
-    with pytest.raises(InvalidValue, match="over = 'draw': is no dimension of y"):
+    with pytest.raises(InvalidValue, match="over = 'draw': is not a dimension of y"):
         apply_reductions(measured(np.arange(18.0)), (Mean("m", "y", over="draw"),))
 
 
@@ -394,7 +394,7 @@ def test_sobol_indices_are_refused():
         with pytest.raises(InvalidValue, match="over = 'draw': was not drawn for Sobol indices"):
             apply_reductions(part, of)
     apply_reductions(whole.isel(draw=slice(0, 160)), of)  # 32 points are a valid sample.
-    with pytest.raises(InvalidValue, match="over = 'sample': is no dimension of y"):
+    with pytest.raises(InvalidValue, match="over = 'sample': is not a dimension of y"):
         apply_reductions(whole, (SobolIndices("share", "y"),))
 
 

@@ -55,7 +55,9 @@ def test_what_is_wrong_with_a_file_is_told(tmp_path, text, complaint):
 def test_a_file_that_is_named_without_its_suffix_is_told(tmp_path, monkeypatch):
     written(tmp_path, DECLARATION)
     monkeypatch.chdir(tmp_path)
-    with pytest.raises(InvalidValue, match="There is a file mine.py here: name it mine.py"):
+    with pytest.raises(
+        InvalidValue, match="To load the file in the current directory, write mine.py"
+    ):
         study_loader.load_study("mine")
 
 

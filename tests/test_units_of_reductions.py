@@ -143,7 +143,11 @@ def test_cells_of_several_scales_make_a_number_that_says_so(kind, across):
     }
     made = apply_reductions(lattice(**scales), (kind,))
     assert "scale" not in made["r"].attrs
-    assert made["r"].attrs["comment"].endswith("; of cells in units of D_c, which varies")
+    assert (
+        made["r"]
+        .attrs["comment"]
+        .endswith("; combines cells in units of D_c, which varies between the cells")
+    )
     np.testing.assert_array_equal(convert_to_display_units(made)["r"], made["r"])
     # Along the other dimension, each result has a single scale.
     other = {"law": "x", "x": "law"}[across]

@@ -70,8 +70,8 @@ def test_stated_extents_that_are_cut_are_reported() -> None:
     fit = rsfstudy.fit(record, **OPTIONS, before="400 um", after="500 um").squeeze()
     assert Status.labels_by_code()[int(fit.status)] == "ok"
     message = str(fit.message.values)
-    assert "before= is cut from 400 to 300 um" in message
-    assert "after= is cut from 500 to 179 um by the end of the record" in message
+    assert "before= is reduced from 400 to 300 um" in message
+    assert "after= is reduced from 500 to 179 um because of the end of the record" in message
     whole = rsfstudy.fit(record, **OPTIONS, before="200 um", after="150 um").squeeze()
     assert "cut" not in str(whole.message.values)
 

@@ -53,7 +53,13 @@ def compare_file_with_known_answer(
         remedy = (
             "Pass --problem, or use a file name that starts with the number, such as 01_mine.csv."
         )
-        raise InvalidValue("problem", number, "is not the number of a problem", choices=map(str, there), remedy=remedy)
+        raise InvalidValue(
+            "problem",
+            number,
+            "is not the number of a problem",
+            choices=map(str, there),
+            remedy=remedy,
+        )
     told = read_external_answer(file, posed, columns)
     return compare_answers(*known_answer(posed, path), told, required_digits)
 

@@ -179,7 +179,7 @@ class RowSelection:
             processing.append(f"{' and '.join(filtered_names)} filtered by {self.filter}")
         if self.thin > 1:
             found = {name: values[:: self.thin].copy() for name, values in found.items()}
-            processing.append(f"every {self.thin}th row")
+            processing.append(f"one of every {self.thin} rows")
         return found, processing
 
 
