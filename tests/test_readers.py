@@ -348,7 +348,7 @@ def test_rows_are_selected(options: dict[str, Any], kept: slice, tmp_path: Path)
         ({"begin": "2 MPa"}, "begin = '2 MPa': is neither a time nor a displacement"),
         ({"begin": "x"}, "begin = 'x': is neither a time nor a displacement"),
         ({"begin": "1 h"}, "begin = '1 h': is outside the record, which covers 0 to 9.75 s"),
-        ({"thin": 0}, "thin = 0: must be a whole number from 1"),
+        ({"thin": 0}, "thin = 0: must be a whole number, 1 or more"),
         ({"filter": "median 1 s"}, "filter = 'median 1 s': is unknown. .*mean, trailing_mean"),
         ({"filter": "mean 20 s"}, "averages over a time that is longer than the record, 9.75 s"),
         ({"filter": "first_order 3 Hz"}, "only contains frequencies below 2 Hz"),

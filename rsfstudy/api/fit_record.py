@@ -262,7 +262,12 @@ def fit(
     """
     if "law" in scene:
         remedy = f"Write laws={np.atleast_1d(scene['law']).tolist()}."
-        raise InvalidValue("law", scene["law"], "must be passed as laws", remedy=remedy)
+        raise InvalidValue(
+            "law",
+            scene["law"],
+            "cannot be set, because one fit is computed for each law",
+            remedy=remedy,
+        )
     records: tuple[Any, ...] = (record,) if isinstance(record, Record | str) else tuple(record)
     for one in records:
         if not isinstance(one, Record):

@@ -190,7 +190,7 @@ class LimitCycle(RecordingMeasure):
         """Check the fields of the measure."""
         super().__post_init__()
         if isinstance(self.events, bool) or not self.events >= 1 or self.events % 1:
-            raise InvalidValue("events", self.events, "must be a whole number from 1")
+            raise InvalidValue("events", self.events, "must be a whole number, 1 or more")
 
     def compute(self, scene: Scene, integrator: Integrator) -> Outcome:
         """Compute the limit cycle, with error estimates.

@@ -65,7 +65,7 @@ class RowSelection:
             rule = "must be the numbers of the first and the last row. Rows are counted from 1"
             raise InvalidValue("rows", self.rows, rule, remedy="Pass, for example, rows=(1, 5000).")
         if not isinstance(self.thin, int) or isinstance(self.thin, bool) or self.thin < 1:
-            raise InvalidValue("thin", self.thin, "must be a whole number from 1")
+            raise InvalidValue("thin", self.thin, "must be a whole number, 1 or more")
         parse_filter(self.filter)
 
     def cut(self, columns: Mapping[str, Column]) -> tuple[dict[str, Column], list[str]]:

@@ -48,12 +48,14 @@ def check_types(study_fields: Mapping[str, Any]) -> None:
         If an attribute has a wrong type, or if there are no axes.
     """
     for name, kind in (_TYPES_OF_STUDY_FIELDS | _ITEM_TYPES_OF_STUDY_LISTS).items():
-        given = study_fields[name]
-        if name in _ITEM_TYPES_OF_STUDY_LISTS and not isinstance(given, list | tuple):
+        given, is_list = study_fields[name], name in _ITEM_TYPES_OF_STUDY_LISTS
+        if is_list and not isinstance(given, list | tuple):
             raise InvalidValue(name, given, f"must be a list of {kind.__name__} objects")
-        for value in given if name in _ITEM_TYPES_OF_STUDY_LISTS else [given]:
+        for value in given if is_list else [given]:
             if not isinstance(value, kind) and not (name == "rig" and value is None):
-                raise InvalidValue(name, value, f"must contain {kind.__name__} objects")
+                rule = f"must be an object of the class {kind.__name__}"
+                rule = f"must contain {kind.__name__} objects" if is_list else rule
+                raise InvalidValue(name, value, rule)
     if not study_fields["axes"]:
         raise InvalidValue("axes", study_fields["axes"], "must contain at least one axis")
 
