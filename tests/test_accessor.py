@@ -77,7 +77,7 @@ def test_an_answer_knows_its_scene_and_why_it_has_no_number():
     (row,) = step.rsf.failures().to_dict("records")
     assert row["status"] == "unstable_at_any_step"
     for ask in (lambda: step.rsf.study, step.rsf.check):
-        with pytest.raises(DataError, match="contains a single scene"):
+        with pytest.raises(DataError, match="belongs to a single scene"):
             ask()
     with pytest.raises(DataError, match="not a motion from simulate"):
         step.rsf.plot()
@@ -98,7 +98,9 @@ def test_results_know_their_study_and_each_cell_its_scene(results):
     with pytest.raises(InvalidValue, match=r"law = \[\]: does not select a single cell"):
         _ = results.isel(law=0, stiffness_ratio=0, drop=True).rsf.scene
     elsewhere = results.isel(law=0, stiffness_ratio=0).assign_coords(stiffness_ratio=7.0)
-    with pytest.raises(InvalidValue, match=r"stiffness_ratio = .*7.0.*: is not on that axis"):
+    with pytest.raises(
+        InvalidValue, match=r"stiffness_ratio = .*7.0.*: is not a point of this axis"
+    ):
         _ = elsewhere.rsf.scene
 
 

@@ -259,7 +259,10 @@ def test_run_all_names_the_studies_it_leaves_out(catalogued, tmp_path, monkeypat
     catalogued(compiled(name="dear"), replace(faulty_study(), name="plain"))
     ran = call_main("run", "--all", "--serial", "--output", tmp_path)
     assert ran.returncode == 0, ran.stderr
-    said, short = "skipped: requires Numba (pip install 'rsfstudy[fast]')", "skipped: needs Numba"
+    said, short = (
+        "skipped: requires Numba (pip install 'rsfstudy[fast]')",
+        "skipped: requires Numba",
+    )
     assert f"dear: {said}" in ran.stdout
     ended = {name: row[-1] for name, row in rows(ran.stdout).items()}
     assert ended == {"plain": "ok", "dear": short}

@@ -54,7 +54,7 @@ def test_a_runaway_is_followed_to_its_end(engine):
         for event in integrator.follow(scene, levels):
             met.extend([event.specification.level] if event.kind is EventKind.RISE else [])
 
-    with pytest.raises(MotionStopped, match=r"beyond 10\^120"):
+    with pytest.raises(MotionStopped, match=r"exceeded 10\^120"):
         follow_on()
     assert met == [50.0, 150.0, 250.0]
     with (

@@ -326,7 +326,10 @@ def test_a_scene_of_ones_own_parts():
         ({"law": Doubled, "factor": -1.0}, "factor = -1.0: must be 0 or greater"),
         ({"law": "doubeld"}, "law = 'doubeld': is unknown. Did you mean 'doubled'"),
         ({"dynamics": Sticky, "inertia": True}, "inertia = True: has no meaning for sticky"),
-        ({"law": Sticky}, "law = .*no class that fills the slot law. Derive a class from"),
+        (
+            {"law": Sticky},
+            "law = .*is not a class that defines the law of a scene. Derive a class from",
+        ),
         ({"law": int}, "law = <class 'int'>: is not a class that defines the"),
     ],
 )
@@ -387,7 +390,7 @@ def test_classes_that_fill_no_slot(rule):
                 "evolution": lambda x, state, p: state + 0.9 * p[LAW] * x,
                 "steady_states": lambda x, shift, p: (shift - 0.9 * p[LAW] * x,),
             },
-            "moves away from steady sliding at .* by 1 per D_c",
+            "moves away from steady sliding at .* growth rate of 1 per D_c",
         ),
     ],
 )

@@ -100,11 +100,11 @@ def test_a_motion_is_no_results_of_a_study(tmp_path):
     motion = rsfstudy.simulate(Scene(hold_time=1.0), duration=1.0, rtol=1e-2)
     motion.to_netcdf(path)
     for ask in (rsfstudy.open, rsfstudy.check, rsfstudy.plot):
-        with pytest.raises(DataError, match=f"motion.nc is of {said}"):
+        with pytest.raises(DataError, match=f"motion.nc contains a {said}"):
             ask(path)
-    with pytest.raises(DataError, match=f"the dataset is of {said}"):
+    with pytest.raises(DataError, match=f"the dataset contains a {said}"):
         rsfstudy.plot(motion)
-    with pytest.raises(DataError, match=f"the dataset is of {said}"):
+    with pytest.raises(DataError, match=f"the dataset contains a {said}"):
         rsfstudy.compare(motion, motion)
 
 
@@ -338,13 +338,13 @@ def test_a_cell_computed_by_other_code_says_so(small, tmp_path):
         other.assign_attrs(provenance=json.dumps(about)), tmp_path / "other.nc"
     )
     place = {"case": "constant", "b_over_a": "2.5"}
-    with pytest.warns(UserWarning, match="physics: older then, .* now"):
+    with pytest.warns(UserWarning, match="physics: older in the file, .* now"):
         rsfstudy.recompute_cell(tmp_path / "other.nc", place)
     with pytest.raises(InvalidValue, match="inf.* is not a point of its axis"):
         rsfstudy.recompute_cell(small, {**place, "b_over_a": "inf"})
     words = [f"--cell={name}={value}" for name, value in place.items()]
     told = call_main("rerun", tmp_path / "other.nc", *words)
-    assert (told.returncode, "physics: older then" in told.stdout) == (0, True)
+    assert (told.returncode, "physics: older in the file" in told.stdout) == (0, True)
 
 
 def test_show_tells_what_is_in_a_file(small):

@@ -133,13 +133,13 @@ def tiny() -> xr.Dataset:
 @pytest.mark.parametrize(
     ("name", "attributes", "rule"),
     [
-        ("critical_stiffness", {"long_name": 5}, "critical_stiffness.long_name is 5, and must be"),
-        ("critical_stiffness", {"units": 1}, "critical_stiffness.units is 1, and must be a string"),
-        ("critical_stiffness", {"scale": [1, 2]}, "scale is .*and must be a string"),
+        ("critical_stiffness", {"long_name": 5}, "critical_stiffness.long_name is 5, but must be"),
+        ("critical_stiffness", {"units": 1}, "critical_stiffness.units is 1, but must be a string"),
+        ("critical_stiffness", {"scale": [1, 2]}, "scale is .*but must be a string"),
         ("critical_stiffness", {"units": " (" * 50_000}, "units has 100,000 characters"),
-        ("status", {"flag_meanings": 3}, "status.flag_meanings is 3, and must be a string"),
-        ("status", {"flag_values": [0, 1]}, "status.flag_values must be numbers, one for each"),
-        ("status", {"flag_values": "many"}, "status.flag_values must be numbers, one for each"),
+        ("status", {"flag_meanings": 3}, "status.flag_meanings is 3, but must be a string"),
+        ("status", {"flag_values": [0, 1]}, "status.flag_values must contain one number for each"),
+        ("status", {"flag_values": "many"}, "status.flag_values must contain one number for each"),
     ],
 )
 def test_attributes_of_the_wrong_kind_are_refused(name, attributes, rule, tiny, tmp_path) -> None:
@@ -158,7 +158,7 @@ def test_attributes_of_a_motion_are_checked(tmp_path: Path) -> None:
     motion = rsfstudy.simulate(rsfstudy.Scene(load_velocity_ratio=2.0), duration=1.0, rtol=1e-3)
     motion["slip"].attrs["long_name"] = 5
     dataset_files.write_dataset(motion, tmp_path / "motion.nc")
-    with pytest.raises(DataError, match="slip.long_name is 5, and must be a string"):
+    with pytest.raises(DataError, match="slip.long_name is 5, but must be a string"):
         dataset_files.read_dataset(tmp_path / "motion.nc")
 
 

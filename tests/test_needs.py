@@ -51,7 +51,7 @@ CONSTANT = {"normal_stress": "constant"}
         ({"normal_stress": "imposed"}, "normal_stress='imposed'", "Set normal_stress='constant'"),
         ({**CONSTANT, "fluid": "dilatant"}, "fluid='dilatant'", "Set fluid='drained'"),
         ({**CONSTANT, "regularised": True}, "regularised=True", "Set regularised=False"),
-        ({"normal_stress": "imposed", "normal_stress_step": 0.1}, "the loading 'step'", "leave"),
+        ({"normal_stress": "imposed", "normal_stress_step": 0.1}, "the loading 'step'", "remove"),
     ],
 )
 def test_a_scene_refuses_a_law_whose_stress_it_does_not_provide(fields, cause, remedy):

@@ -164,7 +164,7 @@ def test_published_curves_pass_to_the_last_place_that_is_written(number):
         (
             2,
             lambda told, _p: {"slip_rate": told["slip_rate"] * 1e6},
-            "slip_rate is 1e+06 times the known answer. With that undone, 1",
+            "slip_rate is 1e+06 times the known answer. With this convention corrected, 1",
         ),
         (
             12,
@@ -187,8 +187,8 @@ def test_conventions_of_what_is_told_explain_a_difference(number, wrong, explana
 @pytest.mark.parametrize(
     ("number", "changes", "explanation"),
     [
-        (12, {"radiation_damping": "9e6 Pa s/m"}, "damping is twice as much"),
-        (13, {"radiation_damping": "9e6 Pa s/m"}, "damping is twice as much"),
+        (12, {"radiation_damping": "9e6 Pa s/m"}, "damping is twice as large"),
+        (13, {"radiation_damping": "9e6 Pa s/m"}, "damping is twice as large"),
         (12, {"theta": "100 s"}, "theta_0 is D_c/V_* instead of the given value"),
         (12, {"theta": "1e5 s"}, "theta_0 is D_c/V(0)"),
         (11, {"regularised": False}, "a logarithm instead of arcsinh"),
@@ -217,7 +217,10 @@ def test_conventions_of_the_problem_explain_a_difference(number, changes, explan
 @pytest.mark.parametrize(
     ("wrong", "explanation"),
     [
-        (lambda rate: -rate, "growth_rate has the opposite sign. With that undone, 12.0 digits"),
+        (
+            lambda rate: -rate,
+            "growth_rate has the opposite sign. With this convention corrected, 12.0 digits",
+        ),
         (lambda rate: rate / (2.0 * math.pi), "growth_rate is 1/(2 pi) times the known answer"),
         # A factor combined with an offset would explain any value.
         (lambda rate: 1.7 * rate, "no common difference of conventions explains the disagreement"),
@@ -271,7 +274,9 @@ def test_where_they_part_is_told(tmp_path):
     rate[25:] *= 1.001
     ran = call_main("verify", filed(tmp_path / "01.csv", 1, slip_rate=rate))
     said = " ".join(ran.stdout.split())
-    pattern = r"slip_rate 3\.0 digits, fewest at time = [234]\d s; they part at time = 25 s"
+    pattern = (
+        r"slip_rate 3\.0 digits, lowest agreement at time = [234]\d s; they part at time = 25 s"
+    )
     assert re.search(pattern, said)
     assert "no common difference of conventions explains the disagreement" in said
     assert "0 problems of 24" in said
@@ -330,7 +335,7 @@ def test_shear_stress_beside_what_is_asked_for_is_left_alone(tmp_path):
 def test_zeros_agree_in_nothing_and_overflows_are_refused(tmp_path):
     zeros = np.zeros(len(of(1).times))
     ran = call_main("verify", filed(tmp_path / "01.csv", 1, friction=zeros))
-    assert re.search(r"friction +0\.0 digits, fewest at", ran.stdout)
+    assert re.search(r"friction +0\.0 digits, lowest agreement at", ran.stdout)
     assert ran.returncode == 1
     huge = filed(tmp_path / "01.csv", 1, slip_rate=zeros + 400.0)
     huge.write_text(huge.read_text().replace("slip_rate (m/s)", "log10_slip_rate (1)"))

@@ -155,7 +155,7 @@ def test_python_names_the_page_and_refuses_what_is_none(tmp_path):
     page = rsfstudy.report(tmp_path / "in", tmp_path / "all.html")
     assert page == tmp_path / "all.html"
     assert 'href="in/one.nc"' in page.read_text()
-    with pytest.raises(InvalidValue, match=r"ends in \.html"):
+    with pytest.raises(InvalidValue, match=r"suffix \.html"):
         rsfstudy.report(tmp_path / "in", tmp_path / "all.txt")
     assert rsfstudy.report(tmp_path / "in", page) == page  # A report can be overwritten.
     page.write_text("<!DOCTYPE html><p>mine</p>")

@@ -285,7 +285,7 @@ def test_a_full_disk_while_the_result_is_written(tmp_path, monkeypatch):
     said = " ".join(ran.stderr.split())
     assert ran.returncode == 1
     assert "No file was replaced" in said
-    assert f"{CELLS} of {CELLS} cells are finished and kept" in said
+    assert f"{CELLS} of {CELLS} cells are finished and stored" in said
     assert (tmp_path / "faulty.nc").read_bytes() == old
     goes_on(tmp_path, CELLS)
 
@@ -359,7 +359,7 @@ def test_where_more_work_is_allowed_answers_are_kept_and_the_rest_is_tried_again
     again = run(SMALL_STUDY, budget=200_000, **few)
     have_same_numbers(again, answered)
     assert (again.wall_time == answered.wall_time).all()  # The cells were not computed again.
-    with pytest.raises(DataError, match="budget: 200000 there, 300 now"):
+    with pytest.raises(DataError, match="budget: 200000 in the journal, 300 in this run"):
         run(SMALL_STUDY, budget=300, **few)
     with pytest.raises(DataError, match="rtol: 1e-07 there, 1e-06 now"):
         run(SMALL_STUDY, budget=400_000, rtol=1e-6, **few)

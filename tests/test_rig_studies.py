@@ -176,7 +176,7 @@ def test_what_states_the_same_takes_the_place_of_an_axis():
     zipped = replace(plain, axes=[Axis("case", {"soft": {"stiffness_ratio": 0.5}})])
     with pytest.raises(InvalidValue, match="stiffness = .*is equivalent to stiffness_ratio"):
         zipped.with_(stiffness=0.02)
-    with pytest.raises(InvalidValue, match="varies 'load_velocity_ratio', as"):
+    with pytest.raises(InvalidValue, match="varies 'load_velocity_ratio', which"):
         study(RIG.axis("load_velocity", ["1 um/s"]), Axis("load_velocity_ratio", [2.0]))
 
 

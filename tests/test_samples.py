@@ -218,7 +218,9 @@ def test_a_sample_beyond_what_is_meaningful_is_told_before_work_starts(monkeypat
     with pytest.raises(InvalidValue, match=told):
         run(sampled)
     lengths = Axis.samples({"slip_distance": norm(1.0, 1.0)}, 8, 1, units={"slip_distance": "um"})
-    with pytest.raises(InvalidValue, match=r"slip_distance = .*positive, and \d of 8 are not"):
+    with pytest.raises(
+        InvalidValue, match=r"slip_distance = .*positive \(\d of 8 values are not\)"
+    ):
         study(lengths, base=RIG.scene(a=0.01, b_over_a=1.5), rig=RIG)
 
 
@@ -387,7 +389,7 @@ def test_sobol_indices_are_refused():
     found = apply_reductions(lost, of)
     count = int(lost["y"].isnull().sum())
     assert np.isnan(found["share_total"]).all()
-    why = f"{count} of 320 cells have no number, and the indices need all: narrower distributions"
+    why = f"{count} of 320 cells have no value, but the indices require all cells"
     assert found["share_total"].attrs["refused"].startswith(why)
     whole = saltelli(lambda x, y, z: x, 64)
     for part in (whole.isel(draw=slice(0, 310)), whole.isel(draw=slice(0, 15))):

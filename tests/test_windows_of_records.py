@@ -80,7 +80,7 @@ def test_a_load_point_that_is_set_to_zero_is_named() -> None:
     record = run_in(depth=0.0)
     moved = record.columns["displacement"] - np.where(record.time > 155.0, 250.0, 0.0)
     reset = rsfstudy.read_record({**record.columns, "displacement": moved})
-    with pytest.raises(InvalidValue, match=r"decreases suddenly .* at 155\S* s.*record\.window"):
+    with pytest.raises(InvalidValue, match=r"decreases suddenly at 155\S* s.*record\.window"):
         rsfstudy.fit(reset, **OPTIONS)
 
 
