@@ -79,7 +79,7 @@ def test_an_answer_knows_its_scene_and_why_it_has_no_number():
     for ask in (lambda: step.rsf.study, step.rsf.check):
         with pytest.raises(DataError, match="belongs to a single scene"):
             ask()
-    with pytest.raises(DataError, match="not a motion from simulate"):
+    with pytest.raises(DataError, match="neither a motion from simulate"):
         step.rsf.plot()
 
 

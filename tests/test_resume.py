@@ -361,5 +361,5 @@ def test_where_more_work_is_allowed_answers_are_kept_and_the_rest_is_tried_again
     assert (again.wall_time == answered.wall_time).all()  # The cells were not computed again.
     with pytest.raises(DataError, match="budget: 200000 in the journal, 300 in this run"):
         run(SMALL_STUDY, budget=300, **few)
-    with pytest.raises(DataError, match="rtol: 1e-07 there, 1e-06 now"):
+    with pytest.raises(DataError, match="rtol: 1e-07 in the journal, 1e-06 in th"):
         run(SMALL_STUDY, budget=400_000, rtol=1e-6, **few)
