@@ -104,7 +104,7 @@ def test_a_pair_of_steps_tells_the_exponent(law: str, exponent: float) -> None:
     scene = {"law_exponent": 0.7}
     fit = rsfstudy.fit(one, laws=["family"], free=free, together=True, **FIT_OPTIONS, **scene)
     fit = fit.squeeze()
-    low, high = (float(fit[f"law_exponent_{end}"]) for end in ("low", "high"))
+    low, high = (float(fit[f"law_exponent_{end}"]) for end in ("ci_low", "ci_high"))
     assert low <= float(fit.law_exponent) <= high
     assert low >= 0.0
     assert high <= 1.0
@@ -165,9 +165,9 @@ def test_laws_of_one_and_of_two_states_are_fitted_beside_each_other() -> None:
 @pytest.mark.parametrize(
     ("free", "error"),
     [
-        (("a", "b"), "names no evolution effect of law='two_slip_states'"),
+        (("a", "b"), "contains no evolution effect of law='two_slip_states'"),
         (("a", "law_exponent"), "is not a parameter with law='slip' or law='two_slip_states'"),
-        (("slip_distance_2",), "names no parameter of law='slip'"),
+        (("slip_distance_2",), "contains no parameter of law='slip'"),
     ],
 )
 def test_parameters_fit_a_law_and_each_law_has_some(free: tuple[str, ...], error: str) -> None:

@@ -376,7 +376,7 @@ def test_sobol_indices_of_a_function_that_has_them_in_closed_form():
         "total": np.array([alone + crossed, second, crossed]) / variance,
     }
     for order, values in exact.items():
-        low, high = (found[f"share_{order}_{end}"] for end in ("low", "high"))
+        low, high = (found[f"share_{order}_{end}"] for end in ("ci_low", "ci_high"))
         assert ((low <= values) & (values <= high)).all()
         assert float((high - low).max()) < 0.3
         np.testing.assert_allclose(found[f"share_{order}"], values, atol=0.05)
