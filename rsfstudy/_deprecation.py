@@ -214,6 +214,20 @@ NEW_NAME_BY_OWNER_AND_FORMER_NAME: Mapping[str, Mapping[str, str]] = {
     },
     "rsfstudy.study.claims:Claim": {
         "check_place": "check_selection",
+        "minus": "baseline",
+        "minus_variable": "baseline_variable",
+        "because": "difference_reason",
+    },
+    "rsfstudy.study.claims:Claim()": {
+        "minus": "baseline",
+        "minus_variable": "baseline_variable",
+        "because": "difference_reason",
+    },
+    "rsfstudy.study.reductions.fits:ProportionalFit": {
+        "minus": "intercept",
+    },
+    "rsfstudy.study.reductions.fits:ProportionalFit()": {
+        "minus": "intercept",
     },
     "rsfstudy.study.figure_declarations": {
         "level": "horizontal_line",

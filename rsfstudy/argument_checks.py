@@ -35,7 +35,7 @@ _MISSING_DIMENSION_MESSAGE_PATTERN = re.compile(
 )
 #: Descriptions of simple types for error messages.
 _TYPE_DESCRIPTIONS: Mapping[Any, str] = {
-    str: "a text",
+    str: "a string",
     bool: "True or False",
     int: "a whole number",
     float: "a number",
@@ -159,14 +159,14 @@ def unusable_value_error(
             if isinstance(part, float) and not math.isfinite(part):
                 return InvalidValue(name, value, "must be finite", remedy=remedy)
             if isinstance(part, int) and abs(part) >= 2**63:
-                return InvalidValue(name, value, "is too large a number", remedy=remedy)
+                return InvalidValue(name, value, "is too large", remedy=remedy)
             if isinstance(part, str) and not _is_encodable_as_utf8(part):
-                return InvalidValue(name, value, "must be a text that UTF-8 can hold")
+                return InvalidValue(name, value, "must be a string that can be encoded as UTF-8")
         if (dimension := _find_missing_dimension(value, error)) is not None:
             rule, dims = f"has no dimension {shorten_text(dimension)!r}", map(str, value.dims)
             return InvalidValue(name, value, rule, choices=dims, remedy=remedy)
         if isinstance(error, OSError) and _is_substring_of_path(value, error.filename):
-            rule = f"cannot be the name of a file: {error.strerror}"
+            rule = f"cannot be used as a file name: {error.strerror}"
             return InvalidValue(name, value, rule, remedy=remedy)
         is_outside = isinstance(error, IndexError) or "out of bounds" in str(error)
         if is_outside and isinstance(value, Integral):

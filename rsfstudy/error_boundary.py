@@ -257,21 +257,25 @@ def _failed_call_error(
     """Return the error for a failed call if all arguments have valid types."""
     reason = format_exception(error)
     if any(map(_is_dataset_or_accessor, arguments.values())):
-        rule = f"is not as rsfstudy made it ({reason.partition(': ')[2] or reason})"
+        rule = (
+            f"was modified, or was not created by rsfstudy ({reason.partition(': ')[2] or reason})"
+        )
         if isinstance(error, KeyError) and len(error.args) == 1:
             # The message of xarray continues with a list of all variables.
             missing = str(error.args[0]).partition(". ")[0].removeprefix("No variable named ")
             if str(error.args[0]).startswith("No variable") or missing.isidentifier():
-                rule = f"has no {shorten_text(missing)}, which datasets of rsfstudy have"
-        remedy = "Pass the dataset as it was opened, or run the study again."
+                rule = f"has no {shorten_text(missing)}, although datasets of rsfstudy contain it"
+        remedy = "Pass the unmodified dataset, or run the study again."
         return DataError(f"{callable_name}: the dataset {rule}. {remedy}")
     if isinstance(error, MemoryError):
         return InvalidValue(
-            callable_name, "...", f"needs more memory than there is ({shorten_text(error)})"
+            callable_name, "...", f"requires more memory than is available ({shorten_text(error)})"
         )
     given = {key: value for key, value in arguments.items() if value is not None}
     remedy = f"See the documentation of {callable_name}."
-    return InvalidValue(callable_name, given, f"cannot be answered ({reason})", remedy=remedy)
+    return InvalidValue(
+        callable_name, given, f"fails for these arguments ({reason})", remedy=remedy
+    )
 
 
 def _is_dataset_or_accessor(value: object) -> bool:
@@ -320,10 +324,10 @@ def check_regular_file(argument_name: str, path: str | Path) -> None:
     except (OSError, ValueError) as error:
         reason = getattr(error, "strerror", None) or str(error)
         raise InvalidValue(
-            argument_name, str(path), f"cannot be the path of a file: {reason}"
+            argument_name, str(path), f"cannot be used as the path of a file: {reason}"
         ) from error
     if is_other:
-        remedy = "Name a file."
+        remedy = "Pass the path of a regular file."
         raise InvalidValue(
             argument_name, str(path), "is a directory, a pipe or a device", remedy=remedy
         )

@@ -33,14 +33,16 @@ def check_path(argument_name: str, path: str | Path) -> Path:
     """
     text = str(path)
     if not text:
-        remedy = "Name a file or a directory; . is the directory you are in."
+        remedy = 'Pass the path of a file or a directory. The current directory is ".".'
         raise InvalidValue(argument_name, text, "is empty", remedy=remedy)
     try:
         parts = [len(part.encode()) for part in (text, *Path(text).parts)]
     except UnicodeError as error:  # NetCDF files cannot store such a path
-        raise InvalidValue(argument_name, text, "must be a text that UTF-8 can hold") from error
+        raise InvalidValue(
+            argument_name, text, "must be a string that can be encoded as UTF-8"
+        ) from error
     if "\0" in text:
-        raise InvalidValue(argument_name, text, "must be a path, without the null character")
+        raise InvalidValue(argument_name, text, "must be a path without the null character")
     rule = ""
     if parts[0] > MAX_PATH_BYTES:
         rule = f"must have at most {MAX_PATH_BYTES:,} bytes (it has {parts[0]:,})"

@@ -133,7 +133,7 @@ class Output(Quantity):
     def __post_init__(self) -> None:
         """Check that a description accompanies a symbol, units or a scale."""
         if not self.long_name and (self.symbol or self.scale or self.units != "1"):
-            rule = f"must say what {self.name} is, which states a symbol, units or a scale"
+            rule = f"must describe {self.name}, because the quantity has a symbol, units or a scale"
             raise InvalidValue("long_name", self.long_name, rule)
 
     @property
@@ -354,7 +354,7 @@ class HtmlTableMixin:
         TypeError
             If the subclass does not override the method.
         """
-        raise TypeError(f"{type(self).__name__} shows no quantities")
+        raise TypeError(f"{type(self).__name__} does not define the quantities")
 
     def _repr_html_(self) -> str:
         """Return the HTML table that notebooks display."""

@@ -30,40 +30,58 @@ class Status(IntEnum):
         member.meaning = meaning
         return member
 
-    OK = 0, "the value stands, within its error estimate"
-    STABLE_FOR_ALL_STEPS = 1, "no step up to the limit of the search reaches the instability norm"
-    UNSTABLE_AT_ANY_STEP = 2, "the smallest step of the search already ends in instability"
-    NO_LIMIT_CYCLE = 3, "the motion settles to steady sliding: there is no stick-slip"
+    OK = 0, "the result is valid within its error estimate"
+    STABLE_FOR_ALL_STEPS = (
+        1,
+        ("no step up to the largest step of the search reaches the instability norm"),
+    )
+    UNSTABLE_AT_ANY_STEP = 2, "even the smallest step of the search causes instability"
+    NO_LIMIT_CYCLE = 3, "the motion settles to steady sliding, so there is no limit cycle"
     NO_STEADY_STATE = 4, "no steady state exists at this load point velocity"
-    LOCKED = 5, "normal stress grows faster than strength: the slider locks up"
-    NORMAL_STRESS_LOST = 6, "normal stress vanishes: the fault opens"
-    SHEAR_STRESS_REVERSED = 7, "shear stress reverses: friction of forward slip no longer applies"
-    NORM_BELOW_LOADING_RATE = 8, "the loading alone already reaches the instability norm: raise it"
+    LOCKED = 5, "the slider locks, because frictional strength increases faster than shear stress"
+    NORMAL_STRESS_LOST = 6, "normal stress vanishes, so the fault opens"
+    SHEAR_STRESS_REVERSED = (
+        7,
+        ("shear stress reverses, but friction is defined for forward slip only"),
+    )
+    NORM_BELOW_LOADING_RATE = (
+        8,
+        ("the load point velocity already exceeds the instability norm, which must be larger"),
+    )
     NORM_UNREACHABLE = 9, "inertia keeps every slip rate below the instability norm"
-    SLIP_RATE_UNBOUNDED = 10, "without mass the slip rate grows beyond 10^120 V_*"
-    UNSTABLE_AT_ANY_STIFFNESS = 11, "steady sliding is unstable however stiff the spring"
-    STABLE_AT_ANY_STIFFNESS = 12, "every perturbation decays however soft the spring"
-    NO_STEP = 13, "the scene has no step to respond to"
-    NOT_APPLICABLE = 14, "what is asked has no meaning in this scene"
-    ACCURACY_OUT_OF_REACH = 15, "the integrator did not reach the accuracy within the work allowed"
-    SLIP_STOPPED = 16, "nothing loads the slider, and its slip rate falls below 10^-290 V_*"
+    SLIP_RATE_UNBOUNDED = 10, "without inertia, the slip rate exceeds 10^120 V_*"
+    UNSTABLE_AT_ANY_STIFFNESS = 11, "steady sliding is unstable at every stiffness"
+    STABLE_AT_ANY_STIFFNESS = 12, "every perturbation decays at every stiffness"
+    NO_STEP = 13, "the scene has no step"
+    NOT_APPLICABLE = 14, "the result is not defined for this scene"
+    ACCURACY_OUT_OF_REACH = (
+        15,
+        ("the integrator did not reach the requested accuracy within the permitted work"),
+    )
+    SLIP_STOPPED = 16, "the slider is not loaded, and its slip rate falls below 10^-290 V_*"
     NOT_PERIODIC = (
         17,
-        "the motion repeats itself after none of up to 16 events, or 4 periods of forcing",
+        "the motion has no period of up to 16 events or up to 4 periods of the forcing",
     )
 
-    NOT_IDENTIFIED = 18, "the record does not constrain a parameter, whose value is not meaningful"
-    ERRORS_NOT_VALID = 19, "the values stand, but their standard errors are not valid"
+    NOT_IDENTIFIED = 18, "the record does not constrain a parameter, so its value is not meaningful"
+    ERRORS_NOT_VALID = 19, "the values are valid, but their standard errors are not valid"
 
     # The statuses below are failures.
-    WORK_BUDGET_SPENT = 20, "the work budget was spent before an answer was reached"
-    INTEGRATION_FAILED = 21, "the integrator gave up or returned non-finite numbers"
-    UNVERIFIED = 22, "two formulations disagree, or errors stay far above what was asked for"
+    WORK_BUDGET_SPENT = 20, "the evaluation budget was exceeded before a result was found"
+    INTEGRATION_FAILED = 21, "the integration failed, or a value is not finite"
+    UNVERIFIED = (
+        22,
+        (
+            "two independent computations disagree, or the error is far larger than the "
+            "requested accuracy"
+        ),
+    )
     CELL_RAISED = 23, "the measure raised an exception"
-    WORKER_LOST = 24, "the worker process died each time it computed this cell alone"
+    WORKER_LOST = 24, "the worker process ended each time it computed only this cell"
     PENDING = 25, "not computed yet"
-    NOT_FINITE = 26, "the measure answered ok without a finite number"
-    TIME_LIMIT_SPENT = 27, "no answer came within the time limit of a cell"
+    NOT_FINITE = 26, "the status of the measure is ok, but its result is not finite"
+    TIME_LIMIT_SPENT = 27, "the cell exceeded the time limit"
 
     @property
     def label(self) -> str:

@@ -37,13 +37,13 @@ QUANTITY_BY_NAME: dict[str, Quantity] = {
 
 _DESCRIPTION_BY_VARIABLE_SUFFIX = {
     "error": "numerical error estimate of",
-    "stable": "value verified as stable beside",
-    "unstable": "value verified as unstable beside",
+    "stable": "largest value verified as stable for",
+    "unstable": "smallest value verified as unstable for",
     "stderr": "standard error (misfit of the fitted law) of",
-    "misfit": "largest misfit of the law fitted for",
-    "points": "number of points fitted for",
-    "crossings": "changes of the answer along",
-    "closed_form": "published closed form beside",
+    "misfit": "largest misfit of the fitted law of",
+    "points": "number of fitted points of",
+    "crossings": "number of crossings of",
+    "closed_form": "published closed-form value of",
 }
 
 _SUFFIXES_OF_COUNT_VARIABLES = ("points", "crossings")

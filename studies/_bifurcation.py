@@ -52,7 +52,7 @@ _OUTPUTS = (
         "floquet_multiplier",
         r"$\mathrm{Re}\,\Lambda_1$",
         "1",
-        "Floquet multiplier of the cycle of one event that is largest in size, its real part",
+        "real part of the largest Floquet multiplier of the cycle with one event",
         error=True,
         optional=True,
     ),
@@ -60,20 +60,21 @@ _OUTPUTS = (
         "floquet_multiplier_imaginary",
         r"$\mathrm{Im}\,\Lambda_1$",
         "1",
-        "imaginary part of that Floquet multiplier",
+        "imaginary part of the largest Floquet multiplier",
     ),
     Output(
         "floquet_multiplier_size",
         r"$|\Lambda_1|$",
         "1",
-        "size of that Floquet multiplier: the cycle of one event attracts below 1",
+        "absolute value of the largest Floquet multiplier; the cycle with one event is stable "
+        "below 1",
     ),
     Output(
         "one_event_log10_peak",
         r"$\log_{10}(V_{peak}/V_*)$",
         "1",
-        "decimal logarithm of the peak slip rate over V_star of the cycle of one event, whether it "
-        "attracts or not",
+        "decimal logarithm of the peak slip rate over V_star of the stable or unstable cycle "
+        "with one event",
         error=True,
         optional=True,
     ),
@@ -81,16 +82,19 @@ _OUTPUTS = (
         "lyapunov_exponent",
         r"$\lambda$",
         "1",
-        "logarithm of the growth of small departures per event, in the mean: positive in chaos",
+        "mean logarithmic growth of small perturbations per event; positive for chaos",
     ),
     Output(
         "lyapunov_exponent_stderr",
         "",
         "1",
-        "standard error of that mean, from blocks of events; only where no cycle attracts",
+        "standard error of the mean growth, from blocks of events; only if no cycle is stable",
     ),
     Output(
-        "peak_spread", "", "1", "decimal logarithm of the fastest over the slowest of the peaks"
+        "peak_spread",
+        "",
+        "1",
+        "decimal logarithm of the ratio of the largest and smallest peak slip rates",
     ),
     Output("critical_stiffness"),
     Output("peak_log10_slip_rate", dims=("event",)),
@@ -98,7 +102,7 @@ _OUTPUTS = (
         "event_interval",
         "$t_r V_*/D_c$",
         "1",
-        "time from an event to the next",
+        "time between successive events",
         "D_c/V_*",
         dims=("event",),
     ),
@@ -144,7 +148,7 @@ class Bifurcation(Measure):
     primary_output = "period_events"
     typical_work = 120_000
     outputs = _OUTPUTS
-    dimensions = (Quantity("event", "", "1", "number of the event, of those that are kept"),)
+    dimensions = (Quantity("event", "", "1", "number of the stored event"),)
 
     def __post_init__(self) -> None:
         """Check the numbers of events."""
@@ -199,7 +203,7 @@ class Bifurcation(Measure):
         values["lyapunov_exponent"] = _lyapunov_exponent(motion.orbit)
         values |= {"period_events": float(motion.orbit.period), "period_events_error": 0.0}
         if status is Status.OK and "one_event_log10_peak" not in values:
-            why = "the motion comes close to no cycle of one event"
+            why = "the motion does not approach a cycle with one event"
         return Outcome(status, values, why)
 
     def _event_outputs(self, scene: Scene, seen: Sequence[Cycle]) -> dict[str, float | np.ndarray]:

@@ -12,13 +12,13 @@ from rsfstudy.reductions import Reduction
 
 #: Unit and description of each result. The keys are the suffixes of the result names.
 _RESULT_DESCRIPTIONS = {
-    "integrator": ("", "integrator with the least right-hand sides"),
-    "work": ("1", "its right-hand sides"),
-    "default_work": ("1", "right-hand sides of the default integrator"),
+    "integrator": ("", "integrator with the fewest right-hand side evaluations"),
+    "work": ("1", "right-hand side evaluations of the cheapest integrator"),
+    "default_work": ("1", "right-hand side evaluations of the default integrator"),
     "default_time": ("s", "wall time of the default integrator"),
-    "default_request": ("1", "digits to ask for with the default integrator"),
-    "relative": ("1", "work of an integrator over that of the default one"),
-    "ratio": ("1", "work of the default integrator over the least"),
+    "default_request": ("1", "digits to request from the default integrator"),
+    "relative": ("1", "work of an integrator divided by the work of the default integrator"),
+    "ratio": ("1", "work of the default integrator divided by the work of the cheapest integrator"),
 }
 
 
@@ -53,7 +53,7 @@ class CheapestIntegrator(Reduction):
     @property
     def quantities(self) -> Sequence[Quantity]:
         """Quantities of the results and of the dimension ``digits``."""
-        digits = Quantity("digits", "", "1", "correct decimal digits wanted")
+        digits = Quantity("digits", "", "1", "required number of correct decimal digits")
         return digits, *(
             Quantity(f"{self.name}_{n}", "", *about) for n, about in _RESULT_DESCRIPTIONS.items()
         )
@@ -105,7 +105,7 @@ class CheapestIntegrator(Reduction):
             "_ratio": by_default / least,
             "_relative": work / by_default,
         }
-        note = f"digits by {self.of}; the least right-hand sides of {', '.join(names)}"
+        note = f"digits from {self.of}; fewest right-hand side evaluations of {', '.join(names)}"
         return self.results(note, result)
 
 

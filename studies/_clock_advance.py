@@ -50,7 +50,7 @@ _OUTPUTS = (
         "clock_advance",
         r"$\Delta t\,V_*/D_c$",
         "1",
-        "time by which the next event comes earlier",
+        "advance of the time of the next event",
         "D_c/V_*",
         error=True,
     ),
@@ -58,19 +58,29 @@ _OUTPUTS = (
         "linear_clock_advance",
         r"$\Delta t\,V_*/D_c$",
         "1",
-        "the same by the equations linear in departures from the free cycle",
+        "clock advance from the equations linearised about the free cycle",
         "D_c/V_*",
     ),
     Output(
         "coulomb_clock_advance",
         r"$\Delta t\,V_*/D_c$",
         "1",
-        "the same of an event that comes as soon as shear stress over normal stress reaches what "
-        "it is at the onset of a free one",
+        "clock advance if the event begins when shear stress divided by normal stress reaches "
+        "its value at the onset of a free event",
         "D_c/V_*",
     ),
-    Output("linear_ratio", "", "1", "clock advance over that of the linear equations"),
-    Output("coulomb_ratio", "", "1", "clock advance over that by a threshold of Coulomb stress"),
+    Output(
+        "linear_ratio",
+        "",
+        "1",
+        "clock advance divided by the clock advance from the linearised equations",
+    ),
+    Output(
+        "coulomb_ratio",
+        "",
+        "1",
+        "clock advance divided by the clock advance from a Coulomb stress threshold",
+    ),
     Output("recurrence_interval", error=True),
 )
 

@@ -28,7 +28,7 @@ TRIGGERS = (_NORMAL_STRESS_FALL, _DISPLACEMENT_STEP, _VELOCITY_STEP)
 def _trigger_outputs(trigger: CriticalStep) -> tuple[Output, ...]:
     """Return the outputs of a critical step."""
     of = trigger.primary_output
-    ended = f"status with which the search for a critical {trigger.of} ended, as its flag value"
+    ended = f"status of the search for the critical {trigger.of}, as a flag value"
     return (
         Output(of, error=True, optional=trigger is _VELOCITY_STEP),
         Output(f"{of}_stable"),
@@ -44,7 +44,7 @@ _STRESS_OUTPUTS = (
         "coulomb_stress_of_displacement",
         _SYMBOL,
         "1",
-        "change of Coulomb stress by the critical displacement step",
+        "Coulomb stress change of the critical displacement step",
         "sigma_*",
         error=True,
     ),
@@ -52,7 +52,7 @@ _STRESS_OUTPUTS = (
         "coulomb_stress_of_normal_stress",
         _SYMBOL,
         "1",
-        "change of Coulomb stress by the critical fall of normal stress",
+        "Coulomb stress change of the critical normal stress decrease",
         "sigma_*",
         error=True,
     ),
@@ -69,23 +69,25 @@ _STRESS_OUTPUTS = (
         "coulomb_ratio",
         r"$\Delta\mathrm{CFS}_\sigma/\Delta\mathrm{CFS}_\delta$",
         "1",
-        "change of Coulomb stress by the critical fall of normal stress over that by the critical "
-        "displacement step",
+        "Coulomb stress change of the critical normal stress decrease divided by that of the "
+        "critical displacement step",
         error=True,
     ),
     Output(
         "direct_ratio",
         r"$a\sigma_*\ln(V_0/V_*)/\Delta\mathrm{CFS}_\delta$",
         "1",
-        "direct effect of the critical load point velocity step over the change of Coulomb stress "
-        "by the critical displacement step",
+        "direct effect of the critical load point velocity step over the Coulomb stress change "
+        "of the critical displacement step",
         error=True,
         optional=True,
     ),
 )
 _OUTPUTS = (
     *_STRESS_OUTPUTS,
-    Output("effective_friction", r"$\mu'$", "1", "effective friction of Coulomb stress"),
+    Output(
+        "effective_friction", r"$\mu'$", "1", "effective friction coefficient of the Coulomb stress"
+    ),
     *(about for trigger in TRIGGERS for about in _trigger_outputs(trigger)),
     Output("critical_stiffness"),
 )
@@ -136,7 +138,9 @@ class Triggers(Measure):
         why = _reason_without_effective_friction(scene)
         coupling = scene.parts.normal_stress.coupling
         if why or coupling is None:
-            return Outcome(Status.NOT_APPLICABLE, message=f"{why} has no one effective friction")
+            return Outcome(
+                Status.NOT_APPLICABLE, message=f"{why} has no unique effective friction coefficient"
+            )
         found = {trigger: _find_critical_step(trigger, scene, integrator) for trigger in TRIGGERS}
         values: dict[str, float] = {}
         for trigger, outcome in found.items():

@@ -15,8 +15,8 @@ from rsfstudy.measures import Measure, Outcome, Output, Status
 
 #: Outputs of the measures that solve problems with known answers.
 ERROR_OUTPUTS = (
-    Output("measured_error", "", "1", "error against an independent reference", error=True),
-    Output("error_estimate", "", "1", "the run's own estimate of its error"),
+    Output("measured_error", "", "1", "difference from an independent reference", error=True),
+    Output("error_estimate", "", "1", "error estimate of the run"),
 )
 
 
@@ -204,7 +204,7 @@ class ProblemMeasure(Measure):
         for number, each in enumerate(listed):
             if each not in known:
                 raise plain_data.invalid_part_error(
-                    f"{path}.problems[{number}]", "is posed by no study"
+                    f"{path}.problems[{number}]", "does not belong to a study"
                 )
         return {"problems": tuple(REGISTERED_PROBLEMS[known.index(each)] for each in listed)}
 
@@ -234,5 +234,5 @@ class ProblemMeasure(Measure):
             "scene",
             scene.as_dict(),
             "has no known answer",
-            remedy="Choose among the points of the axis; other values have no reference.",
+            remedy="Use points of the axis, because other values have no reference.",
         )

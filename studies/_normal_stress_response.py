@@ -44,28 +44,29 @@ _OUTPUTS = (
         "gain",
         r"$|\hat\tau/\hat\sigma|$",
         "1",
-        "amplitude of spring stress over that of imposed normal stress, at the period of forcing",
+        "amplitude of spring stress divided by the amplitude of imposed normal stress, at the "
+        "forcing period",
         error=True,
     ),
     Output(
         "phase_lead",
         r"$\arg(\hat\tau/\hat\sigma)$",
         "degree",
-        "angle by which spring stress is ahead of imposed normal stress, at the period of forcing",
+        "phase lead of spring stress relative to imposed normal stress, at the forcing period",
         error=True,
     ),
     Output(
         "distortion",
         "",
         "1",
-        "spring stress at all other periods than that of forcing, over that at it",
+        "spring stress at all other periods, divided by the spring stress at the forcing period",
         error=True,
     ),
     Output(
         "departure_from_linear",
         "",
         "1",
-        "distance of the response from that of small oscillations, over that",
+        "relative difference from the response to small oscillations",
         error=True,
     ),
     Output(
@@ -84,9 +85,9 @@ _OUTPUTS = (
         "response_period",
         "",
         "1",
-        "number of periods of forcing after which the response repeats itself",
+        "period of the response, in forcing periods",
     ),
-    Output("settled", "", "1", "whether one period of the response is as another later on"),
+    Output("settled", "", "1", "1 if later periods of the response are equal, otherwise 0"),
     *create_outputs_along_phase(*VARIABLES_RECORDED_ALONG_PHASE),
 )
 
@@ -318,15 +319,15 @@ class NormalStressResponse(RecordingMeasure):
         if not isinstance(loading, NormalStressOscillation):
             return Outcome(Status.NO_STEP, message="normal stress does not oscillate")
         if len(loading.segments) > 1:
-            rule = "begins later or ends: the response is that to one that goes on for ever"
-            remedy = "Leave out oscillation_begin and oscillation_cycles, or read it by simulate."
+            rule = "begins later or ends, but the response is defined for a permanent oscillation"
+            remedy = "Leave out oscillation_begin and oscillation_cycles, or use rsfstudy.simulate."
             raise InvalidValue("loading", loading.name, rule, remedy=remedy)
         if not scene.load_velocity or scene.steady_sliding(scene.log_load_velocity) is None:
             why = "the load point is held, or steady sliding is not possible at its velocity"
             return Outcome(Status.NO_STEADY_STATE, message=why)
         decay = -scene.load_velocity * scene.linear_growth_rates(scene.log_load_velocity)[0].real
         if not decay > 0.0:
-            why = "steady sliding is unstable: no transient decays"
+            why = "steady sliding is unstable, so transients do not decay"
             return Outcome(Status.NOT_APPLICABLE, message=why)
         period = loading.oscillation_period
         linear = spring_response_to_normal_stress(
@@ -343,7 +344,10 @@ class NormalStressResponse(RecordingMeasure):
         waits = math.ceil(max(faint, over - _COMPARED_PERIODS))
         start, repeats = self._find_repetition(scene, waits, integrator)
         if not repeats:
-            why = f"it repeats itself after none of 1 to {_MAX_RESPONSE_PERIODS} periods of forcing"
+            why = (
+                f"the response does not repeat itself within {_MAX_RESPONSE_PERIODS} forcing "
+                "periods"
+            )
             return Outcome(Status.NOT_PERIODIC, {**by_theory, "settled": 0.0}, why)
         way = _ResponsePeriod(period * repeats, repeats, fold / repeats)
         first, last = self._resolve(scene, start, way, integrator)

@@ -42,14 +42,14 @@ _OUTPUTS = (
         "apparent_alpha",
         r"$\alpha$",
         "1",
-        "normal stress effect on the state, as read off",
+        "apparent normal stress effect on the state variable",
         error=True,
     ),
     Output(
         "apparent_slip_distance",
         "$D_c$",
         "1",
-        "slip over which the transient of friction falls to 1/e, as read off",
+        "apparent slip distance over which the friction transient decays to 1/e",
         "D_c",
         error=True,
     ),
@@ -57,21 +57,26 @@ _OUTPUTS = (
         "evolution_left",
         r"$\Delta\mu(D_c)/\Delta\mu(0)$",
         "1",
-        "part of the direct change that is left of the transient after a slip of D_c",
+        "transient after a slip of D_c, as a fraction of the direct change",
         error=True,
     ),
     Output(
         "direct_change",
         r"$\Delta\mu(0)$",
         "1",
-        "change of friction at once, less the direct effect of slip rate",
+        "immediate change of friction minus the direct effect of slip rate",
     ),
-    Output("settled", "", "1", "whether friction has settled at the end of the record"),
+    Output(
+        "settled",
+        "",
+        "1",
+        "1 if friction has reached the steady state at the end of the record, otherwise 0",
+    ),
     Output(
         "closed_form_departure",
         "",
         "1",
-        "largest departure of friction, where it is read, from that of a stiff slider",
+        "largest difference of the measured friction from the friction of a stiff slider",
     ),
     *create_outputs_along_phase(*VARIABLES_RECORDED_ALONG_PHASE),
 )
@@ -174,7 +179,7 @@ class NormalStressTransient(RecordingMeasure):
             rule = "must be greater than 0 and less than fit_to"
             raise InvalidValue("fit_from", self.fit_from, rule)
         if not self.fit_to + 1.0 <= self.record < math.inf:
-            rule = "must exceed fit_to by 1 D_c at least, and be finite"
+            rule = "must exceed fit_to by at least 1 D_c, and must be finite"
             raise InvalidValue("record", self.record, rule)
 
     def error_scales(self, scene: Scene, values: Mapping[str, Any]) -> Mapping[str, float]:
@@ -223,20 +228,20 @@ class NormalStressTransient(RecordingMeasure):
         check_loading_changes_stress_only_in_steps(scene)
         step = scene.parts.loading.segments[0]
         if not step.normal_stress:
-            return Outcome(Status.NO_STEP, message="normal stress does not change at once")
+            return Outcome(Status.NO_STEP, message="normal stress does not change suddenly")
         why = self._reason_not_readable(scene)
         if why:
             return Outcome(Status.NOT_APPLICABLE, message=why)
         record = self._record_motion(scene, integrator)
         again = self._record_motion(scene, integrator.refined())
         if record is None or again is None:
-            why = f"slip does not come to {max(self.fit_to, 1.0):g} D_c, where friction is read"
+            why = f"slip does not reach {max(self.fit_to, 1.0):g} D_c, where friction is measured"
             return Outcome(Status.NOT_APPLICABLE, message=f"{why}, within record = {self.record:g}")
         shown = self._record_outputs(scene, record)
         values, refined = self._read_outputs(scene, record), self._read_outputs(scene, again)
         if not values or not refined:
             span = f"{self.fit_from:g} to {self.fit_to:g} D_c of slip"
-            why = f"from {span} friction does not decay, or is still that of loading or unloading"
+            why = f"between {span}, friction does not decay, or is affected by loading or unloading"
             return Outcome(Status.NOT_APPLICABLE, shown, why)
         errors = estimate_errors_at_instants(
             values,
@@ -247,7 +252,7 @@ class NormalStressTransient(RecordingMeasure):
         )
         direct = _direct_change(scene, record)
         if abs(direct) <= _NEGLIGIBLE_DIRECT_CHANGE * scene.mu_star:
-            why = "friction does not change at once, so that no part of that can be left"
+            why = "friction does not change suddenly, so the remaining fraction is not defined"
             del values["evolution_left"], errors["evolution_left_error"]
             return Outcome(Status.NOT_APPLICABLE, {**values, **errors, **shown}, why)
         rounded = Accuracy.RELATIVE_ROUNDING_ERROR * scene.mu_star / abs(direct)
@@ -258,11 +263,11 @@ class NormalStressTransient(RecordingMeasure):
         """Return the reason why the transient cannot be read, or an empty string."""
         step, coupling = scene.parts.loading.segments[0], scene.parts.normal_stress.coupling
         if step.load_velocity != 1.0 or step.displacement:
-            return "the load point does not move on at V_* as before"
+            return "the load point velocity is not V_* after the step"
         if coupling is None or coupling[0] or scene.pressure_source.unknowns:
-            return "effective normal stress follows shear stress or pore pressure"
+            return "effective normal stress depends on shear stress or pore pressure"
         if step.duration < self.record:
-            return "normal stress does not stay so for all of the record"
+            return "normal stress changes during the record"
         return ""
 
     def _record_motion(self, scene: Scene, integrator: Integrator) -> _TransientRecord | None:

@@ -57,14 +57,23 @@ _INITIAL_SLIP_DISTANCE_FACTOR = 1.5
 
 _PARAMETER_OUTPUTS = (
     ("estimate", "parameter, or its logarithm"),
-    ("deviation", "parameter, or its logarithm, less the true one"),
+    (
+        "deviation",
+        "difference between the fitted and the true parameter, or between their logarithms",
+    ),
     ("spread", "standard error of the parameter, or of its logarithm"),
-    ("promised_spread", "standard error that Fisher's information promises"),
-    ("inside_one", "whether the truth lies within the 68.3 % interval"),
-    ("inside_two", "whether the truth lies within the 95.4 % interval"),
-    ("naive_inside_one", "the same, residuals taken for white noise"),
-    ("naive_inside_two", "the same, residuals taken for white noise"),
-    ("told", "whether the record tells the parameter"),
+    ("promised_spread", "standard error from Fisher's information"),
+    ("inside_one", "1 if the true value is within the 68.3 % confidence interval, otherwise 0"),
+    ("inside_two", "1 if the true value is within the 95.4 % confidence interval, otherwise 0"),
+    (
+        "naive_inside_one",
+        "1 if the true value is within the 68.3 % confidence interval for white noise, otherwise 0",
+    ),
+    (
+        "naive_inside_two",
+        "1 if the true value is within the 68.3 % confidence interval for white noise, otherwise 0",
+    ),
+    ("told", "1 if the record constrains the parameter, otherwise 0"),
 )
 _FLAGGED_OUTPUT = Output(
     "flagged", "", "1", "1 if standard errors are reported as not valid, otherwise 0"
@@ -152,15 +161,15 @@ class SyntheticFit(Measure):
     primary_output = "deviation"
     typical_work = 400_000
     dimensions = (
-        Quantity("parameter", "", "", "parameter that is fitted"),
+        Quantity("parameter", "", "", "fitted parameter"),
         Quantity("protocol", "", "", "load point velocities and displacements"),
         Quantity("slip_distance", "$D_c$", "um", "characteristic slip distance"),
         Quantity("rows", "", "1", "rows of a window"),
         Quantity("noise_size", "", "1", "standard deviation of the noise"),
-        Quantity("process", "", "", "noise that is drawn"),
+        Quantity("process", "", "", "simulated noise"),
         Quantity("noise", "", "", "model of the noise"),
-        Quantity("fitted_law", "", "", "law that is fitted"),
-        Quantity("seed", "", "1", "number of the noise that is drawn"),
+        Quantity("fitted_law", "", "", "fitted law"),
+        Quantity("seed", "", "1", "number of the noise realisation"),
     )
 
     def __post_init__(self) -> None:
@@ -171,9 +180,9 @@ class SyntheticFit(Measure):
             raise InvalidValue("process", self.process, "is unknown", choices=_PROCESSES)
         check_fields_positive(self, "slip_distance", "noise_size")
         if self.rows < 10 * len(windows[0]):
-            raise InvalidValue("rows", self.rows, "must be ten for each piece at least")
+            raise InvalidValue("rows", self.rows, "must be at least ten per segment")
         if self.seed < 0:
-            raise InvalidValue("seed", self.seed, "must be 0 or more")
+            raise InvalidValue("seed", self.seed, "must be 0 or greater")
         check_noise_name(self.noise)
 
     @property
@@ -183,9 +192,9 @@ class SyntheticFit(Measure):
             Output(name, "", "1", text, dims=("parameter",), error=name == self.primary_output)
             for name, text in _PARAMETER_OUTPUTS
         ]
-        text = "Akaike's criterion, in which the noise counts"
+        text = "Akaike information criterion, including the noise model"
         order = Output("noise_order", "", "1", "order of the autoregressive process of the noise")
-        return (*by, Output("criterion", "", "1", text), order, _FLAGGED_OUTPUT)
+        return (*by, Output("aic", "", "1", text), order, _FLAGGED_OUTPUT)
 
     @property
     def inner_coordinates(self) -> Mapping[str, np.ndarray]:
@@ -222,7 +231,7 @@ class SyntheticFit(Measure):
         truth = self._joint_model(scene, integrator)
         clean = truth.model_friction(true)
         if not np.isfinite(clean).all():
-            return Outcome(Status.NOT_APPLICABLE, message="the true motion cannot be followed")
+            return Outcome(Status.NOT_APPLICABLE, message="the true motion cannot be computed")
         rng, size = np.random.default_rng(self.seed), self.noise_size
         root = _noise_factor(self.process, self.rows)
         noise = np.concatenate([root @ rng.standard_normal(self.rows) for _ in truth.models])
@@ -245,7 +254,7 @@ class SyntheticFit(Measure):
             true["trend1"] = kind.trend
         windows = self._window_segments()
         if len(windows) > 1 or len(windows[0]) != 2:
-            rule = "is drawn for a protocol with one step"
+            rule = "is only defined for a protocol with one step"
             raise InvalidValue("process", self.process, rule, choices=_PROCESSES)
         before, after = windows[0]
         smooth = integrator.tightened_to(1e-9)
@@ -326,7 +335,7 @@ class SyntheticFit(Measure):
             for n in self.free
         ]
         values: dict[str, OutputValue] = {name: each[shown] for name, each in by_parameter.items()}
-        values |= {"criterion": found.aic, "noise_order": found.noise_model.autoregressive_order}
+        values |= {"aic": found.aic, "noise_order": found.noise_model.autoregressive_order}
         return values | {"flagged": float(bool(reasons))}
 
     def _window_segments(self) -> list[list[_ProtocolSegment]]:
@@ -391,11 +400,13 @@ def _parse_segments(text: str, rows: int) -> list[_ProtocolSegment]:
         stated = _SEGMENT_PATTERN.fullmatch(part)
         speed, size = map(float, stated.group(1, 2)) if stated else (0.0, 0.0)
         if not stated or not size > 0.0 or (speed == 0.0) != bool(stated[3]):
-            remedy = "Write it as in '1:30, 10:270', or with a hold as in '1:30, 0:100 s, 1:270'."
-            raise InvalidValue("protocol", text, "is no protocol", remedy=remedy)
+            remedy = "Write, for example, '1:30, 10:270', or with a hold '1:30, 0:100 s, 1:270'."
+            raise InvalidValue("protocol", text, "is not a protocol", remedy=remedy)
         found.append((speed, size / (speed or 1.0), size))
     if len(found) < 2 or not found[0][0] > 0.0:
-        raise InvalidValue("protocol", text, "must begin with sliding, and change then")
+        raise InvalidValue(
+            "protocol", text, "must begin with sliding, followed by a change of velocity"
+        )
     moved = math.fsum(size for speed, _lasts, size in found if speed)
     held = sum(not speed for speed, _lasts, _size in found)
     each = rows // (len(found) + 1) if held else 0

@@ -117,12 +117,19 @@ INTEGRATORS = tuple(
 #: Outputs of the measure.
 _OUTPUTS = (
     *ERROR_OUTPUTS,
-    Output("achieved_digits", "", "1", "decimal digits reached: -log10 of the measured error"),
-    Output("run_evaluations", "", "1", "right-hand sides, those of numerical Jacobians included"),
-    Output("run_steps", "", "1", "steps taken"),
-    Output("run_jacobians", "", "1", "Jacobians evaluated"),
-    Output("run_time", "", "s", "processor time of the run, median of its repeats"),
-    Output("relative_time", "", "1", "time of the run over that of DOP853 for 3 digits"),
+    Output(
+        "achieved_digits", "", "1", "number of correct decimal digits: -log10 of the measured error"
+    ),
+    Output(
+        "run_evaluations",
+        "",
+        "1",
+        "right-hand side evaluations, including those for numerical Jacobians",
+    ),
+    Output("run_steps", "", "1", "number of steps"),
+    Output("run_jacobians", "", "1", "number of Jacobian evaluations"),
+    Output("run_time", "", "s", "processor time of the run (median of the repetitions)"),
+    Output("relative_time", "", "1", "time of the run divided by the time of DOP853 for 3 digits"),
 )
 
 
@@ -159,7 +166,12 @@ class WorkPrecision(ProblemMeasure):
     typical_work = 25_000
     outputs = _OUTPUTS
     dimensions = (
-        Quantity("integrator", "", "", "integrator: throughout, or between ruptures and in them"),
+        Quantity(
+            "integrator",
+            "",
+            "",
+            "integrator of the whole motion, or integrators between and during ruptures",
+        ),
     )
     needs_time: ClassVar[tuple[bool, ...]] = (False, True)
 
@@ -213,7 +225,7 @@ class WorkPrecision(ProblemMeasure):
         """
         problem = self.problem_of_scene(scene)
         if self.integrator in _INTEGRATOR_PAIRS and not scene.inertia:
-            return Outcome(Status.NOT_APPLICABLE, message=f"{self.integrator} needs mass")
+            return Outcome(Status.NOT_APPLICABLE, message=f"{self.integrator} requires inertia")
         if self._requested_accuracy.engine == Engine.COMPILED:
             problem.measure(scene, self._requested_accuracy)  # compiles the equations
         before = _time_run(problem, scene, _YARDSTICK_ACCURACY)[0]
@@ -353,8 +365,8 @@ figure = Figure(
                 )
             },
             overlays=[reference_line("requested_digits", lambda x: x, "as asked", linewidth=0.9)],
-            x_label="Digits asked for",
-            y_label="Digits reached",
+            x_label="Requested digits",
+            y_label="Correct digits",
             legend_columns=1,
         ),
     ],
@@ -385,7 +397,7 @@ def proportionality_claim(label: str) -> Claim:
     """
     return Claim(
         id="A1",
-        statement=f"{label}: each digit asked for brings 0.7 to 1.3 digits, from 1e-4 to 1e-9",
+        statement=f"{label}: each requested digit gives 0.7 to 1.3 digits, from 1e-4 to 1e-9",
         source="Shampine (1985), Numerical Methods: tolerance proportionality",
         variable="proportionality",
         where={"problem": label, "integrator": "DOP853"},
@@ -414,7 +426,7 @@ def cheapest_claim(label: str, digits: float) -> Claim:
     """
     return Claim.below(
         id="A2",
-        statement=f"{label}: DOP853 takes up to 1.25 times the least work, {digits:g} digits",
+        statement=f"{label}: DOP853 needs at most 1.25 times the least work, {digits:g} digits",
         source="this project's choice of DOP853 in every regime",
         variable="cheapest_ratio",
         where={"problem": label, "digits": digits},
@@ -426,7 +438,7 @@ def cheapest_claim(label: str, digits: float) -> Claim:
 
 study = Study(
     name="accuracy_cost",
-    title="What accuracy costs: error against work for SciPy's integrators",
+    title="Cost of accuracy: error against work for the integrators of SciPy",
     summary=Study.caption(__doc__),
     base=Scene(),
     axes=[

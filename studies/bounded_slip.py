@@ -64,14 +64,14 @@ class PathSeparation(Reduction):
     tolerance: float = 1e-3
     kind: ClassVar[str] = "parting"
     long_names: ClassVar[Mapping[str, str]] = {
-        "_parting": "log10(V/V_star) at which mass makes the path leave its massless twin",
-        "_merging": "log10(V/V_star) at which mass lets the path join its massless twin",
+        "_parting": "log10(V/V_star) at which the paths with and without inertia separate",
+        "_merging": "log10(V/V_star) at which the paths with and without inertia merge",
     }
 
     @property
     def quantities(self) -> Sequence[Quantity]:
         """Quantities of the results."""
-        words = "stress after the rupture with mass, less that without"
+        words = "stress after the rupture with inertia minus stress without inertia"
         offset = Quantity(f"{self.name}_offset", "", "1", words, "sigma_*")
         return [*super().quantities, offset]
 
@@ -107,7 +107,7 @@ class PathSeparation(Reduction):
             {
                 f"{self.name}_parting": parting.assign_attrs(comment=f"log10(V/V_*) where {note}"),
                 f"{self.name}_merging": merging.assign_attrs(
-                    comment=f"log10(V/V_*) below which {note} no more"
+                    comment="log10(V/V_*) below which the difference is smaller than this"
                 ),
                 f"{self.name}_offset": offset.assign_attrs(
                     comment=f"median difference of {self.of}"
@@ -209,7 +209,7 @@ def plot_separation(dataset: xr.Dataset, axes: Axes) -> None:
     for name in ("paths_parting", "paths_merging"):
         rates = np.atleast_1d(dataset.get(name, math.nan))
         for rate in rates[np.isfinite(rates)]:
-            text = "paths part and merge"
+            text = "paths separate and merge"
             axes.axvline(rate, color="0.5", linewidth=0.8, linestyle="-.", label=text)
 
 
@@ -350,7 +350,7 @@ study = Study(
         repeating_peaks_claim(200.0),
         Claim(
             id="C18",
-            statement="V_0 = 200 V_*: mass lowers the peak slip rate by an order of magnitude",
+            statement="V_0 = 200 V_*: inertia lowers the peak slip rate by an order of magnitude",
             source=f"{PAPER}, section 4, Fig. 12",
             variable="peak_lowering",
             where={**LARGEST_STEP, "inertia": True},
@@ -358,7 +358,7 @@ study = Study(
             tolerance=0.5,
             reason="'by one order of magnitude'",
             expected="differs",
-            because=(
+            difference_reason=(
                 "peaks are 10^13.335 and 10^8.952 V_*. Without mass every part of the stress the "
                 "spring carries beyond the state's strength goes into slip rate, e-fold for each "
                 "a sigma; with mass it goes into acceleration. The gap is one order for V_0 = 19 "
@@ -371,7 +371,7 @@ study = Study(
             source=f"{PAPER}, section 4, Fig. 12",
             variable="peak_log10_slip_rate",
             where={**LARGEST_STEP, "peak": 2, "inertia": True},
-            minus={**LARGEST_STEP, "peak": 2, "inertia": False},
+            baseline={**LARGEST_STEP, "peak": 2, "inertia": False},
             published=0.0,
             tolerance=5e-5,
             reason="5 % of the difference in stress, as for other masses; paths are considered "
@@ -379,7 +379,7 @@ study = Study(
         ),
         Claim.above(
             id="C18",
-            statement="V_0 = 200 V_*: they merge on the segment of constant stress",
+            statement="V_0 = 200 V_*: the paths merge on the segment of constant stress",
             source=f"{PAPER}, section 4, Fig. 12",
             variable="paths_merging",
             where=LARGEST_STEP,
@@ -389,7 +389,7 @@ study = Study(
         ),
         Claim.above(
             id="C18",
-            statement="V_0 = 200 V_*: with mass the slip is a rupture, beyond the norm 5e-4",
+            statement="V_0 = 200 V_*: with inertia, the slip is a rupture beyond the norm 5e-4",
             source=f"{PAPER}, section 4",
             variable="max_log10_slip_rate",
             where={**LARGEST_STEP, "inertia": True},

@@ -39,14 +39,18 @@ _MAX_TIGHTER_WORK = 6
 
 #: Outputs of the measure.
 _OUTPUTS = (
-    Output("status_kept", long_name="whether a tighter run ends with the same status", error=True),
+    Output(
+        "status_kept",
+        long_name="1 if a more accurate run has the same status, otherwise 0",
+        error=True,
+    ),
     Output("ended_as"),
-    Output("error_over_estimate", "", "1", "error over its own estimate", dims=("number",)),
+    Output("error_over_estimate", "", "1", "error divided by the error estimate", dims=("number",)),
     Output(
         "error_over_request",
         "",
         "1",
-        "relative error over the accuracy asked for",
+        "relative error divided by the requested accuracy",
         dims=("number",),
     ),
 )
@@ -79,9 +83,9 @@ class Coverage(Measure):
     typical_work = 60_000
     outputs = _OUTPUTS
     dimensions = (
-        Quantity("question", "", "", "what is measured in a random scene"),
+        Quantity("question", "", "", "measure in a random scene"),
         Quantity("sample", "", "1", "number of the random scene"),
-        Quantity("number", "", "", "name of the number"),
+        Quantity("number", "", "", "name of the result"),
     )
     needs_time: ClassVar[tuple[bool, ...]] = (False, True)
 
@@ -92,7 +96,9 @@ class Coverage(Measure):
         if self.sample < 0:
             raise InvalidValue("sample", self.sample, "must be 0 or greater")
         if not 2 <= self.requested_digits <= 9:
-            rule = "must lie between 2 and 9: the tighter run needs two more"
+            rule = (
+                "must lie between 2 and 9, because the more accurate run requires two more digits"
+            )
             raise InvalidValue("requested_digits", self.requested_digits, rule)
 
     @property
@@ -180,7 +186,7 @@ def _error_ratio(error: float, allowed: float) -> float:
 
 # Numba imports a package called coverage, and finds this file if Python runs in this directory.
 if __name__ == "coverage":
-    raise ImportError("this is a study, and not the package coverage")
+    raise ImportError("this module is a study and not the package coverage")
 
 DYNAMICS: dict[str, dict[str, bool | float]] = {
     "quasi-static": {"inertia": False},
@@ -216,10 +222,10 @@ class CoverageStatistics(Reduction):
         """Quantities of the results."""
         among = ", by question" if "question" in self.by else ""
         texts = {
-            "share": "share of errors within their estimates",
-            "worst": "largest error over its estimate",
-            "typical": "median of estimates over errors",
-            "numbers": "how many numbers have an error and an estimate",
+            "share": "fraction of errors within their estimates",
+            "worst": "largest ratio of error and estimate",
+            "typical": "median ratio of estimate and error",
+            "numbers": "number of results with an error and an estimate",
         }
         return [Quantity(f"{self.name}_{k}", "", "1", f"{t}{among}") for k, t in texts.items()]
 
@@ -289,7 +295,7 @@ figure = Figure(
         Panel(
             facet=["question"],
             overlays=[plot_error_histogram],
-            x_label="Error over its estimate",
+            x_label="Error divided by its estimate",
             y_label="Numbers",
         )
     ]
@@ -329,7 +335,7 @@ CLAIMS = [
     Claim(
         id=f"T{number}",
         statement=f"rtol 1e-{digits}: {statement}",
-        source="this project's promise for its error estimates",
+        source="design goal of the error estimates",
         variable=variable,
         where={"requested_digits": float(digits)},
         **held,
@@ -341,7 +347,7 @@ CLAIMS = [
 
 study = Study(
     name="coverage",
-    title="How error estimates cover the errors, over random scenes",
+    title="Coverage of errors by error estimates for random scenes",
     summary=Study.caption(__doc__),
     base=Scene(),
     axes=[

@@ -80,7 +80,7 @@ figure = Figure(
             curve_label=parameter_symbol,
             title=machine_title,
             log="x",
-            x_label="Standard error promised",
+            x_label="Predicted standard error",
             y_label="Experiment",
             x_limits=(1e-5, 0.3),
         )
@@ -140,7 +140,7 @@ def fit_error_claim(k: float, parameter: str) -> Claim:
     """
     return Claim(
         id="D2",
-        statement=f"k = {k:g} per um: estimates of {parameter} scatter as promised",
+        statement=f"k = {k:g} per um: estimates of {parameter} scatter as predicted",
         source="Fisher's information",
         variable="kept_off",
         where={"stiffness": k * SLIP_DISTANCE, "parameter": parameter},
@@ -152,7 +152,7 @@ def fit_error_claim(k: float, parameter: str) -> Claim:
 
 study = Study(
     name="design_of_steps",
-    title="Standard errors that steps, holds and machines promise",
+    title="Predicted standard errors for steps, holds and machines",
     summary=Study.caption(__doc__),
     base=FAMILY_SCENE,
     axes=[

@@ -101,7 +101,8 @@ def growth_threshold_claim(dilatancy: float, drainage: float) -> Claim:
     """
     return Claim(
         id="D3",
-        statement=f"dilatancy {dilatancy:g}, drainage {drainage:g}: k_cr is that of growth",
+        statement=f"dilatancy {dilatancy:g}, drainage {drainage:g}: k_cr agrees with the growth "
+        "rate",
         source="eigenvalues of the assembled equations",
         variable="critical_stiffness_error",
         where={"dilatancy": dilatancy, "drainage": drainage},

@@ -50,7 +50,7 @@ def stabilisation_claim(fault: str, drainage: float, by: float) -> Claim:
         source=f"{SEGALL_RICE}: dilatancy opposes nucleation",
         variable="critical_velocity_ratio",
         where={"fault": fault, "drainage": drainage},
-        minus={"fault": DRAINED, "drainage": drainage},
+        baseline={"fault": DRAINED, "drainage": drainage},
         published=by,
     )
 
@@ -108,7 +108,7 @@ study = Study(
             source=SEGALL_RICE,
             variable="critical_velocity_ratio",
             where={"fault": "dilatancy 0.004", "drainage": 10.0},
-            minus={"fault": "dilatancy 0.004", "drainage": 1.0},
+            baseline={"fault": "dilatancy 0.004", "drainage": 1.0},
             published=-1.0,
         ),
         Claim.above(
@@ -118,7 +118,7 @@ study = Study(
             source=SEGALL_RICE,
             variable="critical_velocity_ratio",
             where={"fault": "dilatancy 0.004", "drainage": 1.0},
-            minus={"fault": "dilatancy 0.004", "drainage": 0.1},
+            baseline={"fault": "dilatancy 0.004", "drainage": 0.1},
             published=-0.5,
             reason="an inequality, 5 % of the boundary",
         ),

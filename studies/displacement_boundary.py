@@ -168,7 +168,7 @@ study = Study(
         closeness_claim(STRONG_NORMAL_STRESS_EFFECT, 1.0, 0.03, PAPER_WORDS_ON_CLOSENESS),
         Claim(
             id="C10",
-            statement="alpha = 0.56, k = k_cr, a/(b-a) = 2: step over D_c a/(b-a)",
+            statement="alpha = 0.56, k = k_cr, a/(b-a) = 2: step divided by D_c a/(b-a)",
             source=f"{PAPER}, eq. 14, Fig. 7",
             variable="over_eq_14",
             where={

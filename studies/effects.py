@@ -64,23 +64,26 @@ _CYCLE_OUTPUTS = tuple(
 _OUTPUTS = (
     *_CYCLE_OUTPUTS,
     Output("unknowns", "", "1", "unknowns of the equations between ruptures"),
-    Output("unknowns_in_rupture", "", "1", "unknowns of the equations where mass acts"),
-    Output("share_in_rupture", "", "1", "share of the right-hand sides where mass acts"),
+    Output("unknowns_in_rupture", "", "1", "unknowns of the equations with inertia"),
+    Output("share_in_rupture", "", "1", "fraction of right-hand side evaluations with inertia"),
     Output(
         "evaluation_cost",
         "",
         "1",
-        "time of a right-hand side between ruptures over one in the plainest scene",
+        "time per right-hand side evaluation between ruptures, relative to the simplest scene",
     ),
     Output(
         "evaluation_cost_in_rupture",
         "",
         "1",
-        "time of a right-hand side where mass acts over one in the plainest scene",
+        "time per right-hand side evaluation with inertia, relative to the simplest scene",
     ),
-    Output("time_per_evaluation", "", "s", "time of one right-hand side between ruptures"),
+    Output("time_per_evaluation", "", "s", "time per right-hand side evaluation between ruptures"),
     Output(
-        "time_per_evaluation_in_rupture", "", "s", "time of one right-hand side where mass acts"
+        "time_per_evaluation_in_rupture",
+        "",
+        "s",
+        "time per right-hand side evaluation with inertia",
     ),
 )
 
@@ -229,8 +232,8 @@ figure = Figure(
             title="",
         )
         for variable, digits, label in (
-            ("work_per_cycle", 4, "Right-hand sides per cycle"),
-            ("evaluation_cost", 2, "Time of a right-hand side, relative"),
+            ("work_per_cycle", 4, "Right-hand side evaluations per cycle"),
+            ("evaluation_cost", 2, "Relative time per evaluation"),
             ("static_stress_drop", 4, None),
             ("max_log10_slip_rate", 4, None),
         )
@@ -258,8 +261,8 @@ def static_drop_loss_claim(law: str, dynamics: str, published: float) -> Claim:
     """
     return Claim.above(
         id="E1",
-        statement=f"{law} law: {dynamics} instead of mass loses part of the static drop",
-        source="overshoot is the mass's: damped slip stops where the stress balances",
+        statement=f"{law} law: {dynamics} instead of inertia reduces the static drop",
+        source="overshoot is due to inertia; damped slip stops at stress equilibrium",
         variable="drop_lost_without_mass",
         where={"law": law, "coupling": "constant normal stress", "dynamics": dynamics},
         published=published,
@@ -268,7 +271,7 @@ def static_drop_loss_claim(law: str, dynamics: str, published: float) -> Claim:
 
 study = Study(
     name="effects",
-    title="What each effect costs in a limit cycle, and what the answer loses without it",
+    title="Cost of each effect in a limit cycle, and change of the result without it",
     summary=Study.caption(__doc__),
     base=Scene(b_over_a=2.0, stiffness_ratio=0.8, load_velocity_ratio=2.0),
     axes=[
@@ -300,7 +303,7 @@ study = Study(
         ),
         Claim.below(
             id="E2",
-            statement="full scene, slip law: the full equations take part of the work only",
+            statement="full scene, slip law: the full equations need only a fraction of the work",
             source="inertia is integrated where it acts",
             variable="share_in_rupture",
             where={"law": "slip", **FULL_SCENE_PLACE},

@@ -68,8 +68,8 @@ class ShareInside(Reduction):
     covers: float = SHARE_WITHIN_ONE_STDERR
     kind: ClassVar[str] = "share_inside"
     long_names: ClassVar[Mapping[str, str]] = {
-        "": "share of records with the truth inside",
-        "_least": "least share above what is promised, in standard deviations",
+        "": "fraction of records whose confidence interval contains the true value",
+        "_least": "smallest difference of coverage and confidence level, in standard deviations",
     }
 
     def __call__(self, dataset: xr.Dataset) -> xr.Dataset:
@@ -105,7 +105,7 @@ class ShareFlagged(Reduction):
 
     kind: ClassVar[str] = "share_flagged"
     long_names: ClassVar[Mapping[str, str]] = {
-        "": "share of records with errors that are not valid"
+        "": "fraction of records with standard errors that are not valid"
     }
 
     def __call__(self, dataset: xr.Dataset) -> xr.Dataset:
@@ -155,7 +155,7 @@ def plot_shares(dataset: xr.Dataset, axes: Axes) -> None:
 shares_panel = Panel(
     facet=["law"],
     overlays=[plot_shares],
-    x_label="Truth inside 68.3 % interval (%)",
+    x_label="Coverage of 68.3 % interval (%)",
     y_label="Noise",
     x_limits=(0.0, 103.0),
     y_scale_group="noise",
@@ -198,8 +198,8 @@ def coverage_claims(series: str, words: str, **where: str) -> list[Claim]:
     return [
         Claim.above(
             id=f"{series}{number}",
-            statement=f"{words}: {100 * share:.1f} % intervals cover as much",
-            source="this project's promise for the errors of fits",
+            statement=f"{words}: {100 * share:.1f} % confidence intervals have this coverage",
+            source="design goal of the standard errors of fits",
             variable=f"share_{name.removeprefix('inside_')}_least",
             where=where,
             published=0.0,
@@ -230,7 +230,7 @@ def flagged_claim(process: str, law: str, least: float) -> Claim:
     return Claim.above(
         id="F6",
         statement=f"{process} record, {law} law: the fit reports that errors are not valid",
-        source="this project's promise for the errors of fits",
+        source="design goal of the standard errors of fits",
         variable="flagged_share",
         where={"process": process, "law": law},
         published=least,
@@ -256,7 +256,7 @@ def seldom_flagged_claim(process: str, law: str) -> Claim:
     return Claim.below(
         id="F7",
         statement=f"{process} record, {law} law: the fit seldom reports errors that are not valid",
-        source="this project's promise for the errors of fits",
+        source="design goal of the standard errors of fits",
         variable="flagged_share",
         where={"process": process, "law": law},
         published=0.05,
@@ -282,8 +282,9 @@ def naive_errors_claim(process: str, law: str) -> Claim:
     """
     return Claim.below(
         id="F3",
-        statement=f"{process} noise, {law} law: naive 68.3 % intervals cover far less",
-        source="of n samples with correlated noise fewer count",
+        statement=f"{process} noise, {law} law: naive 68.3 % confidence intervals have far lower "
+        "coverage",
+        source="correlated noise reduces the effective sample size",
         variable="naive_share_one_least",
         where={"process": process, "law": law},
         published=-MAX_BINOMIAL_DEVIATION,
@@ -300,7 +301,7 @@ FLAGGED_SHARE_REDUCTION = ShareFlagged("flagged_share", "flagged")
 
 study = Study(
     name="fit_coverage",
-    title="Shares of synthetic records whose truth lies within the errors of the fit",
+    title="Coverage of confidence intervals for synthetic records",
     summary=Study.caption(__doc__),
     base=BASE_SCENE,
     axes=[

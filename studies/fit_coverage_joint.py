@@ -27,7 +27,7 @@ DESIGNS = {
 
 study = Study(
     name="fit_coverage_joint",
-    title="Shares of synthetic records of two states whose truth lies within the errors of the fit",
+    title="Coverage of confidence intervals for synthetic records of two states",
     summary=Study.caption(__doc__),
     base=Scene(
         law="two_slowness_states",

@@ -86,21 +86,25 @@ class RecoveryError(Measure):
     primary_output = "largest_deviation"
     typical_work = 200_000
     dimensions = (
-        Quantity("parameter", "", "", "parameter that is fitted"),
-        Quantity("loading_of_record", "", "", "what the load point does"),
-        Quantity("looked_for", "", "", "parameters that are fitted"),
-        Quantity("record_by", "", "", "what makes the record"),
+        Quantity("parameter", "", "", "fitted parameter"),
+        Quantity("loading_of_record", "", "", "loading of the record"),
+        Quantity("looked_for", "", "", "fitted parameters"),
+        Quantity("record_by", "", "", "source of the record"),
     )
     outputs = (
         Output(
             "largest_deviation",
             "",
             "1",
-            "largest deviation of a parameter, over its size",
+            "largest relative deviation of a parameter",
             error=True,
         ),
         Output(
-            "deviation", "", "1", "parameter less the true one, over its size", dims=("parameter",)
+            "deviation",
+            "",
+            "1",
+            "relative deviation of the parameter from the true value",
+            dims=("parameter",),
         ),
     )
 
@@ -113,7 +117,7 @@ class RecoveryError(Measure):
             raise InvalidValue("record_by", self.record_by, "is unknown", choices=MAX_DEVIATIONS)
         for name in self.looked_for.split():
             if name not in PARAMETERS:
-                raise InvalidValue("looked_for", name, "is no parameter", choices=PARAMETERS)
+                raise InvalidValue("looked_for", name, "is not a parameter", choices=PARAMETERS)
 
     @property
     def inner_coordinates(self) -> Mapping[str, np.ndarray]:
@@ -288,13 +292,13 @@ CASES = {
     "composite": {"law": "composite"},
     "cut-off": {"law": "cut_off"},
     "family": {"law": "family", "law_exponent": 0.3},
-    "exponent free": {
+    "free exponent": {
         "law": "family",
         "law_exponent": 0.3,
         "looked_for": "a b slip_distance mu_star law_exponent",
     },
-    "stiffness free": {"law": "slip", "looked_for": "a b slip_distance mu_star stiffness"},
-    "time of step free": {"law": "slip", "looked_for": "a b slip_distance mu_star step_time"},
+    "free stiffness": {"law": "slip", "looked_for": "a b slip_distance mu_star stiffness"},
+    "free step time": {"law": "slip", "looked_for": "a b slip_distance mu_star step_time"},
     "step down": {"law": "slowness", "loading_of_record": "step down"},
     "b < 0": {"law": "slowness", "b_over_a": -0.4},
     "b < 0, slip": {"law": "slip", "b_over_a": -0.4},
@@ -357,7 +361,7 @@ def recovery_claim(case: str, source: str) -> Claim:
     }
     return Claim.below(
         id="F4",
-        statement=f"{case}: the parameters of a record by {source} come back",
+        statement=f"{case}: the fit recovers the parameters of a record from {source}",
         source="identity of model and record",
         variable="largest_deviation",
         where={"case": case, "record_by": source},

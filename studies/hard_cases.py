@@ -75,7 +75,10 @@ class HardCase(ProblemMeasure):
             integrator.work_meter.add_evaluations(regime, evaluations)
         numbers = {"ended_as": float(outcome.status)}
         if outcome.status is not problem.status:
-            why = f"ended as {outcome.status.label}, not {problem.status.label}: {outcome.message}"
+            why = (
+                f"status {outcome.status.label} instead of {problem.status.label}: "
+                f"{outcome.message}"
+            )
             return Outcome(Status.UNVERIFIED, numbers, why)
         if problem.answer is None:
             exact = {"measured_error": 0.0, "measured_error_error": 0.0}
@@ -88,7 +91,7 @@ class HardCase(ProblemMeasure):
             "answer": problem.answer,
         }
         if not error <= estimate + problem.uncertainty or math.isnan(error):
-            why = f"error {error:.2g} beyond its estimate {estimate:.2g}"
+            why = f"error {error:.2g} exceeds its estimate {estimate:.2g}"
             return Outcome(Status.UNVERIFIED, numbers, why)
         return Outcome(Status.OK, numbers)
 
@@ -470,7 +473,7 @@ figure = Figure(
     [
         Panel(
             overlays=[plot_errors],
-            x_label="Error; in words: what came out",
+            x_label="Error, or status of the result",
             y_label="Case",
             legend_columns=3,
         ),
@@ -482,7 +485,7 @@ figure = Figure(
 
 study = Study(
     name="hard_cases",
-    title="Cases that break ordinary slider codes, and what comes out",
+    title="Difficult cases for spring-slider codes, and their results",
     summary=Study.caption(__doc__),
     base=Scene(),
     axes=[

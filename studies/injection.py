@@ -34,8 +34,8 @@ INITIAL_DEPARTURE, SAMPLING_INTERVAL, EXTREMUM_WINDOW = 1e-5, 0.25, 1.0 / 16.0
 LOG_SLIP_RATE_COLUMN = Recording.MOTION_VARIABLES.index("log10_slip_rate")
 GROWTH_ENDS, GROWTH_BEGINS = "end", "begin"
 _GROWTH_DESCRIPTIONS = {
-    GROWTH_ENDS: "stop growing as pressure rises",
-    GROWTH_BEGINS: "begin to grow as it falls",
+    GROWTH_ENDS: "stop growing as pressure increases",
+    GROWTH_BEGINS: "begin to grow as pressure decreases",
 }
 _OUTPUTS = (
     *(
@@ -46,7 +46,7 @@ _OUTPUTS = (
                 f"{at}_pressure",
                 r"$(p-p_\infty)/\sigma_*$",
                 "1",
-                f"pore pressure in the fault at which small departures {words}",
+                f"pore pressure in the fault at which small perturbations {words}",
                 "sigma_*",
                 error=True,
             ),
@@ -54,8 +54,8 @@ _OUTPUTS = (
                 f"{at}_stiffness_ratio",
                 "$k/k_{cr}(p, V)$",
                 "1",
-                "stiffness over the critical one at the pressure and slip rate at which small "
-                f"departures {words}",
+                "stiffness divided by the critical stiffness, at the pressure and slip rate at "
+                f"which small perturbations {words}",
                 error=True,
             ),
         )
@@ -64,7 +64,7 @@ _OUTPUTS = (
         "critical_pressure",
         r"$(p-p_\infty)/\sigma_*$",
         "1",
-        "pore pressure at which stiffness is critical at V_0",
+        "pore pressure at which the stiffness is critical at V_0",
         "sigma_*",
     ),
 )
@@ -144,9 +144,12 @@ class StabilisationPressure(Measure):
         """
         loading = scene.parts.loading
         if not isinstance(loading, SampledHistory) or not loading.of_pressure:
-            return Outcome(Status.NO_STEP, message="there is no record of pore pressure")
+            return Outcome(Status.NO_STEP, message="the scene has no recorded pore pressure")
         if scene.normal_stress != "imposed" or scene.alpha or scene.parts.law.state_count > 1:
-            why = "critical stiffness is that of one state and imposed normal stress, alpha = 0"
+            why = (
+                "the critical stiffness requires a law with one state, imposed normal stress, "
+                "and alpha = 0"
+            )
             return Outcome(Status.NOT_APPLICABLE, message=why)
         seen, refined = (
             _Departures.follow(scene, each) for each in (integrator, integrator.refined())
@@ -388,8 +391,8 @@ def critical_pressure_claim(at: str, law: str, case: str, within: float, reason:
         source="critical stiffness at the pressure of the moment",
         variable=f"{at}_pressure",
         where=where,
-        minus=where,
-        minus_variable="critical_pressure",
+        baseline=where,
+        baseline_variable="critical_pressure",
         published=0.0,
         tolerance=within,
         reason=reason,
@@ -428,7 +431,7 @@ def pressure_panel(at: str) -> Panel:
         markers_only=True,
         log="x",
         overlays=[plot_critical_pressure],
-        y_label=f"Pore pressure where instability {at}s",
+        y_label=f"Pore pressure at which instability {at}s",
         title="",
         legend_title="Length of the record ($D_c/V_*$)",
         y_scale_group="pressure",
@@ -512,7 +515,7 @@ def stiffness_deviation_panel(at: str) -> Panel:
         log="xy",
         overlays=[plot_one_to_one_line],
         x_label=r"Fastest change of pressure ($\sigma_* V_*/D_c$)",
-        y_label=rf"$|k/k_{{cr}} - 1|$ where instability {at}s",
+        y_label=rf"$|k/k_{{cr}} - 1|$ at which instability {at}s",
         title="",
         y_scale_group="off",
     )

@@ -52,9 +52,9 @@ class LawChoiceShares(Reduction):
 
     kind: ClassVar[str] = "choice"
     long_names: ClassVar[Mapping[str, str]] = {
-        "_right": "share of records that tell the law that made them",
-        "_wrong": "share of records that tell the other law",
-        "_open": "share of records that tell neither law",
+        "_right": "fraction of records that identify the true law",
+        "_wrong": "fraction of records that identify the other law",
+        "_open": "fraction of records that identify neither law",
     }
 
     def __call__(self, dataset: xr.Dataset) -> xr.Dataset:
@@ -116,7 +116,7 @@ figure = Figure(
             facet=["law"],
             overlays=[plot_shares],
             x_label="Records (%)",
-            y_label="Steps that are fitted",
+            y_label="Fitted steps",
         )
     ],
     columns=1,
@@ -144,7 +144,7 @@ def all_records_decide_claim(law: str, design: str, size: float) -> Claim:
     """
     return Claim(
         id="L1",
-        statement=f"{law} law, {design}, noise {size:g}: every record tells it",
+        statement=f"{law} law, {design}, noise {size:g}: every record identifies the law",
         source="the standard error of the exponent is below .1",
         variable="chosen_right",
         where={"law": law, "design": design, "noise_size": size},
@@ -179,7 +179,7 @@ def seldom_wrong_claim(law: str) -> Claim:
 
 study = Study(
     name="law_choice",
-    title="Records that tell the evolution law, mislead, or leave it open",
+    title="Records that identify the evolution law, the wrong law, or no law",
     summary=Study.caption(__doc__),
     base=BASE_SCENE,
     axes=[
@@ -190,7 +190,7 @@ study = Study(
         Axis("seed", list(range(RECORDS))),
     ],
     measure=SyntheticFit(noise="white"),
-    reductions=[LawChoiceShares("chosen", "criterion")],
+    reductions=[LawChoiceShares("chosen", "aic")],
     claims=[
         *(
             all_records_decide_claim(law, design, NOISE_SIZES[0])

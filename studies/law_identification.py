@@ -66,8 +66,8 @@ class ScatterRatio(Reduction):
     over: tuple[str, ...] = ("seed",)
     kind: ClassVar[str] = "scatter_over_promise"
     long_names: ClassVar[Mapping[str, str]] = {
-        "": "scatter of estimates over what is promised",
-        "_off": "scatter over what is promised, less 1, in standard deviations",
+        "": "scatter of the estimates divided by the predicted standard error",
+        "_off": "scatter divided by the predicted standard error, minus 1, in standard deviations",
     }
 
     def __call__(self, dataset: xr.Dataset) -> xr.Dataset:
@@ -143,7 +143,7 @@ figure = Figure(
     [
         Panel(
             overlays=[plot_estimates],
-            x_label="Steps that are fitted",
+            x_label="Fitted steps",
             y_label="Exponent of the law",
             y_limits=(0.0, 1.0),
         )

@@ -99,7 +99,7 @@ def critical_displacement_claim(
     """
     return Claim(
         id=id_,
-        statement=f"{law}, constant, k = {ratio:g} k_cr: step over D_c a/(b-a)",
+        statement=f"{law}, constant, k = {ratio:g} k_cr: step divided by D_c a/(b-a)",
         source="h(u*) = -k/k_cr, step u* k_cr/k, for dTheta = b h(Theta/b + ln V) d(slip)/D_c",
         variable="critical_displacement",
         where={"evolution": law, "normal_stress": "constant", "stiffness_ratio": ratio},

@@ -108,7 +108,8 @@ def slip_rate_claim(law: str, relation: str, decades: float) -> Claim:
     """
     return Claim(
         id="L11",
-        statement=f"{law}, V_0 = 2 V_*: variable normal stress moves the slowest V by decades",
+        statement=f"{law}, V_0 = 2 V_*: variable normal stress lowers the minimum slip rate by "
+        "decades",
         source=f"{PAPER}, Fig. 9, for the slip law: lower by about 10 decades",
         variable="slowest_moved",
         where={"evolution": law, "normal_stress": "variable", "load_velocity_ratio": 2.0},

@@ -55,7 +55,7 @@ def law_order_claim(smaller: str, larger: str) -> Claim:
         source="the faster the state falls above steady sliding, the smaller the step",
         variable="critical_velocity_ratio",
         where={"evolution": larger, **STIFF_FIELDS},
-        minus={"evolution": smaller, **STIFF_FIELDS},
+        baseline={"evolution": smaller, **STIFF_FIELDS},
         published=0.0,
     )
 

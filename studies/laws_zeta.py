@@ -67,7 +67,7 @@ def variable_normal_stress_claim(exponent: float) -> Claim:
         source=f"{PAPER}, Fig. 5, for the slip law",
         variable="zeta",
         where={"law_exponent": exponent, "normal_stress": "variable"},
-        minus={"law_exponent": exponent, "normal_stress": "constant"},
+        baseline={"law_exponent": exponent, "normal_stress": "constant"},
         published=0.0,
     )
 
@@ -120,7 +120,7 @@ study = Study(
     measure=CriticalStep(of="load_velocity_ratio"),
     reductions=[
         ProportionalFit(
-            name="zeta", of="critical_velocity_ratio", minus=1.0, on="a_over_b_minus_a"
+            name="zeta", of="critical_velocity_ratio", intercept=1.0, on="a_over_b_minus_a"
         ),
         ClosedFormRatio(
             name="over_closed_form",

@@ -192,7 +192,7 @@ def plot_along_slip(dataset: xr.Dataset, axes: Axes) -> None:
         axes.plot(both, np.tile(stress, 2), "-", color=colour, linewidth=1.2, label=name)
         thin = {"linewidth": 0.7, "label": "spring"}
         axes.plot(slip, cell["shear_stress"], "--", color=colour, **thin)
-        dot = {"marker": cycle_marker(number), "markersize": 4, "label": "fastest slip"}
+        dot = {"marker": cycle_marker(number), "markersize": 4, "label": "peak slip rate"}
         axes.plot(slip[fastest], stress[fastest], linestyle="none", color=colour, **dot)
 
 
@@ -227,11 +227,11 @@ study = Study(
     claims=[
         Claim(
             id="C12",
-            statement="slip law: variable normal stress lowers the slowest V by 10 decades",
+            statement="slip law: variable normal stress lowers the minimum slip rate by 10 decades",
             source=f"{PAPER}, Fig. 9",
             variable="min_log10_slip_rate",
             where=cycle_place("slip", "variable"),
-            minus=cycle_place("slip", "constant"),
+            baseline=cycle_place("slip", "constant"),
             published=-10.0,
             tolerance=0.5,
             reason="'by 10 orders of magnitude'",
@@ -242,7 +242,7 @@ study = Study(
             source=f"{PAPER}, Fig. 9",
             variable="static_stress_drop",
             where=cycle_place("slip", "variable"),
-            minus=cycle_place("slip", "constant"),
+            baseline=cycle_place("slip", "constant"),
             published=0.0,
         ),
         Claim(
@@ -251,7 +251,7 @@ study = Study(
             source=f"{PAPER}, Fig. 10",
             variable="min_log10_slip_rate",
             where=cycle_place("slowness", "variable"),
-            minus=cycle_place("slowness", "constant"),
+            baseline=cycle_place("slowness", "constant"),
             published=0.0,
             tolerance=0.5,
             reason="'similar', compared with ten decades for the slip law",
@@ -284,11 +284,11 @@ study = Study(
         ),
         Claim.above(
             id="C14",
-            statement="constant normal stress: far more so than with the slip law",
+            statement="constant normal stress: the asymmetry is far larger than with the slip law",
             source=f"{PAPER}, section 3.4, Rice and Tse (1986)",
             variable="drop_asymmetry",
             where=cycle_place("slowness", "constant"),
-            minus=cycle_place("slip", "constant"),
+            baseline=cycle_place("slip", "constant"),
             published=1.0,
             reason="'different to the slip law', under which the two drops differ by less than 25 "
             "%",

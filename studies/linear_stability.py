@@ -52,7 +52,7 @@ def growth_threshold_claim(mass: str, phi: float, rate: float) -> Claim:
     """
     return Claim(
         id="C1",
-        statement=f"{mass}, phi = {phi:g}, {rate:g} V_*: k_cr is that of growing perturbations",
+        statement=f"{mass}, phi = {phi:g}, {rate:g} V_*: perturbations grow below k_cr",
         source=f"{PAPER}, eqs. 7 and 8",
         variable="critical_stiffness_error",
         where={"mass": mass, "phi": phi, "load_velocity_ratio": rate},
@@ -83,7 +83,7 @@ def steepness_claim(phi: float, gentler: float) -> Claim:
         source=f"{PAPER}, section 2.2, Fig. 2",
         variable="stiffness_slope",
         where={"mass": NO_MASS, "phi": phi},
-        minus={"mass": NO_MASS, "phi": gentler},
+        baseline={"mass": NO_MASS, "phi": gentler},
         published=0.0,
     )
 
@@ -206,9 +206,9 @@ figure = Figure(
                 row["rise_by_dynamics"].where(row["rise_by_dynamics"] > 0.0),
             ),
             curve_label=lambda row: str(row["mass"].item()),
-            title="Rise by mass, at all angles",
+            title="Increase due to inertia, at all angles",
             condition=lambda dataset: bool((dataset["rise_by_dynamics"] > 0.0).any()),
-            y_label=r"Rise of $k_{cr}$ by mass (fraction)",
+            y_label=r"Relative increase of $k_{cr}$ due to inertia",
         ),
     ]
 )
@@ -256,8 +256,8 @@ study = Study(
             source=f"{PAPER}, eqs. 7 and 8",
             variable="critical_stiffness",
             where={"mass": NO_MASS, "phi": 50.0, "load_velocity_ratio": 100.0},
-            minus_variable="critical_stiffness_explicit",
-            minus={"mass": NO_MASS, "phi": 50.0, "load_velocity_ratio": 100.0},
+            baseline_variable="critical_stiffness_explicit",
+            baseline={"mass": NO_MASS, "phi": 50.0, "load_velocity_ratio": 100.0},
             published=0.0,
             tolerance=1e-15,
             reason="an identity; the tolerance covers rounding",
@@ -278,7 +278,7 @@ study = Study(
         ),
         Claim.below(
             id="C2",
-            statement="phi = 50: a spring of 0.8 k_cr(V_*) slides stably from below 1000 V_* on",
+            statement="phi = 50: sliding at 0.8 k_cr(V_*) is stable from a velocity below 1000 V_*",
             source=f"{PAPER}, section 2.2, Fig. 2",
             variable="stabilising_velocity",
             where={"mass": NO_MASS, "phi": 50.0},
@@ -287,7 +287,8 @@ study = Study(
         ),
         Claim.above(
             id="C2",
-            statement="phi = 60: it takes more than ten times the velocity at phi = 50",
+            statement="phi = 60: stable sliding requires more than ten times the velocity at phi "
+            "= 50",
             source=f"{PAPER}, section 2.2, Fig. 2",
             variable="stabilising_velocity",
             where={"mass": NO_MASS, "phi": 60.0},

@@ -136,8 +136,8 @@ def rigid_limit_claim(law: str, step: float) -> Claim:
     read, rigid = expected_readings(law, step, STIFFEST)[0], expected_readings(law, step)[0]
     return Claim(
         id="R5",
-        statement=f"{law} law, step of {step:+g} sigma_*, k = {STIFFEST:g} k_cr: alpha as "
-        f"read off is that of a rigid slider, {rigid:.4f}, but for O(a/K)",
+        statement=f"{law} law, step of {step:+g} sigma_*, k = {STIFFEST:g} k_cr: the apparent "
+        f"alpha is that of a rigid slider, {rigid:.4f}, except for O(a/K)",
         source=CLOSED_FORM_SOURCE,
         variable="apparent_alpha",
         where={"law": law, "normal_stress_step": step, "stiffness_ratio": STIFFEST},
@@ -167,8 +167,8 @@ def slip_distance_claim(law: str, step: float) -> Claim:
     quicker = initial_log_rate(step) if law == "slip" else -initial_log_rate(step)
     return Claim(
         id="R6",
-        statement=f"{law} law, step of {step:+g} sigma_*, k = {STIFFEST:g} k_cr: D_c as read "
-        f"off is that of a rigid slider, {rigid:.4f} D_c, but for O(a/K)",
+        statement=f"{law} law, step of {step:+g} sigma_*, k = {STIFFEST:g} k_cr: the apparent D_c "
+        f"is that of a rigid slider, {rigid:.4f} D_c, except for O(a/K)",
         source=CLOSED_FORM_SOURCE,
         variable="apparent_slip_distance",
         where={"law": law, "normal_stress_step": step, "stiffness_ratio": STIFFEST},
@@ -196,7 +196,8 @@ def direct_change_claim(law: str, step: float) -> Claim:
     """
     return Claim(
         id="R7",
-        statement=f"{law} law, step of {step:+g} sigma_*: the state loses alpha ln r at once",
+        statement=f"{law} law, step of {step:+g} sigma_*: the state decreases by alpha ln r "
+        "immediately",
         source="Linker and Dieterich (1992): dTheta = -alpha dsigma/sigma",
         variable="direct_change",
         where={"law": law, "normal_stress_step": step, "stiffness_ratio": RATIOS[0]},
@@ -273,13 +274,13 @@ figure = Figure(
         replace(
             readings_panel,
             y=lambda row: row["apparent_alpha"] / row["alpha"],
-            title=r"$\alpha$ as read off",
+            title=r"Apparent $\alpha$",
             y_label=r"$\alpha_{read}/\alpha$",
         ),
         replace(
             readings_panel,
             y="apparent_slip_distance",
-            title="Slip distance as read off",
+            title="Apparent slip distance",
             y_label="$D_{read}/D_c$",
         ),
     ],
@@ -289,7 +290,7 @@ figure = Figure(
 
 study = Study(
     name="normal_stress_steps",
-    title="Steps of normal stress as an experimenter reads them, b/a = 2",
+    title="Apparent parameters of normal stress steps, b/a = 2",
     summary=Study.caption(__doc__),
     base=base,
     axes=[

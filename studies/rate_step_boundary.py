@@ -105,7 +105,7 @@ def variable_normal_stress_claim(inverse: float, published: float) -> Claim:
     """
     return Claim(
         id="C7",
-        statement=f"alpha = 0.56, a/(b-a) = {inverse:g}: lower by {100.0 * published:g} %",
+        statement=f"alpha = 0.56, a/(b-a) = {inverse:g}: boundary lower by {100.0 * published:g} %",
         source=f"{PAPER}, section 3.1",
         variable="lowering",
         where={"case": STRONG_NORMAL_STRESS_EFFECT, "b_over_a": 1.0 + 1.0 / inverse},
@@ -130,7 +130,7 @@ study = Study(
         ProportionalFit(
             name="zeta",
             of="critical_velocity_ratio",
-            minus=1.0,
+            intercept=1.0,
             on="a_over_b_minus_a",
             within=(0.25, 1.0),
         ),
@@ -172,11 +172,11 @@ study = Study(
         ),
         Claim.below(
             id="C7",
-            statement="zeta falls with alpha (0.56 less 0.25)",
+            statement="zeta decreases with alpha (0.56 minus 0.25)",
             source=f"{PAPER}, Fig. 5",
             variable="zeta",
             where={"case": STRONG_NORMAL_STRESS_EFFECT},
-            minus={"case": WEAK_NORMAL_STRESS_EFFECT},
+            baseline={"case": WEAK_NORMAL_STRESS_EFFECT},
             published=0.0,
         ),
         variable_normal_stress_claim(0.25, 0.07),

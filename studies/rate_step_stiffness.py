@@ -87,7 +87,8 @@ def eq_11_claim(stiffness_ratio: float, published: float, tolerance: float, reas
     """
     return Claim(
         id="C8",
-        statement=f"slip law, constant, k = {stiffness_ratio:g} k_cr: V_0 over that of eq. 11",
+        statement=f"slip law, constant, k = {stiffness_ratio:g} k_cr: V_0 divided by the value of "
+        "eq. 11",
         source=f"{PAPER}, eq. 11, section 3.1",
         variable="over_eq_11",
         where={"law": "slip", "case": CONSTANT_NORMAL_STRESS, "stiffness_ratio": stiffness_ratio},
@@ -158,7 +159,7 @@ study = Study(
     claims=[
         Claim(
             id="C8",
-            statement="slip law, alpha = 0.56, k = k_cr: lower by 12 %",
+            statement="slip law, alpha = 0.56, k = k_cr: boundary lower by 12 %",
             source=f"{PAPER}, section 3.1, Fig. 6",
             variable="lowering",
             where={"law": "slip", "case": STRONG_NORMAL_STRESS_EFFECT, "stiffness_ratio": 1.0},
@@ -177,7 +178,8 @@ study = Study(
             reason="'very close'; the tolerance is approximately the size of the symbols in the "
             "figure",
             expected="differs",
-            because="it is lower by 5.7 %, half of that at alpha = 0.56; by 6 % above k_cr",
+            difference_reason="it is lower by 5.7 %, half of that at alpha = 0.56, and by 6 % "
+            "above k_cr",
         ),
         eq_11_claim(
             1.0, 1.0, 1e-7, "exact; a finite norm leaves exp[-10.9 (b/a - 1)] = 7e-9 of it"

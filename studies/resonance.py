@@ -146,7 +146,7 @@ def resonance_claim(law: str, period: float) -> Claim:
         source="linear theory: resonance at omega D_c/V = sqrt((b - a)/a) as k falls to k_cr",
         variable="gain",
         where={**at, "oscillation_period": RESONANCE_PERIOD},
-        minus={**at, "oscillation_period": period},
+        baseline={**at, "oscillation_period": period},
         published=0.0,
     )
 
@@ -212,7 +212,7 @@ def failure_order_claim(softer: float, stiffer: float) -> Claim:
         source="changes of ln V grow as the gain, which is larger nearer to critical stiffness",
         variable="failing_amplitude",
         where={**at, "stiffness_ratio": softer},
-        minus={**at, "stiffness_ratio": stiffer},
+        baseline={**at, "stiffness_ratio": stiffer},
         published=0.0,
     )
 
@@ -355,7 +355,7 @@ figure = Figure(
             large_amplitude_panel,
             y=partial(settled_values, "departure_from_linear"),
             overlays=[horizontal_line(MAX_LINEAR_DEVIATION)],
-            y_label="Relative departure from linear theory",
+            y_label="Relative difference from linear theory",
         ),
     ],
     height=50.0,

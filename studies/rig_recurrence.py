@@ -31,7 +31,7 @@ rig = Rig(
 base = rig.scene(a=0.01, b_over_a=1.5, normal_stress="constant")
 weakening = base.b - base.a
 
-CLOSED_FORM_SOURCE = "steady friction at the load point velocity and at the fastest slip rate"
+CLOSED_FORM_SOURCE = "steady friction at the load point velocity and at the peak slip rate rate"
 TOLERANCE_REASON = (
     "the peak slip rate is proportional to the stress drop, so the slope is steeper by the ratio "
     "of (b-a) sigma to the dynamic drop, 6 to 9 % to first order"
@@ -87,7 +87,7 @@ def slowness_law_drop_claim(stress: float) -> Claim:
     return Claim.below(
         id="S2",
         statement=f"slowness law, {stress:g} MPa: static drop falls faster still",
-        source="contact heals at rest, for a time that goes with the drop",
+        source="contacts heal at rest, for a time that is proportional to the drop",
         variable="static_slope",
         where={"law": "slowness", "sigma_star": stress},
         published=-2.0 * weakening,

@@ -121,7 +121,7 @@ figure = Figure(
             style=curve_style,
             curve_label=lambda row: f"$10^{{{step_in_decades(row)}}}$",
             overlays=[horizontal_line(0.0)],
-            y_label=r"Stress left, $(\tau - \tau_{ss})/(a\,\sigma_*)$",
+            y_label=r"Remaining stress, $(\tau - \tau_{ss})/(a\,\sigma_*)$",
             legend_columns=4,
             legend_title="Slip rate after the step, $V(0^+)/V_*$",
         )
@@ -172,9 +172,10 @@ study = Study(
             where={"law": "slip", "normal_stress": "variable", "load_velocity_ratio": 1e-4},
             published=0.0,
             expected="differs",
-            because=(
-                "the jump itself is smaller downward, since strength grows more slowly the higher "
-                "the stress; the text reads it off curves of stress less its future steady value"
+            difference_reason=(
+                "the jump itself is smaller for the downward step, because strength increases "
+                "more slowly at higher stress; the paper measures the jump in curves of stress "
+                "minus its future steady-state value"
             ),
         ),
         Claim(
@@ -190,7 +191,7 @@ study = Study(
         ),
         Claim.above(
             id="C4",
-            statement="slowness law, variable: they become separate, by more than 0.5 a sigma_*",
+            statement="slowness law, variable: the steps differ by more than 0.5 a sigma_*",
             source=f"{PAPER}, section 2.3, Fig. 4",
             variable="separation",
             where={"law": "slowness", "normal_stress": "variable"},
@@ -209,7 +210,7 @@ study = Study(
         ),
         Claim(
             id="C5",
-            statement="slowness law, constant, V = 1.05 V_*: decays exponentially (eq. 17b)",
+            statement="slowness law, constant, V = 1.05 V_*: stress decays exponentially (eq. 17b)",
             source=f"{PAPER}, eq. 17b",
             variable="exponential_misfit",
             where={"law": "slowness", "normal_stress": "constant", "load_velocity_ratio": 1.05},
@@ -220,7 +221,8 @@ study = Study(
         ),
         Claim.above(
             id="C5",
-            statement="slowness law, constant, V = 200 V_*: far slower than eq. 17b",
+            statement="slowness law, constant, V = 200 V_*: stress decays far more slowly than "
+            "eq. 17b",
             source=f"{PAPER}, section 3.4",
             variable="exponential_misfit",
             where={"law": "slowness", "normal_stress": "constant", "load_velocity_ratio": 200.0},
@@ -230,7 +232,8 @@ study = Study(
         ),
         Claim(
             id="C5",
-            statement="slowness law, constant, V = 200 V_*: 1/e of the stress left after 3.5 D_c",
+            statement="slowness law, constant, V = 200 V_*: 1/e of the stress change remains "
+            "after 3.5 D_c",
             source=f"{PAPER}, section 3.4",
             variable="evolution_distance",
             where={"law": "slowness", "normal_stress": "constant", "load_velocity_ratio": 200.0},

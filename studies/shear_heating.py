@@ -147,7 +147,7 @@ def transition_claim(factor: float, change: str) -> Claim:
         source="dF/dx = [(a - b) + y F]/(1 - y), which is zero at V = 5.02612838 V_*",
         variable="steady_friction",
         where={"cooling": 0.1, "load_velocity_ratio": factor * TRANSITION_RATE},
-        minus={"cooling": 0.1, "load_velocity_ratio": TRANSITION_RATE},
+        baseline={"cooling": 0.1, "load_velocity_ratio": TRANSITION_RATE},
         published=0.0,
     )
 
@@ -255,7 +255,7 @@ study = Study(
             source=f"Blanpied et al. (1998), and {INDEPENDENT}",
             variable="steady_friction",
             where={"cooling": 0.1, "load_velocity_ratio": 100.0},
-            minus={"cooling": 0.1, "load_velocity_ratio": 10.0},
+            baseline={"cooling": 0.1, "load_velocity_ratio": 10.0},
             published=0.0,
         ),
         Claim.below(
@@ -264,7 +264,7 @@ study = Study(
             source=INDEPENDENT,
             variable="steady_friction",
             where={"cooling": 100.0, "load_velocity_ratio": 100.0},
-            minus={"cooling": 100.0, "load_velocity_ratio": 10.0},
+            baseline={"cooling": 100.0, "load_velocity_ratio": 10.0},
             published=0.0,
         ),
     ],

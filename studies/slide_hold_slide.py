@@ -101,7 +101,7 @@ def healing_claim(ratio: float) -> Claim:
     """
     return Claim(
         id="P4",
-        statement=f"slowness law, k = {ratio:g} k_cr: heals by b ln 10 a decade",
+        statement=f"slowness law, k = {ratio:g} k_cr: healing of b ln 10 per decade",
         source=f"{CLOSED_FORM_SOURCE}: b ln 10 at every stiffness",
         variable="healing_per_decade",
         where={"case": SLOWNESS, "stiffness": ratio * a},
@@ -210,11 +210,11 @@ study = Study(
         *(
             Claim.below(
                 id="P5",
-                statement=f"slip law: healing per decade falls from {soft:g} to {stiff:g} k_cr",
-                source="with the slip law a slider heals by the slip of its hold alone",
+                statement=f"slip law: healing per decade decreases from {soft:g} to {stiff:g} k_cr",
+                source="with the slip law, healing is only due to slip during the hold",
                 variable="healing_per_decade",
                 where={"case": SLIP, "stiffness": stiff * a},
-                minus={"case": SLIP, "stiffness": soft * a},
+                baseline={"case": SLIP, "stiffness": soft * a},
                 published=0.0,
             )
             for soft, stiff in ((1.5, 3.0), (3.0, 10.0), (10.0, 30.0))
@@ -222,10 +222,10 @@ study = Study(
         Claim.below(
             id="P5",
             statement="slip law, k = 3 k_cr: relaxation goes on from 1e6 to 1e8 D_c/V_*",
-            source="with the slip law relaxation never ends",
+            source="with the slip law, relaxation does not end",
             variable="relaxation",
             where={"case": SLIP, "stiffness": 3.0 * a, "hold_time": LONGEST_HOLD_TIME},
-            minus={"case": SLIP, "stiffness": 3.0 * a, "hold_time": 1e6},
+            baseline={"case": SLIP, "stiffness": 3.0 * a, "hold_time": 1e6},
             published=0.0,
         ),
     ],

@@ -69,8 +69,8 @@ class CycleRegionEdge(Reduction):
     across: str = "load_velocity_ratio"
     kind: ClassVar[str] = "cycling_edge"
     long_names: ClassVar[Mapping[str, str]] = {
-        "_farthest": "largest distance of that edge from the linear boundary, over the spacing of "
-        "cells",
+        "_farthest": "largest distance of the edge from the linear boundary, divided by the "
+        "spacing of cells",
         "_misplaced": "number of cells that cycle above the linear boundary or settle below it",
     }
 
@@ -79,12 +79,15 @@ class CycleRegionEdge(Reduction):
         """Quantities of the results."""
         name, ratio = self.name, r"$k/k_{cr}(V_*)$"
         return (
-            Quantity(name, ratio, "1", "stiffness at which limit cycles end, over k_cr(V_star)"),
+            Quantity(
+                name, ratio, "1", "stiffness at which limit cycles end, divided by k_cr(V_star)"
+            ),
             Quantity(
                 f"{name}_linear",
                 r"$k_{cr}(V_0)/k_{cr}(V_*)$",
                 "1",
-                "critical stiffness at V_0 by eigenvalues of steady sliding, over k_cr(V_star)",
+                "critical stiffness at V_0 from the eigenvalues of steady sliding, divided by "
+                "k_cr(V_star)",
             ),
             *super().quantities,
         )
@@ -301,14 +304,14 @@ figure = Figure(
 #: Claims about the position of the boundary in each case. The second claim concerns the number of
 #: cells with a limit cycle above the boundary and of cells with steady sliding below the boundary.
 EDGE_CLAIM: dict[str, Any] = {
-    "says": "limit cycles end where the eigenvalues say",
+    "says": "limit cycles end at the stiffness from the eigenvalues",
     "variable": "cycling_edge_farthest",
     "tolerance": 0.5,
     "reason": "half of the spacing of the cells in stiffness, because the boundary lies within the "
     "bracket",
 }
 MISPLACED_CELLS_CLAIM: dict[str, Any] = {
-    "says": "no cell cycles above it or settles below it",
+    "says": "no cell has a limit cycle above the boundary or settles below it",
     "variable": "cycling_edge_misplaced",
     "tolerance": 0.0,
     "reason": "a count",

@@ -190,7 +190,7 @@ def curve_name(drop: str, row: xr.Dataset) -> str:
     if not bool(np.isfinite(slope)):
         return text
     return f"{text}: " + (
-        format_slope(row, f"{drop}_slope") if is_fitted_by_line(drop, row) else "no line fits"
+        format_slope(row, f"{drop}_slope") if is_fitted_by_line(drop, row) else "no linear fit"
     )
 
 
@@ -250,7 +250,7 @@ figure = Figure(
             x="stiffness_ratio",
             y=scaled_slope,
             hue=["case", "law"],
-            title="Slopes of lines that fit, $f(k)$",
+            title="Slopes of the fitted lines, $f(k)$",
             y_label=r"Slope of static drop over $(a-b)\,\sigma_*$",
         ),
         Panel(
@@ -258,7 +258,7 @@ figure = Figure(
             y=local_slope,
             hue=["case", "law"],
             isel={"stiffness_ratio": max},
-            title="Local slopes: level where the law holds",
+            title="Local slopes (constant if the law holds)",
             y_label=r"Local slope of static drop, $\sigma_*$",
         ),
     ],
@@ -296,16 +296,16 @@ study = Study(
             source=f"{PAPER}, section 3.5",
             variable="static_slope",
             where={"law": "slowness", "case": VARIABLE_CASE, "stiffness_ratio": 0.8},
-            minus={"law": "slowness", "case": CONSTANT_CASE, "stiffness_ratio": 0.8},
+            baseline={"law": "slowness", "case": CONSTANT_CASE, "stiffness_ratio": 0.8},
             published=0.0,
         ),
         Claim.above(
             id="C16",
-            statement="slowness law, constant: f(k) depends on stiffness (0.4 less 0.8 k_cr)",
+            statement="slowness law, constant: f(k) depends on stiffness (0.4 minus 0.8 k_cr)",
             source="He et al. (2003), cited in section 3.5",
             variable="static_slope_scaled",
             where={"law": "slowness", "case": CONSTANT_CASE, "stiffness_ratio": 0.4},
-            minus={"law": "slowness", "case": CONSTANT_CASE, "stiffness_ratio": 0.8},
+            baseline={"law": "slowness", "case": CONSTANT_CASE, "stiffness_ratio": 0.8},
             published=0.05,
             reason="an inequality; the bound is much larger than the standard errors",
         ),
@@ -325,7 +325,7 @@ study = Study(
         ),
         Claim.below(
             id="C2",
-            statement="phi = 50, 0.8 k_cr: the fit says how many of ten points it has",
+            statement="phi = 50, 0.8 k_cr: the result contains the number of fitted points",
             source=f"{PAPER}, section 2.2",
             variable="static_slope_points",
             where={"law": "slip", "case": STEEP_CASE, "stiffness_ratio": 0.8},

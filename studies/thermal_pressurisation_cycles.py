@@ -45,13 +45,13 @@ figure = Figure(
             x="heating",
             y=variable,
             hue=["law"],
-            x_label="Undrained pressure by slip of $D_c$, $E$",
+            x_label="Undrained pressure due to slip of $D_c$, $E$",
             y_label=label,
             log="x",
         )
         for variable, label in (
             ("static_stress_drop", r"Static stress drop, $\Delta\tau_s/\sigma_*$"),
-            ("min_log10_slip_rate", r"Slowest slip rate, $\log_{10}(V/V_*)$"),
+            ("min_log10_slip_rate", r"Minimum slip rate, $\log_{10}(V/V_*)$"),
         )
     ]
 )
@@ -81,7 +81,7 @@ study = Study(
             source=f"{RICE}, and {INDEPENDENT}",
             variable="static_stress_drop",
             where={"law": "slip", "heating": 0.01},
-            minus={"law": "slip", "heating": 1e-4},
+            baseline={"law": "slip", "heating": 1e-4},
             published=0.37,
         ),
     ],

@@ -100,7 +100,7 @@ study = Study(
             source="dP/dt = E F s V - C_h P",
             variable="normal_stress_ratio",
             where={"heating": 0.01, "drainage": 300.0, "slip": 100.0},
-            minus={"heating": 0.01, "drainage": UNDRAINED, "slip": 100.0},
+            baseline={"heating": 0.01, "drainage": UNDRAINED, "slip": 100.0},
             published=0.2,
         ),
     ],

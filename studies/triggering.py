@@ -150,7 +150,7 @@ def normal_stress_effect_claim(law: str) -> Claim:
         source="Linker and Dieterich (1992): a fall of normal stress strengthens the state",
         variable="critical_normal_stress_step",
         where={**where, "case": IMPOSED_WITH_ALPHA},
-        minus={**where, "case": IMPOSED_WITHOUT_ALPHA},
+        baseline={**where, "case": IMPOSED_WITHOUT_ALPHA},
         published=-0.5 * base.a * (0.5 / EFFECTIVE_FRICTION - 0.5 / base.mu_star),
         reason="an inequality: the bound is half of the first-order result",
     )
@@ -244,7 +244,7 @@ figure = Figure(
                     VELOCITY_STEP, VELOCITY_STEP_LABEL, DISPLACEMENT_STEP_STYLE, over="a"
                 ),
             ],
-            y_label=r"Critical stress change over $a\sigma_*$",
+            y_label=r"Critical stress change divided by $a\sigma_*$",
             log="y",
             y_scale_group="stress",
         ),
@@ -255,7 +255,7 @@ figure = Figure(
                 horizontal_line(1.0, color="0.82", linewidth=2.5),
                 draw_comparison("direct_ratio", VELOCITY_STEP_LABEL, DISPLACEMENT_STEP_STYLE),
             ],
-            y_label="Stress change over that by a displacement step",
+            y_label="Stress change divided by that of a displacement step",
         ),
     ],
     height=58.0,
@@ -291,7 +291,8 @@ study = Study(
         ),
         Claim(
             id="N2",
-            statement="slip law, imposed, alpha = 0.56: how that limit is left, by k/k_cr",
+            statement="slip law, imposed, alpha = 0.56: difference from this limit, divided by "
+            "k/k_cr",
             source="second order of the closed form: -alpha (1 - a/b) a/(2 mu'^2)",
             variable="coulomb_slope",
             where={"law": "slip", "case": IMPOSED_WITH_ALPHA},
@@ -313,8 +314,9 @@ study = Study(
         ),
         Claim.above(
             id="N5",
-            statement="slip law, inclined, alpha = 0.56, k = 2 k_cr: it predicts to 3 %",
-            source="what is left of the first order where it is worst",
+            statement="slip law, inclined, alpha = 0.56, k = 2 k_cr: Coulomb stress predicts the "
+            "step to 3 %",
+            source="largest difference from the first-order result",
             variable="coulomb_ratio",
             where={"law": "slip", "case": INCLINED_STRONG, "stiffness_ratio": 2.0},
             published=0.97,
@@ -322,7 +324,8 @@ study = Study(
         ),
         Claim.above(
             id="N6",
-            statement="slowness law, inclined, alpha = 0.56, k = 1.25 k_cr: it misleads",
+            statement="slowness law, inclined, alpha = 0.56, k = 1.25 k_cr: Coulomb stress is "
+            "misleading",
             source="a fall also lowers the critical stiffness: h(u*) = -q k^",
             variable="coulomb_ratio",
             where={"law": "slowness", "case": INCLINED_STRONG, "stiffness_ratio": 1.25},

@@ -195,7 +195,7 @@ peaks_panel = Panel(
 multipliers_panel = replace(
     peaks_panel,
     y_label=r"$\Lambda_1$ of the cycle of one event; $\lambda$",
-    title="Multipliers: beyond $-1$ the cycle repels",
+    title="Multipliers: the cycle is unstable below $-1$",
     overlays=[plot_multipliers, horizontal_line(-1.0), horizontal_line(1.0), set_abscissa(False)],
 )
 figure = Figure(
@@ -259,8 +259,8 @@ study = Study(
             source="Floquet theory",
             variable="doubling_by_multiplier",
             where=LAW_SELECTION,
-            minus=LAW_SELECTION,
-            minus_variable="doubling_by_motion",
+            baseline=LAW_SELECTION,
+            baseline_variable="doubling_by_motion",
             published=0.0,
             tolerance=2e-4,
             reason="half of the difference between the two stiffness values that bracket the "
@@ -268,8 +268,8 @@ study = Study(
         ),
         Claim(
             id="S3",
-            statement="that is at 0.86626 k_cr",
-            source="not known to be published; both ways agree",
+            statement="the period doubles at 0.86626 k_cr",
+            source="not published; both computations agree",
             variable="doubling_by_multiplier",
             where=LAW_SELECTION,
             published=0.86626,
@@ -279,7 +279,8 @@ study = Study(
         ),
         Claim(
             id="S4",
-            statement="k = 0.8663 k_cr, next to it: the multiplier is real, and negative",
+            statement="k = 0.8663 k_cr, next to the period doubling: the multiplier is real and "
+            "negative",
             source="Floquet theory",
             variable="floquet_multiplier",
             where=spring_place(0.8663),
@@ -290,7 +291,8 @@ study = Study(
         ),
         Claim.above(
             id="S5",
-            statement="k = 0.8531 k_cr: small departures grow, in the mean: chaos",
+            statement="k = 0.8531 k_cr: small perturbations grow on average, so the motion is "
+            "chaotic",
             source=f"{BECKER}, finds chaos; for this spring not known to be published",
             variable="lyapunov_exponent",
             where=spring_place(0.8531),

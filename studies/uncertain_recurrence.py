@@ -68,7 +68,8 @@ base = rig.scene(
 CLAIMS = (
     Claim(
         id="U1",
-        statement="ln of the interval spreads as its elasticities and the covariance say",
+        statement="the standard deviation of the logarithm of the interval follows from its "
+        "elasticities and the covariance",
         source="propagation of errors to first order",
         variable="relative_spread",
         where={},
@@ -81,7 +82,7 @@ CLAIMS = (
     ),
     Claim.below(
         id="U2",
-        statement="errors taken for independent would say over four times as much",
+        statement="the standard deviation for independent errors is more than four times as large",
         source="propagation of errors to first order, without covariances",
         variable="relative_spread",
         where={},
@@ -89,15 +90,16 @@ CLAIMS = (
     ),
     Claim.below(
         id="U3",
-        statement="the interval is known better than b - a",
-        source="contact heals at rest, by b ln t: not all of the drop goes with b - a",
+        statement="the relative uncertainty of the interval is smaller than that of b - a",
+        source="contacts heal at rest by b ln t, so only a part of the drop is proportional to b "
+        "- a",
         variable="relative_spread",
         where={},
         published=NET_WEAKENING_STDERR,
     ),
     Claim(
         id="U4",
-        statement="every sample slips by stick-slip",
+        statement="every sample has stick-slip",
         source="b - a is five standard errors above zero, the machine several times too soft",
         variable="share",
         where={"ended": "ok"},
@@ -172,14 +174,14 @@ figure = Figure(
             x="a",
             y=lambda row: row["a"] * row["b_over_a"],
             y_label="$b$",
-            title="What is drawn",
+            title="Sampled quantities",
         ),
     ]
 )
 
 study = Study(
     name="uncertain_recurrence",
-    title="Recurrence interval of a rig by estimates of a, b and D_c with their covariance",
+    title="Recurrence interval of a rig from estimates of a, b and D_c with their covariance",
     summary=Study.caption(__doc__),
     rig=rig,
     base=base,

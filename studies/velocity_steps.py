@@ -77,8 +77,8 @@ def rigid_limit_claim(law: str, ratio: float) -> Claim:
     expected = b * abs(peak_departure(law, ratio)) * a / (STIFFEST * (b - a))
     return Claim(
         id="P6",
-        statement=f"{law} law, {STEP_DESCRIPTIONS[ratio]}, k = {STIFFEST:g} k_cr: a rigid "
-        "slider's but for O(a/K)",
+        statement=f"{law} law, {STEP_DESCRIPTIONS[ratio]}, k = {STIFFEST:g} k_cr: that of a rigid "
+        "slider, except for O(a/K)",
         source=f"closed form: {forms[law]}, and its first order in a/K",
         variable="closed_form_departure",
         where={"law": law, "velocity_ratio": ratio, "stiffness_ratio": STIFFEST},
@@ -108,8 +108,8 @@ def direct_effect_claim(law: str, ratio: float) -> Claim:
     """
     return Claim.below(
         id="P7",
-        statement=f"{law} law, {STEP_DESCRIPTIONS[ratio]}, k = 10 k_cr: a is read at least a "
-        "tenth too small",
+        statement=f"{law} law, {STEP_DESCRIPTIONS[ratio]}, k = 10 k_cr: the apparent a is at "
+        "least 10 % too small",
         source="evolution begins before the spring has loaded the slider",
         variable="apparent_a",
         where={"law": law, "velocity_ratio": ratio, "stiffness_ratio": 10.0},
@@ -134,7 +134,8 @@ def rate_dependence_claim(law: str, ratio: float) -> Claim:
     """
     return Claim(
         id="P8",
-        statement=f"{law} law, {STEP_DESCRIPTIONS[ratio]}, k = 3 k_cr: a - b is read right",
+        statement=f"{law} law, {STEP_DESCRIPTIONS[ratio]}, k = 3 k_cr: the apparent a - b is "
+        "correct",
         source="steady friction: (a - b) ln r at every stiffness",
         variable="apparent_a_minus_b",
         where={"law": law, "velocity_ratio": ratio, "stiffness_ratio": 3.0},
@@ -263,18 +264,18 @@ figure = Figure(
             x_limits=(-0.3, PLOTTED_DISPLACEMENT),
             y_scale_group="records",
         ),
-        reading_panel("Direct effect as read off", "$a_{read}/a$", "apparent_a", ("a",)),
-        reading_panel("Evolution as read off", "$b_{read}/b$", "apparent_b", ("a", "b_over_a")),
+        reading_panel("Apparent direct effect", "$a_{read}/a$", "apparent_a", ("a",)),
+        reading_panel("Apparent evolution effect", "$b_{read}/b$", "apparent_b", ("a", "b_over_a")),
         reading_panel(
-            "Slip distance, by the load point",
+            "Apparent slip distance (load point)",
             LENGTH_LABEL,
             "apparent_slip_distance",
             alike="length",
         ),
         reading_panel(
-            "Slip distance, by slip", LENGTH_LABEL, "corrected_slip_distance", alike="length"
+            "Apparent slip distance (slip)", LENGTH_LABEL, "corrected_slip_distance", alike="length"
         ),
-        reading_panel("Rate dependence as read off", "$(a-b)_{read}/(a-b)$", "a_minus_b_over_true"),
+        reading_panel("Apparent rate dependence", "$(a-b)_{read}/(a-b)$", "a_minus_b_over_true"),
     ],
     height=48.0,
 )
@@ -282,7 +283,7 @@ figure = Figure(
 
 study = Study(
     name="velocity_steps",
-    title="Velocity steps as an experimenter reads them, b/a = 2",
+    title="Apparent parameters of velocity steps, b/a = 2",
     summary=Study.caption(__doc__),
     base=base,
     axes=[

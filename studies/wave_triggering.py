@@ -115,8 +115,8 @@ def linear_limit_claim(law: str, period: float, phase: float) -> Claim:
     within = 2.0 * SMALL * SECOND_ORDER_RATIO
     return Claim(
         id="W1",
-        statement=f"{place_description(law, period, phase)}: clock advance of small waves "
-        "over that of linear equations",
+        statement=f"{place_description(law, period, phase)}: clock advance of small waves divided "
+        "by that of the linearised equations",
         source="departures from the free cycle to first order in the amplitude",
         variable="linear_ratio",
         where=claim_place(law, period, SMALL, phase),
@@ -226,8 +226,8 @@ def coulomb_error_claim(law: str) -> Claim:
     """
     return Claim.above(
         id="W5",
-        statement=f"{place_description(law, WAVES, 0.8)}, A = {LARGE:g}: delayed by more "
-        "than a threshold says",
+        statement=f"{place_description(law, WAVES, 0.8)}, A = {LARGE:g}: the delay is larger than "
+        "a threshold predicts",
         source="an inequality: nucleation averages over a sigma/(k V_0)",
         variable="coulomb_ratio",
         where=claim_place(law, WAVES, LARGE, 0.8),
@@ -284,9 +284,9 @@ figure = Figure(
             markers_only=True,
             overlays=[horizontal_line(0.0, color="0.82")],
             x_label="Beginning of the train, in intervals",
-            y_label=r"Clock advance over amplitude ($D_c/V_*$)",
-            legend_title="Lines: linear equations; of the slowest waves, a threshold of Coulomb "
-            "stress",
+            y_label=r"Clock advance divided by amplitude ($D_c/V_*$)",
+            legend_title="Lines: linearised equations, and a Coulomb stress threshold for the "
+            "slowest waves",
         )
     ],
     columns=3,

@@ -160,7 +160,7 @@ def plot_indices(of: str, dataset: xr.Dataset, axes: Axes) -> None:
     from rsfstudy.plots import cycle_marker, cycle_style
 
     for number, (order, text) in enumerate((("first_order", "first order"), ("total", "total"))):
-        found = [dataset[f"{of}_{order}{end}"].values for end in ("", "_low", "_high")]
+        found = [dataset[f"{of}_{order}{end}"].values for end in ("", "_ci_low", "_ci_high")]
         at = np.arange(len(found[0])) + 0.2 * number - 0.1
         bars = [np.maximum(found[0] - found[1], 0.0), np.maximum(found[2] - found[0], 0.0)]
         style = {
@@ -194,7 +194,7 @@ figure = Figure(
 
 study = Study(
     name="what_matters",
-    title="Sobol indices of three headlines under uncertain a, b - a and stiffness",
+    title="Sobol indices of three results for uncertain a, b - a and stiffness",
     summary=Study.caption(__doc__),
     base=Scene(normal_stress="constant", inertia=True, stiffness=0.006),
     axes=[

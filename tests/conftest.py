@@ -95,7 +95,7 @@ def follow_until(
     for event in integrator.follow(scene, (*watches, STEP_END_EVENT), with_time=True):
         if until(event):
             return integrator
-    raise AssertionError("a motion never ends by itself")
+    raise AssertionError("a motion without a time limit cannot end")
 
 
 def reaches_instability_norm(scene: Scene, rtol: float = 1e-8, peaks: float = math.inf) -> bool:

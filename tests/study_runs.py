@@ -109,7 +109,7 @@ def cell_key(scene, measure) -> bytes:
 def run_with_failures(*words, **options) -> xr.Dataset:
     """Run a study and check the warning that some of its cells failed."""
     with pytest.warns(
-        IncompleteWarning, match=r"^\d+ of \d+ cells failed: .*failures\(\) lists them$"
+        IncompleteWarning, match=r"^\d+ of \d+ cells failed: .*failures\(\) for a list$"
     ):
         return run(*words, **options)
 

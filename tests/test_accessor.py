@@ -77,9 +77,9 @@ def test_an_answer_knows_its_scene_and_why_it_has_no_number():
     (row,) = step.rsf.failures().to_dict("records")
     assert row["status"] == "unstable_at_any_step"
     for ask in (lambda: step.rsf.study, step.rsf.check):
-        with pytest.raises(DataError, match="is of one scene"):
+        with pytest.raises(DataError, match="belongs to a single scene"):
             ask()
-    with pytest.raises(DataError, match="no motion as simulate gives it"):
+    with pytest.raises(DataError, match="neither a motion from simulate"):
         step.rsf.plot()
 
 
@@ -91,12 +91,16 @@ def test_results_know_their_study_and_each_cell_its_scene(results):
         cell = results.sel(law=law, stiffness_ratio=stiffness)
         assert cell.rsf.scene == STUDY.scene(number)
         assert cell.rsf.study.size == 4
-    with pytest.raises(InvalidValue, match=r"stiffness_ratio = \[0.8, 1.2\]: leaves the cell open"):
+    with pytest.raises(
+        InvalidValue, match=r"stiffness_ratio = \[0.8, 1.2\]: does not select a single cell"
+    ):
         _ = results.sel(law="slip").rsf.scene
-    with pytest.raises(InvalidValue, match=r"law = \[\]: leaves the cell open"):
+    with pytest.raises(InvalidValue, match=r"law = \[\]: does not select a single cell"):
         _ = results.isel(law=0, stiffness_ratio=0, drop=True).rsf.scene
     elsewhere = results.isel(law=0, stiffness_ratio=0).assign_coords(stiffness_ratio=7.0)
-    with pytest.raises(InvalidValue, match=r"stiffness_ratio = .*7.0.*: is not on that axis"):
+    with pytest.raises(
+        InvalidValue, match=r"stiffness_ratio = .*7.0.*: is not a point of this axis"
+    ):
         _ = elsewhere.rsf.scene
 
 
@@ -112,7 +116,7 @@ def test_failures_name_the_cells_without_a_number(results):
 
 def test_only_whole_results_are_drawn_and_checked_in_their_own_units(results):
     for ask in ("check", "plot"):
-        with pytest.raises(DataError, match="of these law is selected"):
+        with pytest.raises(DataError, match="but law has been selected"):
             getattr(results.sel(law="slip").rsf, ask)()
     converted = results.rsf.to_si(**SI)
     assert converted.rsf.check().verdict.tolist() == ["not applicable"]
@@ -131,7 +135,7 @@ def test_a_foreign_dataset_is_refused():
     rsf = xr.Dataset({"temperature": ("x", [1.0])}).rsf
     asks = rsf.check, rsf.plot, rsf.failures, lambda: rsf.to_si(**SI)
     for ask in (*asks, lambda: rsf.scene, lambda: rsf.study):
-        with pytest.raises(DataError, match="is not of rsfstudy.*rsfstudy.simulate"):
+        with pytest.raises(DataError, match="was not created by rsfstudy.*rsfstudy.simulate"):
             ask()
 
 

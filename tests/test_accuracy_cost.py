@@ -93,7 +93,7 @@ def test_an_accuracy_out_of_reach_is_an_answer():
     found = solved("RK23", 8.0)
     assert found.status is Status.ACCURACY_OUT_OF_REACH
     assert found.status.is_answer
-    assert found.message.startswith("work_budget_spent: more than 9000")
+    assert found.message.startswith("work_budget_spent: the budget of 9000")
     assert found.values["run_evaluations"] == found.rhs_evaluations > 9_000
     assert not {"run_time", "relative_time", "measured_error"} & set(found.values)
 

@@ -47,9 +47,9 @@ def fitted(record: dict[str, np.ndarray] | Record, **options: Any) -> xr.Dataset
 
 def test_columns_that_are_mistaken_are_told() -> None:
     moved, friction = GOOD["displacement"], GOOD["friction"]
-    with pytest.raises(InvalidValue, match="displacement = .* Reverse its sign"):
+    with pytest.raises(InvalidValue, match="displacement = .* Reverse the sign"):
         fitted(GOOD | {"displacement": -moved})
-    with pytest.raises(InvalidValue, match="displacement = .* which column is which"):
+    with pytest.raises(InvalidValue, match="displacement = .* select other columns"):
         fitted(GOOD | {"displacement": friction, "friction": moved})
 
 
@@ -66,7 +66,11 @@ def test_slip_that_is_given_as_load_point_displacement_is_told() -> None:
 
 def test_filters_of_a_record_are_filters_of_its_fit() -> None:
     record = rsfstudy.read_record(GOOD, filter="mean 1 s")
-    with pytest.raises(InvalidValue, match="filter = 'mean 2.0': follows another filter. Leave"):
+    with pytest.raises(
+        InvalidValue,
+        match="filter = 'mean 2.0': cannot be applied, because the "
+        "record was read with filter=. Leave",
+    ):
         fitted(record, averaging="2 s")
     other = rsfstudy.read_record(GOOD, name="other")
     with pytest.raises(InvalidValue, match="filter = ..mean 1.0..: differs between the records"):
@@ -106,10 +110,10 @@ def test_what_a_record_does_not_tell(
     assert found.rhs_evaluations.item() < 3e7
     # The limits of an unbounded parameter differ from its value by at least the standard error,
     # even if other parameters are at their bounds.
-    ends = np.array([found.mu_star_low.item(), found.mu_star_high.item()])
+    ends = np.array([found.mu_star_ci_low.item(), found.mu_star_ci_high.item()])
     assert not (np.abs(ends - found.mu_star.item()) < found.mu_star_stderr.item()).any()
-    assert (found.b_low.item(), found.b_high.item()) == (-1.0, 1.0)
-    assert found.a_high.item() == 1.0
+    assert (found.b_ci_low.item(), found.b_ci_high.item()) == (-1.0, 1.0)
+    assert found.a_ci_high.item() == 1.0
 
 
 def test_friction_that_is_zeroed_is_told() -> None:

@@ -50,7 +50,7 @@ def lattice(values=VALUES, errors=ERRORS, status=0) -> xr.Dataset:
 
 AGAINST = {"along": "case", "reference": "reference"}
 KINDS = [
-    ProportionalFit("r", OF, ON, minus=1.0),
+    ProportionalFit("r", OF, ON, intercept=1.0),
     ProportionalFit("r", OF, ON, within=(0.5, 2.0)),
     LinearFit("r", OF, ON),
     SemilogFit("r", OF, ON),

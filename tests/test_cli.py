@@ -217,7 +217,7 @@ def test_run_all_goes_on_whatever_becomes_of_a_study(catalogued, tmp_path, monke
     ended = rows(ran.stdout)
     assert {name: row[-1] for name, row in ended.items()} == {
         "failing": "1 cell_raised",
-        "moving": "C1 moved",
+        "moving": "verdict of C1 changed",
         "undrawn": "no figure",
         "taken": "not finished",
         "fine": "ok",
@@ -234,7 +234,7 @@ def test_run_all_goes_on_whatever_becomes_of_a_study(catalogued, tmp_path, monke
         "taken": "not_finished",
         "fine": "ok",
     }
-    assert found["moving"]["problems"] == ["C1 moved"]
+    assert found["moving"]["problems"] == ["verdict of C1 changed"]
     assert "taken.cells.sqlite" in found["taken"]["message"]
     assert found["taken"]["results"] is None
 
@@ -259,7 +259,10 @@ def test_run_all_names_the_studies_it_leaves_out(catalogued, tmp_path, monkeypat
     catalogued(compiled(name="dear"), replace(faulty_study(), name="plain"))
     ran = call_main("run", "--all", "--serial", "--output", tmp_path)
     assert ran.returncode == 0, ran.stderr
-    said, short = "skipped: needs Numba (pip install 'rsfstudy[fast]')", "skipped: needs Numba"
+    said, short = (
+        "skipped: requires Numba (pip install 'rsfstudy[fast]')",
+        "skipped: requires Numba",
+    )
     assert f"dear: {said}" in ran.stdout
     ended = {name: row[-1] for name, row in rows(ran.stdout).items()}
     assert ended == {"plain": "ok", "dear": short}
@@ -311,7 +314,7 @@ def test_wrong_usage_of_a_later_study_is_told_before_any_work(catalogued, tmp_pa
     ("duration", "budget", "status", "said"),
     [
         ("100", 5000, 0, ""),
-        ("116", 5000, 3, "warning: beyond the instability norm from 114.5"),
+        ("116", 5000, 3, "warning: the slip rate exceeds the instability norm after 114.5"),
         ("100", 200, 1, ""),
     ],
 )

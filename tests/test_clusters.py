@@ -170,7 +170,7 @@ def test_a_scheduler_lost_in_mid_run(separate, held):
     separate.scheduler.kill()
     code, _out, said = wait_for_command(process)
     assert code == 1
-    assert "the Dask scheduler is lost" in said
+    assert "the connection to the Dask scheduler is lost" in said
     assert "distributed." not in said  # Dask does not print the error again.
     assert "of 30 cells are finished and kept" in said
     assert (output / "faulty.partial.nc").exists()

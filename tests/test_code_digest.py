@@ -235,7 +235,7 @@ def test_a_worker_with_another_helper_is_refused(tmp_path, monkeypatch, cluster)
     assert rsfstudy.run(shared_by_both.study, client=cluster, output=None, progress=False)
     monkeypatch.setattr(shared_by_both, "FACTOR", 100.0)
     with pytest.raises(
-        RunError, match="a worker has own_code .*, this run .* same versions and files"
+        RunError, match="a worker has own_code .*, but this run .* same versions and files"
     ):
         rsfstudy.run(shared_by_both.study, client=cluster, output=None, progress=False)
 

@@ -257,7 +257,7 @@ def test_folders_that_others_may_write_to_are_left_alone(place, mode, empty_cach
     assert [compiled_programs() for _ in range(2)] == [1, 1]
     assert files_in(empty_cache) == before
     (said,) = caplog.messages
-    assert f"{folder}: others own it or may write to it" in said
+    assert f"{folder} is not private to the current user" in said
 
 
 def test_folders_of_others_are_left_alone(empty_cache, monkeypatch):

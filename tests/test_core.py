@@ -231,8 +231,8 @@ LOCKS = {"law": "slowness", "b_over_a": 8.1, "a": 0.066, "mu_star": 0.6, "phi": 
     ("fields", "budget", "message", "status"),
     [
         ({"stiffness_ratio": 1.1, "load_velocity_ratio": 1.2}, 500,
-         "more than 500 right-hand sides", Status.WORK_BUDGET_SPENT),
-        ({"stiffness_ratio": 0.8, "load_velocity_ratio": 2.0}, 10**4, "beyond 10.120",
+         "the budget of 500 right-hand side", Status.WORK_BUDGET_SPENT),
+        ({"stiffness_ratio": 0.8, "load_velocity_ratio": 2.0}, 10**4, "exceeded 10.120",
          Status.SLIP_RATE_UNBOUNDED),
         (LOCKS, 10**6, "normal stress grew", Status.LOCKED),
         ({"displacement_step": -47.0}, 10, None, Status.SHEAR_STRESS_REVERSED),

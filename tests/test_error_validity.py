@@ -115,8 +115,8 @@ def test_outliers_are_left_out_and_named() -> None:
     found = rsfstudy.fit(record_with(noise), **options).squeeze()
     assert found.status.item() == Status.OK
     assert int(found.outliers) == 3
-    assert np.isnan(found.innovation.values[[100, 222, 390]]).all()
-    assert "3 outliers were left out: rows 101, 223, 391" in found.message.item()
+    assert np.isnan(found.whitened_residual.values[[100, 222, 390]]).all()
+    assert "3 outliers were omitted: rows 101, 223, 391" in found.message.item()
     clean = rsfstudy.fit(
         record_with(synthetic.correlated_noise(400, 0.0, 3e-4, 3)), **options
     ).squeeze()
@@ -193,4 +193,4 @@ def test_a_stiffness_that_is_bounded_from_below_only_is_reported() -> None:
     ).squeeze()
     assert found.status.item() == Status.ERRORS_NOT_VALID
     assert "interval of stiffness is asymmetric" in found.message.item()
-    assert found.stiffness_low < 0.5 < found.stiffness_high
+    assert found.stiffness_ci_low < 0.5 < found.stiffness_ci_high

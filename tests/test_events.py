@@ -187,7 +187,8 @@ def test_a_load_point_moves_on_through_drops(motion):
         np.interp(time, motion.time, motion[name]) + rng.normal(0.0, 1e-2, 10_000)
         for name in ("slip", "load_point_displacement")
     )
-    with pytest.warns(NoResultWarning, match="no faster during the drops.* that of the rig"):
+    said = "not increase faster during the stress drops.* stiffness of the rig"
+    with pytest.warns(NoResultWarning, match=said):
         refused = rsfstudy.events(time=time, displacement=load_point, shear_stress=stress)
     for name in ("slip", "slip_error", "peak_slip_rate", "dynamic_stress_drop"):
         assert refused[name].isnull().all(), name
@@ -206,7 +207,7 @@ def test_a_load_point_moves_on_through_drops(motion):
     record = xr.Dataset({n: ("sample", arrays[n], {"units": unit}) for n, unit in units.items()})
     stated = rsfstudy.events(record, stiffness=f"{1e3 * stiffness!r} MPa/mm")
     np.testing.assert_allclose(stated.slip, read.slip, rtol=1e-12)
-    with pytest.raises(InvalidValue, match="stiffness = '1 MPa/um': the record states no units"):
+    with pytest.raises(InvalidValue, match="stiffness = '1 MPa/um': .* the record has no units"):
         rsfstudy.events(time=time, displacement=slip, shear_stress=stress, stiffness="1 MPa/um")
 
 

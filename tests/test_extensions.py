@@ -326,8 +326,11 @@ def test_a_scene_of_ones_own_parts():
         ({"law": Doubled, "factor": -1.0}, "factor = -1.0: must be 0 or greater"),
         ({"law": "doubeld"}, "law = 'doubeld': is unknown. Did you mean 'doubled'"),
         ({"dynamics": Sticky, "inertia": True}, "inertia = True: has no meaning for sticky"),
-        ({"law": Sticky}, "law = .*no class that fills the slot law. Derive a class from"),
-        ({"law": int}, "law = <class 'int'>: is no class that fills the slot"),
+        (
+            {"law": Sticky},
+            "law = .*is not a class that defines the law of a scene. Derive a class from",
+        ),
+        ({"law": int}, "law = <class 'int'>: is not a class that defines the"),
     ],
 )
 def test_scenes_that_are_refused(given, rule):
@@ -352,11 +355,11 @@ ANOTHER = number(1.0, "", "1", "another")
 #: Bodies of invalid classes, by error message.
 NO_LAW = {
     "must be a frozen dataclass": [{"frozen": False}],
-    "must be named by a Python identifier": [{"name": None}, {"name": "my law"}],
-    "takes the name": [{"name": "slowness"}, {"name": "inertia"}, {"name": "doubled"}],
-    "states no evolution": [{"evolution": None}, {"evolution": lambda x, state, p: -x}],
-    "says neither what it is": [{"c": field(default=1.0)}],
-    "something else": [
+    "must have a Python identifier": [{"name": None}, {"name": "my law"}],
+    "has the name": [{"name": "slowness"}, {"name": "inertia"}, {"name": "doubled"}],
+    "does not define evolution": [{"evolution": None}, {"evolution": lambda x, state, p: -x}],
+    "has neither a description": [{"c": field(default=1.0)}],
+    "is already the name": [
         {name: ANOTHER} for name in ("phi", "a", "b_over_a", "stiffness", "b", "parts", "loading")
     ],
 }
@@ -373,21 +376,21 @@ def test_classes_that_fill_no_slot(rule):
 @pytest.mark.parametrize(
     ("body", "complaint"),
     [
-        ({}, r"changes by .* per D_c in steady sliding.*Write steady_states\("),
+        ({}, r"changes by .* per D_c in steady sliding.*Define steady_states\("),
         ({"steady_states": lambda x, shift, p: (shift - 0.9 * p[LAW] * x,)}, ""),
         (
             {
                 "evolution": lambda x, state, p: -(state - 0.1 * p[LAW] + p[LAW] * x),
                 "steady_states": lambda x, shift, p: (shift + p[LAW] * (0.1 - x),),
             },
-            "has states that add up to 0.*at V_[*]",
+            "has states with the sum 0.*at V_[*]",
         ),
         (
             {
                 "evolution": lambda x, state, p: state + 0.9 * p[LAW] * x,
                 "steady_states": lambda x, shift, p: (shift - 0.9 * p[LAW] * x,),
             },
-            "moves away from steady sliding at .* by 1 per D_c",
+            "moves away from steady sliding at .* growth rate of 1 per D_c",
         ),
     ],
 )
@@ -443,14 +446,18 @@ def test_a_cell_of_a_notebook_that_is_run_twice():
 
 def test_two_parts_of_one_scene_share_no_field():
     other = made(name="gripping", grip=number(1.0, "", "1", "another"))
-    with pytest.raises(InvalidValue, match="parts = 'gripping, sticky': have a field of one name"):
+    with pytest.raises(
+        InvalidValue, match="parts = 'gripping, sticky': have fields with the same name"
+    ):
         Scene(law=other, dynamics=Sticky)
 
 
 @pytest.mark.parametrize("name", ["status", "slip", "steady_friction", "a_over_b_minus_a"])
 def test_a_field_that_would_be_mistaken_in_a_file(name):
     part = made(name="mistaken", **{name: number(1.0, "", "1", "another")})
-    with pytest.raises(InvalidValue, match=f"field = '{name}': is the name of something else"):
+    with pytest.raises(
+        InvalidValue, match=f"field = '{name}': is already used for another quantity"
+    ):
         study_of("n", LinearStability(), Axis("phi", [60]), base=Scene(law=part))
 
 
@@ -493,7 +500,9 @@ def test_parts_along_zipped_axes_reach_the_workers(cluster, tmp_path):
     np.testing.assert_array_equal(here.grip, [np.nan, 5.0, np.nan])
     np.testing.assert_array_equal(here.is_odd, [np.nan, np.nan, 1.0])
     assert here.grip.attrs["units"] == "m"
-    assert here.dynamics.attrs["long_name"] == "what balances the spring besides friction"
+    assert here.dynamics.attrs["long_name"] == (
+        "force that balances the spring in addition to friction"
+    )
     there = run(study, client=cluster, output=tmp_path)
     have_same_numbers(rsfstudy.open(tmp_path / "zipped.nc"), here)
     have_same_numbers(there, here)

@@ -198,7 +198,7 @@ def test_where_no_line_fits_the_figure_says_so(tmp_path_factory):
     dataset, _path = named_results("stress_drop", tmp_path_factory)
     for axes in plots.draw_figure(dataset).axes[1:4:2]:
         labels = set(axes.get_legend_handles_labels()[1])
-        curved = [label for label in labels if "no line fits" in label]
+        curved = [label for label in labels if "no linear fit" in label]
         assert [label.split(":")[0] for label in curved] == [r"$\phi$ = 50"]
         fitted = [line for line in axes.lines if line.get_linestyle() != "None"]
         assert len(fitted) == len(labels) - len(curved)
@@ -282,7 +282,7 @@ def test_any_variable_on_request():
     dataset = lattice(ANGLES, RATES)
     drawn = rsfstudy.plot(dataset, "steady_friction")
     assert any("friction coefficient" in text.replace("\n", " ") for text in texts(drawn))
-    with pytest.raises(InvalidValue, match="variable = 'friction': is no number"):
+    with pytest.raises(InvalidValue, match="variable = 'friction': is not a numeric variable"):
         rsfstudy.plot(dataset, "friction")
     with pytest.raises(InvalidValue, match="variable = 'message'"):
         rsfstudy.plot(dataset, "message")
@@ -317,7 +317,7 @@ def test_a_style_of_the_users_own(tmp_path):
         ({"font.size": "large-ish"}, "'large-ish': is not a valid value of font.size: Could not"),
         ("unknown.mplstyle", "unknown.mplstyle, line 2: style = 'font.sise': is not a setting"),
         ("text.mplstyle", "text.mplstyle, line 1: style = 'root': is not"),
-        ("latin.mplstyle", "cannot be read: it is not text in UTF-8"),
+        ("latin.mplstyle", "cannot be read: the file is not encoded in UTF-8"),
         (["ggplot", "folder.mplstyle"], "is a directory"),
     ],
 )
@@ -346,7 +346,7 @@ def test_styles_are_checked_and_never_imported(style, message, tmp_path, monkeyp
     ],
 )
 def test_a_style_in_which_nothing_can_be_drawn_is_named(settings, tmp_path):
-    message = r"^style = \{.*: a figure cannot be drawn in it: .* Draw it without this style"
+    message = r"^style = \{.*: a figure cannot be drawn in this style: .* Draw the figure without"
     with pytest.raises(InvalidValue, match=message):
         plots.save_figure(lattice(RATES), tmp_path / "figure.png", style=settings)
     assert not list(tmp_path.iterdir())

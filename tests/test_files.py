@@ -78,7 +78,7 @@ def test_a_failed_write_leaves_the_old_file_and_nothing_else(tmp_path, monkeypat
         raise OSError(28, "No space left on device")
 
     monkeypatch.setattr(xr.Dataset, "to_netcdf", full)
-    with pytest.raises(DataError, match="No space left.*Nothing was replaced"):
+    with pytest.raises(DataError, match="No space left.*No file was replaced"):
         dataset_files.write_dataset(dataset(2.0), path)
     monkeypatch.undo()
     assert os.listdir(tmp_path) == ["trial.nc"]
@@ -90,21 +90,21 @@ def test_what_reads_back_differently_is_not_put_in_place(tmp_path, monkeypatch):
     monkeypatch.setattr(
         dataset_files, "encoding_without_fill_values", lambda _d: {"v": {"dtype": "float32"}}
     )
-    with pytest.raises(DataError, match="what was read back differs"):
+    with pytest.raises(DataError, match="read back differ"):
         dataset_files.write_dataset(dataset(0.1), path)
     assert os.listdir(tmp_path) == []
 
 
 def test_a_motion_is_no_results_of_a_study(tmp_path):
-    path, said = tmp_path / "motion.nc", r"one scene \(Motion of .*rsfstudy.plot_motion"
+    path, said = tmp_path / "motion.nc", r"single scene \(Motion of .*rsfstudy.plot_motion"
     motion = rsfstudy.simulate(Scene(hold_time=1.0), duration=1.0, rtol=1e-2)
     motion.to_netcdf(path)
     for ask in (rsfstudy.open, rsfstudy.check, rsfstudy.plot):
-        with pytest.raises(DataError, match=f"motion.nc is of {said}"):
+        with pytest.raises(DataError, match=f"motion.nc contains a {said}"):
             ask(path)
-    with pytest.raises(DataError, match=f"the dataset is of {said}"):
+    with pytest.raises(DataError, match=f"the dataset contains a {said}"):
         rsfstudy.plot(motion)
-    with pytest.raises(DataError, match=f"the dataset is of {said}"):
+    with pytest.raises(DataError, match=f"the dataset contains a {said}"):
         rsfstudy.compare(motion, motion)
 
 
@@ -201,9 +201,8 @@ def test_what_another_program_saved_is_read_and_told(small, tmp_path):
 def test_a_file_of_a_later_version_is_told_for_what_it_is(small, tmp_path):
     later = xr.load_dataset(small).assign_attrs(layout=schema.FILE_LAYOUT_VERSION + 1)
     dataset_files.write_dataset(later, tmp_path / "later.nc")
-    with pytest.raises(
-        DataError, match=f"layout is 3, and this version .* reads 1 to {schema.FILE_LAYOUT_VERSION}"
-    ):
+    readable = f"reads the layouts 1 to {schema.FILE_LAYOUT_VERSION}"
+    with pytest.raises(DataError, match=f"layout is 4, but this version .* {readable}"):
         rsfstudy.open(tmp_path / "later.nc")
 
 
@@ -327,7 +326,7 @@ def test_a_rerun_shows_what_differs(small, tmp_path):
 
 
 def test_a_rerun_does_not_take_the_place_of_what_it_is_held_against(small):
-    with pytest.raises(InvalidValue, match="would take the place"):
+    with pytest.raises(InvalidValue, match="would be overwritten"):
         rsfstudy.rerun(small, workers=0, output=small.parent, progress=False)
 
 
@@ -339,13 +338,13 @@ def test_a_cell_computed_by_other_code_says_so(small, tmp_path):
         other.assign_attrs(provenance=json.dumps(about)), tmp_path / "other.nc"
     )
     place = {"case": "constant", "b_over_a": "2.5"}
-    with pytest.warns(UserWarning, match="physics: older then, .* now"):
+    with pytest.warns(UserWarning, match="physics: older in the file, .* now"):
         rsfstudy.recompute_cell(tmp_path / "other.nc", place)
-    with pytest.raises(InvalidValue, match="inf.* is not on its axis"):
+    with pytest.raises(InvalidValue, match="inf.* is not a point of its axis"):
         rsfstudy.recompute_cell(small, {**place, "b_over_a": "inf"})
     words = [f"--cell={name}={value}" for name, value in place.items()]
     told = call_main("rerun", tmp_path / "other.nc", *words)
-    assert (told.returncode, "physics: older then" in told.stdout) == (0, True)
+    assert (told.returncode, "physics: older in the file" in told.stdout) == (0, True)
 
 
 def test_show_tells_what_is_in_a_file(small):

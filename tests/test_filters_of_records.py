@@ -127,9 +127,9 @@ def test_no_filter_is_detected_in_unfiltered_friction() -> None:
 @pytest.mark.parametrize(
     ("options", "text"),
     [
-        ({"averaging": "1 s", "low_pass": "first_order 1 Hz"}, "cannot follow an averaging"),
+        ({"averaging": "1 s", "low_pass": "first_order 1 Hz"}, "cannot be combined with averaging"),
         ({"low_pass": "bessel 1 Hz"}, "first_order, butterworth_2"),
-        ({"low_pass": "first_order 1 s"}, "another kind"),
+        ({"low_pass": "first_order 1 s"}, "incompatible"),
         ({"averaging": "-1 s"}, "must be positive"),
         ({"averaging": "1 um"}, "averaging"),
     ],

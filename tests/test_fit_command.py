@@ -126,12 +126,12 @@ def test_a_rerun_says_what_it_lacks(written):
     for words in ((), ("--cell", "step=1")):
         ran = call_main("rerun", str(here / "fit.nc"), "--serial", *words)
         assert ran.returncode == 2
-        assert "Fit them again" in " ".join(ran.stderr.split())
+        assert "Fit the records again" in " ".join(ran.stderr.split())
 
 
 def test_a_file_that_is_not_there_is_told():
     ran = call_main("fit", "nowhere.csv", *FIT)
-    assert (ran.returncode, ran.stderr.strip()) == (1, "error: there is no file nowhere.csv")
+    assert (ran.returncode, ran.stderr.strip()) == (1, "error: the file nowhere.csv does not exist")
 
 
 def test_files_of_others_are_not_replaced(written, tmp_path):
@@ -245,4 +245,4 @@ def test_the_page_says_how_good_its_fit_is(tmp_path, monkeypatch):
         assert abs(float(right[name]) - true) < 2.0 * float(right[f"{name}_stderr"]), name
     off = float(wrong.slip_distance) - TRUE["slip_distance"]
     assert 7.0 < off / float(wrong.slip_distance_stderr) < 9.0
-    assert float(wrong.criterion - right.criterion) == pytest.approx(48.6, abs=0.5)
+    assert float(wrong.aic - right.aic) == pytest.approx(48.6, abs=0.5)

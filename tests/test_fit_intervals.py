@@ -122,6 +122,6 @@ def test_noise_alone_tells_neither_b_nor_its_slip_distance() -> None:
             model = Relaxation(first | {"b": size}, seed)
             search = FitProblem(model, first, FREE, "ar")  # type: ignore[arg-type]
             told[size] += not {"b", "slip_distance"} & set(search.solve().unidentified_parameters)
-    # A difference of ten in the criterion occurs by chance in a few of a thousand records.
+    # A difference of ten in the AIC occurs by chance in a few of a thousand records.
     assert told[0.0] == 0
     assert told[4.0 * SIZE] > 15

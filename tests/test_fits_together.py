@@ -61,7 +61,7 @@ def test_one_step_together_is_that_step() -> None:
         rsfstudy.fit(one, laws=["slip"], steps=[1], together=together, **FIT_OPTIONS)
         for together in (False, True)
     )
-    for name in (*SHARED, "mu_star", "criterion"):
+    for name in (*SHARED, "mu_star", "aic"):
         assert float(both[name].item()) == float(alone[name].item()), name
 
 
@@ -104,7 +104,7 @@ def test_a_pair_of_steps_tells_the_exponent(law: str, exponent: float) -> None:
     scene = {"law_exponent": 0.7}
     fit = rsfstudy.fit(one, laws=["family"], free=free, together=True, **FIT_OPTIONS, **scene)
     fit = fit.squeeze()
-    low, high = (float(fit[f"law_exponent_{end}"]) for end in ("low", "high"))
+    low, high = (float(fit[f"law_exponent_{end}"]) for end in ("ci_low", "ci_high"))
     assert low <= float(fit.law_exponent) <= high
     assert low >= 0.0
     assert high <= 1.0
@@ -136,7 +136,7 @@ def test_two_states_come_back_in_their_order() -> None:
     fit = rsfstudy.fit(one, laws=["two_slip_states"], free=free, **options).squeeze()
     for name in free:
         assert abs(deviation_in_stderrs(fit, name, TWO_STATES.get(name, 0.0))) < 4.0, name
-    assert fit.slip_distance_high < fit.slip_distance_2_low
+    assert fit.slip_distance_ci_high < fit.slip_distance_2_ci_low
 
 
 def test_laws_of_one_and_of_two_states_are_fitted_beside_each_other() -> None:
@@ -156,7 +156,7 @@ def test_laws_of_one_and_of_two_states_are_fitted_beside_each_other() -> None:
         among = fit.sel(parameter=parameters, other_parameter=parameters)
         np.testing.assert_array_equal(among.covariance, alone.covariance)
         assert np.isnan(fit.correlation).sum() == 8**2 - len(parameters) ** 2
-        for name in (*parameters, "criterion", "a_minus_b_stderr"):
+        for name in (*parameters, "aic", "a_minus_b_stderr"):
             assert float(fit[name]) == float(alone[name]), name
         assert fit.rsf.scene == alone.rsf.scene
         assert {*fit.rsf.sample_parameters(2).data_vars} == {*parameters}
@@ -165,9 +165,9 @@ def test_laws_of_one_and_of_two_states_are_fitted_beside_each_other() -> None:
 @pytest.mark.parametrize(
     ("free", "error"),
     [
-        (("a", "b"), "names no evolution effect of law='two_slip_states'"),
-        (("a", "law_exponent"), "is no parameter with law='slip' or law='two_slip_states'"),
-        (("slip_distance_2",), "names no parameter of law='slip'"),
+        (("a", "b"), "contains no evolution effect of law='two_slip_states'"),
+        (("a", "law_exponent"), "is not a parameter with law='slip' or law='two_slip_states'"),
+        (("slip_distance_2",), "contains no parameter of law='slip'"),
     ],
 )
 def test_parameters_fit_a_law_and_each_law_has_some(free: tuple[str, ...], error: str) -> None:
@@ -229,7 +229,7 @@ def test_noise_tells_nothing_but_friction(law: str, free: tuple[str, ...], tmp_p
     assert abs(deviation_in_stderrs(fit, "mu_star", 0.6)) < 4.0
     for name in untold - {"slip_distance"}:  # The intervals extend to the bounds of the search.
         bounds = {"a": (1e-4, 1.0), "b": (-1.0, 1.0), "law_exponent": (0.0, 1.0)}[name]
-        assert (float(fit[f"{name}_low"]), float(fit[f"{name}_high"])) == bounds, name
+        assert (float(fit[f"{name}_ci_low"]), float(fit[f"{name}_ci_high"])) == bounds, name
 
 
 def test_draws_have_the_mean_and_covariance_of_the_fit() -> None:
@@ -253,7 +253,7 @@ def test_the_table_has_the_columns_of_laboratories() -> None:
     fit = rsfstudy.fit(synthetic_record(seed=4), laws=["slip", "slowness"], **FIT_OPTIONS)
     table = fit.rsf.fit_table()
     short = ("a", "b", "a_minus_b", "Dc", "mu_0", "trend")
-    columns = {*short, *(f"{n}_std" for n in short), "V0", "V1", "law", "window", "R2", "status"}
+    columns = {*short, *(f"{n}_stderr" for n in short), "V0", "V1", "law", "window", "R2", "status"}
     assert columns <= set(table.columns)
     assert table.law.tolist() == ["slip", "slowness"]
     assert table.Dc.tolist() == fit.slip_distance.values.ravel().tolist()
@@ -304,7 +304,7 @@ def test_the_scene_of_a_fit_moves_as_fitted() -> None:
         synthetic_record(seed=4), laws=["slowness"], free=("a", "mu_star"), **FIT_OPTIONS | held
     )
     assert some.squeeze().rsf.scene.b == pytest.approx(0.013, rel=1e-12)
-    with pytest.raises(InvalidValue, match="normal_stress = None: is not in the record"):
+    with pytest.raises(InvalidValue, match="normal_stress = None: is missing from the record"):
         _ = fit.rsf.rig
 
 
@@ -367,5 +367,7 @@ def test_a_chain_that_is_too_short_is_refused() -> None:
 
 def test_a_posterior_without_emcee_says_what_to_install(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "emcee", None)
-    with pytest.raises(InvalidValue, match=r"needs emcee.*pip install 'rsfstudy\[posterior\]'"):
+    with pytest.raises(
+        InvalidValue, match=r"requires the package emcee.*pip install 'rsfstudy\[posterior\]'"
+    ):
         rsfstudy.fit(synthetic_record(seed=4), posterior=1, **FIT_OPTIONS)

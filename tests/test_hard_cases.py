@@ -42,7 +42,7 @@ def test_a_wrong_number_is_unverified():
     assert outcome("alpha = 0").status is Status.OK
     wrong = outcome("alpha = 0", answer=right * (1.0 + 1e-6))
     assert wrong.status is Status.UNVERIFIED
-    assert "beyond its estimate" in wrong.message
+    assert "exceeds its estimate" in wrong.message
 
 
 def test_a_wrong_status_is_unverified():

@@ -131,9 +131,9 @@ def test_units_of_a_rig(tmp_path):
          "time": ("n", 10.0 * record["time"], {"units": "s"})}
     )  # fmt: skip
     np.testing.assert_allclose(history(dataset, rig).sample_table, known.sample_table, atol=1e-11)
-    with pytest.raises(InvalidValue, match="heading = 'time': states no units"):
+    with pytest.raises(InvalidValue, match="heading = 'time': has no units"):
         history(dataset.assign(time=("n", record["time"])), rig)
-    with pytest.raises(InvalidValue, match="units = .*: need the scales of a rig for"):
+    with pytest.raises(InvalidValue, match="units = .*: require a rig to convert"):
         history(dataset)
 
 
@@ -188,7 +188,9 @@ def test_results_hold_the_loadings_of_their_study(tmp_path):
     table = rsfstudy.rerun(tmp_path / "records.nc", workers=0, progress=False)
     assert not table.attrs["differs"]
     assert table["identical"].dropna().equals(table["values"][table["identical"].notna()])
-    with pytest.raises(DataError, match="history_samples holds no loading of 4 columns"):
+    with pytest.raises(
+        DataError, match="history_samples is not the table of a loading with 4 columns"
+    ):
         results.isel(history_column=slice(3)).rsf.study  # noqa: B018
 
 
@@ -204,7 +206,7 @@ def test_the_command_line_follows_files(tmp_path, monkeypatch):
         assert motion.rsf.scene.parts.loading == history(wave(20), name="record")
     status, said = run_command(["simulate", "--set", "loading=absent.csv"])
     assert status == 1
-    assert "there is no file absent.csv" in said
+    assert "the file absent.csv does not exist" in said
 
 
 def test_the_files_that_ship_are_followed():

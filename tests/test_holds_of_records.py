@@ -173,7 +173,7 @@ def test_fit_counts_the_error_of_a_measured_stiffness(monkeypatch: pytest.Monkey
         for factor in (1.0, np.exp(-spread), np.exp(spread))
     )
     assert float(measured["window_stiffness_stderr"]) == pytest.approx(3e-3 * spread)
-    assert measured.rsf.fit_table()["k_std"][0] == pytest.approx(3e-3 * spread)
+    assert measured.rsf.fit_table()["k_stderr"][0] == pytest.approx(3e-3 * spread)
     for name in ("a", "b", "slip_distance"):
         added = float(measured[f"{name}_stderr"]) ** 2 - float(exact[f"{name}_stderr"]) ** 2
         moved = 0.5 * float(stiffer[name] - softer[name])
@@ -198,7 +198,8 @@ def test_summary_has_one_line_per_step_that_is_not_fitted() -> None:
     pieces = [*build_summary_tables_and_sentences(fits)]
     lines = [piece for piece in pieces if isinstance(piece, str) and "is not fitted" in piece]
     assert lines == [
-        "step 2 is not fitted: the window begins in a hold: a fit begins with steady sliding"
+        "step 2 is not fitted: the window begins in a hold, but a fit must begin with steady "
+        "sliding"
     ]
     captions = [piece.caption for piece in pieces if hasattr(piece, "caption")]
     assert sum("step 1" in caption for caption in captions) == 1
@@ -210,5 +211,5 @@ def test_figure_of_healing() -> None:
     table = rsfstudy.healing(record)
     assert len(rsfstudy.plot_healing(table, record).axes) == 2
     assert len(rsfstudy.plot_healing(table).axes) == 1
-    with pytest.raises(DataError, match="no table of holds"):
+    with pytest.raises(DataError, match="not a table of holds"):
         rsfstudy.plot_healing(xr.Dataset())

@@ -28,7 +28,7 @@ TOO_LONG = "must have at most 255 bytes in each part"
 @pytest.mark.parametrize(
     ("words", "message"),
     [
-        ("export '' --csv", "file = '': is empty. Name a file"),
+        ("export '' --csv", "file = '': is empty. Pass the path of"),
         ("export . --csv", ". is a directory"),
         ("export .. --csv", ".. is a directory"),
         ("export motion.nc --csv --output .", "'--output': File '.' is a directory"),
@@ -38,11 +38,14 @@ TOO_LONG = "must have at most 255 bytes in each part"
         (f"simulate --protocol {LONG}.csv", TOO_LONG),
         (f"run stresses.py --output {LONG}", TOO_LONG),
         (f"fit {LONG}.csv", TOO_LONG),
-        (f"verify 01.csv --problem {LONG}.toml", "cannot be the path of a file: File name too"),
+        (
+            f"verify 01.csv --problem {LONG}.toml",
+            "cannot be used as the path of a file: File name too",
+        ),
         ("report . --output ''", "--output = '': is empty"),
         ("report . --output .", "'--output': File '.' is a directory"),
         (f"report . --output {LONG}.html", TOO_LONG),
-        ("problems ''", "is empty. Name a file or a directory"),
+        ("problems ''", "is empty. Pass the path of a file or a directory"),
         (f"problems {LONG}", TOO_LONG),
         (f"run {LONG}", TOO_LONG),
         (f"show {LONG}", TOO_LONG),
@@ -105,7 +108,10 @@ def test_pipes_are_neither_read_nor_replaced(words, tmp_path, monkeypatch):
     for name in pipes:
         os.mkfifo(name)
     status, said = run_command(shlex.split(words))
-    assert (status, "is a directory, a pipe or a device. Name a file." in said) == (2, True)
+    assert (
+        status,
+        "is a directory, a pipe or a device. Pass the path of a regular file." in said,
+    ) == (2, True)
     assert all(Path(name).is_fifo() for name in pipes)
 
 
@@ -167,7 +173,7 @@ def test_the_fuzzer_uses_every_command_and_every_option():
         (Answer(-9, "", 20.0, hangs=True), ["hang"]),
         (Answer(1, "Traceback (most recent call last):\n", 0.1), ["traceback"]),
         (Answer(0, "a\x1b[31mb", 0.1), ["control '\\x1b'"]),
-        (Answer(2, "fit cannot be answered (TypeError: x)", 0.1), ["catch-all"]),
+        (Answer(2, "fit fails for these arguments (TypeError: x)", 0.1), ["catch-all"]),
         (Answer(2, "cannot be read (KeyError: 'x')", 0.1), ["raw KeyError:"]),
     ],
 )

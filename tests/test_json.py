@@ -208,7 +208,8 @@ def test_check(place):
     assert status == 0
     (claim,) = found["claims"]
     (row,) = verdicts.to_dict("records")
-    assert claim == {"study": "slopes"} | row
+    former = {"ours": "computed", "moved": "verdict_changed", "because": "difference_reason"}
+    assert claim == {"study": "slopes"} | row | {old: row[new] for old, new in former.items()}
     assert claim["verdict"] == "reproduced"
     (study,) = found["studies"]
     assert [one["value"] for one in study["reductions"]] == pytest.approx([0.01, 0.01], rel=1e-9)
@@ -220,11 +221,11 @@ def test_check_of_a_changed_verdict_and_of_a_claim_that_does_not_apply(place, tm
     dataset_files.write_dataset(changed, tmp_path / "changed.nc")
     found, status = output_of("check", tmp_path / "changed.nc")
     assert status == 1
-    assert [one["moved"] for one in found["claims"]] == [True]
+    assert [one["verdict_changed"] for one in found["claims"]] == [True]
     changed["slope"] = changed["slope"] * np.nan
     dataset_files.write_dataset(changed, tmp_path / "missing.nc")
     found, status = output_of("check", tmp_path / "missing.nc")
-    assert (status, found["claims"][0]["ours"]) == (1, None)
+    assert (status, found["claims"][0]["computed"]) == (1, None)
     assert found["claims"][0]["verdict"] == "undecided"
     # A slope through fewer points than declared does not belong to the claim.
     checked, status = output_of("check", place / "other" / "slopes.nc")
@@ -335,7 +336,7 @@ def test_fit_and_its_file(tmp_path, monkeypatch):
         assert parameter["value"] == one[parameter["name"]].item()
         assert parameter["stderr"] == one[f"{parameter['name']}_stderr"].item()
     assert {parameter["name"] for parameter in fit["parameters"]} == {"a", "b", "a_minus_b"}
-    assert (fit["aic"], fit["n_eff"]) == (one.criterion.item(), one.effective_samples.item())
+    assert (fit["aic"], fit["n_eff"]) == (one.aic.item(), one.n_eff.item())
     record = rsfstudy.read_record("step.csv", normal_stress="20 MPa")
     assert found["records"][0]["rows"] == len(record)
     steps = [step["velocity_after"] for step in found["records"][0]["steps"]]

@@ -142,7 +142,7 @@ def test_results_say_their_units():
     assert shown.effective_normal_stress.attrs["units"] == "MPa"
     assert float(shown.effective_normal_stress[0]) == pytest.approx(SIGMA / 1e6)
     assert '"normal_stress": 5000000.0' in shown.attrs["laboratory"]
-    with pytest.raises(DataError, match="in other units already"):
+    with pytest.raises(DataError, match="was already converted"):
         RIG.in_units(shown)
     # The displacement of the load point is 10 V_* t.
     np.testing.assert_allclose(motion.load_point_displacement, 10.0 * motion.time, atol=1e-9)
@@ -174,7 +174,9 @@ def test_each_cell_is_converted_by_its_own_reference_rate():
     np.testing.assert_allclose(found.max_slip_rate_error, error, rtol=1e-12)
     assert "D_c/V_* = 100 to 125 s" in found.attrs["scales"]
     for scalar in (1e-2, "0.008 1/s"):
-        with pytest.raises(InvalidValue, match="contradicts that of the dataset, 0.008 to 0.01 1"):
+        with pytest.raises(
+            InvalidValue, match="differs from the value in the dataset, 0.008 to 0.01 1"
+        ):
             rsfstudy.to_si(results, normal_stress=SIGMA, slip_distance=D_C, reference_rate=scalar)
     one = results.isel(reference_rate=1)
     stated = rsfstudy.to_si(one, normal_stress=SIGMA, slip_distance=D_C, reference_rate="0.008 1/s")
@@ -251,7 +253,7 @@ def test_the_picture_of_steady_sliding_has_limits_about_its_slip_rate():
 
     Equal limits would cause a warning of Matplotlib, which is an error in the tests.
     """
-    with pytest.warns(NoResultWarning, match="nothing is stepped"):
+    with pytest.warns(NoResultWarning, match="the scene has no step"):
         motion = simulate(RIG.scene(**LAW), duration=1.0)
     low, high = plot_motion(motion, RIG).axes[1].get_ylim()
     assert low < 1.0 < high  # V_* = 1 um/s

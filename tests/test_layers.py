@@ -28,7 +28,7 @@ FLOORS = (
     ("object_digest",),
     ("argument_checks",),
     ("error_boundary",),
-    ("netcdf_encoding", "path_checks", "quantities"),
+    ("former_data_names", "netcdf_encoding", "path_checks", "quantities"),
     ("slider",),
     ("parts", "vocabulary"),
     ("axes", "motion"),

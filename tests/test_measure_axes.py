@@ -133,7 +133,9 @@ def test_a_field_that_decides_the_shape_is_refused():
         "inner_coordinates": property(lambda self: {"place": np.arange(float(self.times))}),
     })  # fmt: skip
     assert scaled(Axis("factor", [1.0, 2.0]), measure=kind()).shape == (2, 2)
-    with pytest.raises(InvalidValue, match="'times': decides which numbers.*Make a study of each"):
+    with pytest.raises(
+        InvalidValue, match="'times': changes which results.*Create a separate study for each"
+    ):
         scaled(Axis("times", [1.0, 2.0]), measure=kind())
 
 
@@ -150,7 +152,9 @@ def test_cells_are_found_again_by_the_fields_of_their_measure(tmp_path):
     assert computed_by(scaled(measure=Scaled(factor=4.0)), tmp_path) == 0
     assert computed_by(scaled(measure=Scaled(factor=8.0)), tmp_path) == 2
     assert run(scaled(measure=Scaled(factor=4.0)), output=tmp_path).total[0] == 8.0
-    with pytest.raises(DataError, match="holds cells computed differently: measure: .*table"):
+    with pytest.raises(
+        DataError, match="contains cells that were computed with other settings .measure: .*table"
+    ):
         run(scaled(measure=Scaled(table=(2.0,))), output=tmp_path)
 
 
@@ -175,7 +179,7 @@ def test_claims_and_selection_reach_a_place_on_the_axis():
     assert rsfstudy.check(run(declared.with_(direction="up"))).verdict.tolist() == [
         "not applicable"
     ]
-    with pytest.raises(InvalidValue, match="is no place of the lattice, in claim X1"):
+    with pytest.raises(InvalidValue, match="is not a point of the lattice, in claim X1"):
         run(replace(declared, claims=[replace(claim, where={"direction": "left"})]))
 
 

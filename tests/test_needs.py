@@ -51,18 +51,18 @@ CONSTANT = {"normal_stress": "constant"}
         ({"normal_stress": "imposed"}, "normal_stress='imposed'", "Set normal_stress='constant'"),
         ({**CONSTANT, "fluid": "dilatant"}, "fluid='dilatant'", "Set fluid='drained'"),
         ({**CONSTANT, "regularised": True}, "regularised=True", "Set regularised=False"),
-        ({"normal_stress": "imposed", "normal_stress_step": 0.1}, "the loading 'step'", "leave"),
+        ({"normal_stress": "imposed", "normal_stress_step": 0.1}, "the loading 'step'", "remove"),
     ],
 )
 def test_a_scene_refuses_a_law_whose_stress_it_does_not_provide(fields, cause, remedy):
     with pytest.raises(InvalidValue) as refused:
         Scene(law=Heated, **fields)
     text = str(refused.value)
-    assert text.startswith("law = 'heated_by_work': needs shear_stress, which")
+    assert text.startswith("law = 'heated_by_work': requires shear_stress, but")
     assert cause in text
     assert remedy in text
     if not fields.get("regularised"):
-        assert "they receive friction_coefficient, " in text
+        assert "The available quantities are friction_coefficient, " in text
         assert Scene(law=Undeclared, **fields).law == "heated_undeclared"
 
 
@@ -82,7 +82,7 @@ class HeatedPores(DilatantFluid):
 
 
 def test_no_scene_provides_shear_stress_to_a_fluid():
-    with pytest.raises(InvalidValue, match="in any scene: they receive"):
+    with pytest.raises(InvalidValue, match="in any scene. The available quantities are"):
         Scene(fluid=HeatedPores, **CONSTANT)
 
 

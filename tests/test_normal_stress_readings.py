@@ -169,7 +169,7 @@ def test_a_response_of_two_periods_is_told_as_that():
     # The result has an error of 0.5 %, although 1e-5 was requested.
     assert outcome.status is Status.UNVERIFIED
     assert "gain = 0.389" in outcome.message
-    assert "was asked for" in outcome.message
+    assert "was requested" in outcome.message
 
 
 @pytest.mark.parametrize(

@@ -16,8 +16,10 @@ from study_runs import call_main, have_same_numbers, run
 
 import rsfstudy
 from rsfstudy.execution import provenance
+from rsfstudy.former_data_names import rename_former_variables
 from rsfstudy.status import Status
 from rsfstudy.storage import schema
+from rsfstudy.storage.declarations import parse_declaration
 from rsfstudy.study import study_loader
 
 #: Files written by rsfstudy 0.1.0, before files contained a layout number: a study with its
@@ -40,7 +42,7 @@ def test_results_open_check_and_plot(name, older, tmp_path):
     dataset = rsfstudy.open(older / name)
     assert "layout" not in dataset.attrs
     assert dataset.rsf.study.name == dataset.attrs["id"]
-    assert not rsfstudy.check(dataset).moved.any()
+    assert not rsfstudy.check(dataset).verdict_changed.any()
     drawn = call_main("plot", older / name, "--output", tmp_path)
     assert (drawn.returncode, drawn.stderr) == (0, "")
     assert call_main("show", older / name).returncode == (name == "displacement_boundary.nc")
@@ -104,3 +106,68 @@ def test_a_run_goes_on(older, tmp_path, monkeypatch):
     assert np.array_equal(
         resumed.critical_stiffness, rsfstudy.open(older / "tiny.nc").critical_stiffness
     )
+
+
+# ---- former names of layouts 1 and 2 -----------------------------------------------------------
+def test_variables_of_older_fits_are_renamed():
+    described = {
+        "criterion": "Akaike's criterion, in which the noise counts; less is better",
+        "whiteness": "chance of as much correlation of near rows, freed of it",
+        "effective_samples": "number of independent samples that tell as much",
+        "innovation": "residual freed of correlation, over its standard deviation",
+        "noise_size": "standard deviation of the noise",
+        "a_low": "lower end of the 95 % interval of the direct effect",
+        "sobol_total_high": "high end of the 95 % interval of the total Sobol index of drop",
+    }
+    older = xr.Dataset(
+        {name: ((), n, {"long_name": d}) for n, (name, d) in enumerate(described.items())}
+    )
+    older["a"] = (), 0.01, {"ancillary_variables": "a_low status"}
+    older["criterion_of_mine"] = older["criterion"]
+    current = rename_former_variables(older)
+    names = [
+        "aic",
+        "p_value",
+        "n_eff",
+        "whitened_residual",
+        "noise_sd",
+        "a_ci_low",
+        "sobol_total_ci_high",
+    ]
+    assert [*current] == [*names, "a", "criterion_of_mine"]
+    assert [current[name].item() for name in names] == [*range(7)]
+    assert current["a"].attrs["ancillary_variables"] == "a_ci_low status"
+    assert older["a"].attrs["ancillary_variables"] == "a_low status"
+    assert rename_former_variables(current) is current
+
+
+def test_variables_of_users_keep_their_names():
+    own = xr.Dataset({name: ((), 1.0, {"long_name": "mine"}) for name in ("criterion", "x_low")})
+    assert rename_former_variables(own) is own
+
+
+def test_declarations_of_older_files_are_understood():
+    study = study_loader.load_study("rate_step_boundary")
+    claim = rsfstudy.Claim(
+        id="C1",
+        statement="",
+        source="",
+        variable="zeta",
+        where={"case": "alpha = 0.25"},
+        baseline={"case": "alpha = 0.56"},
+        baseline_variable="zeta",
+        published=0.2,
+        tolerance=0.1,
+        reason="read from the figure",
+        expected="differs",
+        difference_reason="a misprint",
+    )
+    declared = {**study.describe(), "claims": [claim.describe()]}
+    older = json.loads(json.dumps(declared))
+    fit = next(one for one in older["reductions"] if one["kind"] == "proportional_fit")
+    fit["minus"] = fit.pop("intercept")
+    for former, new in {"minus": "baseline", "minus_variable": "baseline_variable",
+                        "because": "difference_reason"}.items():  # fmt: skip
+        older["claims"][0][former] = older["claims"][0].pop(new)
+    assert parse_declaration(older) == parse_declaration(json.loads(json.dumps(declared)))
+    assert older["claims"][0]["because"] == "a misprint"

@@ -169,7 +169,7 @@ def test_swings_that_still_shrink_are_not_called_aperiodic():
     """
     found = LimitCycle(events=12)(slow(1.12, load_velocity_ratio=1.02), quick(1e-6))
     assert found.status is Status.WORK_BUDGET_SPENT
-    assert "no cycle repeats yet" in found.message
+    assert "the motion does not repeat itself yet" in found.message
 
 
 def test_the_growth_of_departures_is_that_of_the_motion_alone(monkeypatch):

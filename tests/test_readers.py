@@ -138,13 +138,13 @@ def test_decimal_commas_are_named(text: str, tmp_path: Path) -> None:
 @pytest.mark.parametrize("text", ["", "\n\n", "just words\n", "# a comment\n"])
 def test_a_text_without_numbers_is_refused(text: str, tmp_path: Path) -> None:
     (tmp_path / "run.txt").write_text(text)
-    with pytest.raises(InvalidValue, match="has no header|does not name time"):
+    with pytest.raises(InvalidValue, match="has no header|no recognised headings for time"):
         rsfstudy.read_record(tmp_path / "run.txt")
 
 
 def test_a_file_without_header_asks_for_numbers(tmp_path: Path) -> None:
     (tmp_path / "run.txt").write_text(lines_of("\t"))
-    with pytest.raises(InvalidValue, match=r"states no headings.* 'time=1 \(s\),displacement=2"):
+    with pytest.raises(InvalidValue, match=r"has no headings.* 'time=1 \(s\),displacement=2"):
         rsfstudy.read_record(tmp_path / "run.txt")
     with pytest.raises(InvalidValue, match="column = '5': is not in the table"):
         rsfstudy.read_record(tmp_path / "run.txt", {**BY_NUMBER, "time": "5 (s)"})
@@ -168,14 +168,18 @@ def test_workbooks(library: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
         frame.to_excel(book, sheet_name="notes", index=False, startrow=3, startcol=1)
         frame.iloc[:, :2].to_excel(book, sheet_name="other", index=False)
     check(path)
-    with pytest.raises(InvalidValue, match="sheet 'other', line 1: header = .* does not name fric"):
+    with pytest.raises(
+        InvalidValue, match="sheet 'other', line 1: header = .* no recognised heading for fric"
+    ):
         rsfstudy.read_record(path, sheet="other")
     with pytest.raises(InvalidValue, match="sheet = 'x': is not in the workbook. Choices: notes"):
         rsfstudy.read_record(path, sheet="x")
     frame = frame.astype(object)
     frame.loc[3, HEADINGS[1]] = "off"
     frame.to_excel(path, index=False)
-    with pytest.raises(InvalidValue, match="line 5, column 2: displacement = 'off': is no number"):
+    with pytest.raises(
+        InvalidValue, match="line 5, column 2: displacement = 'off': is not a number"
+    ):
         rsfstudy.read_record(path)
 
 
@@ -191,7 +195,7 @@ def test_matlab_files(tmp_path: Path) -> None:
     check(tmp_path / "nested.mat", columns)
     savemat(tmp_path / "matrix.mat", {"data": np.column_stack([*DATA.values()])})
     check(tmp_path / "matrix.mat", BY_NUMBER)
-    with pytest.raises(InvalidValue, match="does not name time"):
+    with pytest.raises(InvalidValue, match="no recognised headings for time"):
         rsfstudy.read_record(tmp_path / "matrix.mat")
     (tmp_path / "cut.mat").write_bytes((tmp_path / "run.mat").read_bytes()[:300])
     with pytest.raises(DataError, match="cut.mat: cannot be read as a MATLAB file"):
@@ -224,7 +228,9 @@ def test_tdms_files(tmp_path: Path) -> None:
             file.write_segment([nptdms.ChannelObject("plain", name, values, properties=about)])
     check(path)
     check(path, sheet="plain")
-    with pytest.raises(InvalidValue, match="sheet = 'x': is no group with channels. Choices: wave"):
+    with pytest.raises(
+        InvalidValue, match="sheet = 'x': is not a group with channels. Choices: wave"
+    ):
         rsfstudy.read_record(path, sheet="x")
 
 
@@ -338,15 +344,15 @@ def test_rows_are_selected(options: dict[str, Any], kept: slice, tmp_path: Path)
     [
         ({"rows": (0, 5)}, "rows = .0, 5.: must be the numbers of the first and the last row"),
         ({"rows": (5, 3)}, "rows = .5, 3.: must be"),
-        ({"rows": (500, 600)}, "selects no row: the record has 40 rows"),
-        ({"begin": "2 MPa"}, "begin = '2 MPa': is no time or displacement"),
-        ({"begin": "x"}, "begin = 'x': is no time or displacement"),
-        ({"begin": "1 h"}, "begin = '1 h': lies outside the record, 0 to 9.75 s"),
-        ({"thin": 0}, "thin = 0: must be a whole number from 1"),
+        ({"rows": (500, 600)}, "selects no row, because the record has 40 rows"),
+        ({"begin": "2 MPa"}, "begin = '2 MPa': is neither a time nor a displacement"),
+        ({"begin": "x"}, "begin = 'x': is neither a time nor a displacement"),
+        ({"begin": "1 h"}, "begin = '1 h': is outside the record, which covers 0 to 9.75 s"),
+        ({"thin": 0}, "thin = 0: must be a whole number, 1 or more"),
         ({"filter": "median 1 s"}, "filter = 'median 1 s': is unknown. .*mean, trailing_mean"),
-        ({"filter": "mean 20 s"}, "averages over more than the record, 9.75 s"),
-        ({"filter": "first_order 3 Hz"}, "passes all frequencies below 2 Hz"),
-        ({"filter": "first_order 3 s"}, "has units of another kind"),
+        ({"filter": "mean 20 s"}, "averages over a time that is longer than the record, 9.75 s"),
+        ({"filter": "first_order 3 Hz"}, "only contains frequencies below 2 Hz"),
+        ({"filter": "first_order 3 s"}, "has units that are incompatible"),
     ],
 )
 def test_selections_that_cannot_be_made(options: dict[str, Any], told: str) -> None:
@@ -389,7 +395,9 @@ def test_filters_have_their_response(kind: str, gain: complex, spread: float) ->
     assert record.processing == (f"friction filtered by {kind}",)
     lost = round(size / 0.3) if "mean" in kind else 0
     assert len(record) == pytest.approx(len(time) - lost, abs=2 if lost else 0)
-    with pytest.raises(InvalidValue, match="cannot follow the filter of the record"):
+    with pytest.raises(
+        InvalidValue, match="cannot be applied, because the record is already filtered"
+    ):
         rsfstudy.read_record(record, filter=kind)
 
 
@@ -416,9 +424,11 @@ def test_a_negative_normal_stress_is_named() -> None:
 
 def test_what_a_record_lacks_is_named(tmp_path: Path) -> None:
     for names in (["time", "shear_stress"], ["displacement", "shear_stress"]):
-        with pytest.raises(InvalidValue, match="rsfstudy.events does not need"):
+        with pytest.raises(InvalidValue, match="use rsfstudy.events"):
             rsfstudy.read_record({name: DATA[name] for name in names})
-    with pytest.raises(InvalidValue, match="does not name friction or shear stress"):
+    with pytest.raises(
+        InvalidValue, match="has no recognised heading for friction or shear stress"
+    ):
         rsfstudy.read_record({name: DATA[name] for name in ("time", "displacement")})
 
 
@@ -448,9 +458,11 @@ def test_events_of_files_with_usual_headings(tmp_path: Path) -> None:
     half = rsfstudy.events(path, rows=(1, len(MADE.time) // 2))
     assert 0 < half.sizes["event"] < EVENTS.sizes["event"]
     assert half.attrs["processing"] == f"rows 1 to {len(MADE.time) // 2} of {len(MADE.time)}"
-    with pytest.raises(InvalidValue, match="does not name shear stress or friction"):
+    with pytest.raises(
+        InvalidValue, match="has no recognised heading for shear stress or friction"
+    ):
         rsfstudy.events({"Time (s)": MADE.time})
-    with pytest.raises(InvalidValue, match="does not name time or displacement"):
+    with pytest.raises(InvalidValue, match="no recognised heading for time or displacement"):
         rsfstudy.events({"Friction (1)": MADE.stress})
 
 
@@ -477,7 +489,7 @@ def test_events_of_stress_against_displacement() -> None:
         np.testing.assert_allclose(1e3 * found[name], expected, rtol=1e-6, atol=1e-9)
         assert found[name].units == "mm"
         assert "time" not in found[name].long_name
-    with pytest.raises(InvalidValue, match="displacement = .*must increase.*without time needs"):
+    with pytest.raises(InvalidValue, match="displacement = .*must increase.*without time requires"):
         rsfstudy.events({**data, "Displacement (mm)": -MADE.time})
 
 

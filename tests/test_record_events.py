@@ -68,10 +68,12 @@ def test_stress_that_varies_without_drops_is_reported() -> None:
     time = 0.02 * np.arange(10_000)
     wave = 5.0 + np.cos(2.0 * np.pi * time / 150.0)
     noise = np.random.default_rng(6).normal(size=len(time))
-    with pytest.warns(NoResultWarning, match="no drop was found, although stress falls by 2.0"):
+    with pytest.warns(
+        NoResultWarning, match="no drop was detected, although stress decreases by 2.0"
+    ):
         found = rsfstudy.events(time=time, shear_stress=wave + 0.02 * noise)
     assert found.sizes["event"] == 0
-    assert "times the smallest drop" in found.attrs["comment"]
+    assert "times the smallest detectable drop" in found.attrs["comment"]
 
 
 def test_events_of_a_record_as_fits_read_it() -> None:
@@ -79,11 +81,11 @@ def test_events_of_a_record_as_fits_read_it() -> None:
     columns = {"time": made.time, "displacement": made.time, "shear_stress": made.stress}
     record = rsfstudy.read_record(columns, normal_stress="8 MPa")
     with pytest.warns(
-        NoResultWarning, match="no faster"
+        NoResultWarning, match="does not increase faster"
     ):  # The displacement is the load point displacement.
         found = rsfstudy.events(record)
     plain = rsfstudy.events(time=made.time, shear_stress=made.stress)
     np.testing.assert_allclose(found.static_stress_drop, plain.static_stress_drop, rtol=1e-6)
     assert found.static_stress_drop.attrs["units"] == "MPa"
-    with pytest.raises(InvalidValue, match="is no record"):
+    with pytest.raises(InvalidValue, match="is not a record"):
         rsfstudy.events([1.0, 2.0])

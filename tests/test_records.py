@@ -90,7 +90,7 @@ def test_headings_that_may_mean_the_same_are_refused(key: str, other: str, one: 
     right = MOVED if key == "displacement" else NORMAL
     scale = {"normal_stress": 1e6}.get(key, 1.0)
     arrays |= {other: 2.0 * right, one: right}
-    with pytest.raises(InvalidValue, match="may be any of several columns") as refused:
+    with pytest.raises(InvalidValue, match="matches several columns") as refused:
         rsfstudy.read_record(arrays)
     assert other in str(refused.value)
     assert f"--columns '{key}={one}'" in str(refused.value)
@@ -196,7 +196,7 @@ def test_a_binary_file_of_xlook(tmp_path: Path) -> None:
     by_text = {"time": "Time (ms)", "displacement": "LP_Disp (um)", "friction": "mu"}
     plain = rsfstudy.read_record(path, by_text)
     np.testing.assert_allclose(plain.columns["displacement"], bits, rtol=1e-6)
-    with pytest.raises(InvalidValue, match="friction = .1,.: holds 1 samples, and time 4"):
+    with pytest.raises(InvalidValue, match="friction = .1,.: has 1 samples, but time has 4"):
         rsfstudy.read_record(path, {**chosen, "friction": ("rest", "1")})
     with pytest.raises(
         InvalidValue, match="column = 'tau': is not in the table.* Columns can also be"
@@ -233,9 +233,9 @@ def test_slip_is_turned_into_displacement_of_the_load_point(
 
 def test_slip_without_stiffness_is_refused() -> None:
     arrays = {"time": TIME, "slip": MOVED, "friction": 0.6 + 0.0 * TIME}
-    with pytest.raises(InvalidValue, match=r"slip = .*needs a stiffness.*read_record"):
+    with pytest.raises(InvalidValue, match=r"slip = .*requires a stiffness.*read_record"):
         rsfstudy.read_record(arrays)
-    with pytest.raises(InvalidValue, match=r"stiffness = '0.04 MPa/um': needs a normal stress"):
+    with pytest.raises(InvalidValue, match=r"stiffness = '0.04 MPa/um': requires a normal stress"):
         rsfstudy.read_record(arrays, stiffness="0.04 MPa/um")
     for wrong in (-1.0, 0.0, "0 1/um"):
         with pytest.raises(InvalidValue, match=r"stiffness = .*must be positive"):

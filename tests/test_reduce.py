@@ -32,7 +32,11 @@ from rsfstudy.study.claims import Claim, build_verdict_table
 
 X = np.array([0.25, 0.5, 1.0, 2.0, 4.0])
 FIT = ProportionalFit(
-    name="zeta", of="critical_velocity_ratio", on="a_over_b_minus_a", minus=1.0, within=(0.25, 1.0)
+    name="zeta",
+    of="critical_velocity_ratio",
+    on="a_over_b_minus_a",
+    intercept=1.0,
+    within=(0.25, 1.0),
 )
 
 
@@ -201,13 +205,13 @@ def claim(**fields) -> Claim:
 def test_verdicts(relation, value, verdict):
     table = build_verdict_table(lattice(np.full(5, value)), [claim(relation=relation)], {})
     assert table.verdict[0] == verdict
-    assert table.moved[0] == (verdict != "reproduced")
+    assert table.verdict_changed[0] == (verdict != "reproduced")
 
 
 def test_an_expected_difference_does_not_move():
-    off = [claim(published=3.0, expected="differs", because="a misprint")]
-    assert not build_verdict_table(lattice(np.full(5, 2.0)), off, {}).moved[0]
-    assert build_verdict_table(lattice(np.full(5, 3.0)), off, {}).moved[0]
+    off = [claim(published=3.0, expected="differs", difference_reason="a misprint")]
+    assert not build_verdict_table(lattice(np.full(5, 2.0)), off, {}).verdict_changed[0]
+    assert build_verdict_table(lattice(np.full(5, 3.0)), off, {}).verdict_changed[0]
 
 
 PENDING = lattice(np.full(5, 2.0), np.full(5, Status.PENDING))
@@ -228,12 +232,12 @@ PENDING = lattice(np.full(5, 2.0), np.full(5, Status.PENDING))
          {"variable": "zeta", "where": {}, "published": 1.0},
          {"b_over_a": [2.0]}, "not applicable"),
     ],
-    ids=["dimensions", "no place", "scene", "axis", "not known yet", "reduced", "changed axis"],
+    ids=["dimensions", "not a point", "scene", "axis", "not known yet", "reduced", "changed axis"],
 )  # fmt: skip
 def test_where_claims_apply(dataset, of, overrides, verdict):
     table = build_verdict_table(dataset, [claim(**of)], overrides)
     assert table.verdict[0] == verdict
-    assert table.moved[0] == (verdict in ("differs", "undecided"))
+    assert table.verdict_changed[0] == (verdict in ("differs", "undecided"))
 
 
 # ---- boundaries, levels, closed forms, paths ----------------------------------------------------
@@ -392,7 +396,7 @@ def test_over_a_closed_form():
     np.testing.assert_allclose(result.over_closed_form, 1.0 + X, rtol=1e-14)
     assert "Gu et al. (1984)" in result.over.attrs["comment"]
     assert "over" not in form(dataset.drop_vars("b_over_a"))
-    with pytest.raises(InvalidValue, match="is no closed form"):
+    with pytest.raises(InvalidValue, match="is not a closed-form solution"):
         ClosedFormRatio(name="over", of="critical_velocity_ratio", form="net_weakenin")
 
 

@@ -153,7 +153,7 @@ def test_published_curves_pass_to_the_last_place_that_is_written(number):
     ran = call_main("verify", RSFMODEL / name, "--problem", number, "--columns", columns)
     assert (ran.returncode, ran.stderr) == (0, "")
     count = len(of(number).quantities)
-    assert ran.stdout.count("to the last place that is written") == count
+    assert ran.stdout.count("all written decimal places") == count
     assert f"1 problem of 24, {7 if number == 4 else 8} digits" in ran.stdout
 
 
@@ -164,7 +164,7 @@ def test_published_curves_pass_to_the_last_place_that_is_written(number):
         (
             2,
             lambda told, _p: {"slip_rate": told["slip_rate"] * 1e6},
-            "slip_rate is 1e+06 times the known answer. With that undone, 1",
+            "slip_rate is 1e+06 times the known answer. With this convention corrected, 1",
         ),
         (
             12,
@@ -172,7 +172,7 @@ def test_published_curves_pass_to_the_last_place_that_is_written(number):
                 "friction": told["friction"]
                 + p.radiation_damping * told["slip_rate"] / p.rig.normal_stress
             },
-            "friction is that of the spring",
+            "friction is computed from the spring stress",
         ),
     ],
 )
@@ -187,12 +187,12 @@ def test_conventions_of_what_is_told_explain_a_difference(number, wrong, explana
 @pytest.mark.parametrize(
     ("number", "changes", "explanation"),
     [
-        (12, {"radiation_damping": "9e6 Pa s/m"}, "damping is twice as much"),
-        (13, {"radiation_damping": "9e6 Pa s/m"}, "damping is twice as much"),
-        (12, {"theta": "100 s"}, "theta_0 is D_c/V_*, and not as stated"),
+        (12, {"radiation_damping": "9e6 Pa s/m"}, "damping is twice as large"),
+        (13, {"radiation_damping": "9e6 Pa s/m"}, "damping is twice as large"),
+        (12, {"theta": "100 s"}, "theta_0 is D_c/V_* instead of the given value"),
         (12, {"theta": "1e5 s"}, "theta_0 is D_c/V(0)"),
-        (11, {"regularised": False}, "a logarithm for arcsinh"),
-        (15, {"alpha": 0.0}, "alpha is left out"),
+        (11, {"regularised": False}, "a logarithm instead of arcsinh"),
+        (15, {"alpha": 0.0}, "alpha is omitted"),
         (5, {"law": "slip"}, "the law is the slip law"),
     ],
 )
@@ -217,7 +217,10 @@ def test_conventions_of_the_problem_explain_a_difference(number, changes, explan
 @pytest.mark.parametrize(
     ("wrong", "explanation"),
     [
-        (lambda rate: -rate, "growth_rate has the opposite sign. With that undone, 12.0 digits"),
+        (
+            lambda rate: -rate,
+            "growth_rate has the opposite sign. With this convention corrected, 12.0 digits",
+        ),
         (lambda rate: rate / (2.0 * math.pi), "growth_rate is 1/(2 pi) times the known answer"),
         # A factor combined with an offset would explain any value.
         (lambda rate: 1.7 * rate, "no common difference of conventions explains the disagreement"),
@@ -271,7 +274,9 @@ def test_where_they_part_is_told(tmp_path):
     rate[25:] *= 1.001
     ran = call_main("verify", filed(tmp_path / "01.csv", 1, slip_rate=rate))
     said = " ".join(ran.stdout.split())
-    pattern = r"slip_rate 3\.0 digits, fewest at time = [234]\d s; they part at time = 25 s"
+    pattern = (
+        r"slip_rate 3\.0 digits, lowest agreement at time = [234]\d s; they part at time = 25 s"
+    )
     assert re.search(pattern, said)
     assert "no common difference of conventions explains the disagreement" in said
     assert "0 problems of 24" in said
@@ -330,12 +335,12 @@ def test_shear_stress_beside_what_is_asked_for_is_left_alone(tmp_path):
 def test_zeros_agree_in_nothing_and_overflows_are_refused(tmp_path):
     zeros = np.zeros(len(of(1).times))
     ran = call_main("verify", filed(tmp_path / "01.csv", 1, friction=zeros))
-    assert re.search(r"friction +0\.0 digits, fewest at", ran.stdout)
+    assert re.search(r"friction +0\.0 digits, lowest agreement at", ran.stdout)
     assert ran.returncode == 1
     huge = filed(tmp_path / "01.csv", 1, slip_rate=zeros + 400.0)
     huge.write_text(huge.read_text().replace("slip_rate (m/s)", "log10_slip_rate (1)"))
     ran = call_main("verify", huge)
-    said = "line 2, column 3: log10_slip_rate = 400.0: must be a number, of 100 at most"
+    said = "line 2, column 3: log10_slip_rate = 400.0: must be a number of at most 100"
     assert (ran.returncode, said in " ".join(ran.stderr.split())) == (2, True)
     ran = call_main("verify", huge, "--digits", "nan")
     assert (ran.returncode, "--digits = nan" in ran.stderr) == (2, True)
@@ -363,12 +368,15 @@ def test_what_is_no_answer_is_refused(spoil, error, tmp_path):
 def test_files_and_problems_that_are_not_there_are_said_so():
     """Missing files and unknown problems have different exit statuses."""
     ran = call_main("verify", "nowhere.csv", "--problem", "1", "--columns", "time=t (s)")
-    assert (ran.returncode, "there is no file nowhere.csv" in ran.stderr) == (1, True)
+    assert (ran.returncode, "the file nowhere.csv does not exist" in ran.stderr) == (1, True)
     ran = call_main("verify", "nowhere.csv")
-    assert (ran.returncode, "problem = 'no': is none" in ran.stderr) == (2, True)
+    assert (ran.returncode, "problem = 'no': is not the number of a problem" in ran.stderr) == (
+        2,
+        True,
+    )
 
 
-# ---- problems of one's own -----------------------------------------------------------------------
+# ---- user-defined problems ----------------------------------------------------------------------
 #: A scene of another code, with all values in SI units.
 STEP = """
 title = "Velocity step of another code"
@@ -423,7 +431,7 @@ def test_a_problem_of_ones_own(text, tmp_path):
     file = write(tmp_path / "mine.csv", problem.column_headings, told)
     ran = call_main("verify", file, "--problem", path)
     assert (ran.returncode, ran.stderr) == (0, "")
-    assert re.search(r"1 problem of one's own, (8|9|10|11|12) digits", ran.stdout)
+    assert re.search(r"1 user-defined problem, (8|9|10|11|12) digits", ran.stdout)
     given = {"slip_rate": rows[0]["slip_rate"] * 1.01}
     spoilt = [[{**row, **given}[name] for row in rows] for name in problem.column_names]
     assert (
@@ -437,21 +445,21 @@ def test_a_problem_of_ones_own(text, tmp_path):
 @pytest.mark.parametrize(
     ("old", "new", "error"),
     [
-        ("a = 0.01\n", "", "must state a"),
-        ('theta = "4 s"', "", "must state slip_rate and theta"),
-        ('"4 s"', '["4 s", "5 s"]', "must state 1, one for each b"),
+        ("a = 0.01\n", "", "must contain a"),
+        ('theta = "4 s"', "", "must contain slip_rate and theta"),
+        ('"4 s"', '["4 s", "5 s"]', "must contain 1 values, one for each b"),
         ("times = [1, 2, 5, 10, 20, 50]", "", "must list the times"),
         ('"slowness"', '"sloth"', "is unknown"),
         ("[1, 2, 5,", "[2, 1, 5,", "must increase"),
-        ("[1, 2, 5,", '["one", 2, 5,', "must be a number, not a text"),
-        ('"slowness"', "5", "law = 5: must be a text, not a whole number"),
+        ("[1, 2, 5,", '["one", 2, 5,', "must be a number (got a string)"),
+        ('"slowness"', "5", "law = 5: must be a string (got a whole number)"),
         ('["friction", "slip_rate", "theta"]', "[]", "must list at least one quantity"),
         ("a = 0.01", "a = 0", "a = 0: must be positive"),
         ("times =", "digits = 99\ntimes =", "digits = 99: must lie between 1 and 15"),
         ("times =", "number = 1\ntimes =", "key = 'number': is unknown"),
-        ("[[loading]]", "[loading]", "must be a list, not a table"),
-        ('"slowness"', '"two_slip_states"', "must state b_2"),
-        ("mu_star", "phi = 60.0\nmu_star", "has no meaning beside phi"),
+        ("[[loading]]", "[loading]", "must be a list (got a table)"),
+        ('"slowness"', '"two_slip_states"', "must contain b_2"),
+        ("mu_star", "phi = 60.0\nmu_star", "has no meaning with phi"),
     ],
 )
 def test_what_is_no_problem_is_refused(old, new, error, tmp_path):
@@ -506,7 +514,7 @@ def test_the_example_passes_a_third_with_plain_scipy(tmp_path):
     again = call_main("problems", place)
     assert (again.returncode, " ".join(again.stderr.split())[-42:]) == (
         2,
-        "there already. Name a new one: nothing is replaced."[-42:],
+        "there already. Choose a new directory, because existing files are not replaced."[-42:],
     )
 
 

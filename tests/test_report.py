@@ -131,7 +131,7 @@ def test_it_tells_verdicts_failures_and_what_cannot_be_read(written):
     place, ran, text = written
     said = " ".join(" ".join(Page(text).texts).split())
     assert "1 reproduced" in said
-    assert "1 integration_failed, C1 moved" in said
+    assert "1 integration_failed, verdict of C1 changed" in said
     assert "differs, expected reproduced" in said
     assert "rsfstudy rerun 'failed here.nc' --cell law=slip --cell b_over_a=2.0" in said
     assert r"</p><script>alert(1)</script> & \x1b[31m" in said  # Markup in messages is escaped.
@@ -145,7 +145,7 @@ def test_it_tells_verdicts_failures_and_what_cannot_be_read(written):
 
 
 def test_python_names_the_page_and_refuses_what_is_none(tmp_path):
-    with pytest.raises(DataError, match="holds no results"):
+    with pytest.raises(DataError, match="contains no results"):
         rsfstudy.report(tmp_path)
     motion = rsfstudy.simulate(
         Scene(load_velocity_ratio=2.0, normal_stress="constant"), duration=0.1
@@ -155,14 +155,14 @@ def test_python_names_the_page_and_refuses_what_is_none(tmp_path):
     page = rsfstudy.report(tmp_path / "in", tmp_path / "all.html")
     assert page == tmp_path / "all.html"
     assert 'href="in/one.nc"' in page.read_text()
-    with pytest.raises(InvalidValue, match=r"ends in \.html"):
+    with pytest.raises(InvalidValue, match=r"suffix \.html"):
         rsfstudy.report(tmp_path / "in", tmp_path / "all.txt")
     assert rsfstudy.report(tmp_path / "in", page) == page  # A report can be overwritten.
     page.write_text("<!DOCTYPE html><p>mine</p>")
-    with pytest.raises(InvalidValue, match="is there already, and no report"):
+    with pytest.raises(InvalidValue, match="already exists and is not a report"):
         rsfstudy.report(tmp_path / "in", page)
     assert "mine" in page.read_text()
-    with pytest.raises(InvalidValue, match="is no directory"):
+    with pytest.raises(InvalidValue, match="is not a directory"):
         rsfstudy.report(tmp_path / "nowhere")
 
 
@@ -187,7 +187,10 @@ def test_it_tells_answers_that_are_none_and_draws_what_is_in_other_units(tmp_pat
     text = rsfstudy.report(tmp_path).read_text()
     assert ' yellow">3 locked<' in text
     assert ' yellow">no limit cycle<' in text
-    assert "no figure: there is no motion, and nothing to draw. no_limit_cycle: " in text
+    assert (
+        "no figure: the dataset contains no motion, so there is nothing to draw. no_limit_cycle: "
+        in text
+    )
     with plots.style_context():
         wide = f"--inches: {_style.figure_size(2, 1)[0]:.3g}"
     assert [about["style"] for about in Page(text).all("img")] == [wide] * 3

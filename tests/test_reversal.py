@@ -153,5 +153,5 @@ def test_stress_turns_first_where_slip_back_is_as_fast_as_the_load_point():
 def test_a_motion_that_slips_back_says_so():
     hold = protocol([{"velocity": -1.0, "duration": 100.0}, {"velocity": 0.0}])
     scene = Scene(**CONSTANT, stiffness=0.02, regularised=True, loading=hold)
-    with pytest.warns(IncompleteWarning, match="shear stress has gone to -"):
+    with pytest.warns(IncompleteWarning, match="the shear stress has changed to -"):
         assert simulate(scene).attrs["status"] == "shear_stress_reversed"

@@ -113,7 +113,9 @@ def test_a_script_that_workers_would_run_again_is_told_what_to_write(call, tmp_p
     ran = subprocess.run(words, capture_output=True, text=True, check=False, timeout=HANG_TIMEOUT)
     line = len(script.read_text().splitlines())
     assert ran.returncode == 1
-    assert f"worker processes import script.py, and line {line} would run in each" in ran.stderr
+    assert (
+        f"worker processes import script.py, so line {line} would run again in each" in ran.stderr
+    )
     assert 'below `if __name__ == "__main__":`' in ran.stderr
     assert ran.stderr.count("Traceback") == 1
 
@@ -198,7 +200,7 @@ def test_processes_that_are_lost_are_started_anew(monkeypatch, tmp_path):
 
     def mapper(task, batches):
         if lost:
-            raise RunError("the Dask scheduler is lost")
+            raise RunError("the connection to the Dask scheduler is lost")
         yield from worker_pool.compute_serially(task, batches)
 
     def start(_processes, file):

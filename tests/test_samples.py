@@ -92,7 +92,7 @@ def test_the_first_samples_are_a_sample_still():
     assert not whole.with_(a=0.012).axes[0].sampling_info
     with pytest.raises(InvalidValue, match="sample = 16.0: .* from 0 to 15"):
         whole.with_(sample=16)
-    with pytest.raises(InvalidValue, match="a = .*all of its points take one value"):
+    with pytest.raises(InvalidValue, match="a = .*must be a single value for all points"):
         whole.with_(a=[0.01, 0.02])
 
 
@@ -213,11 +213,14 @@ def test_a_sample_beyond_what_is_meaningful_is_told_before_work_starts(monkeypat
     rows = sampled.axes[1].rows
     by_a = sum(row["a"] <= 0.0 for row in rows)
     lost = sum(row["a"] <= 0.0 or row["mu_star"] <= 0.0 for row in rows)
-    told = rf"^{lost} of 64 points of the axis sample \({lost / 64:.2g}\) make no .*a in {by_a}"
+    told = rf"^{lost} of 64 points of the axis sample \(fraction {lost / 64:.2g}\) give invalid "
+    told += rf"scenes because of a \({by_a}\)"
     with pytest.raises(InvalidValue, match=told):
         run(sampled)
     lengths = Axis.samples({"slip_distance": norm(1.0, 1.0)}, 8, 1, units={"slip_distance": "um"})
-    with pytest.raises(InvalidValue, match=r"slip_distance = .*positive, and \d of 8 are not"):
+    with pytest.raises(
+        InvalidValue, match=r"slip_distance = .*positive \(\d of 8 values are not\)"
+    ):
         study(lengths, base=RIG.scene(a=0.01, b_over_a=1.5), rig=RIG)
 
 
@@ -278,7 +281,7 @@ def test_the_error_of_a_standard_deviation_is_honest_of_few_samples(n):
     assert 0.98 < float(found["sd_stderr"].mean()) / np.sqrt(1.0 - c4**2) < 1.2
     pair = apply_reductions(measured(values[:3, :2]), (StandardDeviation("sd", "y"),))
     assert np.isnan([pair["sd"], pair["sd_stderr"]]).all()
-    assert pair["sd"].attrs["refused"] == "needs 3 samples with a number"
+    assert pair["sd"].attrs["refused"] == "requires at least 3 samples with a value"
 
 
 def test_failed_samples_are_refused_and_shares_tell_of_them():
@@ -314,11 +317,11 @@ def test_a_run_warns_of_what_reductions_refuse():
 def test_too_few_samples_for_a_quantile():
     found = apply_reductions(measured(np.arange(18.0)), (Quantile("q", "y", level=0.05),))
     assert np.isnan(found["q"])
-    assert found["q"].attrs["refused"] == "needs 19 samples with a number"
+    assert found["q"].attrs["refused"] == "requires at least 19 samples with a value"
     for level in (1.0, "half"):
         with pytest.raises(InvalidValue, match=f"level = .*{level}.*: must be between 0 and 1"):
             Quantile("q", "y", level=level)
-    with pytest.raises(InvalidValue, match="over = 'draw': is no dimension of y"):
+    with pytest.raises(InvalidValue, match="over = 'draw': is not a dimension of y"):
         apply_reductions(measured(np.arange(18.0)), (Mean("m", "y", over="draw"),))
 
 
@@ -373,7 +376,7 @@ def test_sobol_indices_of_a_function_that_has_them_in_closed_form():
         "total": np.array([alone + crossed, second, crossed]) / variance,
     }
     for order, values in exact.items():
-        low, high = (found[f"share_{order}_{end}"] for end in ("low", "high"))
+        low, high = (found[f"share_{order}_{end}"] for end in ("ci_low", "ci_high"))
         assert ((low <= values) & (values <= high)).all()
         assert float((high - low).max()) < 0.3
         np.testing.assert_allclose(found[f"share_{order}"], values, atol=0.05)
@@ -386,14 +389,14 @@ def test_sobol_indices_are_refused():
     found = apply_reductions(lost, of)
     count = int(lost["y"].isnull().sum())
     assert np.isnan(found["share_total"]).all()
-    why = f"{count} of 320 cells have no number, and the indices need all: narrower distributions"
+    why = f"{count} of 320 cells have no value, but the indices require all cells"
     assert found["share_total"].attrs["refused"].startswith(why)
     whole = saltelli(lambda x, y, z: x, 64)
     for part in (whole.isel(draw=slice(0, 310)), whole.isel(draw=slice(0, 15))):
         with pytest.raises(InvalidValue, match="over = 'draw': was not drawn for Sobol indices"):
             apply_reductions(part, of)
     apply_reductions(whole.isel(draw=slice(0, 160)), of)  # 32 points are a valid sample.
-    with pytest.raises(InvalidValue, match="over = 'sample': is no dimension of y"):
+    with pytest.raises(InvalidValue, match="over = 'sample': is not a dimension of y"):
         apply_reductions(whole, (SobolIndices("share", "y"),))
 
 

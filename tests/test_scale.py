@@ -145,7 +145,9 @@ def test_a_store_is_not_decoded_by_what_ours_are_not(codec, tmp_path):
     about = json.loads(file.read_text())
     about["codecs"].append({"name": codec, "configuration": {}})
     file.write_text(json.dumps(about))
-    with pytest.raises(DataError, match=f"message is coded by '{codec}', which may run code"):
+    with pytest.raises(
+        DataError, match=f"message uses the codec '{codec}', which could run arbitrary code"
+    ):
         rsfstudy.open(tmp_path / "small.zarr")
 
 

@@ -76,14 +76,14 @@ def test_verdicts_show_what_moved_and_are_a_table_of_pandas():
     assert shown[2][5] == "differs, expected reproduced"
     lines = repr(found).splitlines()
     assert [re.split(r"\s{2,}", line) for line in lines] == [
-        ["id", "claim", "published", "ours", "tolerance", "verdict"],
+        ["id", "claim", "published", "computed", "tolerance", "verdict"],
         ["C1", "x < y", "2", "2.05", "0.1", "reproduced"],
-        ["C2", "x < y", "3", "2.05", "0.1", "differs, moved"],
+        ["C2", "x < y", "3", "2.05", "0.1", "differs, unexpected"],
     ]
     long = found.assign(claim="longer than a line " * 9)
     assert max(map(len, repr(VerdictTable(long)).splitlines())) <= 100
-    assert type(found[found.moved]) is pd.DataFrame
-    assert found[found.moved]["id"].tolist() == ["C2"]
+    assert type(found[found.verdict_changed]) is pd.DataFrame
+    assert found[found.verdict_changed]["id"].tolist() == ["C2"]
 
 
 @pytest.mark.parametrize(
@@ -117,7 +117,7 @@ def test_the_accessor_shows_numbers_and_verdicts():
     assert "11 claims not checked: no published values for overrides or other units" in few
     done = run(declared, rtol=1e-3)
     shown = rows(done.rsf._repr_html_())
-    assert ["id", "claim", "published", "ours", "tolerance and reason", "verdict"] in shown
+    assert ["id", "claim", "published", "computed", "tolerance and reason", "verdict"] in shown
     values = {
         f"{value:.8g}" for value in done[rebuild_from_file.find_primary_output(done)].values.flat
     }
@@ -215,8 +215,8 @@ def test_a_large_lattice_is_thinned(map_of_stiffness, tmp_path, monkeypatch):
     said = told_of(map_of_stiffness, tmp_path, monkeypatch)
     caption = "critical stiffness of steady sliding, in sigma_*/D_c (24 of 202 cells, "
     assert (
-        f"{caption}12 of 101 b_over_a, from first to last; rsfstudy export --csv writes all)"
-        in " ".join(said.split())
+        f"{caption}12 of 101 b_over_a, from first to last; to write all cells, use rsfstudy "
+        "export --csv)" in " ".join(said.split())
     )
     lines = [line.split() for line in said.splitlines()]
     laws = ("slip", "slowness")

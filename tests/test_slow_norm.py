@@ -29,7 +29,9 @@ STUDY = Study(
     measure=Triggered(),
     accuracy=Accuracy(1e-3),
 )
-SLOW = "the instability norm 0.0005 is a slip rate of 3.14 V_*, only 3.14 times that of the load"
+SLOW = (
+    "the instability norm 0.0005 corresponds to a slip rate of 3.14 V_*, which is only 3.14 times"
+)
 
 
 def test_a_norm_may_be_a_slip_rate():

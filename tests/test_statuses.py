@@ -43,7 +43,7 @@ LOAD_HELD = {"load_velocity_ratio": 0.0}
 #: Measures and scenes, with the expected status and message.
 ENDS = [
     (UP, {"instability_norm": 5e-9}, Status.NORM_BELOW_LOADING_RATE,
-     "whose norm is 9.31e-09: give instability_norm="),
+     "because its norm is 9.31e-09. Pass a value of instability_norm="),
     (UP, {"stiffness_ratio": 0.8}, Status.UNSTABLE_AT_ANY_STEP, ""),
     (UP, {"inertia": True, "instability_norm": 1e3}, Status.NORM_UNREACHABLE, ""),
     (CriticalStep(of="displacement_step", direction="down"), {}, Status.STABLE_FOR_ALL_STEPS, ""),
@@ -86,7 +86,7 @@ ENDS = [
     (StepResponse(), {"load_velocity_ratio": 20.0}, Status.SLIP_RATE_UNBOUNDED, ""),
     (Triggered(), {"load_velocity_ratio": 1e5, "instability_norm": 5e-4},
      Status.NORM_BELOW_LOADING_RATE, ""),
-    (Healing(), {"stiffness_ratio": 3.0}, Status.NO_STEP, "the load point"),
+    (Healing(), {"stiffness_ratio": 3.0}, Status.NO_STEP, "no hold"),
     (Healing(), {"oscillation_amplitude": 0.1}, Status.NO_STEP, ""),
     (VelocityStep(), {"stiffness_ratio": 3.0}, Status.NO_STEP, ""),
     *((VelocityStep(step_number=n), {"hold_time": 10.0}, Status.NOT_APPLICABLE, "")
@@ -98,18 +98,19 @@ ENDS = [
     (NormalStressResponse(), {**WAVES, "stiffness_ratio": 1.1, "oscillation_amplitude": 0.1},
      Status.SLIP_RATE_UNBOUNDED, ""),
     (NormalStressTransient(), {**STEP, "normal_stress_step": 0.0}, Status.NO_STEP, "not change"),
-    (NormalStressTransient(), {**STEP, **LOAD_HELD}, Status.NOT_APPLICABLE, "not move on at V_"),
+    (NormalStressTransient(), {**STEP, **LOAD_HELD}, Status.NOT_APPLICABLE,
+     "load point velocity is not V_"),
     (NormalStressTransient(), {**STEP, "displacement_step": 0.1}, Status.NOT_APPLICABLE,
-     "does not move on at V_"),
+     "load point velocity is not V_"),
     (NormalStressTransient(), {**STEP, "normal_stress": "variable", "phi": 60.0},
-     Status.NOT_APPLICABLE, "follows shear stress"),
+     Status.NOT_APPLICABLE, "depends on shear stress"),
     (NormalStressTransient(), {**STEP, "fluid": "dilatant"}, Status.NOT_APPLICABLE,
-     "follows shear stress or pore pressure"),
+     "depends on shear stress or pore pressure"),
     (NormalStressTransient(), {**STEP, "stiffness_ratio": 2.0}, Status.NOT_APPLICABLE,
      "loading or unloading"),
     *(
         (Triggers(), {"stiffness_ratio": 0.5, **fields}, Status.NOT_APPLICABLE,
-         "no one effective friction")
+         "no unique effective friction")
         for fields in (CONSTANT, {"normal_stress": "imposed", "fluid": "dilatant"},
                        {"normal_stress": "imposed", "law": "composite"})
     ),

@@ -119,7 +119,7 @@ def test_no_steady_state_below_the_slowest_rate():
     assert steady_state.steady_sliding(scene, slowest + 1e-6) is not None
     assert steady_state.steady_sliding(scene, slowest - 1e-6) is None
     assert math.isnan(stability.critical_stiffness(scene, slowest - 1.0))
-    with pytest.raises(ValueError, match="no steady sliding"):
+    with pytest.raises(ValueError, match="steady sliding does not exist"):
         stability.linear_growth_rates(scene, slowest - 1.0)
     assert steady_state.min_steady_log_slip_rate(Scene(normal_stress="constant")) == -math.inf
 

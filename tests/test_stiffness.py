@@ -39,7 +39,7 @@ def test_one_of_them_sets_the_spring():
 
 
 def test_without_rate_weakening_stiffness_is_given_by_itself():
-    with pytest.raises(InvalidValue, match="must exceed 1.*give stiffness itself"):
+    with pytest.raises(InvalidValue, match="must exceed 1.*Pass stiffness instead"):
         Scene(b_over_a=0.8)
     scene = Scene(**STRENGTHENING)
     assert scene.critical_stiffness == 0.0

@@ -46,7 +46,7 @@ def test_every_cell_is_answered(result):
 def test_every_verdict_is_the_expected_one(result):
     table = rsfstudy.check(result[0])
     assert len(table) == len(reduced_study(result[1].stem).claims)
-    assert not table.moved.any(), table.to_string()
+    assert not table.verdict_changed.any(), table.to_string()
     assert not (table.verdict == "not applicable").any()
 
 
@@ -93,10 +93,13 @@ def called_for(claim, study, dataset) -> float:
     The tolerance is the maximum of ten times the difference, ten times the numerical error,
     the requested accuracy, and the rounding error.
     """
-    second = claim.minus_variable or claim.variable
-    places = [(claim.variable, claim.where), *([(second, claim.minus)] if claim.minus else [])]
+    second = claim.baseline_variable or claim.variable
+    places = [
+        (claim.variable, claim.where),
+        *([(second, claim.baseline)] if claim.baseline else []),
+    ]
     errors = [
-        replace(claim, variable=f"{name}_error", where=where, minus={}).verdict(dataset)[0]
+        replace(claim, variable=f"{name}_error", where=where, baseline={}).verdict(dataset)[0]
         for name, where in places
     ]
     return max(

@@ -37,8 +37,8 @@ def written(tmp_path, text: str) -> str:
 @pytest.mark.parametrize(
     ("text", "complaint"),
     [
-        ("study = 1", "declares no study"),
-        ("", "declares no study"),
+        ("study = 1", "does not define a study"),
+        ("", "does not define a study"),
         ("x = 1\nx +", "line 2: invalid syntax"),
         ("\n\n1 / 0", "raises ZeroDivisionError, line 3: division by zero"),
         ("from rsfstudy import Scene\nScene(alfa=1)", "line 2: field = 'alfa'"),
@@ -55,7 +55,9 @@ def test_what_is_wrong_with_a_file_is_told(tmp_path, text, complaint):
 def test_a_file_that_is_named_without_its_suffix_is_told(tmp_path, monkeypatch):
     written(tmp_path, DECLARATION)
     monkeypatch.chdir(tmp_path)
-    with pytest.raises(InvalidValue, match="There is a file mine.py here: name it mine.py"):
+    with pytest.raises(
+        InvalidValue, match="To load the file in the current directory, write mine.py"
+    ):
         study_loader.load_study("mine")
 
 
@@ -64,7 +66,7 @@ def test_a_file_may_have_helpers_beside_it_and_not_the_name_of_a_named_study(tmp
     helped = "from my_angles import angles\n" + DECLARATION.replace("[55, 65]", "angles")
     assert study_loader.load_study(written(tmp_path, helped)).size == 2
     taken = DECLARATION.replace('"mine"', '"stress_drop"')
-    with pytest.raises(InvalidValue, match="the name of a named study"):
+    with pytest.raises(InvalidValue, match="the name of a study of rsfstudy"):
         study_loader.load_study(written(tmp_path, taken))
 
 

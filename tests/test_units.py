@@ -43,7 +43,9 @@ def test_usual_units(text, units, value):
 
 def test_other_units_need_pint(monkeypatch):
     monkeypatch.setitem(sys.modules, "pint", None)
-    with pytest.raises(InvalidValue, match=r"known here. Install pint .*units.*or give a number"):
+    with pytest.raises(
+        InvalidValue, match=r"the library pint. Install pint .*units.*or pass a number"
+    ):
         convert_to_si("normal_stress", "725 psi", "Pa")
 
 
@@ -52,9 +54,9 @@ def test_quantities_of_pint():
     assert convert_to_si("x", "725 psi", "Pa") == pytest.approx(725 * 6894.757293168361, rel=1e-12)
     assert convert_to_si("x", registry.Quantity(3.0, "MPa/um"), "Pa/m") == pytest.approx(3e12)
     assert convert_to_si("x", "1 furlong/fortnight", "m/s") == pytest.approx(1.663e-4, rel=1e-3)
-    with pytest.raises(InvalidValue, match="another kind than m"):
+    with pytest.raises(InvalidValue, match="incompatible with m"):
         convert_to_si("x", registry.Quantity(3.0, "MPa"), "m")
-    with pytest.raises(InvalidValue, match="pint does not know.*Write it as in"):
+    with pytest.raises(InvalidValue, match="pint does not know.*Write, for example,"):
         convert_to_si("x", "3 bananas", "m")
 
 
@@ -189,7 +191,9 @@ def test_long_texts_are_read_in_linear_time(tmp_path):
     path, blanks = tmp_path / "test.csv", " " * 50_000
     for header in (f"velocity ({blanks}x", f"velocity{blanks}x", f"{blanks}velocity (um/s{blanks}"):
         path.write_text(f"{header}\n1\n")
-        with pytest.raises(InvalidValue, match="at most 200 char|has 1 fields|names no column"):
+        with pytest.raises(
+            InvalidValue, match="at most 200 char|has 1 fields|is not a column name"
+        ):
             read_protocol(path, RIG)
     for text in (f"5 Pa{blanks}!", "1" * 50_000 + "!", "5 " + "m" * 50_000 + "!"):
         assert read(text) is None

@@ -120,7 +120,7 @@ def test_a_law_that_holds_a_number_stays_one_of_numbers():
 
     An example is V_0/V_* = 1 + zeta a/(b - a).
     """
-    made = apply_reductions(lattice(), (ProportionalFit("zeta", OF, on="number", minus=1.0),))
+    made = apply_reductions(lattice(), (ProportionalFit("zeta", OF, on="number", intercept=1.0),))
     assert "scale" not in made["zeta"].attrs | made["zeta_misfit"].attrs
     np.testing.assert_array_equal(convert_to_display_units(made)["zeta"], made["zeta"])
 
@@ -143,7 +143,11 @@ def test_cells_of_several_scales_make_a_number_that_says_so(kind, across):
     }
     made = apply_reductions(lattice(**scales), (kind,))
     assert "scale" not in made["r"].attrs
-    assert made["r"].attrs["comment"].endswith("; of cells in units of D_c, which varies")
+    assert (
+        made["r"]
+        .attrs["comment"]
+        .endswith("; combines cells in units of D_c, which varies between the cells")
+    )
     np.testing.assert_array_equal(convert_to_display_units(made)["r"], made["r"])
     # Along the other dimension, each result has a single scale.
     other = {"law": "x", "x": "law"}[across]

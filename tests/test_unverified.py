@@ -87,7 +87,7 @@ def test_an_error_is_held_to_a_hundred_times_what_was_asked(rtol, relative_to, s
     assert outcome.status is status
     assert outcome.values["known"] == 2.0
     assert outcome.message.startswith("as it is")
-    text = f"known = 2 is known to 0.01, and {rtol:.2g} was asked for"
+    text = f"known = 2 has an error estimate of 0.01, but {rtol:.2g} was requested"
     assert (text in outcome.message) == (status is Status.UNVERIFIED)
 
 

@@ -76,7 +76,7 @@ def test_a_reduction_that_returns_no_dataset_is_refused():
 @pytest.mark.parametrize(
     ("kind", "wrong", "meant"),
     [
-        (ProportionalFit, {"name": "z", "of": "x", "minu": 1.0}, "minus"),
+        (ProportionalFit, {"name": "z", "of": "x", "intercep": 1.0}, "intercept"),
         (Largest, {"name": "z", "of": "x", "off": "x"}, "of"),
         (CriticalStep, {"directions": "up"}, "direction"),
         (Axis, {"dimension": "a", "values": [1.0], "unit": {}}, "units"),
@@ -223,7 +223,7 @@ def test_a_motion_with_radiation_damping_says_what_its_stress_leaves_out():
     damped = rsfstudy.simulate(STEPPED.with_(load_velocity_ratio=2.0, radiation_damping=0.01))
     plain = rsfstudy.simulate(STEPPED.with_(load_velocity_ratio=2.0))
     for name in ("shear_stress", "friction_coefficient"):
-        assert "less the radiation damping stress at V_star" in damped[name].attrs["long_name"]
+        assert "minus the radiation damping stress at V_star" in damped[name].attrs["long_name"]
         assert "damping" not in plain[name].attrs["long_name"]
     # Both stresses are equal in steady sliding at V_*, and differ by eta (V - V_*) otherwise.
     rate = 10.0**damped.log10_slip_rate

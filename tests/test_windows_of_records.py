@@ -46,7 +46,7 @@ def test_a_window_begins_where_friction_has_become_straight() -> None:
         assert abs(deviation_in_stderrs(fit, name, EXACT_PARAMETERS[name])) < 3.5, name
     assert float(fit.mu_star) == pytest.approx(0.6, abs=1e-3)
     assert 80.0 < float(fit.window_begins) < 260.0
-    assert "friction is not a straight line before" in str(fit.message.values)
+    assert "earlier friction is not a straight line" in str(fit.message.values)
 
 
 @pytest.mark.parametrize("rho", [0.0, 0.9])
@@ -70,8 +70,8 @@ def test_stated_extents_that_are_cut_are_reported() -> None:
     fit = rsfstudy.fit(record, **OPTIONS, before="400 um", after="500 um").squeeze()
     assert Status.labels_by_code()[int(fit.status)] == "ok"
     message = str(fit.message.values)
-    assert "before= is cut from 400 to 300 um" in message
-    assert "after= is cut from 500 to 179 um by the end of the record" in message
+    assert "before= is reduced from 400 to 300 um" in message
+    assert "after= is reduced from 500 to 179 um because of the end of the record" in message
     whole = rsfstudy.fit(record, **OPTIONS, before="200 um", after="150 um").squeeze()
     assert "cut" not in str(whole.message.values)
 
@@ -80,7 +80,7 @@ def test_a_load_point_that_is_set_to_zero_is_named() -> None:
     record = run_in(depth=0.0)
     moved = record.columns["displacement"] - np.where(record.time > 155.0, 250.0, 0.0)
     reset = rsfstudy.read_record({**record.columns, "displacement": moved})
-    with pytest.raises(InvalidValue, match=r"falls back .* at 155\S* s.*record\.window"):
+    with pytest.raises(InvalidValue, match=r"decreases suddenly at 155\S* s.*record\.window"):
         rsfstudy.fit(reset, **OPTIONS)
 
 
@@ -89,4 +89,4 @@ def test_negative_friction_is_refused_with_the_remedy() -> None:
     negative = rsfstudy.read_record({**record.columns, "friction": -record.columns["friction"]})
     fit = rsfstudy.fit(negative, **OPTIONS).squeeze()
     assert Status.labels_by_code()[int(fit.status)] == "not_applicable"
-    assert "reverse it with a scale of -1" in str(fit.message.values)
+    assert "write a scale of -1" in str(fit.message.values)

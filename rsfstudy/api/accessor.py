@@ -15,6 +15,7 @@ from xarray.backends import BackendEntrypoint
 from rsfstudy._deprecation import add_former_member_names
 from rsfstudy.error_boundary import error_boundary
 from rsfstudy.errors import DataError
+from rsfstudy.former_data_names import rename_former_variables
 
 # Other modules are imported inside the methods, because xarray imports this module even if it opens
 # a file that rsfstudy has not written.
@@ -27,9 +28,9 @@ if TYPE_CHECKING:
     from rsfstudy.study import Study
 
 _NOT_AN_RSFSTUDY_DATASET_MESSAGE = (
-    "the dataset is not of rsfstudy: it has neither the attribute 'scene' nor 'declaration'. "
-    "Take it from rsfstudy.simulate, critical_step, limit_cycle, run or open, or from a file of "
-    "theirs, with its attributes."
+    "the dataset was not created by rsfstudy, because it has neither the attribute 'scene' nor "
+    "the attribute 'declaration'. Use a dataset from rsfstudy.simulate, critical_step, "
+    "limit_cycle, run or open, or from one of their files, and keep its attributes."
 )
 
 
@@ -62,7 +63,7 @@ class DatasetAccessor:
         dataset : xarray.Dataset
             Dataset to access.
         """
-        self._dataset = dataset
+        self._dataset = rename_former_variables(dataset)
 
     @error_boundary
     def _repr_html_(self) -> str:
@@ -259,7 +260,7 @@ class DatasetAccessor:
         from rsfstudy.api import study_runs
 
         self._require_study()
-        self._require_all_cells_present("claims are held against")
+        self._require_all_cells_present("claims are checked against")
         return study_runs.check(self._dataset)
 
     @error_boundary
@@ -340,7 +341,10 @@ class DatasetAccessor:
         from rsfstudy.api.motion_events import find_motion_events
 
         if self._is_study:
-            raise DataError("the dataset is of a study: events are told of a motion of one scene")
+            raise DataError(
+                "the dataset contains the results of a study, but events require the "
+                "motion of one scene"
+            )
         return find_motion_events(self._dataset, slip_rate, lambda: self.scene)
 
     @error_boundary
@@ -372,7 +376,10 @@ class DatasetAccessor:
         from rsfstudy.api.healing_tables import measure_motion_holds
 
         if self._is_study:
-            raise DataError("the dataset is of a study: holds are measured in a motion")
+            raise DataError(
+                "the dataset contains the results of a study, but holds require the "
+                "motion of one scene"
+            )
         return measure_motion_holds(self._dataset)
 
     @error_boundary
@@ -421,7 +428,7 @@ class DatasetAccessor:
 
         least = convert_to_si("stick_slip_from", stick_slip_from, "m/s")
         if "slip_mode" not in self._dataset:
-            raise DataError("slip_mode is not there: the dataset is of no limit cycles")
+            raise DataError("slip_mode is missing, because the dataset contains no limit cycles")
         there = self._dataset if "max_slip_rate" in self._dataset else self.to_si()
         peak = there["max_slip_rate"]
         fast = (
@@ -570,15 +577,17 @@ class DatasetAccessor:
         selected = [name for name in axes if name not in self._dataset["status"].dims]
         if selected:
             text = (
-                f"{requested_action} all results of a study, and of these {', '.join(selected)} "
-                "is selected"
+                f"{requested_action} all results of a study, but {', '.join(selected)} has been "
+                "selected"
             )
-            raise DataError(f"{text}. Ask the dataset as it was opened.")
+            raise DataError(f"{text}. Use the complete dataset, without a selection.")
 
     def _require_study(self) -> None:
         """Raise ``DataError`` if the dataset is not from a study."""
         if not self._is_study:
-            raise DataError("the dataset is of one scene: no study made it. Ask for its scene.")
+            raise DataError(
+                "the dataset belongs to a single scene and not to a study. Use dataset.rsf.scene."
+            )
 
 
 class Backend(BackendEntrypoint):
@@ -588,7 +597,7 @@ class Backend(BackendEntrypoint):
     ``rsfstudy.open``. xarray registers the accessor ``.rsf`` when it loads the backend.
     """
 
-    description = "Results of rsfstudy, checked when they are opened"
+    description = "Results of rsfstudy, which are checked when the file is opened"
     open_dataset_parameters = ("filename_or_obj", "drop_variables")
 
     def open_dataset(  # type: ignore[override]  # files are read completely

@@ -66,19 +66,22 @@ def rerun_and_compare_motion(motion: xr.Dataset) -> pd.DataFrame:
         requested times, or if the motion has units but no rig.
     """
     about = motion.attrs
-    if "duration" not in about or about.get("told") != "as it moves":
+    times = about.get("output_times", about.get("told"))  # Older files have the attribute told.
+    if "duration" not in about or times not in ("all time steps", "as it moves"):
         title, made = about.get("title", "untitled"), about.get("history", "").rpartition(" ")[2]
         call = f"{made if made.startswith('rsfstudy.') else 'rsfstudy.simulate'}(dataset.rsf.scene"
-        if "told" in about:
-            title, call = f"{title}, told {about['told']}", f"{call}, times=..."
+        if times is not None:
+            title, call = f"{title}, output at {times}", f"{call}, times=..."
         raise DataError(
-            "rerun computes again results of a study, and motions of rsfstudy.simulate (`rsfstudy "
-            f"simulate`) without times; this is of one scene ({title}). With the options that made "
-            f"it, {call}, rtol={about.get('rtol', '...')}) computes it anew."
+            "rerun can recompute the results of a study, and motions of rsfstudy.simulate "
+            f"(`rsfstudy simulate`) without times. The dataset belongs to one scene ({title}). To "
+            f"recompute it, call {call}, rtol={about.get('rtol', '...')}) with the original "
+            "options."
         )
     if DatasetUnits.SCALES_ATTRIBUTE in about and "laboratory" not in about:
         raise DataError(
-            "it is in units of no rig: keep motions as simulate gives them, or by a rig"
+            "the motion was converted to units without a rig. Store motions as simulate returns "
+            "them, or convert them with a rig"
         )
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")

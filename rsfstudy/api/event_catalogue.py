@@ -73,7 +73,7 @@ def build_event_catalogue(
         of_error = {"long_name": f"error estimate of {words}", **units}
         dataset[f"{name}_error"] = "event", errors, of_error
     flags = {
-        "long_name": "what of the event the record leaves out",
+        "long_name": "part of the event that is missing in the record",
         "flag_values": np.arange(len(_MEANINGS_OF_EVENT_TRUNCATION_FLAGS), dtype=np.int8),
         "flag_meanings": " ".join(_MEANINGS_OF_EVENT_TRUNCATION_FLAGS),
     }
@@ -251,21 +251,23 @@ def events(
     moves = None if moved is None else _check_record_samples("displacement", moved)
     for name, samples in (("shear_stress", stress), ("displacement", moves)):
         if samples is not None and len(samples) != len(times):
-            rule = f"must hold as many samples as time, which holds {len(times)}"
+            rule = f"must have as many samples as time ({len(times)})"
             raise InvalidValue(name, len(samples), rule)
     if not (np.diff(times) > 0.0).all():
         late = int(np.argmax(np.diff(times) <= 0.0)) + 1
-        rule = f"must increase, and does not at sample {late}"
+        rule = f"must increase, but does not increase at sample {late}"
         if read.has_time:
             raise InvalidValue("time", times[late], rule)
-        remedy = "A record without time needs a displacement that increases. Try thin=10."
+        remedy = "A record without time requires an increasing displacement. Try thin=10."
         raise InvalidValue("displacement", times[late], rule, remedy=remedy)
     direction = _find_stress_sign(stress, sign)
     stress = direction * stress
     about = {name: dict(getattr(values, "attrs", {})) for name, values in given.items()}
     if stiffness is not None:
         if moves is None:
-            raise InvalidValue("stiffness", stiffness, "needs the displacement of the load point")
+            raise InvalidValue(
+                "stiffness", stiffness, "requires the displacement of the load point"
+            )
         moves = moves - stress / _parse_stiffness(stiffness, about)
     rows, detection, is_slip = read_drops(
         times, stress, moves, check_slip=stiffness is None and not read.is_slip
@@ -274,11 +276,17 @@ def events(
         row[0].update(dict.fromkeys(_QUANTITIES_REQUIRING_DISPLACEMENT, (math.nan, math.nan)))
     dataset = build_event_catalogue(rows, about | {"slip": about["displacement"]})
     if rows and not is_slip:
-        why = "displacement moves no faster during the drops of stress than before and after"
+        why = (
+            "displacement does not increase faster during the stress drops than before and "
+            "after them"
+        )
         dataset["slip"].attrs["comment"] = why
-        remedy = "Give stiffness='0.05 MPa/um', that of the rig, or math.inf if it is the fault's"
+        remedy = (
+            "Pass stiffness='0.05 MPa/um' (the stiffness of the rig), or math.inf if "
+            "displacement is the slip of the fault"
+        )
         warnings.warn(
-            f"slip has no number: {why}. {remedy}",
+            f"slip is NaN, because {why}. {remedy}",
             NoResultWarning,
             stacklevel=find_stacklevel_of_user_code(),
         )
@@ -288,7 +296,7 @@ def events(
         detection.noise_sd,
         {"long_name": "standard deviation of the noise", **units},
     )
-    words = "smallest drop of shear stress that is missed once in 1,000 records"
+    words = "smallest detectable drop of shear stress (missed once in 1,000 records)"
     dataset["smallest_drop"] = ((), detection.detectable_drop, {"long_name": words, **units})
     dataset.attrs["sign_of_shear_stress"] = int(direction)
     if read.processing:
@@ -307,8 +315,13 @@ def _parse_stiffness(stiffness: Any, variable_attributes: Mapping[str, Mapping[A
             variable_attributes[n].get("units") for n in ("shear_stress", "displacement")
         )
         if not (stress and length):
-            remedy = "Give it as a number in the units of the record."
-            raise InvalidValue("stiffness", stiffness, "the record states no units", remedy=remedy)
+            remedy = "Pass a number in the units of the record."
+            raise InvalidValue(
+                "stiffness",
+                stiffness,
+                "cannot be converted, because the record has no units",
+                remedy=remedy,
+            )
         ours = compute_conversion_factor("shear_stress", stress, "Pa") / compute_conversion_factor(
             "displacement", length, "m"
         )
@@ -327,12 +340,12 @@ def _check_record_samples(variable_name: str, values: Any) -> np.ndarray:
     except (TypeError, ValueError) as error:
         raise InvalidValue(variable_name, values, "must be numbers") from error
     if samples.ndim != 1 or len(samples) < MIN_SAMPLES:
-        rule = f"must be a list of {MIN_SAMPLES} samples at least, which tell the noise"
+        rule = f"must have at least {MIN_SAMPLES} samples, from which the noise is estimated"
         raise InvalidValue(variable_name, samples.shape, rule)
     if not np.isfinite(samples).all():
         late = int(np.argmin(np.isfinite(samples)))
         raise InvalidValue(
-            variable_name, samples[late], f"must be finite, and is not at sample {late}"
+            variable_name, samples[late], f"must be finite, but is not finite at sample {late}"
         )
     return samples
 
@@ -340,9 +353,9 @@ def _check_record_samples(variable_name: str, values: Any) -> np.ndarray:
 def _name_displacement(dataset: xr.Dataset) -> xr.Dataset:
     """Rename the times of a catalogue if the record contains no time."""
     words = {
-        "time": "displacement at which the event begins",
+        "time": "displacement at the beginning of the event",
         "duration": "displacement during the event",
-        "interval": "displacement since the event before began",
+        "interval": "displacement since the beginning of the previous event",
     }
     for name, text in words.items():
         dataset[name].attrs["long_name"] = text
@@ -377,11 +390,11 @@ def _warn_if_stress_falls_without_drop(detection: Detection) -> str:
     ):
         return ""
     text = (
-        f"no drop was found, although stress falls by {detection.max_decrease:.4g} in all, "
-        f"{detection.max_decrease / detection.detectable_drop:.0f} times the smallest drop "
-        f"that can be detected ({detection.detectable_drop:.4g}): it falls for most of the record "
-        "or too slowly"
+        f"no drop was detected, although stress decreases by {detection.max_decrease:.4g} in "
+        f"total, which is {detection.max_decrease / detection.detectable_drop:.0f} times the "
+        f"smallest detectable drop ({detection.detectable_drop:.4g}). The decrease is too slow or "
+        "lasts for most of the record"
     )
-    remedy = "Select a part of the record, or pass sign=-1 if shear stress is negative"
+    remedy = "Select a part of the record, or pass sign=-1 if the shear stress is negative"
     warnings.warn(f"{text}. {remedy}.", NoResultWarning, stacklevel=find_stacklevel_of_user_code())
     return text

@@ -58,7 +58,8 @@ DEFAULT_FREE_PARAMETERS = (
 #: sentence for error messages about these parameters.
 _EVOLUTION_EFFECT_PARAMETERS = ("b", "b1", "b2")
 _REMEDY_FOR_WRONG_STATE_PARAMETERS = (
-    "One state has b; two states have b1, b2, slip_distance and slip_distance_2."
+    "Laws with one state have the parameter b. Laws with two states have b1, b2, slip_distance "
+    "and slip_distance_2."
 )
 #: Value of the argument ``stiffness`` that requests a measurement of the stiffness in the records.
 STIFFNESS_FROM_RECORD = "from record"
@@ -201,14 +202,16 @@ def fit(
         steps or records. Lengths are in um and velocities in um/s.
 
         - For each parameter, ``<name>`` is the best-fit value, ``<name>_stderr`` is the standard
-          error, ``<name>_low`` and ``<name>_high`` are the ends of the 95 % confidence interval,
-          and ``<name>_error`` is the numerical error. ``a_minus_b`` is the difference of a and b.
+          error, ``<name>_ci_low`` and ``<name>_ci_high`` are the ends of the 95 % confidence
+          interval, and ``<name>_error`` is the numerical error. ``a_minus_b`` is the difference of
+          a and b.
         - ``covariance`` and ``correlation`` have the dimensions ``parameter`` and
           ``other_parameter``.
-        - The noise is described by ``noise_size``, ``noise_order``, ``effective_samples`` and
-          ``whiteness``, the p-value of a test for remaining autocorrelation.
-        - ``fitted_friction``, ``residual`` and ``innovation`` (whitened residual) have the
-          dimension ``row`` and are NaN outside the window.
+        - The noise is described by ``noise_sd`` (standard deviation), ``noise_order``, ``n_eff``
+          (effective sample size) and ``p_value``, the p-value of a test for remaining
+          autocorrelation. ``aic`` is the Akaike information criterion.
+        - ``fitted_friction``, ``residual`` and ``whitened_residual`` have the dimension ``row`` and
+          are NaN outside the window.
         - ``status`` is ``not_identified`` if the record does not constrain a parameter, and
           ``errors_not_valid`` if only the standard errors are invalid. ``message`` contains the
           reason.
@@ -259,12 +262,17 @@ def fit(
     """
     if "law" in scene:
         remedy = f"Write laws={np.atleast_1d(scene['law']).tolist()}."
-        raise InvalidValue("law", scene["law"], "is given as laws, each fitted", remedy=remedy)
+        raise InvalidValue(
+            "law",
+            scene["law"],
+            "cannot be set, because one fit is computed for each law",
+            remedy=remedy,
+        )
     records: tuple[Any, ...] = (record,) if isinstance(record, Record | str) else tuple(record)
     for one in records:
         if not isinstance(one, Record):
-            remedy = "Make one by rsfstudy.read_record."
-            raise InvalidValue("record", one, "is no record", remedy=remedy)
+            remedy = "Read a record with rsfstudy.read_record."
+            raise InvalidValue("record", one, "is not a record", remedy=remedy)
     records = tuple(_add_normal_stress_of_rig(one, rig) for one in records)
     numbers = _select_step_numbers(records, steps)
     guess = _guess_slip_distance(records[0], rig, numbers[0], slip_distance)
@@ -347,13 +355,13 @@ def _select_step_numbers(records: Sequence[Record], steps: Sequence[int]) -> tup
         check_displacement_was_not_reset(record)
     count = max(len(one.loading_steps) for one in records)
     if not count:
-        remedy = "State them: record.with_steps([(begins, ends, before, after)])."
+        remedy = "Specify the steps: record.with_steps([(begins, ends, before, after)])."
         rule = "has no step of load point velocity or normal stress"
         raise InvalidValue("record", records[0].name, rule, remedy=remedy)
     numbers = tuple(steps) or tuple(range(1, count + 1))
     for number in numbers:
         if not 1 <= number <= count:
-            rule = f"is not the number of a step: the record has {count}"
+            rule = f"is not the number of a step. The number of steps in the record is {count}"
             raise InvalidValue("steps", number, rule)
         for record in records:
             for step in record.loading_steps[number - 1 : number]:
@@ -403,9 +411,9 @@ def _initial_stiffness(
             return 0.0, float(rig.stiffness * 1e-6), 0.0
         if "stiffness" in free_parameters:
             return 1e-3, 0.0, 0.0
-        remedy = "Give --stiffness (stiffness=), as in '1.6e-3 /um', "
-        remedy += "or look for it: --free (free=)."
-        raise InvalidValue("stiffness", None, "is needed, and not stated", remedy=remedy)
+        remedy = "Pass --stiffness (stiffness=), for example '1.6e-3 /um', "
+        remedy += "or fit the stiffness: --free (free=)."
+        raise InvalidValue("stiffness", None, "is required", remedy=remedy)
     over_stress = isinstance(stated_stiffness, Real) or Rig.is_stiffness_over_stress(
         stated_stiffness
     )
@@ -421,8 +429,10 @@ def _initial_stiffness(
         return found, 0.0, 0.0
     for record in records:
         if "normal_stress" not in record.columns:
-            remedy = "Give --normal-stress (normal_stress of read_record), or stiffness in 1/um."
-            rule = f"needs a normal stress, and {record.name} has none"
+            remedy = (
+                "Pass --normal-stress (normal_stress of read_record), or the stiffness in 1/um."
+            )
+            rule = f"requires a normal stress, but {record.name} has no normal stress"
             raise InvalidValue("stiffness", stated_stiffness, rule, remedy=remedy)
     return 0.0, found, 0.0
 
@@ -446,9 +456,14 @@ def _measure_stiffness(records: Sequence[Record]) -> tuple[float, float, float]:
     found = np.array([(float(of[name]), float(of[f"{name}_stderr"])) for of in tables])
     found = found[np.isfinite(found).all(axis=1)]
     if not len(found):
-        rule = "needs a portion of the record in which the fault is locked: the reloading after a "
+        rule = (
+            "requires a portion of the record in which the fault is locked: the reloading after a "
+        )
         rule += "hold, an unloading and reloading, or the initial loading"
-        remedy = "Pass the stiffness as a quantity, as in '1.6e-3 1/um', or fit it: --free (free=)."
+        remedy = (
+            "Pass the stiffness as a quantity, for example '1.6e-3 1/um', or fit the "
+            "stiffness: --free (free=)."
+        )
         raise InvalidValue("stiffness", STIFFNESS_FROM_RECORD, rule, remedy=remedy)
     value, stderr = compute_weighted_mean(*found.T)
     return (0.0, value, stderr / value) if stressed else (value, 0.0, stderr / value)
@@ -468,7 +483,7 @@ def _check_normal_stress_is_compressive(
             stress = FitWindow(record, number).mean_normal_stress_before_step
             if not stress > 0.0:
                 rule = f"must be positive before step {number} of {record.name}, in Pa"
-                remedy = "Compression is positive: reverse the sign, as in columns={"
+                remedy = "Compression is positive. To reverse the sign, pass columns={"
                 remedy += "'normal_stress': ('heading', 'MPa', -1.0)}."
                 raise InvalidValue("normal_stress", stress, rule, remedy=remedy)
 
@@ -517,7 +532,7 @@ def _free_parameters(
     shared = tuple(name for name in free if any(name in names for names in own.values()))
     for name in stated_parameters:
         if name not in shared:
-            rule = f"is no parameter with {' or '.join(f'law={law!r}' for law in laws)}"
+            rule = f"is not a parameter with {' or '.join(f'law={law!r}' for law in laws)}"
             remedy = (
                 _REMEDY_FOR_WRONG_STATE_PARAMETERS
                 if name in (*_EVOLUTION_EFFECT_PARAMETERS, "slip_distance_2")
@@ -529,7 +544,7 @@ def _free_parameters(
             {*_EVOLUTION_EFFECT_PARAMETERS} & {*free}
             and not {*_EVOLUTION_EFFECT_PARAMETERS} & {*names}
         ):
-            rule = f"names no {'evolution effect' if names else 'parameter'} of law={law!r}"
+            rule = f"contains no {'evolution effect' if names else 'parameter'} of law={law!r}"
             raise InvalidValue("free", free, rule, remedy=_REMEDY_FOR_WRONG_STATE_PARAMETERS)
     return shared
 
@@ -542,7 +557,7 @@ def _describe_filter(averaging: Any, low_pass: str) -> str:
     """
     if averaging is not None and low_pass:
         remedy = "Pass `averaging=` or `low_pass=`."
-        raise InvalidValue("low_pass", low_pass, "cannot follow an averaging", remedy=remedy)
+        raise InvalidValue("low_pass", low_pass, "cannot be combined with averaging", remedy=remedy)
     if averaging is not None:
         kind, size = MEAN, averaging
         if isinstance(size, str) and size.startswith("trailing "):
@@ -551,7 +566,7 @@ def _describe_filter(averaging: Any, low_pass: str) -> str:
     elif low_pass:
         kind, _, size = str(low_pass).partition(" ")
         if kind not in LOW_PASS_ORDERS:
-            remedy = "Write it as in 'butterworth_2 2 Hz'."
+            remedy = "Pass, for example, 'butterworth_2 2 Hz'."
             choices = [*LOW_PASS_ORDERS]
             raise InvalidValue("low_pass", low_pass, "is unknown", choices=choices, remedy=remedy)
         seconds = convert_to_si("low_pass", size, "1/s")
@@ -570,7 +585,12 @@ def _find_common_filter(records: Sequence[Record], stated_filter: str) -> str:
         return stated_filter
     if stated_filter:
         remedy = "Leave averaging= and low_pass= out, or read the record without filter=."
-        raise InvalidValue("filter", stated_filter, "follows another filter", remedy=remedy)
+        raise InvalidValue(
+            "filter",
+            stated_filter,
+            "cannot be applied, because the record was read with filter=",
+            remedy=remedy,
+        )
     if len({record.filter for record in records}) > 1:
         remedy = "Read all records with the same filter=, or fit them separately."
         raise InvalidValue("filter", sorted(filters), "differs between the records", remedy=remedy)

@@ -22,8 +22,8 @@ def _require_single_fit(dataset: xr.Dataset) -> xr.Dataset:
     """Return the fit of a dataset, or raise ``InvalidValue`` if there are several."""
     found = split_into_single_fits(dataset)
     if len(found) != 1:
-        remedy = "Select one first, as in dataset.sel(law='slip')."
-        raise InvalidValue("dataset", len(found), "holds several fits", remedy=remedy)
+        remedy = "Select a fit first, for example dataset.sel(law='slip')."
+        raise InvalidValue("dataset", len(found), "contains several fits", remedy=remedy)
     return found[0]
 
 
@@ -63,7 +63,9 @@ def sample_parameters(dataset: xr.Dataset, sample_count: int, seed: int = 0) -> 
     covariance = one["covariance"].values[np.ix_(has, has)]
     if not (has.any() and np.isfinite(covariance).all()):
         raise InvalidValue(
-            "dataset", Status.labels_by_code()[int(one["status"])], "has no covariance to draw from"
+            "dataset",
+            Status.labels_by_code()[int(one["status"])],
+            "has no covariance matrix for sampling",
         )
     logs = np.array([name in LOGARITHMIC_PARAMETERS for name in names])
     scales = np.where(logs, at, 1.0)
@@ -146,8 +148,10 @@ def fitted_rig(dataset: xr.Dataset) -> Rig:
     one, slider = _require_single_fit(dataset), fitted_scene(dataset)
     stress = one["normal_stress_before"].item() if "normal_stress_before" in one else math.nan
     if not stress > 0.0:
-        remedy = "Read the record with normal_stress=, or make a rsfstudy.Rig that states it."
-        raise InvalidValue("normal_stress", None, "is not in the record", remedy=remedy)
+        remedy = (
+            "Read the record with normal_stress=, or create a rsfstudy.Rig with the normal stress."
+        )
+        raise InvalidValue("normal_stress", None, "is missing from the record", remedy=remedy)
     velocity = one["velocity_before"].item() * 1e-6
     distance = velocity / slider.reference_rate
     return Rig(

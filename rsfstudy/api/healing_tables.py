@@ -72,10 +72,10 @@ def healing(record: Record | xr.Dataset | str | Path, **reading: Any) -> xr.Data
     elif hasattr(record, "data_vars"):
         table, name = measure_motion_holds(record), "motion"
     else:
-        remedy = "Pass a record of rsfstudy.read_record, the path of its file, or a motion."
-        raise InvalidValue("record", record, "is no record", remedy=remedy)
+        remedy = "Pass a record from rsfstudy.read_record, the path of its file, or a motion."
+        raise InvalidValue("record", record, "is not a record", remedy=remedy)
     if not table.sizes["hold"]:
-        remedy = "If the steps are not detected, state them: record.with_steps([...])."
+        remedy = "If the steps are not detected, specify them: record.with_steps([...])."
         rule = "has no hold of the load point between sliding and reloading"
         raise InvalidValue("record", name, rule, remedy=remedy)
     return table.assign_attrs(provenance_attributes("rsfstudy.healing"))
@@ -101,7 +101,10 @@ def measure_motion_holds(motion: xr.Dataset) -> xr.Dataset:
     """
     for name in ("time", *_MOTION_VARIABLES):
         if name not in motion or motion[name].dims != ("time",):
-            text = "is not there, along time: it is no motion as simulate gives it"
+            text = (
+                "is missing, or does not have the dimension time. The dataset is not a motion "
+                "from simulate"
+            )
             raise DataError(f"{name} {text}")
     time, values = motion["time"].values, np.column_stack([motion[n] for n in _MOTION_VARIABLES])
     rows = InterpolatedMotionRows(time, values, 0.0)

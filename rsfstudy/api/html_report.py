@@ -147,20 +147,20 @@ def write_report(
 
     place = output_directory(directory)
     if place is None or not place.is_dir():
-        raise InvalidValue("directory", str(directory), "is no directory")
+        raise InvalidValue("directory", str(directory), "is not a directory")
     page = place / "report.html" if output is None else output_directory(output)
     if page is None or page.suffix != ".html" or page.is_dir():
-        raise InvalidValue("output", str(output), "must be a file that ends in .html")
+        raise InvalidValue("output", str(output), "must be a path with the suffix .html")
     check_regular_file("output", page)
     try:
         if page.exists() and _HTML_GENERATOR_META_TAG not in page.read_bytes()[:1000]:
-            remedy = "Choose another output, or move it away first."
+            remedy = "Choose another output, or move the file."
             raise InvalidValue(
-                "output", str(page), "is there already, and no report", remedy=remedy
+                "output", str(page), "already exists and is not a report", remedy=remedy
             )
         files = sorted(file for ending in ("nc", "zarr") for file in place.glob(f"[!.]*.{ending}"))
         if not files:
-            raise DataError(f"{shorten_text(place)} holds no results, which end in .nc or .zarr.")
+            raise DataError(f"{shorten_text(place)} contains no results (.nc or .zarr).")
         found = [_build_section_of_file(file, page.parent) for file in files]
         write_image(_build_page(place, found).encode(), page)
     except OSError as error:
@@ -226,7 +226,7 @@ def _build_section_of_file(results_path: Path, page_directory: Path) -> _ResultS
 
 def _build_section_of_dataset(results_path: Path, dataset: xr.Dataset) -> _ResultSection:
     """Build the section of a dataset."""
-    title = str(dataset.attrs.get("title", "answer for one scene"))
+    title = str(dataset.attrs.get("title", "result for one scene"))
     numbers = dataset_html(dataset)
     # The module uses the accessor without an import, because the accessor imports this module.
     if StoredDataset(dataset).is_of_single_scene:
@@ -243,13 +243,11 @@ def _build_section_of_dataset(results_path: Path, dataset: xr.Dataset) -> _Resul
     about = StoredDataset(dataset).declaration
     parts = [_format_summary_piece_as_html(about.summary)] if about.summary else []
     if about.overrides:
-        parts.append(
-            _html_paragraph(f"Not as declared: {format_overrides(about.overrides)}", "yellow")
-        )
+        parts.append(_html_paragraph(f"Overrides: {format_overrides(about.overrides)}", "yellow"))
     parts += [_format_figure_as_html(results_path, dataset.rsf.plot), numbers]
     verdicts, wrong = summarise_verdicts(dataset, study_runs.check(dataset))
     if undone := count_pending_cells(dataset):
-        wrong.append(f"{undone} cells not computed")
+        wrong.append(f"{undone} cells not yet computed")
     failed = failures_table(dataset, results_path.name)
     if failed.rows:
         lines = _escape("\n".join(row["command"] for row in failed.values))

@@ -65,14 +65,15 @@ def find_motion_events(
     for name in names:
         if name not in motion or motion[name].dims != ("time",):
             raise DataError(
-                f"{name} is not there, along time: it is no motion as simulate gives it"
+                f"{name} is missing, or does not have the dimension time. The dataset is not a "
+                "motion from simulate"
             )
     times, *rest = (np.asarray(motion[name], dtype=float) for name in names)
     if slip_rate is None:
         loads = [segment.load_velocity for segment in scene().parts.loading.segments]
         slip_rate = _EVENT_SLIP_RATE_OVER_LOAD_VELOCITY * max([1.0, *loads])
     if not 0.0 < slip_rate < math.inf:
-        raise InvalidValue("slip_rate", slip_rate, "must be positive and finite, over V_*")
+        raise InvalidValue("slip_rate", slip_rate, "must be positive and finite (in units of V_*)")
     rows = InterpolatedMotionRows(times, np.column_stack(rest), math.log10(slip_rate))
     found = [rows.measure_event(*ends) for ends in rows.iterate_event_row_spans()]
     about = {name: motion[name].attrs for name in names}

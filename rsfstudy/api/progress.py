@@ -108,4 +108,7 @@ def compile_scenes_with_notice(
         Engine.compilation_log.total_compilation_seconds - before.total_compilation_seconds,
     )
     if programs:
-        console.print(f"compiled the equations ({programs} programs) in {seconds:.0f} s, once")
+        console.print(
+            f"compiled the equations ({programs} programs) in {seconds:.0f} s; later "
+            "runs use the cache"
+        )

@@ -49,9 +49,12 @@ def check_displacement_was_not_reset(record: Record) -> None:
         _MIN_DISPLACEMENT_RESET_OVER_EXTENT * np.ptp(moved),
     )
     if record.specified_steps is None and back:
-        rule = f"falls back between two rows at {time[row + 1]:g} s in {record.name}, as a load "
-        rule += "point does that is set to zero again"
-        remedy = f"Fit its parts, as in record.window({time[0]:g}, {time[row]:g}) or by reading "
+        rule = f"decreases suddenly at {time[row + 1]:g} s in {record.name}, because the load "
+        rule += "point displacement was probably reset to zero"
+        remedy = (
+            f"Fit the parts separately, for example record.window({time[0]:g}, "
+            f"{time[row]:g}), or read the record with "
+        )
         remedy += f"begin='{time[row + 1]:g} s' (--begin), or add the offset to the later rows."
         raise InvalidValue("displacement", f"{jumps[row]:.4g} um", rule, remedy=remedy)
 
@@ -91,9 +94,14 @@ def check_displacement_is_not_slip(
             moved = record.columns["displacement"][rows]
             if displacement_is_slip(record.time[rows], moved, shortening[rows]):
                 rule = f"is the slip of the fault at step {number}, because displacement plus "
-                rule += "friction over stiffness moves at constant velocities, as a load point does"
-                remedy = "Name the column slip: --columns 'slip=HEADING (um)' (columns=), and pass "
-                remedy += "the stiffness to read_record, too."
+                rule += (
+                    "friction divided by stiffness increases at constant velocities, like a "
+                    "load point"
+                )
+                remedy = (
+                    "Rename the column to slip: --columns 'slip=HEADING (um)' (columns=), and pass "
+                )
+                remedy += "the stiffness to read_record."
                 raise InvalidValue("displacement", record.name, rule, remedy=remedy)
 
 
@@ -116,8 +124,8 @@ def check_step_can_be_fitted(record: Record, step_number: int, step: LoadingStep
     """
     time, moved = record.time, record.columns["displacement"]
     if not time[0] < step.start <= step.end < time[-1]:
-        rule = f"is stated outside of {record.name}, {time[0]:g} to {time[-1]:g} s"
-        remedy = "State steps in s, by the clock of the record: record.with_steps([...])."
+        rule = f"is outside {record.name}, which lasts from {time[0]:g} to {time[-1]:g} s"
+        remedy = "Specify the times of steps in s, as in the record: record.with_steps([...])."
         raise InvalidValue(f"step {step_number}", tuple(step), rule, remedy=remedy)
     if min(step.velocity_before, step.velocity_after) < 0.0 or not moved[-1] > np.interp(
         step.end, time, moved
@@ -126,8 +134,8 @@ def check_step_can_be_fitted(record: Record, step_number: int, step: LoadingStep
             f"{step.velocity_before:.4g} um/s before step {step_number}, "
             f"{step.velocity_after:.4g} um/s after it"
         )
-        rule = "must grow: a load point moves forward"
-        remedy = "Reverse its sign, or say which column is which: --columns (columns=)."
+        rule = "must increase, because the load point moves forward"
+        remedy = "Reverse the sign, or select other columns: --columns (columns=)."
         raise InvalidValue("displacement", told, rule, remedy=remedy)
 
 
@@ -157,8 +165,8 @@ def check_normal_stress_changes_for_alpha(
         ]
         by_steps = loading_kind == "steps" and any(step.stress_ratio != 1.0 for step in steps)
         if not by_steps and not (loading_kind == "recorded" and np.ptp(stress) > 0.0):
-            rule = "needs a normal stress that changes: "
-            rule += f"that of {record.name} has no step among those that are fitted"
-            remedy = "Leave alpha out, name a step of normal stress (steps=), or follow the "
+            rule = "requires a normal stress that changes, but the "
+            rule += f"fitted steps of {record.name} do not change the normal stress"
+            remedy = "Remove alpha, select a step of normal stress (steps=), or use the "
             remedy += "recorded normal stress with --loading recorded (loading=)."
             raise InvalidValue("free", "alpha", rule, remedy=remedy)

@@ -72,7 +72,7 @@ def find_results(study_or_file: str | Path, output_path: str | Path | None) -> P
         )
     except OSError as error:
         raise DataError(
-            f"{shorten_text(study_or_file)} cannot be looked for: {error.strerror}"
+            f"cannot search for {shorten_text(study_or_file)}: {error.strerror}"
         ) from error
 
 
@@ -80,19 +80,23 @@ def _result_path_of_study(study_name: str, output_path: Path) -> Path:
     """Return the path of the NetCDF file or Zarr store of a study."""
     file, in_pieces = output_path / f"{study_name}.nc", output_path / f"{study_name}.zarr"
     if file.exists() and in_pieces.exists():
-        raise DataError(f"{file} and {in_pieces} are both there: name one, ending and all.")
+        raise DataError(
+            f"both {file} and {in_pieces} exist. Pass the path of one of them, "
+            "including its suffix."
+        )
     if file.exists() or in_pieces.exists():
         return file if file.exists() else in_pieces
     partial = output_path / f"{study_name}.partial.nc"
     if partial.exists():
         raise DataError(
-            f"{file} does not exist, but {partial} does: run the study again, or name it."
+            f"{file} does not exist, but the incomplete results {partial} exist. Run the study "
+            "again, or pass the path of the incomplete results."
         )
     there = any(file.name.startswith(f"{study_name}.") for file in output_path.glob("*"))
     if not there and study_name not in study_names():
         rule, remedy = (
             f"has no results in {shorten_text(output_path)}",
-            "Results files end in .nc or .zarr.",
+            "Results files have the suffix .nc or .zarr.",
         )
         raise InvalidValue("study", study_name, rule, choices=study_names(), remedy=remedy)
     return file

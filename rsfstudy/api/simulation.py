@@ -44,10 +44,10 @@ _MIN_TIME_ULPS, _MIN_TIME_DIFFERENCE = 4, 1e-290
 #: the last segment of a protocol, in D_c.
 _DEFAULT_DURATION, _DISPLACEMENT_AFTER_PROTOCOL = 50.0, 20.0
 _UNPERTURBED_SCENE_MESSAGE = (
-    "nothing is stepped: the motion is steady sliding at V_*. State load_velocity_ratio, "
+    "the scene has no step, so the slider slides steadily at V_*. Set load_velocity_ratio, "
     "displacement_step, hold_time, velocity_steps, loading or initial_state in the scene."
 )
-_INSTABILITY_TIME_LONG_NAME = "time at which slip rate first passed the instability norm"
+_INSTABILITY_TIME_LONG_NAME = "time at which the slip rate first exceeded the instability norm"
 _INSTABILITY_TIME_QUANTITY = Quantity(
     "instability_time", "$t V_*/D_c$", "1", _INSTABILITY_TIME_LONG_NAME, "D_c/V_*"
 )
@@ -200,7 +200,7 @@ def simulate(
     if extra_positional_arguments:
         remedy = f"Write duration={shorten_text(extra_positional_arguments[0])}, in D_c/V_*."
         raise InvalidValue(
-            "simulate", extra_positional_arguments[0], "is given without a name", remedy=remedy
+            "simulate", extra_positional_arguments[0], "must be passed by name", remedy=remedy
         )
     check_scene(scene)
     since = None if start is None else _read_end_of_motion(start, scene)
@@ -211,7 +211,7 @@ def simulate(
     duration = _loading_duration(scene) - began if duration is None else duration
     known = isinstance(duration, int | float | np.number) and not isinstance(duration, bool)
     if not (known and 0.0 < duration < math.inf):
-        remedy = "It is in D_c/V_*; rig.dimensionless converts units of a rig."
+        remedy = "The unit is D_c/V_*. To convert from units of a rig, use rig.dimensionless."
         raise InvalidValue("duration", duration, "must be positive and finite", remedy=remedy)
     is_alone = integrator is None
     if integrator is None:
@@ -252,7 +252,7 @@ def simulate(
             "status": status.label,
             "message": message,
             "duration": duration,
-            "told": "as it moves" if at is None else "at times that were asked for",
+            "output_times": "all time steps" if at is None else "requested times",
             "rtol": integrator.rtol,
             "budget": integrator.accuracy.budget,
             "engine": integrator.engine,
@@ -273,7 +273,10 @@ def simulate(
             history_samples=_build_loading_history_variable(scene.parts.loading)
         )
     if passed >= 0.0:
-        text = f"from {passed:.9g} D_c/V_* on, with neither mass nor radiation damping: no physics"
+        text = (
+            f"after {passed:.9g} D_c/V_* without inertia or radiation damping, so the motion "
+            "has no physical meaning"
+        )
         dataset[_INSTABILITY_TIME_QUANTITY.name] = (
             (),
             passed,
@@ -281,7 +284,9 @@ def simulate(
         )
         dataset = dataset.assign_attrs({BEYOND_INSTABILITY_NORM_ATTRIBUTE_NAME: text})
         if is_alone:
-            warnings.warn(f"beyond the instability norm {text}", NoResultWarning, stacklevel=3)
+            warnings.warn(
+                f"the slip rate exceeds the instability norm {text}", NoResultWarning, stacklevel=3
+            )
     if status is not Status.OK:
         text = f"the motion ends after {max([0.0, *seen[-1:, 0]]):.6g} of {duration:g} D_c/V_*"
         warnings.warn(f"{text}: {status.label} ({message})", IncompleteWarning, stacklevel=3)
@@ -374,14 +379,15 @@ def motion_variable_attributes(quantity: Quantity, scene: Scene) -> dict[str, An
         quantity.name in _VARIABLES_DERIVED_FROM_SPRING_STRESS
         and scene.dynamics.radiated_stress_slope(0.0)
     ):
-        attributes["long_name"] += " less the radiation damping stress at V_star"
+        attributes["long_name"] += " minus the radiation damping stress at V_star"
     return attributes
 
 
 def _build_state_variable_quantity(state_number: int) -> Quantity:
     """Return the quantity of a single state, for laws with several states."""
     about = (
-        f"state {state_number} of the law, as a part of the friction coefficient, freed of stress"
+        f"contribution of state {state_number} of the law to the friction coefficient, without "
+        "changes due to stress"
     )
     return Quantity(f"state_{state_number}", rf"$\Psi_{{{state_number}}}$", "1", about)
 
@@ -389,11 +395,13 @@ def _build_state_variable_quantity(state_number: int) -> Quantity:
 def _read_end_of_motion(motion: object, scene: Scene) -> Event:
     """Return the state of the slider at the end of a stored motion."""
     if not isinstance(motion, xr.Dataset) or MOTION_END_ATTRIBUTE_NAME not in motion.attrs:
-        remedy = "Give a motion that simulate returned, and that lasted as long as was asked."
-        raise InvalidValue("start", motion, "is no motion with an end", remedy=remedy)
+        remedy = "Pass a motion from simulate that did not end early."
+        raise InvalidValue("start", motion, "is not a complete motion", remedy=remedy)
     if json.loads(motion.attrs["scene"]) != json.loads(json.dumps(scene.describe())):
-        remedy = "Give the scene of the motion itself, motion.rsf.scene."
-        raise InvalidValue("start", motion.attrs["title"], "is of another scene", remedy=remedy)
+        remedy = "Pass the scene of the motion, motion.rsf.scene."
+        raise InvalidValue(
+            "start", motion.attrs["title"], "belongs to another scene", remedy=remedy
+        )
     time, slip, numbers = json.loads(motion.attrs[MOTION_END_ATTRIBUTE_NAME])
     point = MotionPoint._make(tuple(x) if isinstance(x, list) else x for x in numbers)
     return Event(EventKind.END, None, time, slip, point, "", 0, 0.0)
@@ -405,7 +413,7 @@ def _build_loading_history_variable(history: SampledHistory) -> xr.Variable:
     The loading of the scene can be recreated from the variable.
     """
     about = {
-        "long_name": "time, load point velocity, fall and rate of normal stress of the loading",
+        "long_name": "time, load point velocity, decrease and rate of normal stress of the loading",
         "of_stress": int(history.of_stress),
         **({"of_pressure": 1} if history.of_pressure else {}),
     }
@@ -446,7 +454,7 @@ def _check_requested_times(
     if times is None:
         return None
     if duration is not None:
-        raise InvalidValue("duration", duration, "give duration or times, not both")
+        raise InvalidValue("duration", duration, "cannot be combined with times")
     given = np.array(times, dtype=object)
     if not all(isinstance(time, Real) and not isinstance(time, bool) for time in given.flat):
         raise InvalidValue("times", times, "must be numbers, in D_c/V_*")
@@ -512,5 +520,5 @@ def check_scene(value: object) -> None:
         If the object is not a scene.
     """
     if not isinstance(value, Scene):
-        remedy = "Make one, rsfstudy.Scene(...); rsfstudy.run computes studies."
-        raise InvalidValue("scene", value, "is no scene", remedy=remedy)
+        remedy = "Create a scene with rsfstudy.Scene(...). For studies, use rsfstudy.run."
+        raise InvalidValue("scene", value, "is not a scene", remedy=remedy)

@@ -272,7 +272,7 @@ def _measure_scene_to_dataset(
         pass
     elif outcome.status is not Status.OK:
         why = outcome.message or outcome.status.meaning
-        text = f"{measure.name} has no number: {outcome.status.label} ({why})"
+        text = f"{measure.name} has no result: {outcome.status.label} ({why})"
         warnings.warn(text, NoResultWarning, stacklevel=4)
     elif outcome.message:
         warnings.warn(outcome.message, RsfStudyWarning, stacklevel=4)

@@ -82,10 +82,13 @@ def read_stress_record(
     lacking = "shear stress or friction" if not {"shear_stress", "friction"} & {*found} else ""
     lacking = lacking or ("" if {"time", "displacement"} & {*found} else "time or displacement")
     if lacking:
-        remedy = "Say which is which: --columns 'time=t (s),shear_stress=tau (MPa)' (columns=)."
+        remedy = (
+            "Select the columns, for example --columns 'time=t (s),shear_stress=tau (MPa)' "
+            "(columns=)."
+        )
         header = ", ".join(table.headings)[:200]
         raise InvalidValue(
-            "header", header, f"does not name {lacking}", remedy=remedy
+            "header", header, f"has no recognised heading for {lacking}", remedy=remedy
         ).with_location(table.location)
     moved = found.get("slip", found.get("displacement"))
     series = {"time": found.get("time"), "displacement": moved,

@@ -458,9 +458,9 @@ def check(dataset: xr.Dataset | str | Path) -> pd.DataFrame:
     -------
     pandas.DataFrame
         Table with one row per claim. The columns include the published value ``published``, the
-        computed value ``ours``, ``tolerance``, the ``reason`` for the tolerance, ``verdict`` and
-        ``moved``. ``moved`` is True if the verdict differs from the expected verdict. If overrides
-        change the conditions of a claim, the claim does not apply.
+        value ``computed``, ``tolerance``, the ``reason`` for the tolerance, ``verdict`` and
+        ``verdict_changed``, which is True if the verdict differs from the expected verdict. If
+        overrides change the conditions of a claim, the claim does not apply.
 
     Raises
     ------
@@ -575,8 +575,8 @@ def rerun(
     place = output_directory(output)
     if place is not None:
         for taken in place.glob(f"{declared.name}.*"):
-            rule = f"holds {taken.name}, which this would take the place of"
-            raise InvalidValue("output", str(output), rule, remedy="Name another directory.")
+            rule = f"contains {taken.name}, which would be overwritten"
+            raise InvalidValue("output", str(output), rule, remedy="Choose another directory.")
     keeping = OutputOptions(
         output=place,
         fresh=True,
@@ -707,7 +707,7 @@ def recompute_cell(
     """
     declared, number, differs = _find_cell_in_results_file(file, place, study)
     for name, (theirs, ours) in differs.items():
-        text = f"{name}: {theirs} then, {ours} now"
+        text = f"{name}: {theirs} in the file, {ours} now"
         warnings.warn(text, RsfStudyWarning, stacklevel=find_stacklevel_of_user_code())
     scene, changes = declared.cell(number)
     return scene, declared.measure.with_(**changes)(scene, declared.accuracy)

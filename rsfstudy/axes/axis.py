@@ -62,11 +62,13 @@ def check_storable_text(argument_name: str, text: object) -> None:
         If the value is not a string, contains a null character, or cannot be encoded as UTF-8.
     """
     if not isinstance(text, str) or "\0" in text:
-        raise InvalidValue(argument_name, text, "must be a text")
+        raise InvalidValue(argument_name, text, "must be a string")
     try:
         text.encode()
     except UnicodeError as error:
-        raise InvalidValue(argument_name, text, "must be a text that UTF-8 can hold") from error
+        raise InvalidValue(
+            argument_name, text, "must be a string that can be encoded as UTF-8"
+        ) from error
 
 
 def to_plain_value(field_name: str, value: Any) -> Any:
@@ -92,7 +94,7 @@ def to_plain_value(field_name: str, value: Any) -> Any:
     """
     value = SceneFields.normalise_value(field_name, value)
     if isinstance(value, np.ndarray) and value.ndim:
-        raise InvalidValue(field_name, value.tolist(), "must be one number, flag or text")
+        raise InvalidValue(field_name, value.tolist(), "must be a single number, bool or string")
     value = value.item() if isinstance(value, np.generic | np.ndarray) else value
     if not isinstance(value, int) or isinstance(value, bool):
         return value
@@ -164,7 +166,7 @@ class Axis:
     ) -> None:
         """Create an axis from values or points."""
         if not is_variable_name(dimension):
-            rule = "must be named by a Python identifier, its accents composed (NFC)"
+            rule = "must be a Python identifier in Unicode normalisation form NFC"
             raise InvalidValue("axis", dimension, rule)
         labels: tuple[str, ...] | None = None
         if (
@@ -181,7 +183,7 @@ class Axis:
                 raise InvalidValue(dimension, values, "must be a list of values")
             rows = tuple({dimension: to_plain_value(dimension, value)} for value in listed)
             if any(row[dimension] is None for row in rows):
-                raise InvalidValue(dimension, None, "must be a value on an axis")
+                raise InvalidValue(dimension, None, "cannot be a point of an axis")
         beside = ({} if mapping is None else mapping for mapping in (units, sampling_info))
         held = (dimension, rows, labels, *beside)
         for name, value in zip(self.__dataclass_fields__, held, strict=True):
@@ -324,7 +326,7 @@ class Axis:
         for number, row in enumerate(self.rows):
             for name, value in row.items():
                 if not isinstance(value, float | str | bool | None):
-                    raise InvalidValue(name, value, "must be a number, a flag or a text")
+                    raise InvalidValue(name, value, "must be a number, a bool or a string")
                 if isinstance(value, str):
                     check_storable_text(name, value)
                 if isinstance(value, float) and not math.isfinite(value):
@@ -339,7 +341,7 @@ class Axis:
             key = frozenset(row.items())
             if key in seen:
                 value = row.get(self.dimension, dict(row))
-                raise InvalidValue(self.dimension, value, "stands twice on its axis")
+                raise InvalidValue(self.dimension, value, "occurs twice on its axis")
             seen.add(key)
 
     @cached_property
@@ -452,9 +454,11 @@ def _rows_from_points(dimension: str, labelled_points: Mapping[str, Any]) -> tup
     for label, row in rows.items():
         check_storable_text(dimension, label)
         if not label:
-            raise InvalidValue(dimension, label, "must be a text that labels a point")
+            raise InvalidValue(dimension, label, "must be a non-empty string")
         if not isinstance(row, Mapping) or not row:
-            raise InvalidValue(dimension, row, f"must be the fields set at {label!r}")
+            raise InvalidValue(
+                dimension, row, f"must be a mapping of the fields at the point {label!r}"
+            )
     return tuple({n: to_plain_value(n, v) for n, v in row.items()} for row in rows.values())
 
 
@@ -465,10 +469,13 @@ def _rows_from_columns(
     lengths = {name: len(column) for name, column in values_by_field.items()}
     for name, length in lengths.items():
         if not is_variable_name(name) or name == dimension:
-            rule = f"must be named as a field is, and not as the axis, {dimension!r}"
+            rule = (
+                "must be the name of a field, and must differ from the name of the axis, "
+                f"{dimension!r}"
+            )
             raise InvalidValue("column", name, rule)
         if length != max(lengths.values()):
-            raise InvalidValue("columns", lengths, "must be of one length")
+            raise InvalidValue("columns", lengths, "must have the same length")
     made = [
         [to_plain_value(name, value) for value in column]
         for name, column in values_by_field.items()

@@ -100,13 +100,15 @@ def _check_sampling_arguments(
         raise InvalidValue("n", sample_count, f"must be at most {MAX_ITEMS_OF_LIST_ARGUMENT:,}")
     if method in _SOBOL_METHODS and sample_count & (sample_count - 1):
         below = 1 << (int(sample_count).bit_length() - 1)
-        rule = "is no power of two, without which Sobol points are not balanced"
-        remedy = f"Draw {below} or {2 * below}, or by method='latin_hypercube'."
+        rule = "must be a power of two, because other numbers of Sobol points are not balanced"
+        remedy = f"Use n={below} or n={2 * below}, or method='latin_hypercube'."
         raise InvalidValue("n", sample_count, rule, remedy=remedy)
     for name, drawn in distributions.items():
         if not _is_value_with_error(drawn) and _quantile_function(drawn) is None:
-            rule = "is neither a distribution of scipy.stats with its parameters, nor an estimate"
-            raise InvalidValue(name, drawn, rule, remedy="As in scipy.stats.norm(0.01, 0.001).")
+            rule = "must be a frozen distribution of scipy.stats, or a mean value"
+            raise InvalidValue(
+                name, drawn, rule, remedy="Pass, for example, scipy.stats.norm(0.01, 0.001)."
+            )
 
 
 def _compute_sds_and_correlation_matrix(
@@ -117,8 +119,8 @@ def _compute_sds_and_correlation_matrix(
     estimates = [name for name, drawn in distributions.items() if _is_value_with_error(drawn)]
     if covariance is None:
         if estimates:
-            rule = "is an estimate without a variance"
-            remedy = "Give covariance=, or a distribution in its place."
+            rule = "is a mean value without a variance"
+            remedy = "Pass covariance=, or replace the value by a distribution."
             raise InvalidValue(estimates[0], distributions[estimates[0]], rule, remedy=remedy)
         return np.ones(count), np.eye(count)
     try:
@@ -130,17 +132,23 @@ def _compute_sds_and_correlation_matrix(
         raise InvalidValue("covariance", covariance, rule)
     variances = np.diag(given)
     if not np.allclose(given, given.T, rtol=1e-9, atol=0.0) or (variances <= 0.0).any():
-        rule = "must be symmetric, with variances above zero along its diagonal"
+        rule = "must be symmetric with positive variances on the diagonal"
         raise InvalidValue("covariance", given.tolist(), rule)
     deviations = np.sqrt(variances)
     correlation = given / np.outer(deviations, deviations)
     if method == "saltelli" and not np.array_equal(correlation, np.eye(count)):
-        rule = "correlates what is drawn, and Sobol indices are of independent quantities"
-        remedy = "Draw by method='sobol', or draw independent quantities of which fields are made."
+        rule = "contains correlations, but Sobol indices require independent quantities"
+        remedy = (
+            "Use method='sobol', or sample independent quantities and compute the fields "
+            "from them with fields=."
+        )
         raise InvalidValue("covariance", given.tolist(), rule, remedy=remedy)
     lowest = float(np.linalg.eigvalsh(correlation)[0])
     if lowest < -_EIGENVALUE_ROUNDING_ERROR * count:
-        rule = f"is impossible: its correlations have the eigenvalue {lowest:.2g}, below zero"
+        rule = (
+            "is not positive semidefinite, because its correlation matrix has the eigenvalue "
+            f"{lowest:.2g}"
+        )
         raise InvalidValue("covariance", given.tolist(), rule)
     return deviations, correlation
 
@@ -204,7 +212,7 @@ def _compute_quantiles(
         raise InvalidValue(
             quantity_name,
             _describe_distribution(distribution),
-            "has no finite quantiles: look at its parameters",
+            "has quantiles that are not finite. Check its parameters",
         )
     return found
 
@@ -250,7 +258,7 @@ def compute_field_values(
     for name, by in field_sources.items():
         if isinstance(by, str):
             if by not in sampled_values:
-                raise InvalidValue(name, by, "is not drawn", choices=sampled_values)
+                raise InvalidValue(name, by, "is not a sampled quantity", choices=sampled_values)
             found[name] = sampled_values[by]
         else:
             found[name] = _evaluate_field_function(
@@ -267,7 +275,7 @@ def _evaluate_field_function(
         made = np.asarray(field_function(sampled_values)).astype(float, casting="same_kind")
         return np.broadcast_to(made, count)
     except Exception as error:
-        rule = f"gives no number for each sample ({type(error).__name__}: {error})"
+        rule = f"does not return one number per sample ({type(error).__name__}: {error})"
         raise InvalidValue(
             field_name,
             getattr(field_function, "__name__", field_function),
@@ -297,8 +305,8 @@ def read_table_columns_and_units(table: Any) -> tuple[dict[str, Any], dict[str, 
         If the object is not a table, if a column occurs twice, or if units contradict each other.
     """
     if not hasattr(table, "keys") or getattr(table, "ndim", 2) != 2 or not len(table):
-        rule = "is no table of columns"
-        remedy = "Give a mapping of names to lists, a DataFrame, or rsfstudy.read_table(path)."
+        rule = "is not a table with named columns"
+        remedy = "Pass a mapping of names to lists, a DataFrame, or rsfstudy.read_table(path)."
         raise InvalidValue("table", table, rule, remedy=remedy)
     found: dict[str, Any] = {}
     units: dict[str, str] = {}
@@ -309,13 +317,13 @@ def read_table_columns_and_units(table: Any) -> tuple[dict[str, Any], dict[str, 
         stated = stated.get(heading, "") if isinstance(stated, Mapping) else stated
         name, of_heading = split_heading_into_name_and_units(heading) or (heading, "")
         if name in found:
-            raise InvalidValue("column", name, "stands twice in the table")
+            raise InvalidValue("column", name, "occurs twice in the table")
         if stated and of_heading and stated != of_heading:
-            raise InvalidValue("units", stated, f"are not those of the heading, {heading}")
+            raise InvalidValue("units", stated, f"differ from the units in the heading, {heading}")
         values = getattr(column, "values", column)
         values = np.asarray(values) if hasattr(values, "dtype") else values
         if np.ndim(np.asarray(values, dtype=object)) != 1:
-            raise InvalidValue(name, column, "must be one list, of a value for each row")
+            raise InvalidValue(name, column, "must be a list with one value per row")
         found[name], stated = list(values), stated or of_heading
         if stated not in ("", "1"):
             units[name] = stated

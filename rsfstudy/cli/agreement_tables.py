@@ -27,7 +27,7 @@ def build_agreement_table(agreement: pd.DataFrame) -> TextTable:
             "variable": row["variable"],
             "values": str(row["values"]),
             "identical": str(row["identical"]),
-            "beyond errors": format_number_or_dash(row["beyond_errors"], ".0f"),
+            "beyond error estimates": format_number_or_dash(row["beyond_errors"], ".0f"),
             "largest difference": format_number_or_dash(row["largest_difference"], ".3g"),
         }
         for row in agreement.to_dict("records")

@@ -71,7 +71,7 @@ def parse_scene_field_assignments(settings: tuple[str, ...]) -> dict[str, Any]:
     InvalidValue
         If an assignment is malformed or a field is set twice.
     """
-    rule = "must read FIELD=VALUE, as in law=slowness"
+    rule = "must have the form FIELD=VALUE, for example law=slowness"
     given = _parse_each_assignment(settings, lambda text: split_assignment("--set", text, rule))
     return {name: parse_boolean_number_or_text(text) for name, text in given.items()}
 
@@ -182,7 +182,7 @@ def parse_cell_coordinate(text: str) -> tuple[str, str]:
     """
     name, equals, value = text.partition("=")
     if not equals:
-        raise InvalidValue("--cell", text, "must read AXIS=VALUE, as in b_over_a=2")
+        raise InvalidValue("--cell", text, "must have the form AXIS=VALUE, for example b_over_a=2")
     return name, value
 
 
@@ -233,7 +233,7 @@ def parse_column_assignments(text: str | None) -> dict[str, str] | None:
     InvalidValue
         If an assignment is malformed.
     """
-    rule = "must read NAME=HEADING, as in 'time=t (s),friction=mu'"
+    rule = "must have the form NAME=HEADING, for example 'time=t (s),friction=mu'"
     parts = (part for part in (text or "").split(",") if part.strip())
     return dict(split_assignment("--columns", part.strip(), rule) for part in parts) or None
 
@@ -260,7 +260,9 @@ def parse_axis_assignment(text: str, known_labels: Collection[str]) -> tuple[str
     InvalidValue
         If the assignment is malformed or a value in the list is missing.
     """
-    name, values = split_assignment("--set", text, "must read AXIS=VALUES, as in b_over_a=2,3,4")
+    name, values = split_assignment(
+        "--set", text, "must have the form AXIS=VALUES, for example b_over_a=2,3,4"
+    )
     if values in known_labels:
         return name, [values]
     for label in sorted(known_labels, key=len, reverse=True):

@@ -233,5 +233,5 @@ def describe_missing_engine_packages(engine_name: str) -> str:
     except InvalidValue:
         if engine_name != Engine.COMPILED:
             raise
-        return "needs Numba (pip install 'rsfstudy[fast]')"
+        return "requires Numba (pip install 'rsfstudy[fast]')"
     return ""

@@ -218,7 +218,11 @@ budget_option = make_count_option(
 #: Options of the worker pool that computes the cells.
 worker_options = combine_option_decorators(
     make_count_option("--workers", 2, "Number of worker processes on this machine."),
-    click.option("--serial", is_flag=True, help="Compute in this process."),
+    click.option(
+        "--serial",
+        is_flag=True,
+        help="Compute all cells in this process, without worker processes.",
+    ),
     click.option("--scheduler", metavar="ADDRESS", help="Use an existing Dask cluster."),
     click.option(
         "--time-limit",
@@ -368,12 +372,42 @@ EXAMPLE_VALUES_OF_RIG_OPTIONS = {
 }
 
 
-_RIG_OPTION_HELP = "Rig parameter, for example '{}'. A number without units is in SI units."
+#: Meanings of the rig options. The meanings are those of ``Rig.QUANTITIES``, which is not imported
+#: because the import would delay the start of every command.
+MEANINGS_OF_RIG_OPTIONS = {
+    "normal_stress": "normal stress",
+    "slip_distance": "slip distance",
+    "reference_velocity": "velocity of the load point before the test",
+    "stiffness": "stiffness of the machine with its sample",
+    "period": "period of free oscillation",
+    "mass": "mass per area of the fault",
+    "shear_modulus": "shear modulus of the medium",
+    "density": "density of the medium",
+    "thermal_diffusivity": "thermal diffusivity of the fault",
+    "heat_capacity": "volumetric heat capacity of the fault",
+    "shear_zone_width": "width of the shear zone",
+    "reference_temperature": "temperature in steady sliding at the reference velocity",
+    "heat_loss_width": "distance over which heat is conducted away",
+    "direct_activation_energy": "activation energy of the direct effect",
+    "evolution_activation_energy": "activation energy of the evolution effect",
+    "pressurisation_factor": "change of undrained pore pressure per change of temperature",
+    "load_velocity": "load point velocity",
+}
+
+
+def _describe_rig_option(name: str) -> str:
+    """Return the help text of a rig option."""
+    meaning, example = MEANINGS_OF_RIG_OPTIONS[name], EXAMPLE_VALUES_OF_RIG_OPTIONS[name]
+    return (
+        f"Rig parameter: {meaning}, for example '{example}'. A number without units is in SI units."
+    )
+
+
 #: Options that define a rig.
 rig_options = combine_option_decorators(
     *(
-        click.option(f"--{n.replace('_', '-')}", help=_RIG_OPTION_HELP.format(e))
-        for n, e in EXAMPLE_VALUES_OF_RIG_OPTIONS.items()
+        click.option(f"--{name.replace('_', '-')}", help=_describe_rig_option(name))
+        for name in EXAMPLE_VALUES_OF_RIG_OPTIONS
     )
 )
 

@@ -107,7 +107,7 @@ def open_worker_pool(options: CommandOptions, log_path: Path | None = None) -> I
         If the options are contradictory.
     """
     if options.serial and options.scheduler:
-        raise click.UsageError("--serial and --scheduler exclude each other")
+        raise click.UsageError("--serial and --scheduler cannot be combined")
     nowhere = contextlib.nullcontext()
     with nowhere if options.scheduler is None else connect_to_cluster(options.scheduler) as client:
         processes = 0 if options.serial else options.workers

@@ -17,6 +17,7 @@ import xarray as xr
 from rsfstudy import check
 from rsfstudy.cli.printing import print_line, print_pieces
 from rsfstudy.formatting import format_overrides, pluralize
+from rsfstudy.former_data_names import NEW_VERDICT_COLUMNS
 from rsfstudy.reporting import (
     TextTable,
     claims_table,
@@ -120,10 +121,16 @@ def verdicts_to_json(verdicts: pd.DataFrame, study_name: str = "") -> list[dict[
     Returns
     -------
     list of dict
-        One dictionary per claim.
+        One dictionary per claim. In addition to the columns of the table, a dictionary contains the
+        former names of renamed columns, which version 1.0.0 will remove.
     """
     rows = verdicts.drop(columns="number", errors="ignore").to_dict("records")
-    return [{"study": study_name} | {str(key): v for key, v in row.items()} for row in rows]
+    return [
+        {"study": study_name}
+        | {str(key): value for key, value in row.items()}
+        | {former: row[new] for former, new in NEW_VERDICT_COLUMNS.items()}
+        for row in rows
+    ]
 
 
 def print_study_name(results: StudyResults) -> None:
@@ -163,7 +170,7 @@ def print_unexpected_verdicts(verdicts: pd.DataFrame) -> None:
     verdicts : pandas.DataFrame
         Verdicts on the claims.
     """
-    for row in verdicts[verdicts["moved"]].itertuples(index=False):
+    for row in verdicts[verdicts["verdict_changed"]].itertuples(index=False):
         print_line(f"{row.id}: {row.verdict}, expected {row.expected}: {row.claim}", style="red")
 
 

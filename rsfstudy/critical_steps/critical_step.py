@@ -156,7 +156,12 @@ class CriticalStep(Measure):
         if isinstance(self.of, str):
             object.__setattr__(self, "of", QUANTITY_ALIASES.get(self.of, self.of))
         if not isinstance(self.of, str) or self.of not in STEP_FAMILY_BY_QUANTITY:
-            raise InvalidValue("of", self.of, "cannot be stepped", choices=STEP_FAMILY_BY_QUANTITY)
+            raise InvalidValue(
+                "of",
+                self.of,
+                "is not a step that the measure can compute",
+                choices=STEP_FAMILY_BY_QUANTITY,
+            )
         if self.direction not in STEP_DIRECTIONS:
             raise InvalidValue("direction", self.direction, "is unknown", choices=STEP_DIRECTIONS)
 
@@ -224,8 +229,11 @@ class CriticalStep(Measure):
         """
         check_loading_is_single_step(scene)
         if scene.starts_unsteady:
-            rule = "is no steady sliding, from which critical steps start"
-            remedy = "Ask whether the step of a scene triggers by the measure triggered."
+            rule = "differs from steady sliding, but critical steps start from steady sliding"
+            remedy = (
+                "Use the measure triggered, which determines whether the step of a scene "
+                "triggers an instability."
+            )
             raise InvalidValue("initial_state", scene.initial_state, rule, remedy=remedy)
         sign = 1 if self.direction == "up" else -1
         steps = STEP_FAMILY_BY_QUANTITY[self.of](scene, sign)
@@ -245,7 +253,8 @@ class CriticalStep(Measure):
         ):
             return Outcome(
                 Status.UNVERIFIED,
-                message="stiffness is critical to within the accuracy: ask for a smaller rtol",
+                message="the stiffness is equal to the critical stiffness within the accuracy. "
+                "Use a smaller rtol",
             )
         if not scene.critical_stiffness:
             # Perturbations do not grow, so only the step itself can reach the norm.
@@ -327,7 +336,7 @@ class CriticalStep(Measure):
         return Outcome(
             Status.UNVERIFIED,
             self._output_values(step_family),
-            "no bracket within 2 % confirms "
+            "a stable and an unstable step within 2 % could not be found for "
             f"{self.primary_output} = "
             f"{step_family.step_size_to_field_value(boundary.step_size):.9g}",
         )
@@ -373,7 +382,7 @@ class CriticalStep(Measure):
                 if halt.status is Status.WORK_BUDGET_SPENT or stable is None:
                     raise
                 return self._no_critical_step_outcome(
-                    step_family, math.exp(stable), integrator, f", where {halt}"
+                    step_family, math.exp(stable), integrator, f", because {halt}"
                 )
             stable, unstable = unstable, unstable + spacing
         else:
@@ -385,8 +394,8 @@ class CriticalStep(Measure):
                     step_family,
                     unstable_value=step_family.step_size_to_field_value(step_family.min_size),
                 ),
-                "already a step to "
-                f"{step_family.step_size_to_field_value(step_family.min_size):.6g} is unstable",
+                f"even a step to {step_family.step_size_to_field_value(step_family.min_size):.6g} "
+                "is unstable",
             )
         return self._refine_size_bracket(step_family, (stable, unstable), integrator)
 
@@ -426,7 +435,7 @@ class CriticalStep(Measure):
                 raise
             if unstable - stable > _MAX_CONFIRMING_BRACKET_OVER_STEP_SIZE:
                 return self._no_critical_step_outcome(
-                    step_family, math.exp(log_size_bracket[0]), integrator, f", where {halt}"
+                    step_family, math.exp(log_size_bracket[0]), integrator, f", because {halt}"
                 )
             log_size = 0.5 * (stable + unstable)
         # Motions with the same tolerances would repeat the same errors, so the verification uses
@@ -457,7 +466,8 @@ class CriticalStep(Measure):
                 self._output_values(
                     step_family, stable_value=step_family.step_size_to_field_value(largest_size)
                 ),
-                f"mass keeps every slip rate below the norm {step_family.scene.instability_norm:g}",
+                "inertia keeps the slip rate below the instability norm "
+                f"{step_family.scene.instability_norm:g}",
             )
         if step_family.largest_step_reaches_norm and not step_family.scene.has_mass and not reason:
             value = step_family.step_size_to_field_value(largest_size)

@@ -32,8 +32,10 @@ def check_loading_is_single_step(scene: Scene) -> None:
     check_loading_changes_stress_only_in_steps(scene)
     loading = scene.parts.loading
     if len(loading.segments) > 1:
-        rule = "is no single step, after which a motion decides"
-        remedy = "Read its peaks by step_response, or by simulate."
+        rule = "is not a single step, so the stability after the step is not defined"
+        remedy = (
+            "To find the peaks of the motion, use the measure step_response, or rsfstudy.simulate."
+        )
         raise InvalidValue("loading", loading.name, rule, remedy=remedy)
 
 
@@ -58,8 +60,9 @@ def outcome_if_norm_is_below_load_velocity(scene: Scene, load_velocity: float = 
     norm, least = scene.instability_norm, scene.inertial_time * max(1.0, abs(load_velocity))
     return Outcome(
         Status.NORM_BELOW_LOADING_RATE,
-        message=f"norm {norm:g} is reached by the loading alone, whose norm is {least:.3g}: give "
-        f"instability_norm= well above that, or period= (here {scene.period:g} s) well below "
+        message=f"the load point velocity already exceeds the instability norm {norm:g}, because "
+        f"its norm is {least:.3g}. Pass a value of instability_norm= well above "
+        f"{least:.3g}, or a value of period= (now {scene.period:g} s) well below "
         f"{scene.period * norm / least:.3g} s",
     )
 
@@ -90,10 +93,9 @@ def build_slow_instability_norm_warning(scene: Scene, load_velocity: float) -> s
     ):
         return ""
     return (
-        f"{SLOW_INSTABILITY_NORM_WARNING_PREFIX}{scene.instability_norm:g} is a slip rate of "
-        f"{rate:.3g} V_*, only "
-        f"{rate / load:.3g} times that of the load point: what reaches it may be no instability. "
-        f"Give one above {_MIN_NORM_OVER_LOAD_VELOCITY * load:.3g} V_*, of a rig as a "
-        "slip rate, as in "
-        "rig.scene(instability_norm='10 mm/s')"
+        f"{SLOW_INSTABILITY_NORM_WARNING_PREFIX}{scene.instability_norm:g} corresponds to a slip "
+        f"rate of {rate:.3g} V_*, which is only {rate / load:.3g} times the load point velocity. "
+        "A motion that reaches this slip rate may be stable. Use a slip rate above "
+        f"{_MIN_NORM_OVER_LOAD_VELOCITY * load:.3g} V_*. For a rig, pass the slip rate with "
+        "units, for example rig.scene(instability_norm='10 mm/s')"
     )

@@ -177,7 +177,7 @@ def _max_log_slip_rate_of_closed_orbit(scene: Scene, integrator: Integrator) -> 
             or event.point.log_slip_rate_derivative == 0.0
         ):
             return event.point.log_slip_rate
-    raise AssertionError("a motion never ends by itself")
+    raise AssertionError("a motion without a time limit cannot end")
 
 
 def _orbit_touching_norm_shrinks(scene: Scene, integrator: Integrator) -> bool:
@@ -286,7 +286,7 @@ def _follow_one_orbit(
             slow = len(peaks) > 1 and peaks[-1] - peaks[-2] < 0.2 * (norm - top)
             if slow and not steady_state.is_stable and event.regime != Scene.RUPTURE_REGIME:
                 return _OrbitOutcome(tuple(peaks), False, event.point)
-    raise AssertionError("a motion never ends by itself")
+    raise AssertionError("a motion without a time limit cannot end")
 
 
 class _CycleRepetitionDetector:

@@ -114,7 +114,7 @@ class StepFamily:
         float
             Value of the field.
         """
-        raise TypeError(f"{type(self).__name__} steps nothing")
+        raise TypeError(f"{type(self).__name__} does not define this method")
 
     def compute_field_value_error(self, step_size: float, relative_error: float) -> float:
         """Return the error of the step value that results from an error of the size.
@@ -131,7 +131,7 @@ class StepFamily:
         float
             Absolute error of ``step_size_to_field_value(step_size)``.
         """
-        raise TypeError(f"{type(self).__name__} steps nothing")
+        raise TypeError(f"{type(self).__name__} does not define this method")
 
     def size_tolerance(self, step_size: float, value_tolerance: float) -> float:
         r"""Return the tolerance of the size for a tolerance of the step value.
@@ -194,7 +194,7 @@ class StepFamily:
         float
             Size for the next tolerance. The iterator ends early if there is no critical path.
         """
-        raise TypeError(f"{type(self).__name__} steps nothing")
+        raise TypeError(f"{type(self).__name__} does not define this method")
 
     def find_sizes_by_limit_cycle(
         self, local_tolerances: Iterable[float], integrator: Integrator
@@ -281,7 +281,7 @@ class StepFamily:
         return all(is_linearly_stable(self.scene_with_step(each)) for each in sizes)
 
     def _compute_max_size(self) -> float:
-        raise TypeError(f"{type(self).__name__} steps nothing")
+        raise TypeError(f"{type(self).__name__} does not define this method")
 
 
 def slip_lag_due_to_inertia(scene: Scene) -> tuple[float, float]:
@@ -478,7 +478,7 @@ class ShootingStepFamily(StepFamily):
 
     def _guess_critical_size(self) -> float:
         """Return the step size at which the search starts."""
-        raise TypeError(f"{type(self).__name__} steps nothing")
+        raise TypeError(f"{type(self).__name__} does not define this method")
 
     def _find_misfit_sign_without_critical_path(
         self, scene: Scene, integrator: Integrator

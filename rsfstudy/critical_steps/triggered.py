@@ -60,7 +60,9 @@ class Triggered(Measure):
     name: ClassVar[str] = "triggered"
     primary_output = "unstable"
     typical_work = 800
-    outputs = (Output("unstable", "", "1", "whether the step triggers instability", error=True),)
+    outputs = (
+        Output("unstable", "", "1", "1 if the step triggers instability, otherwise 0", error=True),
+    )
     needs_time: ClassVar[tuple[bool, ...]] = (False,)
 
     def compute(self, scene: Scene, integrator: Integrator) -> Outcome:
@@ -90,7 +92,7 @@ class Triggered(Measure):
         # indistinguishable.
         if answer != again or is_neutrally_stable(scene, integrator.result_tolerance(10.0)):
             return Outcome(
-                Status.UNVERIFIED, message="the tolerance decides: ask for a smaller rtol"
+                Status.UNVERIFIED, message="the result depends on the tolerance. Use a smaller rtol"
             )
         values = {"unstable": float(answer), "unstable_error": 0.0}
         return Outcome(

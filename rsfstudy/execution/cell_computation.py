@@ -165,7 +165,7 @@ def serialize_task(task: CellTask) -> bytes:
             sent = cloudpickle.dumps(value)
         except Exception as error:
             rule = f"cannot be sent to a worker ({error})"
-            remedy = "Compute in this process: --serial (workers=0)."
+            remedy = "Run the study in this process: --serial (workers=0)."
             raise InvalidValue(what, name, rule, remedy=remedy) from error
     return bytes(sent)
 
@@ -183,16 +183,17 @@ def _load_cell_task(serialized_task: bytes) -> CellTask:
         task: CellTask = cloudpickle.loads(serialized_task)
     except Exception as error:
         raise RunError(
-            f"a worker cannot load the measure, or a part ({type(error).__name__}: {error}). Give "
-            "the workers the files it needs, or put them beside the study file"
+            f"a worker cannot load the measure or a part ({type(error).__name__}: {error}). Copy "
+            "the required files to the workers, or put them in the directory of the study file"
         ) from error
     used = *task.measure.code_classes, *task.user_parts, *task.user_stepper_classes
     ours = provenance.code_fingerprint(task.accuracy.engine, used)
     for name, wanted in task.code_fingerprint.items():
         if ours.get(name) != wanted:
             raise RunError(
-                f"a worker has {name} {ours.get(name)}, this run {wanted}: their numbers would "
-                "mix. Give the workers the same versions and files, and start them again"
+                f"a worker has {name} {ours.get(name)}, but this run has {wanted}, so results of "
+                "different code would be mixed. Install the same versions and files on the "
+                "workers, and restart them"
             )
     return task
 

@@ -182,10 +182,12 @@ def _add_failure_counts_to_error(
                 study.cell(cell)
             except InvalidValue as error:
                 names[error.name] += 1
-        by = ", ".join(f"{name} in {count}" for name, count in sorted(names.items()))
+        by = ", ".join(f"{name} ({count})" for name, count in sorted(names.items()))
         told = f"{names.total()} of {len(axis)} points of the axis {axis.dimension}"
         share = f"{names.total() / len(axis):.2g}"
-        return first_error.with_location(f"{told} ({share}) make no meaningful scene, by {by}")
+        return first_error.with_location(
+            f"{told} (fraction {share}) give invalid scenes because of {by}"
+        )
     return first_error
 
 

@@ -54,9 +54,12 @@ def check_script_has_main_guard(worker_count: int) -> None:
     conditions = (n for n in ast.walk(tree) if isinstance(n, ast.If | ast.IfExp | ast.BoolOp))
     if not tree.body or any(n.lineno <= line <= (n.end_lineno or line) for n in conditions):
         return
-    rule = f"worker processes import {Path(file).name}, and line {line} would run in each again"
+    rule = (
+        f"worker processes import {Path(file).name}, so line {line} would run again in each of them"
+    )
     remedy = (
-        'Put what runs below `if __name__ == "__main__":`, or compute in this process: workers=0.'
+        'Move the code that runs the study below `if __name__ == "__main__":`, or run the study '
+        "in this process: workers=0."
     )
     raise InvalidValue("workers", worker_count, rule, remedy=remedy)
 
@@ -182,8 +185,9 @@ def start_local_cluster(worker_count: int, log_path: Path) -> Iterator[Any]:
             except Exception as error:
                 raise RunError(
                     f"a worker process could not be started ({str(error).rstrip('.')}). Worker "
-                    "processes import the script that starts them: call what runs below "
-                    '`if __name__ == "__main__":`, or compute in this process, --serial (workers=0)'
+                    "processes import the script that starts them. Move the code that runs the "
+                    'study below `if __name__ == "__main__":`, or run the study in this process: '
+                    "--serial (workers=0)"
                 ) from error
             stack.enter_context(cluster)
         yield stack.enter_context(Client(cluster))
@@ -240,9 +244,9 @@ def connect_to_cluster(scheduler_address: str, *, timeout: float = 30.0) -> Iter
         except Exception as error:  # Dask raises errors of many types for a wrong address.
             raise RunError(
                 f"no Dask scheduler answers at {shorten_text(scheduler_address)!r}: "
-                f"{shorten_text(error) or 'it took too long'}. "
-                "Start one with `dask scheduler` (certificates for tls:// are those of Dask's "
-                "configuration), or leave --scheduler out."
+                f"{shorten_text(error) or 'the connection timed out'}. Start one with `dask "
+                "scheduler` (the certificates for tls:// are read from the Dask configuration), "
+                "or omit --scheduler."
             ) from error
         with client:
             yield client

@@ -84,7 +84,7 @@ class OutputOptions:
         if self.format == "zarr":
             ZarrStore.check_installed()
             if self.output is None:
-                raise InvalidValue("output", None, "must name a directory for a Zarr store")
+                raise InvalidValue("output", None, "must be a directory if the format is Zarr")
 
 
 class StudyRun:
@@ -246,9 +246,9 @@ class StudyRun:
                 ):
                     _key, status, message, *_ = row
                     raise RunError(
-                        f"the first {done} cells all failed, the last with {Status[status].label}"
-                        f"{': ' * bool(message)}{message}. "
-                        "Mend that, or go on all the same with --keep-going (keep_going=True)"
+                        f"the first {done} cells all failed. The status of the last cell is "
+                        f"{Status[status].label}{': ' * bool(message)}{message}. Correct the "
+                        "cause, or continue with --keep-going (keep_going=True)"
                     )
 
     def _warn_of_lost_cells(self, finished_cells: StoredCellRows) -> None:
@@ -258,7 +258,7 @@ class StudyRun:
                 cell = int(np.flatnonzero(self.plan.keys == np.void(key))[0])
                 warnings.warn(
                     f"cell {self.study.describe_cell(cell)} failed, {Status[status].label}: "
-                    f"{message}. The run goes on",
+                    f"{message}. The run continues",
                     stacklevel=2,
                 )
 
@@ -276,7 +276,7 @@ class StudyRun:
         except RsfStudyError:
             raise
         except Exception as error:  # A reduction may raise any exception.
-            raise RunError(f"cannot be reduced ({type(error).__name__}: {error})") from error
+            raise RunError(f"a reduction failed ({type(error).__name__}: {error})") from error
         if self.options.output is None:
             return convert_attributes_for_netcdf(results)
         written = results if zarr else write_dataset(results, self.output_path(".nc"))
@@ -335,6 +335,6 @@ class StudyRun:
         known = int((journal.statuses(self.plan.keys) != int(Status.PENDING)).sum())
         text = f"{known} of {self.study.size} cells are finished"
         if self.options.output is None:
-            return f"{text}; nothing was to be kept (no output directory)."
+            return f"{text}. They are lost, because the run has no output directory."
         where = self.output_path(".cells.sqlite")
-        return f"{text} and kept in {where}; the same command goes on from there."
+        return f"{text} and stored in {where}. Run the same command again to resume."

@@ -53,7 +53,7 @@ _POLL_INTERVAL = 2.0
 #: Number of workers that a cell may kill. After this number of workers, the cell is recorded as
 #: lost.
 _MAX_WORKER_DEATHS_PER_CELL = 2
-_SCHEDULER_LOST_MESSAGE = "the Dask scheduler is lost"
+_SCHEDULER_LOST_MESSAGE = "the connection to the Dask scheduler is lost"
 
 
 class WorkerPool(contextlib.ExitStack):
@@ -102,10 +102,10 @@ class WorkerPool(contextlib.ExitStack):
             )
             if process_count > most:
                 rule = (
-                    f"must be at most {most} here: {_MAX_WORKERS_PER_CORE} for each core, "
-                    f"or {_MAX_WORKERS_ON_SMALL_MACHINES}"
+                    f"must be at most {most} on this machine ({_MAX_WORKERS_PER_CORE} per core, "
+                    f"but at least {_MAX_WORKERS_ON_SMALL_MACHINES})"
                 )
-                remedy = "A cluster has room for more: --scheduler ADDRESS (client=)."
+                remedy = "To use more workers, use a cluster: --scheduler ADDRESS (client=)."
                 raise InvalidValue("workers", process_count, rule, remedy=remedy)
             check_script_has_main_guard(process_count)
         if dask_client is not None and not hasattr(dask_client, "submit"):
@@ -255,8 +255,8 @@ def make_dask_batch_mapper(
                             yield finished
                 elif suspects:
                     warnings.warn(
-                        f"a worker ended: the cells it held ({len(suspects)}) are computed again, "
-                        f"one at a time (see {log_path})",
+                        f"a worker ended. Its {len(suspects)} cells are computed again, one at a "
+                        f"time (see {log_path})",
                         stacklevel=2,
                     )
                     yield from map(run_isolated, suspects)
@@ -272,10 +272,9 @@ def make_dask_batch_mapper(
 def _timeout_outcome(task: CellTask) -> Outcome:
     """Build the outcome of a cell that exceeded its time limit."""
     text = (
-        f"no answer within {task.time_limit:g} s of CPU time, or "
-        f"{WALL_TIME_LIMIT_OVER_CPU_TIME_LIMIT:g} times "
-        "as long on the clock; the worker's log shows where it was, and --time-limit (time_limit=) "
-        "allows more"
+        f"the cell exceeded {task.time_limit:g} s of CPU time, or "
+        f"{WALL_TIME_LIMIT_OVER_CPU_TIME_LIMIT:g} times as much wall time. The worker log "
+        "contains a stack trace. Increase the limit with --time-limit (time_limit=)"
     )
     return Outcome(Status.TIME_LIMIT_SPENT, message=text)
 
@@ -283,9 +282,8 @@ def _timeout_outcome(task: CellTask) -> Outcome:
 def _worker_lost_outcome() -> Outcome:
     """Build the outcome of a cell whose worker died."""
     text = (
-        f"its worker died {_MAX_WORKER_DEATHS_PER_CELL} times while it computed nothing "
-        "else: a crash, "
-        "or more memory than a worker may use"
+        f"its worker ended {_MAX_WORKER_DEATHS_PER_CELL} times while it computed only this cell, "
+        "because of a crash or insufficient memory"
     )
     return Outcome(Status.WORKER_LOST, message=text)
 
@@ -313,7 +311,7 @@ def count_worker_threads(dask_client: Any) -> int:
     if dask_client.status == "connecting":  # The client has lost the connection.
         raise RunError(_SCHEDULER_LOST_MESSAGE)
     if dask_client.status != "running":
-        raise RunError(f"the Dask client is {dask_client.status}: connect one to a cluster")
+        raise RunError(f"the Dask client is {dask_client.status}. Connect a client to a cluster")
     try:
         return sum(dask_client.nthreads().values())
     except (OSError, TimeoutError) as error:
@@ -345,14 +343,14 @@ def _wait_for_finished_futures(dask_client: Any, running_futures: Iterable[Any])
             elif waited > WARN_AFTER_SECONDS_WITHOUT_WORKER and not warned:
                 warned = True
                 warnings.warn(
-                    "the Dask cluster has no worker: waiting "
-                    f"{GIVE_UP_AFTER_SECONDS_WITHOUT_WORKER:g} s for one",
+                    "the Dask cluster has no worker. The run waits "
+                    f"{GIVE_UP_AFTER_SECONDS_WITHOUT_WORKER:g} s for a worker",
                     stacklevel=2,
                 )
             elif waited > GIVE_UP_AFTER_SECONDS_WITHOUT_WORKER:
                 raise RunError(
                     "the Dask cluster has had no worker for "
-                    f"{GIVE_UP_AFTER_SECONDS_WITHOUT_WORKER:g} s: start some"
+                    f"{GIVE_UP_AFTER_SECONDS_WITHOUT_WORKER:g} s. Start workers"
                 ) from None
         except CancelledError as error:
             raise RunError(_SCHEDULER_LOST_MESSAGE) from error
@@ -378,7 +376,7 @@ def _batch_result(future: Any) -> StoredCellRows | None:
         raise RunError(_SCHEDULER_LOST_MESSAGE) from error
     except Exception as error:
         raise RunError(
-            f"the Dask cluster gave up ({type(error).__name__}: {error}). "
-            "Its workers need the same rsfstudy"
+            f"the Dask cluster failed ({type(error).__name__}: {error}). Install the same version "
+            "of rsfstudy on its workers"
         ) from error
     return finished

@@ -120,8 +120,8 @@ def detect_unspecified_filter(
     else:
         seems, remedy = f"low-pass filtered at about {size:.3g} Hz", "`low_pass=` (`--low-pass`)"
     return (
-        f"friction looks {seems}, which changes a parameter by {change:.1f} standard errors: "
-        f"pass {remedy}",
+        f"friction was probably {seems}, which changes a parameter by {change:.1f} standard "
+        f"errors. Pass {remedy}",
     )
 
 

@@ -75,7 +75,7 @@ class Filter:
         if self.kind not in FILTER_KINDS:
             raise InvalidValue("filter", self.kind, "is unknown", choices=FILTER_KINDS)
         if not 0.0 < self.size < math.inf:
-            rule = "must be positive: an averaging time in s, or a corner frequency in Hz"
+            rule = "must be positive (an averaging time in s, or a corner frequency in Hz)"
             raise InvalidValue("filter", self.size, rule)
 
     @classmethod
@@ -174,7 +174,7 @@ class Filter:
         first = int(np.searchsorted(time, time[0] + before))
         last = int(np.searchsorted(time, time[-1] - after, side="right"))
         if first >= last:
-            rule = f"averages over more than the record, {time[-1] - time[0]:g} s"
+            rule = f"averages over a time that is longer than the record, {time[-1] - time[0]:g} s"
             raise InvalidValue("filter", f"{self.kind} {self.size:g} s", rule)
         return slice(first, last)
 
@@ -209,11 +209,17 @@ class Filter:
         interval = float(np.median(np.diff(time)))
         about = f"{self.kind} {self.size:g} Hz"
         if not self.size * interval < 0.5:
-            rule = f"passes all frequencies below {0.5 / interval:g} Hz, which the rows resolve"
+            rule = (
+                "has no effect, because the record only contains frequencies below "
+                f"{0.5 / interval:g} Hz"
+            )
             raise InvalidValue("filter", about, rule, remedy="Lower the corner frequency.")
         step = interval / max(math.ceil(_ROW_POINTS_PER_CORNER_PERIOD * self.size * interval), 1)
         if not (time[-1] - time[0]) / step < _MAX_ROW_POINTS:
-            rule = f"needs more than {_MAX_ROW_POINTS:,} points, because sampling is uneven"
+            rule = (
+                f"requires more than {_MAX_ROW_POINTS:,} points, because the sampling "
+                "intervals differ"
+            )
             raise InvalidValue("filter", about, rule, remedy="Use a running mean: 'mean 1 s'.")
         at = np.arange(time[0], time[-1] + step, step)
         samples = np.interp(at, time, values)

@@ -155,11 +155,11 @@ class Fit(Measure):
     record have the shape (rows,). The outputs ``covariance`` and ``correlation`` have the shape
     (parameters, parameters).
 
-    For each parameter, ``<name>_stderr`` is the standard error, ``<name>_low`` and ``<name>_high``
-    are the ends of the 95 % confidence interval, and ``<name>_error`` is the numerical error. If
-    the record does not constrain a parameter, the status is ``not_identified``, and the message
-    names the parameter. The confidence interval of an unconstrained parameter extends to the bounds
-    of the search, or is NaN if the search has no bounds for this parameter.
+    For each parameter, ``<name>_stderr`` is the standard error, ``<name>_ci_low`` and
+    ``<name>_ci_high`` are the ends of the 95 % confidence interval, and ``<name>_error`` is the
+    numerical error. If the record does not constrain a parameter, the status is ``not_identified``,
+    and the message names the parameter. The confidence interval of an unconstrained parameter
+    extends to the bounds of the search, or is NaN if the search has no bounds for this parameter.
 
     The standard errors account for correlated noise [1]_. Fits of velocity steps are described in
     [2]_ and [3]_.
@@ -202,26 +202,26 @@ class Fit(Measure):
     name: ClassVar[str] = "fit"
     typical_work = 250_000
     dimensions = (
-        Quantity("parameter", "", "", "parameter that is fitted"),
-        Quantity("other_parameter", "", "", "parameter that is fitted"),
+        Quantity("parameter", "", "", "fitted parameter"),
+        Quantity("other_parameter", "", "", "fitted parameter"),
         Quantity("row", "", "1", "row of the record"),
-        Quantity("record", "", "", "record that is fitted"),
+        Quantity("record", "", "", "fitted record"),
         Quantity("step", "", "1", "number of the step in the record"),
-        Quantity("before", "", "um", "load point displacement that is fitted before the step"),
-        Quantity("after", "", "um", "load point displacement that is fitted after the step"),
-        Quantity("part", "", "1", "part of what follows the step that is fitted"),
+        Quantity("before", "", "um", "fitted load point displacement before the step"),
+        Quantity("after", "", "um", "fitted load point displacement after the step"),
+        Quantity("part", "", "1", "fitted fraction of the record after the step"),
         Quantity("noise", "", "", "model of the noise"),
-        Quantity("loading", "", "", "where the loading is taken from"),
-        Quantity("filter", "", "", "filter that friction passed before it was recorded"),
+        Quantity("loading", "", "", "source of the loading"),
+        Quantity("filter", "", "", "filter that was applied to friction before recording"),
     )
 
     def __post_init__(self) -> None:
         """Validate the options."""
         if not self.records:
-            raise InvalidValue("records", self.records, "must hold a record at least")
+            raise InvalidValue("records", self.records, "must contain at least one record")
         names = [record.name for record in self.records]
         if len(set(names)) < len(names):
-            raise InvalidValue("records", names, "must have names that differ")
+            raise InvalidValue("records", names, "must have different names")
         check_free_parameters(self.free)
         for name, step in self._fitted_record_names_and_steps:
             if name not in names:
@@ -232,12 +232,12 @@ class Fit(Measure):
             if not 0.0 <= getattr(self, name) < math.inf:
                 raise InvalidValue(name, getattr(self, name), "must be 0 or more, in um")
         if not 0.0 < self.part <= 1.0:
-            raise InvalidValue("part", self.part, "must be above 0, and 1 at most")
+            raise InvalidValue("part", self.part, "must be greater than 0 and at most 1")
         check_fields_positive(self, "slip_distance_guess", "slip_distance_2_guess")
         if self.loading not in LOADING_KINDS:
             raise InvalidValue("loading", self.loading, "is unknown", choices=LOADING_KINDS)
         if "step_time" in self.free and self.loading == "recorded":
-            rule = "is that of a loading by steps"
+            rule = "is only defined for a loading by steps"
             raise InvalidValue("free", "step_time", rule, remedy="Leave it out.")
         check_noise_name(self.noise)
         Filter.parse(self.filter)
@@ -364,8 +364,8 @@ class Fit(Measure):
         InvalidValue
             Always, because the description contains only hashes of the records.
         """
-        rule = "are fitted, and the file has no more than digests of them"
-        remedy = "Fit them again: show FILE tells the command."
+        rule = "are required for the fit, but the file contains only their digests"
+        remedy = "Fit the records again. The command show FILE prints the command of the fit."
         raise InvalidValue("records", [*described["records"]], rule, remedy=remedy)
 
     @cached_property
@@ -429,7 +429,7 @@ class Fit(Measure):
             for name in self.parameters
         }
         for name, (low, high) in ends.items():
-            values[f"{name}_low"], values[f"{name}_high"] = low, high
+            values[f"{name}_ci_low"], values[f"{name}_ci_high"] = low, high
         if self.posterior:
             values |= posterior.sample_posterior_parameters(search, found, self.posterior)
         if unidentified:
@@ -568,18 +568,18 @@ class Fit(Measure):
         values |= {
             "a_minus_b": fit_solution.parameter_values["a"] - b,
             "a_minus_b_stderr": math.sqrt(max(variance_of_rate, 0.0)),
-            "noise_size": fit_solution.noise_sd,
+            "noise_sd": fit_solution.noise_sd,
             "outliers": len(fit_solution.outlier_rows),
             "friction_quantum": fit_solution.friction_rounding_quantum,
             "noise_order": fit_solution.noise_model.autoregressive_order,
-            "effective_samples": fit_solution.noise_model.effective_sample_size,
+            "n_eff": fit_solution.noise_model.effective_sample_size,
             "degrees_of_freedom": fit_solution.degrees_of_freedom,
-            "whiteness": ljung_box_p_value(
+            "p_value": ljung_box_p_value(
                 fit_solution.whitened_residuals, fit_solution.noise_model.autoregressive_order
             ),
             "r_squared": 1.0 - float(np.var(fit_solution.residuals)) / variance,
             "rows_fitted": len(rows),
-            "criterion": fit_solution.aic,
+            "aic": fit_solution.aic,
             "covariance": covariance,
             "correlation": correlation,
         }
@@ -588,7 +588,7 @@ class Fit(Measure):
             "fitted_friction_stderr": fit_solution.fitted_friction_stderr,
             "detrended_friction": fit_solution.model_friction,
             "residual": fit_solution.residuals,
-            "innovation": fit_solution.all_whitened_residuals,
+            "whitened_residual": fit_solution.all_whitened_residuals,
         }
         for name in (about.name for about in RECORD_COLUMNS[:3]):
             whole = [record.columns[name] for record in self._records_with_first_rows]

@@ -13,28 +13,28 @@ from rsfstudy.quantities import Output
 _SCALAR_OUTPUTS = (
     Output("a_minus_b", "$a-b$", "1", "rate dependence of steady friction"),
     Output("a_minus_b_stderr", "", "1", "standard error of a - b"),
-    Output("noise_size", "", "1", "standard deviation of the noise"),
-    Output("outliers", "", "1", "number of rows that were left out as outliers"),
-    Output("friction_quantum", "", "1", "quantum to which friction is rounded, 0 if it is not"),
+    Output("noise_sd", "", "1", "standard deviation of the noise"),
+    Output("outliers", "", "1", "number of rows that were omitted as outliers"),
+    Output("friction_quantum", "", "1", "rounding step of the recorded friction, or 0"),
     Output("noise_order", "", "1", "order of the autoregressive process of the noise"),
-    Output("effective_samples", "", "1", "number of independent samples that tell as much"),
-    Output("degrees_of_freedom", "", "1", "degrees of freedom of the intervals"),
-    Output("whiteness", "", "1", "chance of as much correlation of near rows, freed of it"),
-    Output("criterion", "", "1", "Akaike's criterion, in which the noise counts; less is better"),
-    Output("r_squared", "$R^2$", "1", "share of the variance of friction that the fit explains"),
+    Output("n_eff", "", "1", "effective sample size"),
+    Output("degrees_of_freedom", "", "1", "degrees of freedom of the confidence intervals"),
+    Output("p_value", "", "1", "p-value of the autocorrelation test of the whitened residuals"),
+    Output("aic", "", "1", "Akaike information criterion, including the noise model"),
+    Output("r_squared", "$R^2$", "1", "coefficient of determination of the fit"),
     Output("velocity_before", "$V_0$", "um s-1", "load point velocity before the step"),
     Output("velocity_after", "$V_1$", "um s-1", "load point velocity after the step"),
-    Output("window_begins", "", "um", "load point displacement where the window begins"),
-    Output("window_ends", "", "um", "load point displacement where the window ends"),
-    Output("load_point_noise", "", "um", "standard deviation of noise of the recorded load point"),
+    Output("window_begins", "", "um", "load point displacement at the beginning of the window"),
+    Output("window_ends", "", "um", "load point displacement at the end of the window"),
+    Output("load_point_noise", "", "um", "standard deviation of the noise of the load point"),
     Output("rows_fitted", "", "1", "number of rows in the window"),
     Output("normal_stress_before", r"$\sigma_*$", "Pa", "mean normal stress before the step"),
-    Output("window_stiffness", "$k$", "um-1", "stiffness over normal stress before the step"),
+    Output("window_stiffness", "$k$", "um-1", "stiffness divided by normal stress before the step"),
     Output(
         "window_stiffness_stderr", "", "um-1", "standard error of the stiffness, if it is fixed"
     ),
     *(
-        Output(name, "", "1", f"{name} of parameters", dims=("parameter", "other_parameter"))
+        Output(name, "", "1", f"{name} of the parameters", dims=("parameter", "other_parameter"))
         for name in ("covariance", "correlation")
     ),
 )
@@ -43,27 +43,27 @@ _OUTPUTS_PER_RECORD_ROW = tuple(
     Output(*about, dims=("row",))
     for about in (
         *((f"record_{q.name}", q.symbol, q.units, q.long_name) for q in RECORD_COLUMNS[:3]),
-        ("fitted_friction", r"$\mu$", "1", "friction of the fit, with its trend"),
-        ("fitted_friction_stderr", "", "1", "standard error of the friction of the fit"),
-        ("detrended_friction", r"$\mu$", "1", "friction of the fit, without its trend"),
-        ("residual", "", "1", "friction less that of the fit"),
-        ("innovation", "", "1", "residual freed of correlation, over its standard deviation"),
+        ("fitted_friction", r"$\mu$", "1", "fitted friction with the trend"),
+        ("fitted_friction_stderr", "", "1", "standard error of the fitted friction"),
+        ("detrended_friction", r"$\mu$", "1", "fitted friction without the trend"),
+        ("residual", "", "1", "recorded friction minus fitted friction"),
+        ("whitened_residual", "", "1", "whitened residual divided by its standard deviation"),
     )
 )
 #: Suffixes and descriptions of the outputs that belong to each parameter in addition to its value.
 _DESCRIPTIONS_BY_NAME_SUFFIX = {
     "stderr": "standard error",
-    "low": "lower end of the 95 % interval",
-    "high": "upper end of the 95 % interval",
+    "ci_low": "lower end of the 95 % confidence interval",
+    "ci_high": "upper end of the 95 % confidence interval",
 }
 #: Outputs of a fit with posterior draws.
 _POSTERIOR_OUTPUTS = (
-    Output("autocorrelation_time", "", "1", "steps after which a chain has forgotten where it was"),
+    Output("autocorrelation_time", "", "1", "autocorrelation time of the chains, in steps"),
     Output(
         "posterior",
         "",
         "1",
-        "draws of the parameters from their posterior",
+        "samples of the parameters from the posterior distribution",
         dims=("draw", "parameter"),
     ),
 )

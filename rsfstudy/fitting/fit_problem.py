@@ -283,7 +283,7 @@ class FitProblem:
             )
         found = self._build_solution(x, noise)
         if not (self.has_converged or found.unidentified_parameters):
-            text = f"the search did not end within {_MAX_MODEL_EVALUATIONS} curves"
+            text = f"the search did not converge within {_MAX_MODEL_EVALUATIONS} model evaluations"
             raise MotionStopped(Status.ACCURACY_OUT_OF_REACH, text)
         return found
 
@@ -315,7 +315,7 @@ class FitProblem:
                 values |= {n: values[n] + v for n, v in zip(linear, moved.tolist(), strict=True)}
             best = min(best, (float(left @ left), values), key=lambda found: (found[0],))
         if not math.isfinite(best[0]):
-            text = "no motion with the first guess can be followed, or its spring is softer than "
+            text = "the motion for the first guess cannot be computed, or the stiffness is below "
             raise MotionStopped(Status.NOT_APPLICABLE, f"{text}the critical stiffness")
         return self.values_to_coordinates(best[1])
 
@@ -385,7 +385,9 @@ class FitProblem:
             left = self.residuals(self.coordinates_to_values(coordinates))
             whitened = noise.whiten_columns(np.column_stack([jacobian, left]))
             if not np.isfinite(whitened).all():
-                raise MotionStopped(Status.INTEGRATION_FAILED, "the best motion cannot be followed")
+                raise MotionStopped(
+                    Status.INTEGRATION_FAILED, "the motion for the best fit cannot be computed"
+                )
             beyond = np.clip(
                 coordinates + _solve_linear_least_squares(whitened),
                 self.lower_bounds,

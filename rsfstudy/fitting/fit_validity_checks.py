@@ -98,8 +98,9 @@ def describe_asymmetric_intervals(
         if max(below, above) > _MAX_CONFIDENCE_INTERVAL_ASYMMETRY * min(below, above):
             low, high = interval_ends[name]
             reasons.append(
-                f"the 95 % interval of {name} is asymmetric ({low:.3g} to {high:.3g}), so standard "
-                f"errors do not describe it: specify {name} instead of fitting it, or sample faster"
+                f"the 95 % confidence interval of {name} is asymmetric ({low:.3g} to {high:.3g}), "
+                f"so standard errors do not describe it. Specify {name} instead of fitting it, or "
+                "sample faster"
             )
     return tuple(reasons)
 
@@ -124,7 +125,7 @@ def describe_outliers(outlier_rows: np.ndarray) -> str:
     more = " and more" * (len(outlier_rows) > _MAX_LISTED_OUTLIERS)
     count = pluralize(len(outlier_rows), "outlier")
     verb = "was" if len(outlier_rows) == 1 else "were"
-    return f"{count} {verb} left out: rows {names}{more} of the window"
+    return f"{count} {verb} omitted: rows {names}{more} of the window"
 
 
 def _check_misfit_is_small(solution: FitSolution, recorded_friction: np.ndarray) -> Iterator[str]:
@@ -132,14 +133,14 @@ def _check_misfit_is_small(solution: FitSolution, recorded_friction: np.ndarray)
     size = float(np.sqrt(np.mean(solution.noise_model.drop_outliers(solution.residuals) ** 2)))
     if not size < np.std(recorded_friction):
         yield (
-            "the fit explains the record no better than its mean does (R2 is not positive): "
-            "check the step, the stiffness and the law"
+            "the fit is not better than a constant (R2 is not positive). Check the step, the "
+            "stiffness and the law"
         )
     elif size > _MAX_RESIDUAL_SD_OVER_LEAST_SQUARES * solution.ols_residual_rms:
         yield (
-            f"the residuals ({size:.2g}) are {size / solution.ols_residual_rms:.1f} times as large "
-            "as those of an ordinary least-squares fit, so part of the response is taken for "
-            "noise: check the time of the step, the trend and the law"
+            f"the residuals ({size:.2g}) are {size / solution.ols_residual_rms:.1f} times as "
+            "large as those of an ordinary least-squares fit, so part of the response is "
+            "attributed to noise. Check the time of the step, the trend and the law"
         )
 
 
@@ -147,9 +148,9 @@ def _check_rounding_is_below_noise(solution: FitSolution) -> Iterator[str]:
     """Yield a warning message if the rounding of friction is too coarse."""
     if is_rounding_too_coarse(solution):
         yield (
-            f"friction is rounded to {solution.friction_rounding_quantum:.2g}, more "
-            "than 2.5 times the noise, so "
-            "rounding errors are not random: export the record with more digits"
+            f"friction is rounded to {solution.friction_rounding_quantum:.2g}, more than 2.5 "
+            "times the noise, so rounding errors are not random. Export the record with more "
+            "digits"
         )
 
 
@@ -179,7 +180,7 @@ def _check_outlier_count(solution: FitSolution) -> Iterator[str]:
     """Yield a warning message if too many rows of the record are outliers."""
     count, rows = len(solution.outlier_rows), len(solution.residuals)
     if count > _MAX_OUTLIER_FRACTION * rows:
-        yield f"{count} of {rows} rows are outliers: remove them from the record, or check the law"
+        yield f"{count} of {rows} rows are outliers. Remove them from the record, or check the law"
 
 
 def _check_residuals_are_white(solution: FitSolution) -> Iterator[str]:
@@ -189,8 +190,8 @@ def _check_residuals_are_white(solution: FitSolution) -> Iterator[str]:
     )
     if p_value < SIGNIFICANCE_LEVEL:
         yield (
-            f"the whitened residuals are still autocorrelated (p = {p_value:.2g}): "
-            "the law, the trend or the noise model does not describe the record"
+            f"the whitened residuals are still autocorrelated (p = {p_value:.2g}), so the law, "
+            "the trend or the noise model does not describe the record"
         )
 
 
@@ -219,9 +220,14 @@ def describe_load_point_noise(
         pairs = zip(solution.free_parameters, moved.tolist(), strict=True)
         names = ", ".join(n for n, most in pairs if most and strip_window_number(n) != "step_time")
         remedy = (
-            "" if "step_time" in solution.free_parameters else ": looked for, step_time lessens it"
+            ""
+            if "step_time" in solution.free_parameters
+            else ". Fitting step_time as well reduces this error"
         )
-        text = f"noise of load point displacement makes most of the error of {names}{remedy}"
+        text = (
+            f"most of the standard error of {names} is due to noise of the load point "
+            f"displacement{remedy}"
+        )
         return text if names else ""
     if "slip_distance" not in solution.free_parameters:
         return ""
@@ -242,9 +248,9 @@ def describe_load_point_noise(
     ):
         return ""
     return (
-        f"noise of the recorded load point, {displacement_noise_sd:.2g} um, moves "
-        "slip_distance by some "
-        f"{100.0 * shift:.2g} %, more than its standard error: see loading='steps'"
+        f"the noise of the recorded load point, {displacement_noise_sd:.2g} um, changes "
+        f"slip_distance by about {100.0 * shift:.2g} %, which is more than its standard error. "
+        "Consider loading='steps'"
     )
 
 
@@ -308,10 +314,12 @@ def describe_unidentified_parameters(
     if sparse := set(parameter_names) - set(solution.unidentified_parameters):
         rows = min(solution.parameter_values[name] for name in sparse) / displacement_per_row
         text += f"; the record has {rows:.1f} rows per slip distance, and "
-        text += f"{_MIN_ROWS_PER_SLIP_DISTANCE:g} are needed: sample faster after the step"
+        text += (
+            f"at least {_MIN_ROWS_PER_SLIP_DISTANCE:g} are required. Sample faster after the step"
+        )
     if "a" in parameter_names and is_a_at_bound:
-        text += "; friction does not change at the step as velocity does: "
-        text += "see whether columns (time and displacement, say) are exchanged"
+        text += "; friction does not change at the velocity step. "
+        text += "Check whether columns (such as time and displacement) are exchanged"
     return text
 
 

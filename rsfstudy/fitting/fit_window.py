@@ -224,20 +224,21 @@ class FitWindow:
         )
         if begins > nominal:
             found.append(
-                f"the window begins {at - begins:.4g} um before the step, not {at - nominal:.4g}: "
-                "friction is not a straight line before"
+                f"the window begins {at - begins:.4g} um before the step instead of "
+                f"{at - nominal:.4g} um, because the earlier friction is not a straight line"
             )
         elif at - begins < _MIN_INCLUDED_WINDOW_FRACTION * self.displacement_before:
             found.append(
-                f"before= is cut from {self.displacement_before:.4g} to {at - begins:.4g} um: "
-                "the step before, or the beginning of the record, is nearer than twice that"
+                f"before= is reduced from {self.displacement_before:.4g} to {at - begins:.4g} um, "
+                "because the previous step or the beginning of the record is less than twice "
+                "this distance away"
             )
         if (
             self.fraction_of_displacement_after == 1.0
             and ends - at < _MIN_INCLUDED_WINDOW_FRACTION * self.displacement_after
         ):
-            cut = f"after= is cut from {self.displacement_after:.4g} to {ends - at:.4g} um"
-            found.append(f"{cut} by the {later}")
+            cut = f"after= is reduced from {self.displacement_after:.4g} to {ends - at:.4g} um"
+            found.append(f"{cut} because of the {later}")
         return found
 
     def _earliest_start_time(self, step: LoadingStep) -> float:
@@ -300,14 +301,15 @@ class FitWindow:
             or not step.start < self._end_time()
         ):
             text = (
-                f"the window holds {len(rows)} rows, too few for {len(free_parameters)} parameters"
+                f"the window contains {len(rows)} rows, which are too few for "
+                f"{len(free_parameters)} parameters"
             )
             raise MotionStopped(Status.NOT_APPLICABLE, text)
         before = friction[time < step.start]
         if before.size and not before.mean() > 0.0:
             text = (
-                f"mean friction before the step is {before.mean():.3g}, and must be positive. If "
-                "shear stress has the opposite sign, reverse it with a scale of -1 behind its "
+                f"the mean friction before the step is {before.mean():.3g}, but must be positive. "
+                "If the shear stress has the opposite sign, write a scale of -1 after the "
                 "heading: --columns 'friction=HEADING * -1' (columns=)"
             )
             raise MotionStopped(Status.NOT_APPLICABLE, text)
@@ -324,7 +326,7 @@ class FitWindow:
             for each in (pieces, *moves):
                 each[0, 0] -= _MAX_LOADING_DELAY_FRACTION * (step.start - begins)
         if not pieces[0, 1] > 0.0:
-            text = "the window begins in a hold: a fit begins with steady sliding"
+            text = "the window begins in a hold, but a fit must begin with steady sliding"
             raise MotionStopped(Status.NOT_APPLICABLE, text)
         self._check_normal_stress_matches_loading(rows, pieces)
         steady = stepwise_loading(begins, find_steps_between(record, begins, ends))
@@ -371,12 +373,12 @@ class FitWindow:
             stress *= before * 1e-6
             text = (
                 f"normal stress varies from {stress.min():.4g} to {stress.max():.4g} MPa within "
-                f"the window, and is {before * 1e-6:.4g} MPa before the step; the model accounts "
-                f"for changes of {100.0 * MIN_RELATIVE_NORMAL_STRESS_CHANGE:g} % at "
-                "most. Shorten the window "
-                "with --before and --after (before=, after=), or model the normal stress: --set "
-                "normal_stress=imposed (normal_stress=) for its steps, with --loading recorded "
-                "(loading=) row by row; alpha is then free or stated"
+                f"the window, and is {before * 1e-6:.4g} MPa before the step. The model allows "
+                f"changes of at most {100.0 * MIN_RELATIVE_NORMAL_STRESS_CHANGE:g} %. Shorten the "
+                "window with --before and --after (before=, after=), or model the normal stress "
+                "with --set normal_stress=imposed (normal_stress=). With --loading recorded "
+                "(loading=), the model uses the recorded normal stress of each row, otherwise "
+                "its steps. The parameter alpha is then fitted or specified"
             )
             raise MotionStopped(Status.NOT_APPLICABLE, text)
 

@@ -21,13 +21,13 @@ from rsfstudy.quantities import Quantity
 
 #: Quantities of a hold, in the order of the columns of the table.
 HOLD_QUANTITIES = (
-    Quantity("begins", "$t$", "s", "time at which the hold begins"),
+    Quantity("begins", "$t$", "s", "time at the beginning of the hold"),
     Quantity("duration", "$t_h$", "s", "duration of the hold"),
     Quantity("velocity_before", "$V_0$", "um s-1", "load point velocity before the hold"),
     Quantity("velocity_after", "$V_1$", "um s-1", "load point velocity after the hold"),
     Quantity("friction_before", r"$\mu_0$", "1", "friction before the hold"),
     Quantity("peak_friction", r"$\mu_p$", "1", "peak friction on reloading"),
-    Quantity("healing", r"$\Delta\mu$", "1", "peak friction less friction before the hold"),
+    Quantity("healing", r"$\Delta\mu$", "1", "peak friction minus friction before the hold"),
     Quantity("relaxation", r"$\Delta\mu_c$", "1", "change of friction during the hold"),
     Quantity("peak_displacement", "", "um", "load point displacement from reloading to the peak"),
 )
@@ -84,7 +84,7 @@ def build_hold_table(
     for name, value, meaning in (
         ("healing_rate", rate, "increase of healing per decade of hold duration"),
         ("healing_rate_stderr", stderr, "standard error of the healing rate"),
-        ("healing_intercept", intercept, "healing of the line at a duration of 1"),
+        ("healing_intercept", intercept, "healing of the fitted line at a hold duration of 1 s"),
     ):
         data[name] = (), value, {"long_name": meaning, "units": "1"}
     number = {"long_name": "number of the hold", "units": "1"}

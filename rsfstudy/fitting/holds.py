@@ -174,7 +174,7 @@ def measure_holds(
     of_healing = np.diag(errors[:, 2] ** 2) + np.outer(by_trend[:, 2], by_trend[:, 2])
     exact = np.array([hold.exact_quantities for hold in holds]).reshape(-1, 4)
     table = build_hold_table(exact, values, np.hypot(errors, by_trend), of_healing)
-    words = "trend of friction that is subtracted"
+    words = "subtracted trend of friction"
     table["trend"] = (), trend, {"long_name": words, "units": "um-1"}
     words = f"standard error of the {words}"
     table["trend_stderr"] = (), trend_stderr, {"long_name": words, "units": "um-1"}

@@ -246,7 +246,7 @@ class JointModel:
             for part, own in self._iterate_windows(values):
                 part.build_scene(own)
         except InvalidValue as wrong:
-            text = f"no slider has the first guess of the parameters: {wrong}"
+            text = f"the first guess of the parameters is invalid: {wrong}"
             raise MotionStopped(Status.NOT_APPLICABLE, text) from wrong
 
     def model_friction(

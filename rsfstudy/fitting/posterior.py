@@ -58,7 +58,12 @@ def check_sampling_is_possible(draw_count: int) -> None:
         )
     if draw_count and importlib.util.find_spec("emcee") is None:
         remedy = "pip install 'rsfstudy[posterior]'."
-        raise InvalidValue("posterior", draw_count, "needs emcee, which is missing", remedy=remedy)
+        raise InvalidValue(
+            "posterior",
+            draw_count,
+            "requires the package emcee, which is not installed",
+            remedy=remedy,
+        )
 
 
 def sample_posterior_coordinates(

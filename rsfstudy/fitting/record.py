@@ -106,20 +106,20 @@ class Record:
         for about in RECORD_COLUMNS[:3]:
             if about.name not in self.columns:
                 rule = f"has no {about.name}"
-                raise InvalidValue("record", [*self.columns], rule, remedy=f"Give {about.name}.")
+                raise InvalidValue("record", [*self.columns], rule, remedy=f"Pass {about.name}.")
         for name, values in self.columns.items():
             if values.shape != self.time.shape:
-                rule = f"holds {values.size} samples, and time {self.time.size}"
+                rule = f"has {values.size} samples, but time has {self.time.size}"
                 raise InvalidValue(name, values.shape, rule)
             if not np.isfinite(values).all():
                 row = int(np.argmin(np.isfinite(values)))
-                remedy = "Leave such rows out of the record."
-                rule = f"must be a finite number, and is none in row {row + 1}"
+                remedy = "Remove such rows from the record."
+                rule = f"must be a finite number, but is not finite in row {row + 1}"
                 raise InvalidValue(name, float(values[row]), rule, remedy=remedy)
         late = np.diff(self.time) <= 0.0
         if late.any():
             row = int(np.argmax(late)) + 1
-            rule = f"must be later in each row than in the row before, and is not in row {row + 1}"
+            rule = f"must increase from row to row, but does not increase in row {row + 1}"
             raise InvalidValue("time", float(self.time[row]), rule)
 
     @property
@@ -173,7 +173,9 @@ class Record:
             raise InvalidValue("window", (start, end), "must end after it begins")
         rows = (self.time >= start) & (self.time <= end)
         if not rows.any():
-            rule = f"lies outside the record, {self.time[0]:g} to {self.time[-1]:g} s"
+            rule = (
+                f"is outside the record, which lasts from {self.time[0]:g} to {self.time[-1]:g} s"
+            )
             raise InvalidValue("window", (start, end), rule)
         return replace(self, columns={n: v[rows] for n, v in self.columns.items()})
 
@@ -361,8 +363,11 @@ def _parse_loading_step(step_fields: Sequence[float]) -> LoadingStep:
     """Validate the values of a user-defined step and create a ``LoadingStep``."""
     if isinstance(step_fields, LoadingStep):  # Steps from another record are already valid.
         return step_fields
-    rule = "is no step: begins, ends, velocity before and after, and, if it changes, "
-    rule += "normal stress before and after"
+    rule = (
+        "is not a step. A step consists of the beginning, the end, the velocities before and "
+        "after, and optionally the "
+    )
+    rule += "normal stresses before and after"
     try:
         numbers = [float(number) for number in step_fields]
     except (TypeError, ValueError) as error:

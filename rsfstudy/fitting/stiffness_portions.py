@@ -162,12 +162,20 @@ def _build_table(
     table = xr.Dataset(
         {
             "kind": ("portion", kinds, {"long_name": "kind of the portion"}),
-            "begins": ("portion", begins, {"long_name": "time at which it begins", "units": "s"}),
-            "ends": ("portion", ends, {"long_name": "time at which it ends", "units": "s"}),
+            "begins": (
+                "portion",
+                begins,
+                {"long_name": "time at the beginning of the portion", "units": "s"},
+            ),
+            "ends": (
+                "portion",
+                ends,
+                {"long_name": "time at the end of the portion", "units": "s"},
+            ),
         },
         {"portion": ("portion", np.arange(1, len(rows) + 1), number)},
     )
-    scales = {"stiffness": (np.ones(len(rows)), "um-1", "stiffness over normal stress")}
+    scales = {"stiffness": (np.ones(len(rows)), "um-1", "stiffness divided by normal stress")}
     if has_stress:
         scales["machine_stiffness"] = stresses, "Pa um-1", "stiffness of the machine"
     for name, (scale, units, words) in scales.items():

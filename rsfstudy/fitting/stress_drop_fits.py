@@ -17,17 +17,17 @@ from rsfstudy.fitting.drop_fit import FittedStressDrop, fit_drop
 EVENT_QUANTITIES = {
     "time": ("D_c/V_*", "time", "time at which the event begins"),
     "duration": ("D_c/V_*", "duration", "duration of the event"),
-    "interval": ("D_c/V_*", "interval", "time since the event before began"),
+    "interval": ("D_c/V_*", "interval", "time since the beginning of the previous event"),
     "peak_log10_slip_rate": ("", "lg V_max/V_*", "decimal logarithm of peak slip rate over V_star"),
     "peak_slip_rate": ("V_*", "peak rate", "peak slip rate"),
     "slip": ("D_c", "slip", "slip during the event"),
     "stress_before": ("sigma_*", "", "highest shear stress before the event"),
     "stress_after": ("sigma_*", "", "lowest shear stress after the event"),
-    "static_stress_drop": ("sigma_*", "static drop", "highest less lowest shear stress"),
+    "static_stress_drop": ("sigma_*", "static drop", "highest minus lowest shear stress"),
     "dynamic_stress_drop": (
         "sigma_*",
         "dynamic drop",
-        "highest shear stress less that at peak slip rate",
+        "highest shear stress minus shear stress at peak slip rate",
     ),
 }
 #: Properties of an event, and a flag for incomplete events. The properties are a dictionary. For

@@ -38,12 +38,19 @@ PARAMETERS = {
         Quantity("slip_distance", "$D_c$", "um", "characteristic slip distance"),
         Quantity("slip_distance_2", "$L_2$", "um", "slip distance of the second state"),
         Quantity("mu_star", r"$\mu_*$", "1", "friction coefficient before the first step"),
-        Quantity("stiffness", "$k$", "um-1", "stiffness over normal stress"),
-        Quantity("alpha", r"$\alpha$", "1", "strength of the normal stress effect on state"),
+        Quantity("stiffness", "$k$", "um-1", "stiffness divided by normal stress"),
+        Quantity(
+            "alpha", r"$\alpha$", "1", "parameter of the normal stress effect on the state variable"
+        ),
         Quantity("law_exponent", r"$\epsilon$", "1", "exponent of the family of laws"),
-        Quantity("step_time", r"$\Delta t$", "s", "time by which loading comes late"),
+        Quantity("step_time", r"$\Delta t$", "s", "delay of the loading"),
         *(
-            Quantity(f"trend{n}", f"$c_{n}$", f"um-{n}", f"trend with power {n} of displacement")
+            Quantity(
+                f"trend{n}",
+                f"$c_{n}$",
+                f"um-{n}",
+                f"coefficient of power {n} of displacement in the trend",
+            )
             for n in range(1, 6)
         ),
     )
@@ -56,7 +63,7 @@ PARAMETER_SYNONYMS = {
     **dict.fromkeys(("mu", "mu0", "mu_0", "f0", "f_0", "mu_ref"), "mu_star"),
     **dict.fromkeys(("k", "K", "kappa", "stiffness_ratio"), "stiffness"),
     **dict.fromkeys(("trend", "slope", "drift", "detrend"), "trend1"),
-    **dict.fromkeys(("a_minus_b", "b_over_a"), "a and b, of which both follow"),
+    **dict.fromkeys(("a_minus_b", "b_over_a"), "a and b, from which both quantities follow"),
     **dict.fromkeys(("eps", "epsilon"), "law_exponent, with law='family'"),
     **dict.fromkeys(("t0", "step"), "step_time"),
 }
@@ -117,11 +124,13 @@ def check_free_parameters(free: Sequence[str]) -> None:
     rsfstudy.errors.InvalidValue: ...
     """
     if not free or len(set(free)) < len(free):
-        raise InvalidValue("free", tuple(free), "must name parameters, each once")
+        raise InvalidValue("free", tuple(free), "must be names of parameters without repetition")
     for name in free:
         if name not in PARAMETERS:
             remedy = f"Write {PARAMETER_SYNONYMS[name]}." if name in PARAMETER_SYNONYMS else ""
-            raise InvalidValue("free", name, "is no parameter", choices=PARAMETERS, remedy=remedy)
+            raise InvalidValue(
+                "free", name, "is not a parameter", choices=PARAMETERS, remedy=remedy
+            )
 
 
 def parameters_of_law(scene: Scene, free: Sequence[str]) -> tuple[str, ...]:

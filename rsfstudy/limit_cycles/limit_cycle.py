@@ -93,23 +93,29 @@ _OUTPUTS = (
         "healing_exponent",
         "",
         "1",
-        "exponent of theta in slip rate, from arrest to the slowest; only where there is one theta",
+        "exponent of theta in the slip rate, from arrest to the minimum slip rate; only for laws "
+        "with one state",
     ),
     Output("residual_friction"),
     Output(
         "drop_asymmetry",
         "",
         "1",
-        "stress drop while slip accelerates over that while it decelerates",
+        "stress drop during acceleration divided by stress drop during deceleration",
     ),
     EVENTS_PER_PERIOD_OUTPUT,
-    Output("events_until_repeat", "", "1", "number of the cycle that repeated the one before"),
-    Output("work_per_cycle", "", "1", "right-hand sides of the accepted cycle"),
+    Output(
+        "events_until_repeat",
+        "",
+        "1",
+        "number of the first cycle that is equal to the previous cycle",
+    ),
+    Output("work_per_cycle", "", "1", "right-hand side evaluations of the accepted cycle"),
     Output(
         "slip_mode",
         "",
         "",
-        "what the slider does in the end, by its peak slip rate",
+        "long-term behaviour of the slider, classified by the peak slip rate",
         flags=SLIP_MODES,
     ),
     *create_outputs_along_phase(*Recording.MOTION_VARIABLES),
@@ -184,7 +190,7 @@ class LimitCycle(RecordingMeasure):
         """Check the fields of the measure."""
         super().__post_init__()
         if isinstance(self.events, bool) or not self.events >= 1 or self.events % 1:
-            raise InvalidValue("events", self.events, "must be a whole number from 1")
+            raise InvalidValue("events", self.events, "must be a whole number, 1 or more")
 
     def compute(self, scene: Scene, integrator: Integrator) -> Outcome:
         """Compute the limit cycle, with error estimates.
@@ -273,7 +279,10 @@ class LimitCycle(RecordingMeasure):
         )
         again = one and fine.refine_orbit(one)
         if one is None or again is None:
-            why = "with other tolerances the cycle does not close: ask for a smaller rtol"
+            why = (
+                "the cycle does not close if it is computed with other tolerances. Use a "
+                "smaller rtol"
+            )
             return Outcome(Status.UNVERIFIED, message=why)
         errors = estimate_primary_output_errors(integrator, one, again)
         values = dict(
@@ -311,9 +320,9 @@ def _period_of_several_events_message(orbit: PeriodicOrbit) -> str:
         return ""
     period = math.fsum(cycle.recurrence_interval for cycle in orbit.cycles)
     return (
-        f"the motion repeats itself after {orbit.period} events, in {period:.6g} D_c/V_*: "
-        "the numbers are those of the event with the fastest peak, up to the next maximum of "
-        "spring stress"
+        f"the motion repeats itself after {orbit.period} events, with a period of {period:.6g} "
+        "D_c/V_*. The results describe the event with the highest peak slip rate, until the next "
+        "maximum of the spring stress"
     )
 
 
@@ -376,12 +385,12 @@ def outcome_of_aperiodic_motion(scene: Scene, sequence: StickSlipSequence, remed
     peaks = [cycle.max_log_slip_rate / LN10 for cycle in latest]
     intervals = [cycle.recurrence_interval for cycle in latest]
     text = (
-        f"the last {len(latest)} of {len(sequence.cycles)} events peak at 10^{min(peaks):.4g} to "
-        f"10^{max(peaks):.4g} V_* and come after {min(intervals):.5g} to {max(intervals):.5g} "
-        "D_c/V_*"
+        f"the last {len(latest)} of {len(sequence.cycles)} events have peak slip rates of "
+        f"10^{min(peaks):.4g} to 10^{max(peaks):.4g} V_* and intervals of {min(intervals):.5g} to "
+        f"{max(intervals):.5g} D_c/V_*"
     )
     if sequence.may_still_converge:
-        why = f"no cycle repeats yet: {text}; {remedy}"
+        why = f"the motion does not repeat itself yet: {text}. {remedy}"
         return Outcome(Status.WORK_BUDGET_SPENT, message=why)
     return Outcome(Status.NOT_PERIODIC, message=text)
 
@@ -416,8 +425,8 @@ def status_from_output_errors(
     if worst <= integrator.result_tolerance(Accuracy.MAX_ERROR_OVER_RTOL):
         return Status.OK, ""
     asked = integrator.result_tolerance()
-    why = f"the cycle is known to {worst:.1e} only, where {asked:g} was asked for"
-    return Status.UNVERIFIED, f"{why}: ask for another rtol"
+    why = f"the error of the cycle is {worst:.1e}, but {asked:g} was requested"
+    return Status.UNVERIFIED, f"{why}. Use another rtol"
 
 
 def _primary_output_error_scales(orbit: PeriodicOrbit) -> list[float]:

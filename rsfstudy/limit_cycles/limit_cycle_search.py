@@ -156,7 +156,7 @@ class LimitCycleSearch:
                     remedy = self._critical_stiffness_text or suggest_raising_event_limit(
                         max_cycles
                     )
-                    text = f"no cycle repeats within {max_cycles} events; {remedy}"
+                    text = f"the motion does not repeat itself within {max_cycles} events. {remedy}"
                     raise MotionStopped(Status.WORK_BUDGET_SPENT, text)
                 if self._should_leap_to_fixed_point():
                     self._distance_at_leap = abs(
@@ -177,7 +177,10 @@ class LimitCycleSearch:
         off = abs(self._scene.stiffness / critical - 1.0) if critical else math.inf
         if off > _CRITICAL_STIFFNESS_TOLERANCE:
             return ""
-        return f"stiffness is critical to {off:.0e}: swings take for ever to grow or to die out"
+        return (
+            f"the stiffness differs from the critical stiffness by a fraction of {off:.0e}, so "
+            "oscillations neither grow nor decay"
+        )
 
     @property
     def orbit(self) -> PeriodicOrbit:

@@ -195,7 +195,7 @@ def suggest_raising_event_limit(event_count: int, option_name: str = "events") -
     str
         Advice with the command-line option and the field.
     """
-    return f"--set {option_name}={2 * event_count} ({option_name}=) waits for more"
+    return f"To compute more events, pass --set {option_name}={2 * event_count} ({option_name}=)"
 
 
 def recorded_rows_of_cycles(

@@ -66,11 +66,11 @@ def check_measure_description(
     try:
         name: object = json.loads(json.dumps(describe_measure()))["name"]
     except (TypeError, ValueError) as error:
-        remedy = "Use Python's own numbers and texts, and tuples of them."
-        rule = f"is no plain data ({error})"
+        remedy = "Use Python numbers, strings, and tuples of numbers or strings."
+        rule = f"must consist of plain data ({error})"
         raise InvalidValue("measure", measure_name, rule, remedy=remedy) from error
     if not isinstance(name, str):
-        raise InvalidValue("name", name, "must be a text, in a measure")
+        raise InvalidValue("name", name, "must be a string, in a measure")
 
 
 def check_coordinate_values(name: str, values: Any) -> None:
@@ -98,9 +98,15 @@ def check_coordinate_values(name: str, values: Any) -> None:
     if texts:
         texts = "\0" not in "".join(array).encode().decode()
     if not texts and not (numbers and np.isfinite(array).all()):
-        raise InvalidValue(name, values, "must be finite numbers, or texts, on an inner dimension")
+        raise InvalidValue(
+            name, values, "must contain finite numbers or strings, because it is an inner dimension"
+        )
     if len(set(array.tolist())) < array.size:
-        raise InvalidValue(name, values, "has a value that stands twice on its inner dimension")
+        raise InvalidValue(
+            name,
+            values,
+            "contains a value twice, but the values of an inner dimension must be unique",
+        )
 
 
 def check_output_value(
@@ -135,13 +141,13 @@ def check_output_value(
     if output_name not in dimensions_by_output:
         raise InvalidValue("measured", output_name, "is not declared", choices=dimensions_by_output)
     if isinstance(value, np.ma.MaskedArray):
-        raise InvalidValue(output_name, value, "is masked, and must be a real number")
+        raise InvalidValue(output_name, value, "is masked, but must be a real number")
     array = np.asarray(value)
     if array.dtype.kind not in "iufb":
         raise InvalidValue(output_name, value, "must be a real number")
     shape = tuple(len(coordinates[dim]) for dim in dimensions_by_output[output_name])
     if array.shape != shape:
-        rule = f"has the shape {array.shape} and must have {shape}"
+        rule = f"has the shape {array.shape}, but must have the shape {shape}"
         raise InvalidValue("measured", output_name, rule)
     return array if shape else array.item()
 
@@ -177,7 +183,7 @@ def check_field_value(
         raise InvalidValue(
             field_name,
             value,
-            f"must be {_describe_value_type(current_value)}, as {current_value!r} is",
+            f"must be {_describe_value_type(current_value)}, such as {current_value!r}",
         )
     if isinstance(value, float) and not math.isfinite(value):
         raise InvalidValue(field_name, value, "must be finite")
@@ -190,7 +196,7 @@ def _describe_value_type(value: object) -> str:
     if isinstance(value, bool):
         return "a flag"
     if isinstance(value, str):
-        return "a text"
+        return "a string"
     return "a number" if isinstance(value, int | float) else "something else"
 
 

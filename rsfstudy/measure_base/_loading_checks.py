@@ -24,6 +24,9 @@ def check_loading_changes_stress_only_in_steps(scene: Scene) -> None:
     loading = scene.parts.loading
     if loading.unknowns:
         what = "load point velocity" if loading.has_load_point_unknown else "normal stress"
-        rule = f"changes {what} all along, so that no motion settles or repeats by itself"
-        remedy = "Read its motion by simulate; that of an oscillation as the study resonance does."
+        rule = f"changes {what} continuously, so the motion neither settles nor repeats itself"
+        remedy = (
+            "Compute the motion with rsfstudy.simulate. For an oscillation, see the study "
+            "resonance."
+        )
         raise InvalidValue("loading", loading.name, rule, remedy=remedy)

@@ -41,8 +41,9 @@ _RIG_QUANTITIES_THAT_ARE_NOT_SCENE_FIELDS = (
     "reference_velocity",
 )
 _REMEDY_FOR_RIG_QUANTITY_ELASTICITIES = (
-    "b at constant a is b_over_a; of a time in s, D_c is 1 + stiffness - reference_rate, normal "
-    "stress is -stiffness, and V_* is reference_rate - 1."
+    "The elasticity with respect to b at constant a is that of b_over_a. For a time in s, the "
+    "elasticity with respect to D_c is 1 + stiffness - reference_rate, with respect to normal "
+    "stress it is -stiffness, and with respect to V_* it is reference_rate - 1."
 )
 #: Largest finite-difference step of ln p for a parameter p. The finite-difference formula spans
 #: four steps.
@@ -141,7 +142,7 @@ class Elasticities(Measure):
     name: ClassVar[str] = "elasticities"
     needs_time: ClassVar[tuple[bool, ...]] = (False, True)
     dimensions: ClassVar[Sequence[Quantity]] = (
-        Quantity("parameter", "", "", "number of the scene that is changed"),
+        Quantity("parameter", "", "", "parameter of the scene that is varied"),
     )
 
     def __post_init__(self) -> None:
@@ -150,7 +151,7 @@ class Elasticities(Measure):
             not isinstance(self.measure, Measure)
             or self.measure.variables[self.measure.primary_output]
         ):
-            rule = "must be a measure whose headline is one number"
+            rule = "must be a measure whose primary output is a single number"
             raise InvalidValue("measure", self.measure, rule)
         object.__setattr__(
             self,
@@ -160,7 +161,7 @@ class Elasticities(Measure):
         )
         for name in self.parameters:
             if name not in self._differentiable_parameter_names:
-                rule = f"is no number of a scene that {self.measure.name} leaves as it is"
+                rule = f"is not a numeric field of the scene, or is computed by {self.measure.name}"
                 choices, remedy = (
                     ((), _REMEDY_FOR_RIG_QUANTITY_ELASTICITIES)
                     if name in _RIG_QUANTITIES_THAT_ARE_NOT_SCENE_FIELDS
@@ -251,7 +252,7 @@ class Elasticities(Measure):
         values: dict[str, OutputValue] = {name: outcome.values.get(name, 0.0) for name in names}
         here = self._log_of_primary_output(outcome)
         if here is None:
-            why = f"{self.primary_output} is zero, which has no logarithm"
+            why = f"{self.primary_output} is zero, so its logarithm does not exist"
             return Outcome(Status.NOT_APPLICABLE, values, why)
         accuracy = integrator.accuracy
         most = min(accuracy.budget, _MAX_EVALUATION_RATIO * (outcome.rhs_evaluations or 1))
@@ -268,7 +269,7 @@ class Elasticities(Measure):
             if np.isnan(found[place, 0]):
                 lacking.append(name)
         values = {**values, "elasticity": found[:, 0], "elasticity_error": found[:, 1]}
-        why = f"no number on either side of {', '.join(lacking)}" if lacking else ""
+        why = f"the measure has no result after a change of {', '.join(lacking)}" if lacking else ""
         return Outcome(Status.OK, values, why)
 
     def _differentiate_by_parameter(

@@ -153,7 +153,7 @@ class Measure(ConstructorKeywordCheckMixin):
     @property
     def primary_output(self) -> str:
         """Name of the main result of the measure."""
-        raise TypeError(f"{type(self).__name__} names no primary_output")
+        raise TypeError(f"{type(self).__name__} does not define primary_output")
 
     @property
     def outputs(self) -> Sequence[Output]:
@@ -218,7 +218,7 @@ class Measure(ConstructorKeywordCheckMixin):
 
         The typical number is valid for the default accuracy.
         """
-        raise TypeError(f"{type(self).__name__} states no typical work")
+        raise TypeError(f"{type(self).__name__} does not define typical_work")
 
     @property
     def work_by_digits(self) -> Mapping[float, float]:
@@ -277,7 +277,7 @@ class Measure(ConstructorKeywordCheckMixin):
         present, annotated = self.plain_fields, {f.name: f.type for f in fields(self)}
         for name, value in changes.items():
             if name not in present:
-                rule = f"is no number, flag or text of the measure {self.name}"
+                rule = f"is not a number, flag or string field of the measure {self.name}"
                 raise InvalidValue("field", name, rule, choices=present)
             whole = type(present[name]) is int and annotated[name] not in (float, "float")
             changes[name] = _declaration_checks.check_field_value(name, value, present[name], whole)
@@ -286,7 +286,9 @@ class Measure(ConstructorKeywordCheckMixin):
         except InvalidValue:
             raise
         except Exception as error:
-            rule = f"are refused by the measure {self.name} ({type(error).__name__}: {error})"
+            rule = (
+                f"are invalid fields of the measure {self.name} ({type(error).__name__}: {error})"
+            )
             raise InvalidValue("fields", changes, rule) from error
 
     def error_scales(self, scene: Scene, values: Mapping[str, Any]) -> Mapping[str, float]:
@@ -331,7 +333,7 @@ class Measure(ConstructorKeywordCheckMixin):
         MotionStopped
             If the motion cannot continue. The caller converts the exception into a status.
         """
-        raise TypeError(f"{type(self).__name__} measures nothing")
+        raise TypeError(f"{type(self).__name__} does not define compute")
 
     def check(self) -> None:
         """Check the declarations of the measure.
@@ -344,8 +346,11 @@ class Measure(ConstructorKeywordCheckMixin):
         try:
             for name in ("__call__", "run_nested", "run_metered"):
                 if getattr(type(self), name) is not getattr(Measure, name):
-                    rule = f"has a {name} of its own"
-                    remedy = "Write compute: what it gives is checked."
+                    rule = f"overrides {name}"
+                    remedy = (
+                        "Override compute instead, because the base class checks the result "
+                        "of compute."
+                    )
                     raise InvalidValue("measure", self.name, rule, remedy=remedy)
             _check_names_declared_by_measure(self)
             for name, values in self.inner_coordinates.items():
@@ -355,7 +360,9 @@ class Measure(ConstructorKeywordCheckMixin):
         except InvalidValue:
             raise
         except Exception as error:
-            rule = f"declares what no lattice can hold ({type(error).__name__}: {error})"
+            rule = (
+                f"declares outputs that a lattice cannot contain ({type(error).__name__}: {error})"
+            )
             raise InvalidValue("measure", type(self).__name__, rule) from error
 
     def __call__(self, scene: Scene, accuracy: Accuracy) -> Outcome:
@@ -447,9 +454,13 @@ class Measure(ConstructorKeywordCheckMixin):
         if not isinstance(outcome.values, Mapping):
             raise InvalidValue("measured", outcome.values, "must map names to numbers")
         if not isinstance(outcome.message, str):
-            raise InvalidValue("message", type(outcome.message).__name__, "must be a text")
+            raise InvalidValue("message", type(outcome.message).__name__, "must be a string")
         if outcome.status is Status.PENDING:
-            raise InvalidValue("measured", outcome, "must say what became of the cell")
+            raise InvalidValue(
+                "measured",
+                outcome,
+                "has the status pending, but must have the status of a computed cell",
+            )
         declared, inner = self.variables, self.inner_coordinates
         given = outcome.values.items()
         values = {
@@ -491,8 +502,11 @@ class Measure(ConstructorKeywordCheckMixin):
         for name, scale in self.error_scales(scene, values).items():
             error, asked = values.get(f"{name}_error", 0.0), integrator.result_tolerance() * scale
             if error > Accuracy.MAX_ERROR_OVER_RTOL * asked:
-                text = f"{name} = {values[name]:.6g} is known to {error:.2g}, and {asked:.2g}"
-                doubts.append(f"{text} was asked for")
+                text = (
+                    f"{name} = {values[name]:.6g} has an error estimate of {error:.2g}, but "
+                    f"{asked:.2g}"
+                )
+                doubts.append(f"{text} was requested")
         if not doubts:
             return outcome
         message = "; ".join([*filter(None, [outcome.message]), *doubts])
@@ -539,10 +553,15 @@ def _check_names_declared_by_measure(measure: Measure) -> None:
     variables = measure.variables
     names = [*(stated or variables), *measure.inner_coordinates]
     if not variables:
-        raise InvalidValue("variables", {}, f"must name a number, in measure {measure.name}")
+        raise InvalidValue(
+            "variables", {}, f"must name a numeric output, in the measure {measure.name}"
+        )
     if measure.primary_output not in variables:
         raise InvalidValue(
-            "primary_output", measure.primary_output, "is not measured", choices=variables
+            "primary_output",
+            measure.primary_output,
+            "is not an output of the measure",
+            choices=variables,
         )
     for name in names:
         if (
@@ -550,19 +569,27 @@ def _check_names_declared_by_measure(measure: Measure) -> None:
             or name in RESERVED_NAMES - {*measure.solved_fields}
             or names.count(name) > 1
         ):
-            rule = f"names something else, or nothing, in measure {measure.name}"
+            rule = f"is reserved or is not a valid variable name, in the measure {measure.name}"
             raise InvalidValue("variable", name, rule)
     for name, dims in variables.items():
         if not isinstance(dims, tuple | list) or len(set(dims)) < len(dims):
-            raise InvalidValue("dimensions", dims, f"of {name!r} must be names, each once")
+            raise InvalidValue(
+                "dimensions", dims, f"must be names without repetition, for the output {name!r}"
+            )
         for dim in dims:
             if dim not in measure.inner_coordinates:
-                raise InvalidValue("dimension", dim, f"of {name!r} has no coordinate values")
+                raise InvalidValue(
+                    "dimension",
+                    dim,
+                    f"has no coordinate values, but the output {name!r} has this dimension",
+                )
     known = {*names, *measure.plain_fields}
     for about in measure.quantities:
         if not isinstance(about, Quantity) or about.name not in known:
             odd = about.name if isinstance(about, Quantity) else about
-            raise InvalidValue("quantities", odd, "describes nothing measured", choices=known)
+            raise InvalidValue(
+                "quantities", odd, "does not describe an output of the measure", choices=known
+            )
     for name in measure.solved_fields:
         if name not in SceneFields.NAMES:
             raise InvalidValue(

@@ -33,8 +33,8 @@ def steady_sliding_is_linearly_stable(scene: Scene) -> bool:
     if growth.is_zero_within_error:
         raise MotionStopped(
             Status.UNVERIFIED,
-            "the motion comes close to steady sliding, but it is undecided if it settles: the "
-            f"growth rate of small changes is {growth.value:.1e} per D_c of slip, with an error of "
-            f"{growth.error:.1e}. Change stiffness= by more than that.",
+            "the motion approaches steady sliding, but it is undecided whether it settles, "
+            f"because the growth rate of small perturbations is {growth.value:.1e} per D_c of "
+            f"slip with an error of {growth.error:.1e}. Use a slightly different stiffness=.",
         )
     return growth.value < 0.0

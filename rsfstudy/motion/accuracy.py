@@ -98,7 +98,8 @@ class Accuracy:
                 "rtol",
                 self.rtol,
                 f"must lie between {MIN_RTOL:g} and {MAX_RTOL:g}",
-                remedy="Below that, rounding decides; above it, nothing is resolved.",
+                remedy="Smaller values are below the rounding errors, and larger values do not "
+                "resolve the motion.",
             )
         if not 1 <= self.budget <= MAX_EVALUATION_BUDGET or self.budget % 1:
             rule = f"must be a whole number from 1 to {MAX_EVALUATION_BUDGET:,}"
@@ -106,8 +107,10 @@ class Accuracy:
         object.__setattr__(self, "budget", int(self.budget))
         object.__setattr__(self, "engine", engine_name(self.engine))
         if self.methods and self.engine != SCIPY:
-            rule = f"are SciPy's, and the engine is {self.engine}"
-            raise InvalidValue("methods", self.methods, rule, remedy="Leave them out.")
+            rule = f"are SciPy solvers, but the engine is {self.engine}"
+            raise InvalidValue(
+                "methods", self.methods, rule, remedy="Omit methods=, or use engine='scipy'."
+            )
 
     def refined(self) -> Accuracy:
         """Return the accuracy for a second run, which yields an error estimate.

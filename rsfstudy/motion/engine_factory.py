@@ -101,8 +101,8 @@ def import_compiled_engine() -> Any:
     try:
         return importlib.import_module("rsfstudy.motion.compiled.numba_backend")
     except ImportError as error:
-        rule = f"needs Numba, which cannot be imported ({error})"
-        remedy = "Install it: pip install 'rsfstudy[fast]'."
+        rule = f"requires Numba, which cannot be imported ({error})"
+        remedy = "Install Numba: pip install 'rsfstudy[fast]'."
         raise InvalidValue("engine", COMPILED, rule, remedy=remedy) from error
 
 

@@ -51,14 +51,14 @@ def engine_name(engine: Any) -> str:
     name: Any = getattr(engine, "name", None)
     if not issubclass(engine, base):
         remedy = f"Derive a class from {base.__module__}.{base.__name__}."
-        raise InvalidValue("engine", engine, "is no stepper", remedy=remedy)
+        raise InvalidValue("engine", engine, "is not a subclass of Stepper", remedy=remedy)
     if not isinstance(name, str) or not is_variable_name(name):
-        rule = f"must be named by a Python identifier, not {name!r}"
+        rule = f"must have a Python identifier as its name (got {name!r})"
         raise InvalidValue("engine", engine, rule, remedy='Write name = "..." in its class.')
     known = _USER_STEPPER_CLASS_BY_NAME.get(name, engine)
     if name in ENGINES or _qualified_name_of_stepper(known) != _qualified_name_of_stepper(engine):
-        rule = f"takes the name {name!r}, which stands for another engine"
-        raise InvalidValue("engine", engine, rule, remedy="Give it another name.")
+        rule = f"has the name {name!r}, which another engine already has"
+        raise InvalidValue("engine", engine, rule, remedy="Choose another name.")
     _USER_STEPPER_CLASS_BY_NAME[name] = engine
     return name
 

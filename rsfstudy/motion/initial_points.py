@@ -219,7 +219,7 @@ def point_with_slip_rate(scene: Scene, point: MotionPoint, log_slip_rate: float)
     excess = scene.a * log_slip_rate + point.psi
     friction = scene.frictional_stress_after_jump(excess, point.psis)
     if friction is None:
-        raise MotionStopped(Status.NORMAL_STRESS_LOST, "the step takes normal stress away")
+        raise MotionStopped(Status.NORMAL_STRESS_LOST, "the normal stress vanishes at the step")
     return point._replace(log_slip_rate=log_slip_rate, frictional_stress=friction)
 
 
@@ -250,16 +250,16 @@ def check_forward_slip_is_possible_at_start(
         and scene.effective_normal_stress_at(spring_stress, start_point.psis)
         <= regime_switching.MIN_NORMAL_STRESS
     ):
-        raise MotionStopped(Status.NORMAL_STRESS_LOST, "the step takes normal stress away")
+        raise MotionStopped(Status.NORMAL_STRESS_LOST, "the normal stress vanishes at the step")
     if slider.mu_star + spring_stress > 0.0:
         return
     steps = start_point is None or scene.spring_stress_step
-    now = "the step takes shear stress to" if steps else "shear stress has gone to"
+    now = "the step changes the shear stress to" if steps else "the shear stress has changed to"
     text = f"{now} {slider.mu_star + spring_stress:.3g} sigma_*"
     if not scene.parts.law.regularised:
         raise MotionStopped(
-            Status.SHEAR_STRESS_REVERSED, f"{text}; slip may reverse where regularised=True"
+            Status.SHEAR_STRESS_REVERSED, f"{text}. Reversed slip requires regularised=True"
         )
     if scene.load_velocity == 0.0:
-        text = f"{text}, where slip backwards dies out under a load point at rest"
+        text = f"{text}, and reversed slip decays because the load point is at rest"
         raise MotionStopped(Status.SHEAR_STRESS_REVERSED, text)

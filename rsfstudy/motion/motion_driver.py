@@ -45,7 +45,9 @@ from rsfstudy.status import Status
 _MIN_EVENT_ROWS, _RECORDING_ROWS = 64, 4096
 #: Constructor of named tuples that takes half the time of a normal constructor call.
 _make_named_tuple_without_checks = tuple.__new__
-_STEP_TOO_SHORT_TEXT = "a step would be shorter than the spacing of numbers around the clock"
+_STEP_TOO_SHORT_TEXT = (
+    "the required step size is smaller than the spacing of floating-point numbers"
+)
 _EMPTY_RECORDING_TABLES = array_layout.RECORD_NEVER, np.empty(0), np.empty((0, FIRST_STATE_COLUMN))
 _EMPTY_KINK_TABLE_AND_ZERO_COUNT = np.empty((0, SEGMENT_STRESS_FALL + 1)), 0
 
@@ -332,7 +334,7 @@ def _motion_stopped_error(
             int(motion_state.get_state_field("termination")),
             motion_state.get_state_field("final_normal_stress"),
         )
-    why = "step without length, or a state that is not finite"
+    why = "the step size is zero, or a value is not finite"
     if return_code == array_layout.NO_STEP_POSSIBLE:
         why = stepper.failure if stepper else _STEP_TOO_SHORT_TEXT
     return MotionStopped(

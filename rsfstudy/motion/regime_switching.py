@@ -439,12 +439,17 @@ def build_termination_error(termination_status: int, normal_stress: float) -> Mo
         Exception with the status and the message.
     """
     if termination_status == NORMAL_STRESS_VANISHED:
-        return MotionStopped(Status.NORMAL_STRESS_LOST, "normal stress vanished during the motion")
+        return MotionStopped(
+            Status.NORMAL_STRESS_LOST, "the normal stress vanished during the motion"
+        )
     if termination_status == NORMAL_STRESS_UNBOUNDED:
-        text = f"normal stress grew to {normal_stress:.3g} sigma_* and goes on"
+        text = f"the normal stress grew to {normal_stress:.3g} sigma_* and is still growing"
         return MotionStopped(Status.LOCKED, text)
     if termination_status == SLIP_STOPPED:
         return MotionStopped(Status.SLIP_STOPPED, "the slip rate fell below 10^-290 V_*")
-    bound = "inertia=True (a rig's period=, mass=) or radiation_damping= (shear_modulus=) bounds it"
-    text = f"slip rate grew beyond 10^120 V_* without mass: {bound}"
+    bound = (
+        "To limit the slip rate, pass inertia=True (period= or mass= of a rig) or "
+        "radiation_damping= (shear_modulus= of a rig)"
+    )
+    text = f"the slip rate exceeded 10^120 V_* without inertia. {bound}"
     return MotionStopped(Status.SLIP_RATE_UNBOUNDED, text)

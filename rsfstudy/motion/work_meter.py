@@ -95,7 +95,10 @@ class WorkMeter:
     @property
     def budget_advice(self) -> str:
         """End of a message that suggests a budget four times as large."""
-        return f"; --budget {4 * self.budget} (budget=) allows more"
+        return (
+            f". To continue, increase the budget to {4 * self.budget}: --budget "
+            f"{4 * self.budget} (budget=)"
+        )
 
     def check_budget(self) -> None:
         """Raise MotionStopped if the evaluations exceed the budget.
@@ -108,7 +111,8 @@ class WorkMeter:
         if self.evaluations > self.budget:
             raise MotionStopped(
                 Status.WORK_BUDGET_SPENT,
-                f"more than {self.budget} right-hand sides without an answer",
+                f"the budget of {self.budget} right-hand side evaluations was exceeded before a "
+                "result was found",
             )
 
     def charge_new_work(

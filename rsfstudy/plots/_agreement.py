@@ -54,9 +54,9 @@ def draw_agreement(digits: Mapping[str, CurvePoints], label: str, required_digit
             *zip(*points, strict=True), cycle_marker(number), label=name.replace("_", " "), **style
         )
     axes.axhline(
-        required_digits, color="0.5", linewidth=0.8, linestyle="--", label="enough to pass"
+        required_digits, color="0.5", linewidth=0.8, linestyle="--", label="required to pass"
     )
-    axes.set(xlabel=label[0].upper() + label[1:], ylabel="Digits that agree")
+    axes.set(xlabel=label[0].upper() + label[1:], ylabel="Number of correct digits")
     add_legend(axes, 5)
     enlarge_for_legends(figure, [[axes]])
     finalize_layout(figure)

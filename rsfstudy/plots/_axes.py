@@ -233,7 +233,7 @@ def describe_point(cell: xr.Dataset | xr.DataArray, dimension: str) -> str:
     if dimension == "stiffness_ratio":
         return format_stiffness_ratio(value)
     if dimension == "inertia":
-        return "with mass" if value else "without mass"
+        return "with inertia" if value else "without inertia"
     units = {"": "", "1": "", "degree": "°"}.get(about.units, f" {format_units(about.units)}")
     return f"{quantity_symbol(about)} = {format_number(value, 4)}{units}"
 

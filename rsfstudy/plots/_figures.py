@@ -176,8 +176,10 @@ def draw_figure(
         or callable(getattr(user_figure, "draw", user_figure))
     )
     if not draws:
-        rule = "must be a Figure, or a function or module of yours that draws"
-        raise InvalidValue("own", user_figure, rule, remedy="Write def name(dataset, axes): ...")
+        rule = "must be a Figure, or a user-defined function or module that draws"
+        raise InvalidValue(
+            "own", user_figure, rule, remedy="Define, for example, def name(dataset, axes): ..."
+        )
     dataset = DatasetUnits(dataset).convert_for_display()
     with style_context(style):
         drawing, dataset = _choose_figure(dataset, user_figure, variable)
@@ -236,7 +238,7 @@ def _format_note_on_overrides(dataset: xr.Dataset, max_line_characters: int) -> 
     text = to_mathtext(
         format_overrides(values).replace("=", " = ").replace(",", ", ").replace(",  ", ", ")
     )
-    return wrap_text(f"not as declared: {text}", 55 if max_line_characters == 1 else 120)
+    return wrap_text(f"overrides: {text}", 55 if max_line_characters == 1 else 120)
 
 
 # ---- choice of the figure -----------------------------------------------------------------------
@@ -310,7 +312,7 @@ def _expand_panels_of_figure(
         )
     named = [panel.y for panel in figure_declaration.panels if isinstance(panel.y, str) and panel.y]
     if not found and named and not any(name in dataset for name in named):
-        rule = "does not fit these results (they have none of its variables)"
+        rule = "does not fit these results, because the results do not contain its variables"
         raise InvalidValue("plot", StoredDataset(dataset).declaration.plot, rule)
     return found
 
@@ -351,7 +353,9 @@ def _generic_figure(dataset: xr.Dataset, variable: str | None = None) -> Declare
     choices = [
         str(name) for name, values in dataset.data_vars.items() if _axes.is_numeric_variable(values)
     ]
-    raise InvalidValue("variable", variable, "is no number of these results", choices=choices)
+    raise InvalidValue(
+        "variable", variable, "is not a numeric variable of these results", choices=choices
+    )
 
 
 # ---- files --------------------------------------------------------------------------------------
@@ -417,7 +421,7 @@ def save_figure(
     form = path.suffix[1:].lower()
     if form not in Defaults.FIGURE_FORMATS:
         raise InvalidValue(
-            "figure", path.name, "needs an ending we write", choices=Defaults.FIGURE_FORMATS
+            "figure", path.name, "has an unsupported suffix", choices=Defaults.FIGURE_FORMATS
         )
     try:
         drawn = draw_figure(dataset, user_figure, variable=variable, style=style)

@@ -66,9 +66,9 @@ def plot_healing(table: xr.Dataset, record: Record | None = None) -> Figure:
     1
     """
     if not {"healing", "duration", "healing_rate"} <= set(table.variables):
-        raise DataError("the dataset is no table of holds. Pass the result of rsfstudy.healing.")
+        raise DataError("the dataset is not a table of holds. Pass the result of rsfstudy.healing.")
     if not table.sizes["hold"]:
-        raise DataError("the table has no holds, and there is nothing to draw.")
+        raise DataError("the table contains no holds, so there is nothing to draw.")
     count = 1 if record is None else 2
     with style_context():
         figure = NotebookFigure(

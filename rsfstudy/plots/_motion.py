@@ -97,7 +97,7 @@ def plot_motion(
     _check_motion(motion, against)
     if not motion["slip"].notnull().any():
         text = f"{motion.attrs.get('status', '')}: {motion.attrs.get('message', '')}"
-        raise DataError(f"there is no motion, and nothing to draw. {text}")
+        raise DataError(f"the dataset contains no motion, so there is nothing to draw. {text}")
     against = against or _choose_abscissa(motion)
     shown = motion if rig is None else rig.in_units(motion, **DatasetUnits.DISPLAY_UNITS)
     with style_context():
@@ -140,15 +140,20 @@ def _check_motion(motion: xr.Dataset, abscissa: str | None) -> None:
     known = [name for name in ABSCISSA_VARIABLES if name in motion]
     for name in (*needed, _find_normal_stress_name(motion), *known):
         if name not in motion:
-            text = "is missing: it is no motion as simulate gives it, and no limit cycle"
+            text = "is missing. The dataset is neither a motion from simulate nor a limit cycle"
             raise DataError(f"{name} {text}")
         if motion[name].dims != motion["slip"].dims or motion[name].dtype.kind not in "fiu":
-            text = f"must be numbers along {', '.join(map(str, motion['slip'].dims))}, as slip is"
-            raise DataError(f"{name} {text}: the dataset is no motion as simulate returns it")
+            text = (
+                "must be numeric and have the dimensions of slip, "
+                f"{', '.join(map(str, motion['slip'].dims))}"
+            )
+            raise DataError(f"{name} {text}. The dataset is not a motion from simulate")
     largest = float(np.abs(motion["log10_slip_rate"]).max())
     if largest > sys.float_info.max_10_exp:
         rule = f"must be at most {sys.float_info.max_10_exp} in absolute value"
-        raise DataError(f"log10_slip_rate = {largest:g} {rule}: the file is damaged. Run it again.")
+        raise DataError(
+            f"log10_slip_rate = {largest:g} {rule}. The file is damaged. Run the simulation again."
+        )
 
 
 def _find_normal_stress_name(motion: xr.Dataset) -> str:

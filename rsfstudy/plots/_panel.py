@@ -330,7 +330,8 @@ def _draw_curve(
         shapes = " and ".join(f"shape {found.shape}" for found in values)
         remedy = "Assign each other axis to hue=, facet= or isel= of the panel."
         raise DataError(
-            f"x and y of a curve have {shapes}, but must be equally long lists. {remedy}"
+            f"x and y of a curve have {shapes}, but must be one-dimensional arrays of the same "
+            f"size. {remedy}"
         )
     named = [found.dtype.kind not in "fiu" for found in values]
     x, y = (

@@ -87,8 +87,8 @@ def style_context(user_styles: Any = None) -> Iterator[None]:
         except Exception as error:
             if not settings:
                 raise
-            rule = f"a figure cannot be drawn in it: {shorten_text(error).rstrip('.')}"
-            remedy = "Draw it without this style to find out if the style is the reason."
+            rule = f"a figure cannot be drawn in this style: {shorten_text(error).rstrip('.')}"
+            remedy = "Draw the figure without this style to check whether the style is the cause."
             raise InvalidValue(
                 "style", _format_style_for_message(user_styles), rule, remedy=remedy
             ) from error
@@ -107,7 +107,7 @@ def _to_matplotlib_style(user_style: Any) -> str | dict[str, Any]:
         return user_style
     if isinstance(user_style, str | Path) and Path(user_style).suffix == _STYLE_SHEET_SUFFIX:
         return _read_style_sheet(Path(user_style))
-    rule = f"is neither a style sheet, which ends in {_STYLE_SHEET_SUFFIX}, nor the name of a style"
+    rule = f"is neither a style sheet (suffix {_STYLE_SHEET_SUFFIX}) nor the name of a style"
     raise InvalidValue(
         "style", _format_style_for_message(user_style), rule, choices=["default", *style.available]
     )
@@ -147,7 +147,7 @@ def _read_style_sheet(path: Path) -> dict[str, Any]:
     try:
         lines = path.read_text(encoding="utf-8").splitlines()
     except (OSError, UnicodeDecodeError) as error:
-        reason = getattr(error, "strerror", None) or "it is not text in UTF-8"
+        reason = getattr(error, "strerror", None) or "the file is not encoded in UTF-8"
         raise InvalidValue("style", str(path), f"cannot be read: {reason}") from error
     settings: dict[str, Any] = {}
     for number, line in enumerate(lines, start=1):
@@ -156,7 +156,7 @@ def _read_style_sheet(path: Path) -> dict[str, Any]:
             continue
         try:
             if not colon:
-                raise InvalidValue("style", line, "must read NAME: VALUE")
+                raise InvalidValue("style", line, "must have the form NAME: VALUE")
             settings |= _validate_settings({name.strip(): _strip_quotes(value.strip())})
         except InvalidValue as error:
             raise error.with_location(f"{path}, line {number}") from error

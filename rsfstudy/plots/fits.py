@@ -48,9 +48,9 @@ def panels(dataset: xr.Dataset) -> Sequence[Panel]:
     dataset : xarray.Dataset
         Results of ``rsfstudy.fit``. The required variables are ``record_displacement``,
         ``record_friction``, ``record_time``, ``fitted_friction``, ``fitted_friction_stderr``,
-        ``residual`` and ``innovation`` along ``row``, and ``correlation`` with the coordinate
-        ``parameter``. The dimension ``law`` is required, and the dimensions ``record``, ``step``
-        and ``part`` are optional.
+        ``residual`` and ``whitened_residual`` along ``row``, and ``correlation`` with the
+        coordinate ``parameter``. The dimension ``law`` is required, and the dimensions ``record``,
+        ``step`` and ``part`` are optional.
 
     Returns
     -------
@@ -152,10 +152,10 @@ def _draw_record_with_fits(dataset: xr.Dataset, axes: Axes) -> None:
         style = cycle_style(law) | {"marker": "", "label": name, "linewidth": 1.2, "zorder": 3}
         for x, y, error in _iterate_columns_of_fit_windows(one, names):
             if not law:
-                axes.axvspan(x[0], x[-1], color="0.94", lw=0, zorder=0, label="what is fitted")
+                axes.axvspan(x[0], x[-1], color="0.94", lw=0, zorder=0, label="fitted window")
             windows += [x[0], x[-1]]
             band = {"color": style["color"], "alpha": 0.3, "lw": 0, "zorder": 2}
-            said = f"within {_CONFIDENCE_BAND_HALF_WIDTH_IN_STDERRS:g} standard errors"
+            said = rf"$\pm${_CONFIDENCE_BAND_HALF_WIDTH_IN_STDERRS:g} standard errors"
             axes.fill_between(
                 x,
                 y - _CONFIDENCE_BAND_HALF_WIDTH_IN_STDERRS * error,
@@ -176,7 +176,7 @@ def _draw_residuals(dataset: xr.Dataset, axes: Axes) -> None:
         style = cycle_style(law) | {"label": name, "marker": "", "linewidth": 1.0, "zorder": 3}
         for x, y in _iterate_columns_of_fit_windows(one, ("record_displacement", "residual")):
             if not law:
-                axes.plot(x, y, label=f"each row, {name}", **_LINE_STYLE_OF_RECORD_ROWS)
+                axes.plot(x, y, label=f"rows, {name}", **_LINE_STYLE_OF_RECORD_ROWS)
             count = max(1, round(_RESIDUAL_AVERAGING_FRACTION_OF_WINDOW * len(x)))
             mean = np.ones(count) / count
             axes.plot(np.convolve(x, mean, "valid"), np.convolve(y, mean, "valid"), **style)
@@ -186,16 +186,16 @@ def _draw_autocorrelation(dataset: xr.Dataset, axes: Axes) -> None:
     """Draw the autocorrelation of residuals and of whitened residuals."""
     axes.axhline(0.0, color="0.5", lw=0.8)
     for one, name, law in _iterate_fits_with_law(dataset, only_first_step=True):
-        left, freed = _select_thinned_columns_of_fit(one, ("residual", "innovation"))
+        left, whitened = _select_thinned_columns_of_fit(one, ("residual", "whitened_residual"))
         if len(left) <= _MAX_AUTOCORRELATION_LAGS:
             continue
         style = cycle_style(law) | {"marker": ""}
         axes.plot(_compute_autocorrelation(left), **style | {"label": name})
-        axes.plot(_compute_autocorrelation(freed), **style | {"linestyle": ":"})
-        chance = 2.0 / len(left) ** 0.5
+        axes.plot(_compute_autocorrelation(whitened), **style | {"linestyle": ":"})
+        bound = 2.0 / len(left) ** 0.5
         if not law:
-            axes.axhspan(-chance, chance, color="0.9", lw=0, zorder=0, label="white noise (95 %)")
-    add_grey_legend_entry(axes, "freed of correlation", {"linestyle": ":"})
+            axes.axhspan(-bound, bound, color="0.9", lw=0, zorder=0, label="white noise (95 %)")
+    add_grey_legend_entry(axes, "whitened residuals", {"linestyle": ":"})
 
 
 def _compute_autocorrelation(values: np.ndarray) -> np.ndarray:
@@ -212,7 +212,7 @@ def _correlation_title(dataset: xr.Dataset) -> str:
     laws = [str(law) for law in dataset["law"].values]
     if len(laws) == 1:
         return f"Correlation: {describe_point(dataset.isel(law=0), 'law')}"
-    return f"Correlation: {laws[0]} below, {laws[1]} above".replace("_", " ")
+    return f"Correlation: {laws[0]} (lower), {laws[1]} (upper)".replace("_", " ")
 
 
 def _parameter_symbol(parameter_name: str) -> str:

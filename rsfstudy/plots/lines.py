@@ -124,7 +124,7 @@ def _draw_lines(variable_name: str, x_dimension: str, dataset: xr.Dataset, axes:
         axes.set_yscale("log")
     if len(curves) > _MAX_LEGEND_LINES:
         add_grey_legend_entry(
-            axes, f"the first {_MAX_LEGEND_LINES} of {len(curves)}", {"linestyle": "none"}
+            axes, f"first {_MAX_LEGEND_LINES} of {len(curves)} curves", {"linestyle": "none"}
         )
 
 

@@ -37,8 +37,8 @@ _MAX_DIFFERENCE_IN_LAST_PLACE_UNITS = 1.51
 _QUANTITIES_STARTING_AT_ZERO = ("slip", "pore_pressure")
 #: Conventions for radiation damping, and the factors by which eta is multiplied.
 _RADIATION_DAMPING_CONVENTIONS = {
-    "twice as much (G/c_s for G/(2 c_s))": 2.0,
-    "half as much": 0.5,
+    "twice as large (G/c_s instead of G/(2 c_s))": 2.0,
+    "half as large": 0.5,
     "left out": 0.0,
 }
 #: Common conversion factors. The factors convert units, powers of ten, angles or logarithms.
@@ -139,13 +139,19 @@ class AnswerComparison:
                 f"{round_digits_down(agreement.agreeing_digits):4.1f} digits"
             )
             if agreement.agrees_to_written_digits:
-                text += ", to the last place that is written"
+                text += ", all written decimal places"
             elif agreement.agreeing_digits == problem.digits:
-                text += ", all that are known"
+                text += ", all known digits"
             elif problem.index_column:
-                text += f", fewest at {_format_answer_row(problem, agreement.least_agreeing_row)}"
+                text += (
+                    ", lowest agreement at "
+                    f"{_format_answer_row(problem, agreement.least_agreeing_row)}"
+                )
             if agreement.first_failing_row is not None and problem.index_column:
-                text += f"; they part at {_format_answer_row(problem, agreement.first_failing_row)}"
+                text += (
+                    "; fewer digits than required from "
+                    f"{_format_answer_row(problem, agreement.first_failing_row)}"
+                )
             lines.append(text)
         return lines
 
@@ -250,7 +256,9 @@ def compare_answers(
         _iterate_explanations_of_disagreement(problem, values, answer), default=(0.0, "")
     )
     better = best >= max(_MIN_EXPLAINED_DIGITS, found.agreeing_digits + _MIN_DIGITS_GAINED)
-    explanation = f"{words}. With that undone, {round_digits_down(best):.1f} digits agree"
+    explanation = (
+        f"{words}. With this convention corrected, {round_digits_down(best):.1f} digits agree"
+    )
     return replace(found, explanation_of_disagreement=explanation if better else "")
 
 
@@ -363,15 +371,15 @@ def _iterate_answers_in_other_conventions(
     """
     shift, stress = sum(problem.b) * math.log(2.0), problem.rig.normal_stress
     if "friction" in reported:
-        for sign, place in ((1.0, "left out of"), (-1.0, "left in")):
+        for sign, place in ((1.0, "omitted from"), (-1.0, "included in")):
             moved = reported["friction"] + sign * shift
-            words = f"friction is shifted by b ln 2, as where 2 D_c is {place} the logarithm"
+            words = f"friction is shifted by b ln 2, as if 2 D_c were {place} the logarithm"
             yield words, reported | {"friction": moved}
         if problem.radiation_damping and "slip_rate" in reported:
             at_fault = (
                 reported["friction"] - problem.radiation_damping * reported["slip_rate"] / stress
             )
-            words = "friction is that of the spring, which holds eta V/sigma too"
+            words = "friction is computed from the spring stress, which includes eta V/sigma"
             yield words, reported | {"friction": at_fault}
     for name in problem.quantities:
         factor = float(np.median(reported[name] / np.where(answer[name], answer[name], np.nan)))
@@ -443,12 +451,12 @@ def _iterate_problems_in_other_conventions(
         at_rate = [f"{factor * theta!r} s" for theta in problem.theta_star]
         for words, thetas in (("D_c/V_*", steady), (f"D_c/V(0) with V(0) = {rate}", at_rate)):
             other = {**problem.initial, "theta": thetas}
-            yield f"theta_0 is {words}, and not as stated", replace(problem, initial=other)
+            yield f"theta_0 is {words} instead of the given value", replace(problem, initial=other)
     if problem.parameters.get("regularised"):
-        yield "friction has a logarithm for arcsinh", changed(regularised=False)
+        yield "friction uses a logarithm instead of arcsinh", changed(regularised=False)
     for name in ("alpha", "stress_dependence"):
         if problem.parameters.get(name):
-            yield f"{name} is left out", changed(**{name: 0.0})
+            yield f"{name} is omitted", changed(**{name: 0.0})
     law = {"slip": "slowness", "slowness": "slip"}.get(problem.law)
     if law:
         yield f"the law is the {law} law", replace(problem, law=law)

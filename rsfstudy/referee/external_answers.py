@@ -86,7 +86,8 @@ def read_external_answer(
     )
     if count != len(rows):
         remedy = (
-            f"Give a row for each {problem.index_column} of the problem. Rows are not interpolated."
+            f"Write one row for each {problem.index_column} of the problem. Rows are not "
+            "interpolated."
         )
         rule = f"must be {len(rows)}"
         wrong = InvalidValue(
@@ -109,7 +110,8 @@ def read_external_answer(
     for name in reversed(problem.column_names):
         if name not in found:
             remedy = (
-                f"Head it {name} ({problem.quantity_units[name]}), or say --columns '{name}=...'."
+                f"Use the heading {name} ({problem.quantity_units[name]}), or pass --columns "
+                f"'{name}=...'."
             )
             wrong = InvalidValue("column", name, "is missing", choices=table, remedy=remedy)
             raise wrong.with_location(str(path))
@@ -152,7 +154,9 @@ def _convert_column_to_si(
     )
     one = "1" if column.units in ("", "1") else f"1 {column.units}"
     if units != "1" and one == "1":
-        remedy = f"Write them in the header, or --columns '{quantity_name}=... ({units})'."
+        remedy = (
+            f"Write the units in the header, or pass --columns '{quantity_name}=... ({units})'."
+        )
         raise InvalidValue(
             quantity_name, column.units, "has no units", remedy=remedy
         ).with_location(column.path)
@@ -166,7 +170,7 @@ def _convert_column_to_si(
         else _MAX_ACCEPTED_ANSWER_VALUE_IN_SI / factor
     )
     column.check_values(
-        quantity_name, ~(np.abs(column.values) <= most), f"must be a number, of {most:g} at most"
+        quantity_name, ~(np.abs(column.values) <= most), f"must be a number of at most {most:g}"
     )
     return ReportedQuantity(column.values * factor, factor * _find_last_place_unit(column.values))
 
@@ -196,5 +200,5 @@ def _check_index_values(
     )
     wanted = f"{expected_values[np.argmax(wrong)]:g} {problem.quantity_units[problem.index_column]}"
     column._replace(values=values).check_values(
-        problem.index_column, wrong, f"must be {wanted}: nothing is interpolated"
+        problem.index_column, wrong, f"must be {wanted}, because rows are not interpolated"
     )

@@ -80,7 +80,7 @@ _NAMES_OF_LAWS_WITH_THETA_AS_STATE = (
 #: descriptions of types for error messages of rsfstudy.
 _TYPE_ERROR_PATTERN = re.compile(r"Expected `(\w+)`, got `(\w+)`(?: - at `\$(.*)`)?")
 _READABLE_NAME_BY_TYPE_NAME = {
-    "array": "a list", "object": "a table", "str": "a text", "int": "a whole number",
+    "array": "a list", "object": "a table", "str": "a string", "int": "a whole number",
     "float": "a number", "bool": "true or false", "null": "nothing", "date": "a date",
 }  # fmt: skip
 #: Maximum number of digits of an answer, and maximum number of requested peaks.
@@ -166,7 +166,10 @@ class BenchmarkProblem:
         if (np.diff(times, prepend=-1e-300) <= 0.0).any():
             raise InvalidValue("times", self.times, "must increase, from 0 or later")
         if self.report == "peaks" and not 1 <= self.count <= _MAX_PEAKS:
-            rule = f"must lie between 1 and {_MAX_PEAKS:,}: it is the number of peaks to report"
+            rule = (
+                f"must lie between 1 and {_MAX_PEAKS:,}, because it is the number of peaks to "
+                "report"
+            )
             raise InvalidValue("count", self.count, rule)
         if self.law not in _NAMES_OF_LAWS_WITH_THETA_AS_STATE:
             raise InvalidValue(
@@ -175,12 +178,15 @@ class BenchmarkProblem:
         two = ("b_2", "D_c_2") if self.law.startswith("two") else ()
         for name in ("a", "b", *two, *_REQUIRED_RIG_FIELD_BY_PARAMETER):
             if name not in self.parameters:
-                raise InvalidValue("parameters", [*self.parameters], f"must state {name}")
+                raise InvalidValue("parameters", [*self.parameters], f"must contain {name}")
         if self.initial and self.initial.keys() != {"slip_rate", "theta"}:
-            rule = "must state slip_rate and theta, or nothing"
+            rule = "must contain slip_rate and theta, or be empty"
             raise InvalidValue("initial", [*self.initial], rule)
         if self.initial and "phi" in self.parameters:
-            rule = "has no meaning beside phi: it begins with normal_stress, in steady sliding"
+            rule = (
+                "has no meaning with phi, because the motion starts from steady sliding at "
+                "normal_stress"
+            )
             raise InvalidValue("initial", [*self.initial], rule)
 
     @property
@@ -357,7 +363,7 @@ class BenchmarkProblem:
         stated = self.initial["theta"]
         thetas = stated if isinstance(stated, list) else [stated]
         if len(thetas) != len(self.b):
-            rule = f"must state {len(self.b)}, one for each b"
+            rule = f"must contain {len(self.b)} values, one for each b"
             raise InvalidValue("theta", stated, rule)
         known = zip(self.b, thetas, self.theta_star, strict=True)
         return tuple(
@@ -412,7 +418,7 @@ def read_problem(path: Path) -> BenchmarkProblem:
             _check_declared_type(name, value, known[name])
         for name in ("title", "law", "quantities", "parameters"):
             if name not in stated:
-                raise InvalidValue("problem", [*stated], f"must state {name}")
+                raise InvalidValue("problem", [*stated], f"must contain {name}")
         number = int(path.name[:2]) if path.parent == SHIPPED_PROBLEM_FOLDER else 0
         problem = BenchmarkProblem(**stated, number=number)
         _ = problem.scene, problem.initial_event
@@ -427,8 +433,8 @@ def read_problem(path: Path) -> BenchmarkProblem:
         ValueError,
         MotionStopped,
     ) as error:
-        rule = f"cannot be posed ({format_exception(error)})"
-        remedy = "rsfstudy problems DIR writes files of problems to begin with."
+        rule = f"is not a valid problem ({format_exception(error)})"
+        remedy = "Run rsfstudy problems DIR to write example problem files."
         raise InvalidValue("problem", str(path), rule, remedy=remedy) from error
 
 
@@ -450,7 +456,7 @@ def _check_declared_type(name: str, value: Any, expected_type: Any) -> None:
             _READABLE_NAME_BY_TYPE_NAME.get(kind, kind) for kind in found.groups()[:2]
         )
         place = f"{name}{found[3] or ''}"
-        raise InvalidValue(place, value, f"must be {wanted}, not {actual}") from error
+        raise InvalidValue(place, value, f"must be {wanted} (got {actual})") from error
 
 
 def shipped_problem_files() -> dict[int, Path]:
@@ -489,8 +495,8 @@ def write_problems(directory: Path) -> int:
     """
     check_path("DIR", directory)
     if directory.exists() and (not directory.is_dir() or any(directory.iterdir())):
-        remedy = "Name a new one: nothing is replaced."
-        raise InvalidValue("DIR", str(directory), "is there already", remedy=remedy)
+        remedy = "Choose a new directory, because existing files are not replaced."
+        raise InvalidValue("DIR", str(directory), "already exists", remedy=remedy)
     shipped = shipped_problem_files()
     try:
         places = {name: directory / name for name in ("problems", "answers", "templates")}

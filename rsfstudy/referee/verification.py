@@ -7,6 +7,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 from rsfstudy.errors import InvalidValue
+from rsfstudy.formatting import pluralize
 from rsfstudy.referee.answer_comparison import AnswerComparison, compare_answers, known_answer
 from rsfstudy.referee.external_answers import read_external_answer
 from rsfstudy.referee.problem_files import read_problem, shipped_problem_files
@@ -49,8 +50,16 @@ def compare_file_with_known_answer(
         posed = read_problem(there[int(number)])
         path = there[int(number)].with_suffix(".csv")
     else:
-        remedy = "Give --problem, or a file name that begins with it, as in 01_mine.csv."
-        raise InvalidValue("problem", number, "is none", choices=map(str, there), remedy=remedy)
+        remedy = (
+            "Pass --problem, or use a file name that starts with the number, such as 01_mine.csv."
+        )
+        raise InvalidValue(
+            "problem",
+            number,
+            "is not the number of a problem",
+            choices=map(str, there),
+            remedy=remedy,
+        )
     told = read_external_answer(file, posed, columns)
     return compare_answers(*known_answer(posed, path), told, required_digits)
 
@@ -74,8 +83,8 @@ def summarise_comparisons(comparisons: Sequence[AnswerComparison]) -> str:
         if one.has_required_digits
     }
     own = all(one.problem.number == 0 for one in comparisons)
-    of = "one's own" if own else f"{len(shipped_problem_files())}"
-    text = f"{len(passed)} problem{'s' * (len(passed) != 1)} of {of}"
+    kind = "user-defined problem" if own else "problem"
+    text = pluralize(len(passed), kind) + ("" if own else f" of {len(shipped_problem_files())}")
     if not passed:
         return text
     low, high = min(passed.values()), max(passed.values())

@@ -116,7 +116,7 @@ def format_notes_on_incomplete_results(results: xr.Dataset) -> list[str]:
     if failed := count_failures(results):
         each = ", ".join(f"{label} {number}" for label, number in failed.items())
         first = f"{sum(failed.values())} of {results['status'].size} cells failed: {each}"
-        told = [first, *told, "dataset.rsf.failures() lists them"]
+        told = [first, *told, "use dataset.rsf.failures() for a list"]
     return told
 
 

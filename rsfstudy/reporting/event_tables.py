@@ -61,12 +61,12 @@ def build_record_events_pieces(catalogue: xr.Dataset) -> list[TextTable | str]:
     if count > len(rows):
         pieces.append(f"and {count - len(rows):,} more events")
     pieces.append(
-        f"{count} drops of shear stress; smallest drop that can be detected: "
+        f"{count} drops of shear stress; smallest detectable drop: "
         f"{float(catalogue['smallest_drop']):.3g}{stated}; standard deviation of the noise: "
         f"{float(catalogue['noise']):.3g}{stated}"
     )
     if catalogue.attrs["sign_of_shear_stress"] < 0:
-        pieces.append("shear stress is negative in the record: its sign was reversed")
+        pieces.append("shear stress is negative in the record, so its sign was reversed")
     if processing := catalogue.attrs.get("processing"):
         pieces.append(str(processing))
     return pieces

@@ -90,7 +90,7 @@ def _compare_laws_of_fits(fits: Sequence[xr.Dataset]) -> Iterator[str]:
 
     The sentence also reports whether the AIC of the second-best law is higher by a decisive amount.
     """
-    known = [(one["criterion"].item(), str(one["law"].item())) for one in fits]
+    known = [(one["aic"].item(), str(one["law"].item())) for one in fits]
     known = sorted(pair for pair in known if math.isfinite(pair[0]))
     if len(known) > 1:
         (best, law), (next_best, _other) = known[:2]
@@ -142,9 +142,9 @@ def _build_parameter_column(fit: xr.Dataset) -> dict[str, str]:
         process = f"AR({order})" if order else "white"
         quality = {
             "R2": f"{fit['r_squared'].item():.4f}",
-            "AIC": f"{fit['criterion'].item():.1f}",
-            "noise": f"{process}, sd {fit['noise_size'].item():.2g}",
-            "effective sample size": f"{fit['effective_samples'].item():.0f}",
+            "AIC": f"{fit['aic'].item():.1f}",
+            "noise": f"{process}, sd {fit['noise_sd'].item():.2g}",
+            "effective sample size": f"{fit['n_eff'].item():.0f}",
         }
     return found | quality | {"status": status_label_of_fit(fit)}
 
@@ -248,8 +248,8 @@ def _iterate_fit_remarks(fit: xr.Dataset) -> Iterator[str]:
             for of in drawn.dropna("parameter").transpose("parameter", ...)
         )
         time = f"{fit['autocorrelation_time'].item():.2g} steps"
-        yield f"{law}: 95 % of the posterior: {each} (autocorrelation time {time})"
-    p_value = fit["whiteness"].item()
+        yield f"{law}: 95 % credible intervals: {each} (autocorrelation time {time})"
+    p_value = fit["p_value"].item()
     if math.isfinite(p_value):
         order, rows = int(fit["noise_order"]), int(fit["rows_fitted"])
         yield f"{law}: {describe_whiteness(p_value, order, rows)}"

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from typing import Any
+from collections.abc import Mapping
+from typing import Any, ClassVar
 
 import numpy as np
 import pandas as pd
@@ -14,6 +15,7 @@ from rsfstudy.fitting import (
     PARAMETERS,
     split_window_number,
 )
+from rsfstudy.former_data_names import TableWithFormerColumns, rename_former_variables
 from rsfstudy.reporting.tables import format_units
 from rsfstudy.status import Status
 
@@ -69,6 +71,7 @@ def split_into_single_fits(dataset: xr.Dataset) -> list[xr.Dataset]:
     """
     if not is_fit(dataset):
         raise DataError("the dataset contains no fit. Use a dataset from rsfstudy.fit.")
+    dataset = rename_former_variables(dataset)
     if "part" in dataset.dims:
         dataset = dataset.isel(part=0)
     dims = dataset["rows_fitted"].dims
@@ -117,6 +120,15 @@ def parameter_headings(fit: xr.Dataset) -> dict[str, str]:
     return found
 
 
+class FitTable(TableWithFormerColumns):
+    """Table of fits, with one row per fit.
+
+    Selections from the table are ordinary data frames.
+    """
+
+    NEW_COLUMNS: ClassVar[Mapping[str, str]] = {"criterion": "aic", "_std": "_stderr"}
+
+
 def fit_table(dataset: xr.Dataset) -> pd.DataFrame:
     """Return a table of fits with the column names used in laboratories.
 
@@ -130,7 +142,7 @@ def fit_table(dataset: xr.Dataset) -> pd.DataFrame:
     pandas.DataFrame
         Table with one row per fit. Lengths are in um. Parameters that were not fitted are NaN.
 
-        - Columns ``<name>_std`` contain standard errors. The standard errors of a row with the
+        - Columns ``<name>_stderr`` contain standard errors. The standard errors of a row with the
           status ``errors_not_valid`` are not valid.
         - Columns ``<name>_windows`` contain the range of a parameter over the windows.
         - ``k`` is the stiffness divided by the normal stress in 1/um.
@@ -147,7 +159,7 @@ def fit_table(dataset: xr.Dataset) -> pd.DataFrame:
         row: dict[str, Any] = dict(record_and_step_of_fit(one))
         for name, short in parameter_headings(one).items():
             row[short] = one[name].item()
-            row[f"{short}_std"] = one[f"{name}_stderr"].item()
+            row[f"{short}_stderr"] = one[f"{name}_stderr"].item()
             if f"{name}_windows" in one:
                 row[f"{short}_windows"] = one[f"{name}_windows"].item()
         row |= {"V0": one["velocity_before"].item(), "V1": one["velocity_after"].item()}
@@ -156,12 +168,12 @@ def fit_table(dataset: xr.Dataset) -> pd.DataFrame:
         if "window_stiffness" in one and "stiffness" not in one["parameter"].values:
             row["k"] = one["window_stiffness"].item()
             if stderr := stderr_of_fixed_stiffness(one):
-                row["k_std"] = stderr
+                row["k_stderr"] = stderr
         row["window"] = f"{one['window_begins'].item():g} to {one['window_ends'].item():g}"
-        row["R2"], row["criterion"] = one["r_squared"].item(), one["criterion"].item()
-        row["p_value"], row["status"] = one["whiteness"].item(), status_label_of_fit(one)
+        row["R2"], row["aic"] = one["r_squared"].item(), one["aic"].item()
+        row["p_value"], row["status"] = one["p_value"].item(), status_label_of_fit(one)
         rows.append(row)
-    return pd.DataFrame(rows)
+    return FitTable(rows)
 
 
 def list_fit_values(dataset: xr.Dataset) -> list[dict[str, Any]]:
@@ -183,13 +195,10 @@ def list_fit_values(dataset: xr.Dataset) -> list[dict[str, Any]]:
     DataError
         If the dataset contains no fits.
     """
-    numbers = {
-        "velocity_before": "velocity_before", "velocity_after": "velocity_after",
-        "window_begins": "window_begins", "window_ends": "window_ends",
-        "rows_fitted": "rows_fitted", "r_squared": "r_squared", "aic": "criterion",
-        "noise_order": "noise_order", "noise_sd": "noise_size", "n_eff": "effective_samples",
-        "p_value": "whiteness",
-    }  # fmt: skip
+    numbers = (
+        *("velocity_before", "velocity_after", "window_begins", "window_ends", "rows_fitted"),
+        *("r_squared", "aic", "noise_order", "noise_sd", "n_eff", "p_value"),
+    )
     return [
         {
             **dict.fromkeys(("record", "step")),
@@ -206,7 +215,7 @@ def list_fit_values(dataset: xr.Dataset) -> list[dict[str, Any]]:
                 }
                 for name in parameter_headings(one)
             ],
-            **{key: one[name].item() for key, name in numbers.items()},
+            **{name: one[name].item() for name in numbers},
         }
         for one in split_into_single_fits(dataset)
     ]

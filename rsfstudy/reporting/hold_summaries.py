@@ -49,7 +49,7 @@ def summarise_holds(table: xr.Dataset) -> Iterator[TextTable | str]:
     for number in range(table.sizes["hold"]):
         hold = table.isel(hold=number)
         suffix = "stderr" if "healing_stderr" in hold else "error"
-        row = {"hold": f"{hold['hold'].item()}", "lasts (s)": f"{hold['duration'].item():.5g}"}
+        row = {"hold": f"{hold['hold'].item()}", "duration (s)": f"{hold['duration'].item():.5g}"}
         for name, heading in _HEADINGS_WITHOUT_ERROR.items():
             row[heading] = f"{hold[name].item():.5f}".replace("nan", "-")
         for name, heading in _HEADINGS_WITH_ERROR.items():

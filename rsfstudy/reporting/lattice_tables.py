@@ -74,7 +74,7 @@ def build_primary_output_table(dataset: xr.Dataset) -> TextTable:
         full = dataset.sizes
         every = [f"{n} of {full[d]} {d}" for d, n in few.sizes.items() if n < full[d]]
         which = f"{shown} of {size:,} cells, {', '.join(every)}, from first to last"
-        caption += f" ({which}; rsfstudy export --csv writes all)"
+        caption += f" ({which}; to write all cells, use rsfstudy export --csv)"
     table = build_table_along_dimensions(few, dims, columns, caption)
     about = {"name": name, "units": units}
     return replace(table, values=[{**about, **row} for row in table.values])

@@ -247,5 +247,7 @@ def build_events_table(event_catalogue: xr.Dataset) -> TextTable | str:
         rows.append({**row, "cut": flags[int(event["cut"])].replace("_", " ")})
     caption = f"Events {limit}"
     if count > len(rows):
-        caption += f" ({len(rows)} of {count:,}: dataset.rsf.events() has all, with their errors)"
+        caption += (
+            f" ({len(rows)} of {count:,}; use dataset.rsf.events() for all events and their errors)"
+        )
     return TextTable(rows, caption)

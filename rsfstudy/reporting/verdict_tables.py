@@ -31,7 +31,7 @@ def claims_table(verdicts: pd.DataFrame) -> TextTable | str:
             rows
         )
     colours = [
-        "red" if row["moved"] else "green" if row["verdict"] == "reproduced" else "yellow"
+        "red" if row["verdict_changed"] else "green" if row["verdict"] == "reproduced" else "yellow"
         for row in rows
     ]
     return TextTable(
@@ -79,5 +79,6 @@ def summarise_verdicts(dataset: xr.Dataset, verdicts: pd.DataFrame) -> tuple[str
         Descriptions of failed cells, and of claims whose verdict differs from the expected verdict.
     """
     wrong = [f"{count} {label}" for label, count in count_failures(dataset).items()]
-    wrong += [f"{claim} moved" for claim in dict.fromkeys(verdicts["id"][verdicts["moved"]])]
+    changed = verdicts["id"][verdicts["verdict_changed"]]
+    wrong += [f"verdict of {claim} changed" for claim in dict.fromkeys(changed)]
     return count_verdicts(verdicts), wrong

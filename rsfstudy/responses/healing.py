@@ -55,8 +55,8 @@ _FRICTION_NOISE_OVER_LOCAL_TOLERANCE = 3.0
 _SETTLING_TOLERANCE_OVER_MAX_DISTANCE = 1e-6
 
 _PEAK_DISPLACEMENT_MEANING = "load point displacement from reloading to the peak of friction"
-_HEALING_MEANING = "healing: peak friction on reloading less friction before the hold"
-_RELAXATION_MEANING = "change of friction during the hold: that at its end less that before"
+_HEALING_MEANING = "healing: peak friction on reloading minus friction before the hold"
+_RELAXATION_MEANING = "friction at the end of the hold minus friction before the hold"
 _OUTPUTS = (
     Output("healing", r"$\Delta\mu$", "1", _HEALING_MEANING, error=True),
     Output("relaxation", r"$\Delta\mu_c$", "1", _RELAXATION_MEANING, error=True),
@@ -190,7 +190,7 @@ class Healing(RecordingMeasure):
         peakless = Outcome(
             Status.NOT_APPLICABLE,
             {"relaxation": first.friction_before_segments[1] - first.friction_before_segments[0]},
-            "; ".join(filter(None, ("no peak of friction on reloading", said))),
+            "; ".join(filter(None, ("friction has no peak on reloading", said))),
         )
         if first.peak_event is None:
             if first.last_event.kind is EventKind.SETTLED:
@@ -272,14 +272,16 @@ def _find_first_hold_segment(scene: Scene) -> int:
     history = scene.parts.loading.segments
     holds = [n for n, segment in enumerate(history[:-1]) if segment.load_velocity == 0.0]
     if not holds:
-        raise MotionStopped(Status.NO_STEP, "the load point is never held and moved again")
+        raise MotionStopped(
+            Status.NO_STEP, "the loading contains no hold that is followed by reloading"
+        )
     before, hold, reload = (Segment(1.0), *history)[holds[0] : holds[0] + 3]
     if reload.load_velocity <= 0.0:
-        why = "the hold is followed by another, or by a load point that moves back"
+        why = "the hold is followed by another hold or by a load point that moves backwards"
         raise MotionStopped(Status.NOT_APPLICABLE, why)
     stresses = {before.normal_stress, hold.normal_stress, reload.normal_stress}
     if hold.displacement or reload.displacement or len(stresses) > 1:
-        why = "the load point is displaced, or normal stress stepped, at an end of the hold"
+        why = "a displacement step or a normal stress step occurs at an end of the hold"
         raise MotionStopped(Status.NOT_APPLICABLE, why)
     return holds[0]
 
@@ -292,7 +294,7 @@ def _describe_unsteady_start_of_hold(
     away = distance_from_steady_sliding(scene, hold_start_event.point, before.load_velocity)
     if away <= tolerance:
         return ""
-    return f"the hold does not begin in steady sliding, but {away:.2g} from it in ln V or state/b"
+    return f"the hold does not begin in steady sliding: ln V or state/b differs by {away:.2g}"
 
 
 def _record_hold_and_reloading(

@@ -39,7 +39,7 @@ _OUTPUTS = (
     Output("relative_critical_stiffness"),
     Output(
         "rise_by_dynamics",
-        long_name="fraction by which mass raises, or radiation lowers, the critical stiffness",
+        long_name="relative change of the critical stiffness due to inertia or radiation damping",
     ),
     Output("steady_friction"),
     Output("steady_normal_stress", "", "1", "steady-state normal stress", "sigma_*"),
@@ -131,7 +131,8 @@ class LinearStability(Measure):
             return Outcome(
                 Status.NO_STEADY_STATE,
                 {"steady_friction": scene.mu_star + scene.steady_friction_minus_reference(load)},
-                "phi < atan(mu_ss): the slider locks while stress rises, and runs while it falls",
+                "phi < atan(mu_ss): the slider locks while stress increases, and slips while "
+                "stress decreases",
             )
         sigma_ss = scene.effective_normal_stress_at(steady.frictional_stress)
         mu_ss = (scene.mu_star + steady.frictional_stress) / sigma_ss
@@ -142,13 +143,14 @@ class LinearStability(Measure):
             return Outcome(
                 Status.STABLE_AT_ANY_STIFFNESS,
                 values,
-                "without rate weakening every perturbation decays"
+                "every perturbation decays, because friction is not rate-weakening"
                 if massless <= 0.0
-                else f"at eta V = {scene.dynamics.radiated_stress_slope(load):.3g} sigma_* "
-                "radiation damps every perturbation",
+                else "radiation damping of eta V = "
+                f"{scene.dynamics.radiated_stress_slope(load):.3g} sigma_* damps every "
+                "perturbation",
             )
         if massless == math.inf:
-            why = "with this friction a perturbation grows without mass or damping too"
+            why = "with this friction law, perturbations also grow without inertia or damping"
             return Outcome(Status.UNSTABLE_AT_ANY_STIFFNESS, values, why)
         at_reference = scene.critical_stiffness
         relative = critical / at_reference if at_reference else math.inf
@@ -158,11 +160,14 @@ class LinearStability(Measure):
             return Outcome(
                 Status.UNSTABLE_AT_ANY_STIFFNESS,
                 values,
-                f"at V T/(2 pi D_c) = {norm:.3g} the direct effect cannot damp the spring",
+                f"at V T/(2 pi D_c) = {norm:.3g}, the direct effect cannot damp the oscillations",
             )
         by_growth = _find_stiffness_at_zero_growth(scene, steady, critical, integrator)
         if math.isnan(by_growth):
-            why = f"growth of the equations does not end at a stiffness of {critical:.9g}"
+            why = (
+                "the growth rate of the linearised equations does not vanish at the stiffness "
+                f"{critical:.9g}"
+            )
             return Outcome(Status.UNVERIFIED, values, why)
         return Outcome(
             Status.OK,

@@ -24,24 +24,29 @@ _MIN_FRICTION_EVOLUTION_OVER_A = 1e-9
 
 #: Results of the measure for stress changes and their ratios, with scales and meanings.
 _STRESS_CHANGE_OUTPUTS = (
-    ("direct_stress_change", "sigma_*", "stress change just after a rate step"),
-    ("direct_asymmetry", "", "direct stress change of the step over that of its inverse, less 1"),
+    ("direct_stress_change", "sigma_*", "stress change immediately after a rate step"),
+    (
+        "direct_asymmetry",
+        "",
+        "direct stress change divided by the direct stress change of the inverse step, minus 1",
+    ),
     (
         "evolution_asymmetry",
         "",
-        "stress change from direct effect to steady state over that of the inverse step, less 1",
+        "evolution stress change divided by the evolution stress change of the inverse step, "
+        "minus 1",
     ),
-    ("steady_stress_change", "sigma_*", "change of steady-state stress by a rate step"),
-    ("stress_left_at_unit_slip", "sigma_*", "stress above its steady state after a slip of D_c"),
+    ("steady_stress_change", "sigma_*", "change of steady-state stress due to a rate step"),
+    ("stress_left_at_unit_slip", "sigma_*", "stress minus steady-state stress after a slip of D_c"),
     (
         "closed_form_misfit",
         "sigma_*",
-        "largest departure of stress from the closed form at constant normal stress",
+        "largest difference from the closed-form stress at constant normal stress",
     ),
     (
         "exponential_misfit",
         "",
-        "largest departure from exponential decay over D_c, as a fraction of the stress change",
+        "largest difference from exponential decay over D_c, divided by the stress change",
     ),
 )
 _OUTPUTS = (
@@ -174,9 +179,12 @@ class RigidResponse(Measure):
         """
         log_slip_rate = scene.log_load_velocity
         if log_slip_rate == 0.0:
-            return Outcome(Status.NO_STEP, message="V = V_* is no step")
+            return Outcome(Status.NO_STEP, message="the slip rate is V_*, so there is no step")
         if log_slip_rate == -math.inf:
-            return Outcome(Status.NO_STEADY_STATE, message="the load point is held: nothing slips")
+            return Outcome(
+                Status.NO_STEADY_STATE,
+                message="the load point is held, so the slider does not slip",
+            )
         sliding = scene.steady_sliding(log_slip_rate)
         if sliding is None:
             return Outcome(Status.NO_STEADY_STATE, message="no steady state at this slip rate")
@@ -322,7 +330,9 @@ def frictional_stress_after_rate_step(scene: Scene, log_slip_rate: float) -> flo
     """
     friction = scene.frictional_stress_after_jump(scene.a * log_slip_rate)
     if friction is None and log_slip_rate < 0.0:
-        raise MotionStopped(Status.NORMAL_STRESS_LOST, "the direct effect takes normal stress away")
+        raise MotionStopped(
+            Status.NORMAL_STRESS_LOST, "the normal stress vanishes due to the direct effect"
+        )
     if friction is None:
-        raise MotionStopped(Status.LOCKED, "no stress is strong enough for the direct effect")
+        raise MotionStopped(Status.LOCKED, "no shear stress balances the direct effect")
     return friction

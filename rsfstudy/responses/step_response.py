@@ -43,8 +43,8 @@ _OUTPUTS = (
     Output("max_log10_slip_rate", error=True),
     Output(
         "peak_ratio",
-        long_name="second over first peak of ln V above the load point velocity: 1 where "
-        "oscillations repeat",
+        long_name="second peak of ln(V/V_0) divided by the first peak; 1 if the oscillation "
+        "repeats itself",
     ),
     Output("peak_log10_slip_rate", dims=("peak",)),
     *create_outputs_along_phase(*Recording.MOTION_VARIABLES),
@@ -169,7 +169,7 @@ class StepResponse(RecordingMeasure):
         if scene.log_load_velocity == -math.inf:
             return Outcome(Status.NO_STEADY_STATE, message="the load point is held")
         if not scene.is_perturbed:
-            return Outcome(Status.NO_STEP, message="V_0 = V_* is no step")
+            return Outcome(Status.NO_STEP, message="V_0 is equal to V_*, so there is no step")
         peaks, rows = self._follow_and_record_oscillations(scene, integrator)
         again, _rows = self._follow_and_record_oscillations(scene, integrator.refined())
         heights = peaks - scene.log_load_velocity / LN10
@@ -206,11 +206,14 @@ class StepResponse(RecordingMeasure):
                 peaks.append(event.point.log_slip_rate / LN10)
             settles = event.kind is EventKind.SETTLED and steady_sliding_is_linearly_stable(scene)
             if settles and not peaks:
-                text = "slip rate has no maximum: it changes steadily to that of the load point"
+                text = (
+                    "the slip rate has no maximum, because it approaches the load point "
+                    "velocity monotonically"
+                )
                 raise MotionStopped(Status.NOT_APPLICABLE, text)
             if len(peaks) == self.peaks or settles:
                 return np.array(peaks), recording.as_table(scene, end_event=event)
-        raise AssertionError("a motion never ends by itself")
+        raise AssertionError("a motion without a time limit cannot end")
 
 
 def _slip_rate_peaks_at_start(scene: Scene, event: Event) -> bool:

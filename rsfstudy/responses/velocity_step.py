@@ -54,11 +54,16 @@ _MAX_STEADY_DISTANCE_OVER_LOG_RATIO = 1e-3
 
 #: Results of the measure, with symbols, scales and meanings.
 _APPARENT_PARAMETER_OUTPUTS = (
-    ("apparent_a", "$a$", "", "direct effect parameter as read off"),
-    ("apparent_b", "$b$", "", "evolution effect parameter as read off"),
-    ("apparent_a_minus_b", "$a-b$", "", "rate dependence of friction as read off"),
+    ("apparent_a", "$a$", "", "apparent direct effect parameter a"),
+    ("apparent_b", "$b$", "", "apparent evolution effect parameter b"),
+    ("apparent_a_minus_b", "$a-b$", "", "apparent rate dependence of friction a - b"),
     *(
-        (name, "$D_c$", "D_c", f"{moved} from the peak until 1/e of the evolution is left")
+        (
+            name,
+            "$D_c$",
+            "D_c",
+            f"{moved} from the peak to the point where 1/e of the evolution remains",
+        )
         for name, moved in (
             ("apparent_slip_distance", "load point displacement"),
             ("corrected_slip_distance", "slip"),
@@ -73,10 +78,15 @@ _OUTPUTS = (
         Output(name, symbol, "1", meaning, scale, error=True)
         for name, symbol, scale, meaning in _APPARENT_PARAMETER_OUTPUTS
     ),
-    Output("settled", long_name="whether friction has settled at the end of the record"),
+    Output(
+        "settled",
+        long_name="1 if friction has reached the steady state at the end of the "
+        "record, otherwise 0",
+    ),
     Output(
         "closed_form_departure",
-        long_name="largest departure of friction, from the peak on, from that of a stiff slider",
+        long_name="largest difference of friction after the peak from the friction of a stiff "
+        "slider",
     ),
     *create_outputs_along_phase(
         "load_point_displacement", "slip", "friction_coefficient", "log10_slip_rate"
@@ -268,7 +278,7 @@ class VelocityStep(RecordingMeasure):
         errors = estimate_errors_at_instants(values, again, slopes, scene, integrator, neglected)
         found = {**values, **errors, **self._compute_outputs_along_record(scene, step, record)}
         if not abs(values["apparent_b"]) > errors["apparent_b_error"]:
-            text = "friction has no extremum after the step, or does not evolve from there"
+            text = "friction has no extremum after the step, or does not evolve after the extremum"
             return Outcome(Status.NOT_APPLICABLE, found, text)
         return Outcome(Status.OK, found)
 
@@ -286,10 +296,13 @@ class VelocityStep(RecordingMeasure):
         earlier, own = history[: self.step_number - 1], history[self.step_number - 1]
         before = earlier[-1] if earlier else Segment(1.0)
         if own.load_velocity == before.load_velocity:
-            raise MotionStopped(Status.NO_STEP, "the load point goes on as before")
+            raise MotionStopped(Status.NO_STEP, "the load point velocity does not change")
         changed = own.displacement or own.normal_stress != before.normal_stress
         if min(own.load_velocity, before.load_velocity) <= 0.0 or changed:
-            text = "a hold, a reversal, a displacement or a change of normal stress is no step"
+            text = (
+                "a hold, a reversal, a displacement step or a change of normal stress is not "
+                "a velocity step"
+            )
             raise MotionStopped(Status.NOT_APPLICABLE, text)
         start_time = math.fsum(segment.duration for segment in earlier)
         duration = min(own.duration, self.record / own.load_velocity)

@@ -188,7 +188,7 @@ def convert_values_to_units(quantity_name: str, values: Sequence[Any], units: st
         if not _is_allowed_rig_number(quantity_name, number)
     ]
     if wrong:
-        of = f", and {len(wrong)} of {len(found)} are not" if len(found) > 1 else ""
+        of = f" ({len(wrong)} of {len(found)} values are not)" if len(found) > 1 else ""
         raise InvalidValue(quantity_name, wrong[0], f"must be positive{of}")
     return found
 
@@ -277,5 +277,5 @@ def factor_to_si(quantity_name: str, units: str) -> Fraction:
         return compute_conversion_factor(quantity_name, units, "1/m")
     si = _axis_si_units(quantity_name, f"1 {units}")
     if si is None:
-        raise InvalidValue(quantity_name, units, "is no quantity of a rig, nor in units of one")
+        raise InvalidValue(quantity_name, units, "are not units of a rig quantity")
     return compute_conversion_factor(quantity_name, units, si)

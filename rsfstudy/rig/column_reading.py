@@ -145,7 +145,7 @@ def _convert_force(name: str, column: Column, area: Any) -> Column:
     if name not in _STRESS_COLUMNS or size is None or size[1] != _EXPONENTS_OF_FORCE:
         return column
     if area is None:
-        rule = "is a force, and stress is force over area"
+        rule = "is a force, but stress is force divided by area"
         remedy = "Pass the area of the fault: area='25 cm2' (--area '25 cm2')."
         raise InvalidValue(name, f"in {column.units}", rule, remedy=remedy)
     square_metres = convert_to_si("area", area, "m2")

@@ -93,8 +93,8 @@ def check_heading_lengths(headings: Iterable[str], file_description: str) -> Non
 
 def _parse_column_spec_given_as_list(column_choice: Any) -> ColumnSpec:
     """Parse a column selection with heading, units, scale and offset."""
-    rule = "must be a heading, or a list of a heading, its units, a scale and an offset"
-    remedy = "Write ('Time (s)', 's', 0.001), for example."
+    rule = "must be a heading, or a list with a heading, units, a scale and an offset"
+    remedy = "Write, for example, ('Time (s)', 's', 0.001)."
     wrong = InvalidValue("column", column_choice, rule, remedy=remedy)
     column_choice = (
         column_choice.tolist() if isinstance(column_choice, np.ndarray) else column_choice

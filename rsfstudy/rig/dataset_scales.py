@@ -112,8 +112,13 @@ def _resolve_scale_of_dataset(
 ) -> float | xr.Variable:
     if coordinate_name not in dataset.variables:
         if stated_value is None:
-            remedy = "State it."
-            raise InvalidValue(argument_name, None, "is not in the dataset", remedy=remedy)
+            remedy = "Pass it as an argument."
+            raise InvalidValue(
+                argument_name,
+                None,
+                "is required, because the dataset does not contain it",
+                remedy=remedy,
+            )
         return stated_value
     variable = dataset[coordinate_name].variable.to_base_variable()
     held = variable * float(
@@ -126,8 +131,10 @@ def _resolve_scale_of_dataset(
     if stated_value is not None and not np.allclose(
         held, stated_value, rtol=_RTOL_OF_EQUAL_REFERENCE_RATES, atol=0.0
     ):
-        rule = f"contradicts that of the dataset, {_format_number_or_range(held)} {units}"
-        remedy = "Each cell is converted by its own: state another to the scenes."
+        rule = f"differs from the value in the dataset, {_format_number_or_range(held)} {units}"
+        remedy = (
+            "Each cell is converted with its own scale. To use another scale, set it in the scenes."
+        )
         raise InvalidValue(argument_name, stated_value, rule, remedy=remedy)
     return held
 
@@ -356,7 +363,10 @@ def convert_dataset_by_unit_scales(
         if (scale := find_scale_of_variable(v, scales_by_name))
     }
     if not sizes:
-        text = "nothing in the dataset says its scale: it is in other units already, or not ours"
+        text = (
+            "no variable of the dataset has the attribute scale. The dataset was already "
+            "converted, or was not created by rsfstudy"
+        )
         raise DataError(text)
     for name, scale in sizes.items():
         values = dataset[name].variable.to_base_variable()
@@ -365,8 +375,8 @@ def convert_dataset_by_unit_scales(
         converted = values * scale.factor if np.any(values) else values
         if name in dataset.dims and converted.dims != (name,):
             other = next(dim for dim in converted.dims if dim != name)
-            text = f"the scale of the axis {name} varies along {other}: select one place on that"
-            raise DataError(f"{text} first, as in dataset.isel({other}=0)")
+            text = f"the scale of the axis {name} varies along {other}. Select one point of {other}"
+            raise DataError(f"{text} first, for example dataset.isel({other}=0)")
         gone = {"scale", "symbol"} if "/" in values.attrs.get("symbol", "") else {"scale"}
         kept = {key: value for key, value in values.attrs.items() if key not in gone}
         result[name] = (converted.dims, converted.values, kept | {"units": scale.units})

@@ -119,28 +119,39 @@ def history(
     """
     found = _read_history_columns(record, columns, rig, ReadingOptions.parse("history", reading))
     if "time" not in found or len(found) == 1:
-        remedy = 'State "time" and what was sampled, as in {"time": ..., "displacement": ...}.'
-        raise InvalidValue("record", [*found], "tells no history", remedy=remedy)
+        remedy = (
+            'Pass "time" and at least one sampled column, for example {"time": ..., '
+            '"displacement": ...}.'
+        )
+        raise InvalidValue(
+            "record",
+            [*found],
+            "does not contain time and at least one sampled column",
+            remedy=remedy,
+        )
     if "displacement" in found and "velocity" in found:
-        rule = "has displacement and velocity of the load point: give one of them"
+        rule = "contains both displacement and velocity of the load point. Pass only one of them"
         raise InvalidValue("record", [*found], rule)
     sizes = {len(column.values) for column in found.values()}
     if len(sizes) > 1 or min(sizes) < 2:
-        rule = f"has columns of {sorted(sizes)} samples: all must have as many, 2 at least"
+        rule = (
+            f"has columns with {sorted(sizes)} samples, but all columns must have the same "
+            "number of samples, at least 2"
+        )
         raise InvalidValue("record", [*found], rule)
     values = {
         key: _convert_column_to_slider_units(key, column, rig) for key, column in found.items()
     }
     time = values["time"]
     late = np.append(False, np.diff(time) < MIN_SEGMENT_DURATION)
-    found["time"].check_values("time", late, "must be later than the sample before")
+    found["time"].check_values("time", late, "must be later than the time of the previous sample")
     velocity, back = _load_point_velocity(values, found)
     fall = None
     if "normal_stress" in found or "pore_pressure" in found:
         ones, none = np.ones(len(time)), np.zeros(len(time))
         fall = values.get("pore_pressure", none) - (values.get("normal_stress", ones) - 1.0)
         key = "normal_stress" if "normal_stress" in found else "pore_pressure"
-        rule = "leaves no normal stress: it must stay positive, less pore pressure"
+        rule = "must keep the effective normal stress (normal stress minus pore pressure) positive"
         found[key].check_values(key, fall >= 1.0, rule)
     of_pressure = "pore_pressure" in found and "normal_stress" not in found
     return SampledHistory.from_samples(
@@ -154,12 +165,16 @@ def _read_history_columns(
     """Read the columns of a source that describe a loading history."""
     if options.filter:
         remedy = "Filter the columns before you pass them as arrays."
-        raise InvalidValue("filter", options.filter, "is not for a loading history", remedy=remedy)
+        raise InvalidValue(
+            "filter", options.filter, "cannot be applied to a loading history", remedy=remedy
+        )
     usable = UsableColumns((*_SLIDER_UNITS_OF_RECORD_COLUMNS,))
     found = read_columns(record, columns, usable, options).columns
     for name, column in found.items():
         if rig is not None and hasattr(record, "data_vars") and not column.units:
-            raise InvalidValue(name, name, "has no units", remedy="Set its attribute units.")
+            raise InvalidValue(
+                name, name, "has no units", remedy="Set the attribute units of the variable."
+            )
     thinned = slice(None, None, options.thin)
     return {
         name: of._replace(values=of.values[thinned], line_numbers=of.line_numbers[thinned])
@@ -175,8 +190,10 @@ def _convert_column_to_slider_units(
     if units == scale or (rig is None and units in ("", "1")):
         return column.values
     if rig is None:
-        rule = f"need the scales of a rig for {quantity_name}"
-        raise InvalidValue("units", units, rule, remedy=f"Give a rig, or {scale}.")
+        rule = f"require a rig to convert {quantity_name}"
+        raise InvalidValue(
+            "units", units, rule, remedy=f"Pass rig=, or use the dimensionless unit {scale}."
+        )
     one = rig.dimensionless(f"1 {units}" if units else 1.0, scale, quantity_name)
     return np.asarray(column.values * one)
 
@@ -267,8 +284,8 @@ def read_protocol(
     units = {key: column.units for key, column in columns.items()}
     of_slider = all(SLIDER_UNITS_OF_SEGMENT_FIELDS[key] == of for key, of in units.items())
     if not of_slider and rig is None:
-        remedy = "Give a rig, or the units of the slider: V_*, D_c, D_c/V_*."
-        rule = "need the scales of a rig"
+        remedy = "Pass rig=, or use the dimensionless units V_*, D_c and D_c/V_*."
+        rule = "require a rig"
         raise InvalidValue("units", ", ".join(units.values()), rule, remedy=remedy)
     rows = zip(*(column.values.tolist() for column in columns.values()), strict=True)
     stated = [{k: x for k, x in zip(columns, row, strict=True) if not np.isnan(x)} for row in rows]

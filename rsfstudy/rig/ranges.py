@@ -10,9 +10,9 @@ import numpy as np
 from rsfstudy.errors import InvalidValue
 from rsfstudy.rig.units import parse_number
 
-_RANGE_SYNTAX_RULE = "must read start:stop:count, two finite numbers and a count"
+_RANGE_SYNTAX_RULE = "must have the form start:stop:count, with two finite numbers and a count"
 _LOG_RANGE_SYNTAX_REMEDY = (
-    "For logarithmic spacing write start:stop:count:log, as in hold_time=1:1e5:30:log."
+    "For logarithmic spacing, write start:stop:count:log, for example hold_time=1:1e5:30:log."
 )
 _MAX_POINTS_OF_RANGE = 1_000_000
 
@@ -60,7 +60,9 @@ def _expand_range_of_numbers(
             argument_name, text, f"{_RANGE_SYNTAX_RULE}, from 1 to {_MAX_POINTS_OF_RANGE:,}"
         )
     if spacing and min(first, last) <= 0.0:
-        remedy = "Leave :log out, or start above 0."
-        raise InvalidValue(argument_name, text, "has no logarithm of 0 or less", remedy=remedy)
+        remedy = "Remove :log, or use positive limits."
+        raise InvalidValue(
+            argument_name, text, "must have positive limits for logarithmic spacing", remedy=remedy
+        )
     laid = np.geomspace if spacing else np.linspace
     return [float(x) for x in laid(first, last, int(points))]

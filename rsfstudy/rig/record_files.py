@@ -133,8 +133,8 @@ def read_record(
     options = ReadingOptions(rows, begin, end, thin, filter, decimal, sheet, area)
     earlier = source if isinstance(source, Record) else None
     if earlier is not None and earlier.filter and filter:
-        rule = "cannot follow the filter of the record"
-        raise InvalidValue("filter", filter, rule, remedy="Filter the file once.")
+        rule = "cannot be applied, because the record is already filtered"
+        raise InvalidValue("filter", filter, rule, remedy="Apply one filter only.")
     found = read_columns(source, columns, _USABLE_COLUMNS, options)
     values = {key: _convert_to_record_units(key, found) for key in found.columns}
     _check_required_columns(found)
@@ -170,12 +170,15 @@ def _check_required_columns(found: ColumnsOfSource) -> None:
     moved = {"displacement", "slip"} & {*names}
     rubbed = {"friction", "shear_stress"} & {*names}
     if not ("time" in names and moved):
-        rule = "does not name time and displacement (or slip)"
+        rule = "has no recognised headings for time and displacement (or slip)"
         if rubbed and ("time" in names or moved):
-            rule += ", which a record needs and rsfstudy.events does not need"
+            rule += (
+                ", which are required for a record. Without time or displacement, use "
+                "rsfstudy.events"
+            )
         raise missing_columns_error(table, rule)
     if not rubbed:
-        raise missing_columns_error(table, "does not name friction or shear stress")
+        raise missing_columns_error(table, "has no recognised heading for friction or shear stress")
 
 
 def _add_derived_columns(
@@ -188,8 +191,10 @@ def _add_derived_columns(
     if "friction" not in record_values:
         stress = record_values.get("normal_stress")
         if stress is None:
-            remedy = "Give --normal-stress (normal_stress=), as in '20 MPa'."
-            raise InvalidValue("record", [*record_values], "tells no normal stress", remedy=remedy)
+            remedy = "Pass --normal-stress (normal_stress=), for example '20 MPa'."
+            raise InvalidValue(
+                "record", [*record_values], "contains no normal stress", remedy=remedy
+            )
         check_compression(stress)
         record_values["friction"] = record_values["shear_stress"] / stress
     if "displacement" not in record_values:
@@ -213,13 +218,13 @@ def check_compression(normal_stress: np.ndarray) -> None:
     if (normal_stress > 0.0).all():
         return
     row = int(np.argmax(~(normal_stress > 0.0)))
-    rule = f"must be positive, and is not in row {row + 1}"
+    rule = f"must be positive, but is not positive in row {row + 1}"
     remedy = ""
     if (normal_stress < 0.0).all():
-        rule = "must be positive, and is negative in all rows"
+        rule = "must be positive, but is negative in all rows"
         remedy = (
-            "Compression is positive here: reverse the sign with a scale of -1 behind the heading: "
-            "--columns 'normal_stress=HEADING * -1' (columns=)."
+            "Compression is positive in rsfstudy. To reverse the sign, write a scale of -1 after "
+            "the heading: --columns 'normal_stress=HEADING * -1' (columns=)."
         )
     raise InvalidValue("normal_stress", float(normal_stress[row]), rule, remedy=remedy)
 
@@ -241,10 +246,16 @@ def _compute_load_point_displacement(
     friction.
     """
     if stiffness is None:
-        remedy = "Give the stiffness that the correction used: read_record(..., stiffness="
+        remedy = (
+            "Pass the stiffness that was used for the elastic correction: read_record(..., "
+            "stiffness="
+        )
         remedy += "'0.05 MPa/um'), or --stiffness."
-        rule = "needs a stiffness: the load point moves by slip plus shear stress over stiffness"
-        raise InvalidValue("slip", "given without displacement", rule, remedy=remedy)
+        rule = (
+            "requires a stiffness, because the load point displacement is slip plus shear "
+            "stress divided by stiffness"
+        )
+        raise InvalidValue("slip", "no column displacement", rule, remedy=remedy)
     friction, stress = record_values["friction"], record_values.get("normal_stress")
     is_number = isinstance(stiffness, int | float)
     over_stress = is_number or is_stiffness_over_normal_stress(stiffness)
@@ -257,6 +268,6 @@ def _compute_load_point_displacement(
     if over_stress:
         return np.asarray(record_values["slip"] + friction / per_um)
     if stress is None:
-        remedy = "Give --normal-stress (normal_stress=), or stiffness in 1/um."
-        raise InvalidValue("stiffness", stiffness, "needs a normal stress", remedy=remedy)
+        remedy = "Pass --normal-stress (normal_stress=), or the stiffness in 1/um."
+        raise InvalidValue("stiffness", stiffness, "requires a normal stress", remedy=remedy)
     return np.asarray(record_values["slip"] + friction * stress / per_um)

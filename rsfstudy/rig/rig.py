@@ -167,7 +167,7 @@ class Rig(HtmlTableMixin):
         """Convert all quantities to SI units and check their values."""
         for name in ("normal_stress", "slip_distance", "reference_velocity"):
             if getattr(self, name) is None:
-                raise InvalidValue(name, None, "is required", remedy="Give a value with units.")
+                raise InvalidValue(name, None, "is required", remedy="Pass a value with units.")
         for name in RIG_QUANTITIES:
             if getattr(self, name) is not None:
                 object.__setattr__(
@@ -222,7 +222,7 @@ class Rig(HtmlTableMixin):
             unknown.
         """
         if scale not in self.scales:
-            raise InvalidValue("scale", scale, "is no scale of a rig", choices=self.scales)
+            raise InvalidValue("scale", scale, "is not a scale of a rig", choices=self.scales)
         return float(
             convert_rig_value_to_si(name, value, SI_UNIT_BY_SCALE[scale], self._normal_stress_in_pa)
             / self.scales[scale].factor
@@ -262,7 +262,7 @@ class Rig(HtmlTableMixin):
                 raise InvalidValue(
                     name,
                     fields[name],
-                    f"give {name} or {RATIO_FIELD_BY_DIMENSIONAL_NAME[name]}, not both",
+                    f"cannot be combined with {RATIO_FIELD_BY_DIMENSIONAL_NAME[name]}",
                 )
         fields = {
             RATIO_FIELD_BY_DIMENSIONAL_NAME.get(n, n): self._convert_to_scene_field(

@@ -48,20 +48,22 @@ RIG_QUANTITIES: Mapping[str, RigQuantity] = {
     ),
     "stiffness": RigQuantity("Pa/m", 1e4, 1e15, "$k$", "stiffness of the machine with its sample"),
     "period": RigQuantity("s", 1e-6, 1e3, "$T$", "period of free oscillation"),
-    "mass": RigQuantity("kg/m^2", 1e-2, 1e9, "$m$", "mass over the area of the fault"),
+    "mass": RigQuantity("kg/m^2", 1e-2, 1e9, "$m$", "mass per area of the fault"),
     "shear_modulus": RigQuantity("Pa", 1e5, 1e12, "$G$", "shear modulus of the medium"),
     "density": RigQuantity("kg/m^3", 1e2, 2e4, r"$\rho$", "density of the medium"),
     "thermal_diffusivity": RigQuantity(
         "m^2/s", 1e-8, 1e-4, r"$\alpha_{th}$", "thermal diffusivity of the fault"
     ),
     "heat_capacity": RigQuantity(
-        "J/m^3/K", 1e5, 1e7, r"$\rho c$", "heat capacity of the fault over its volume"
+        "J/m^3/K", 1e5, 1e7, r"$\rho c$", "volumetric heat capacity of the fault"
     ),
     "shear_zone_width": RigQuantity("m", 1e-7, 1e1, "$w$", "width of the shear zone"),
     "reference_temperature": RigQuantity(
         "K", 1e2, 2e3, "$T_*$", "temperature in steady sliding at the reference velocity"
     ),
-    "heat_loss_width": RigQuantity("m", 1e-7, 1e2, "$w_h$", "width from which heat flows out"),
+    "heat_loss_width": RigQuantity(
+        "m", 1e-7, 1e2, "$w_h$", "distance over which heat is conducted away"
+    ),
     "direct_activation_energy": RigQuantity(
         "J/mol", 1e3, 1e6, "$Q_a$", "activation energy of the direct effect"
     ),
@@ -69,7 +71,11 @@ RIG_QUANTITIES: Mapping[str, RigQuantity] = {
         "J/mol", 1e3, 1e6, "$Q_b$", "activation energy of the evolution effect"
     ),
     "pressurisation_factor": RigQuantity(
-        "Pa/K", 1e3, 1e8, r"$\Lambda_p$", "undrained pore pressure over temperature"
+        "Pa/K",
+        1e3,
+        1e8,
+        r"$\Lambda_p$",
+        "change of undrained pore pressure per change of temperature",
     ),
 }
 #: Quantities that shear heating requires, and optional quantities for shear heating.
@@ -136,9 +142,14 @@ def convert_rig_value_and_warn_if_unusual(
     units, least, most, *_words = RIG_QUANTITIES[quantity_name]
     found = convert_rig_value_to_si(quantity_name, value, units, normal_stress)
     if not found > 0.0:
-        raise InvalidValue(quantity_name, value, "must be positive", remedy=f"Give it in {units}.")
+        raise InvalidValue(
+            quantity_name, value, "must be positive", remedy=f"Pass a value in {units}."
+        )
     if not least <= found <= most:
-        text = f"{quantity_name} is {found:g} {units}: unusual for a rig. Is the unit right?"
+        text = (
+            f"{quantity_name} is {found:g} {units}: this value is unusual for a rig. Check the "
+            "unit."
+        )
         warnings.warn(text, RsfStudyWarning, stacklevel=find_stacklevel_of_user_code())
     return found
 
@@ -215,23 +226,32 @@ def check_rig_quantities_are_consistent(rig_values: Mapping[str, Any]) -> None:
         shear modulus and density is given, or if a quantity that shear heating requires is missing.
     """
     if "mass" in rig_values and "period" in rig_values:
-        rule = f"give mass or period (here {rig_values['period']:g} s), not both"
+        rule = f"cannot be combined with period (got {rig_values['period']:g} s)"
         raise InvalidValue("mass", rig_values["mass"], rule)
     if "mass" in rig_values and "stiffness" not in rig_values:
-        remedy = "State the stiffness too, or the period."
+        remedy = "Pass stiffness= as well, or pass period= instead of mass=."
         raise InvalidValue(
-            "mass", rig_values["mass"], "needs a stiffness to oscillate", remedy=remedy
+            "mass",
+            rig_values["mass"],
+            "requires a stiffness, which determines the period of oscillation",
+            remedy=remedy,
         )
     if ("shear_modulus" in rig_values) != ("density" in rig_values):
-        remedy = "State shear_modulus and density, or neither."
+        remedy = "Pass both shear_modulus= and density=, or neither."
         raise InvalidValue(
-            "density", rig_values.get("density"), "goes with shear_modulus", remedy=remedy
+            "density",
+            rig_values.get("density"),
+            "requires shear_modulus, and shear_modulus requires density",
+            remedy=remedy,
         )
     given = [n for n in (*HEAT_QUANTITIES, *OPTIONAL_HEAT_QUANTITIES) if n in rig_values]
     missing = [n for n in HEAT_QUANTITIES if n not in rig_values]
     if given and missing:
-        rule = f"needs {' and '.join(missing)}, because all of them determine shear heating"
-        remedy = "State them too, or leave the quantities of heat out."
+        rule = (
+            f"requires {' and '.join(missing)}, because all of these quantities determine "
+            "shear heating"
+        )
+        remedy = "Pass them too, or omit all quantities of shear heating."
         raise InvalidValue(given[0], rig_values[given[0]], rule, remedy=remedy)
 
 

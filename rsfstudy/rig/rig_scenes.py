@@ -70,8 +70,8 @@ class LatticeScenesOnRig:
             if not isinstance(value, bool | str) and not _is_close_within_rounding(
                 theirs.get(name), value
             ):
-                rule = f"is not that of the rig, {value:g}"
-                remedy = "Make the base of its study with rig.scene(...)."
+                rule = f"differs from the value of the rig, {value:g}"
+                remedy = "Create the base scene of the study with rig.scene(...)."
                 raise InvalidValue(name, theirs.get(name), rule, remedy=remedy)
         for along in self.axes:
             for row in along.rows:
@@ -79,8 +79,10 @@ class LatticeScenesOnRig:
                 if lacks and not {
                     AXIS_NAME_BY_RIG_NAME.get(name, name) for name in REQUIRED_QUANTITIES
                 } & set(lacks):
-                    rule = f"does not state {lacks[0]}, which the rig of the study does"
-                    raise InvalidValue(along.dimension, dict(row), rule, remedy="State it.")
+                    rule = f"does not contain {lacks[0]}, which the rig of the study contains"
+                    raise InvalidValue(
+                        along.dimension, dict(row), rule, remedy="Pass it as an argument."
+                    )
 
     def _derive_fields(self, rig_values: Mapping[str, Any]) -> dict[str, Any]:
         """Compute scene fields from the rig, without heat if the base has no heat."""

@@ -25,7 +25,7 @@ _COLUMN_BY_EXPONENTS: Mapping[tuple[int, ...], str] = {
     (0, 0, 1, 0, 0): "time",
     (0, 1, 0, 0, 0): "displacement",
 }
-_REMEDY_FOR_LIMITS = "Write it as in '100 s' or '2 mm', or as a number in s."
+_REMEDY_FOR_LIMITS = "Pass, for example, '100 s' or '2 mm', or a number in s."
 #: Default units of columns without units.
 _DEFAULT_UNITS = {"time": "s", "displacement": "um", "slip": "um"}
 
@@ -62,10 +62,10 @@ class RowSelection:
     def __post_init__(self) -> None:
         """Check the row numbers and the thinning."""
         if self.rows is not None and not _are_row_numbers(self.rows):
-            rule = "must be the numbers of the first and the last row, counted from 1"
-            raise InvalidValue("rows", self.rows, rule, remedy="Pass rows=(1, 5000), for example.")
+            rule = "must be the numbers of the first and the last row. Rows are counted from 1"
+            raise InvalidValue("rows", self.rows, rule, remedy="Pass, for example, rows=(1, 5000).")
         if not isinstance(self.thin, int) or isinstance(self.thin, bool) or self.thin < 1:
-            raise InvalidValue("thin", self.thin, "must be a whole number from 1")
+            raise InvalidValue("thin", self.thin, "must be a whole number, 1 or more")
         parse_filter(self.filter)
 
     def cut(self, columns: Mapping[str, Column]) -> tuple[dict[str, Column], list[str]]:
@@ -97,7 +97,7 @@ class RowSelection:
             last = min(last, self._find_row("end", self.end, columns))
         if first >= last:
             stated = {"rows": self.rows, "begin": self.begin, "end": self.end}
-            rule = f"selects no row: the record has {count:,} rows"
+            rule = f"selects no row, because the record has {count:,} rows"
             raise InvalidValue("selection", stated, rule)
         if (first, last) == (0, count):
             return dict(columns), []
@@ -111,16 +111,20 @@ class RowSelection:
     def _find_row(self, name: str, limit: Any, columns: Mapping[str, Column]) -> int:
         """Convert a limit to the index of the first row, or to the end index."""
         if isinstance(limit, bool) or not isinstance(limit, int | float | str):
-            raise InvalidValue(name, limit, "is no time or displacement", remedy=_REMEDY_FOR_LIMITS)
+            raise InvalidValue(
+                name, limit, "is neither a time nor a displacement", remedy=_REMEDY_FOR_LIMITS
+            )
         text = limit if isinstance(limit, str) else f"{limit!r} s"
         size = find_size_of_units(split_number_and_units(text)[1])
         key = _COLUMN_BY_EXPONENTS.get(size[1]) if size else None
         if key is None:
-            raise InvalidValue(name, limit, "is no time or displacement", remedy=_REMEDY_FOR_LIMITS)
+            raise InvalidValue(
+                name, limit, "is neither a time nor a displacement", remedy=_REMEDY_FOR_LIMITS
+            )
         if key == "displacement" and key not in columns:
             key = "slip"
         if key not in columns:
-            rule = f"needs the column {key.replace('slip', 'displacement')}"
+            rule = f"requires the column {key.replace('slip', 'displacement')}"
             raise InvalidValue(name, limit, rule, remedy="Pass rows=(first, last).")
         column = columns[key]
         si = "s" if key == "time" else "m"
@@ -128,7 +132,10 @@ class RowSelection:
         value = convert_to_si(name, text, si) / float(compute_conversion_factor(key, units, si))
         inside = column.values >= value if name == "begin" else column.values <= value
         if not inside.any():
-            rule = f"lies outside the record, {column.values[0]:g} to {column.values[-1]:g} {units}"
+            rule = (
+                f"is outside the record, which covers {column.values[0]:g} to "
+                f"{column.values[-1]:g} {units}"
+            )
             raise InvalidValue(name, limit, rule)
         if name == "begin":
             return int(np.argmax(inside))
@@ -164,7 +171,7 @@ class RowSelection:
         if chosen := parse_filter(self.filter):
             if "time" not in found:
                 remedy = "Leave the filter out."
-                raise InvalidValue("filter", self.filter, "needs the column time", remedy=remedy)
+                raise InvalidValue("filter", self.filter, "requires the column time", remedy=remedy)
             time = found["time"]
             kept = chosen.complete_rows(time)
             found |= {name: chosen.filter_rows(time, found[name]) for name in filtered_names}
@@ -207,7 +214,7 @@ def parse_filter(text: str) -> Filter | None:
         return None
     kind, _, size = str(text).partition(" ")
     if kind not in FILTER_KINDS:
-        remedy = "Write it as in 'mean 1 s' or 'butterworth_2 2 Hz'."
+        remedy = "Pass, for example, 'mean 1 s' or 'butterworth_2 2 Hz'."
         raise InvalidValue("filter", text, "is unknown", choices=FILTER_KINDS, remedy=remedy)
     number = convert_to_si("filter", size, "1/s" if kind in LOW_PASS_ORDERS else "s")
     if not 0.0 < number < math.inf:

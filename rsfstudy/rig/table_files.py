@@ -95,19 +95,19 @@ def _choose_all_columns_of_header(
     """Select all columns of a file whose header contains names and units."""
     found: dict[str, ColumnSpec] = {}
     if not table.has_headings:
-        remedy = f"Its first line reads, for instance, {EXAMPLE_OF_TABLE_HEADER}."
+        remedy = f"Write a first line such as {EXAMPLE_OF_TABLE_HEADER}."
         raise InvalidValue("table", table.location, "has no header", remedy=remedy)
     for n, heading in enumerate(table.headings, start=1):
         stated = split_heading_into_name_and_units(heading)
         if stated is None:
-            remedy = f"Write the header as in {EXAMPLE_OF_TABLE_HEADER}."
-            rule = "names no column with its units"
+            remedy = f"Write a header such as {EXAMPLE_OF_TABLE_HEADER}."
+            rule = "is not a column name with units"
             raise InvalidValue("header", heading, rule, remedy=remedy).with_location(
                 f"{table.location}, column {n}"
             )
         name, units = stated
         if name in found:
-            raise InvalidValue("column", name, "stands twice in the header").with_location(
+            raise InvalidValue("column", name, "occurs twice in the header").with_location(
                 table.location
             )
         found[name] = ColumnSpec(heading, units)

@@ -168,8 +168,8 @@ def convert_to_si_as_fraction(quantity_name: str, value: Any, units: str) -> Fra
     else:
         found = Axis.to_plain_value(quantity_name, value)
     if isinstance(found, bool) or not isinstance(found, int | float | Fraction):
-        remedy = f"Give a number in {units}, or a text with units."
-        raise InvalidValue(quantity_name, value, "is no quantity", remedy=remedy)
+        remedy = f"Pass a number in {units}, or a string with units."
+        raise InvalidValue(quantity_name, value, "is not a quantity", remedy=remedy)
     if not math.isfinite(_to_float(found)):
         raise InvalidValue(quantity_name, value, "must be finite")
     return Fraction(found)
@@ -249,15 +249,15 @@ def _parse_quantity(quantity_name: str, text: str, units: str) -> Fraction | flo
     Infinite numbers and NaN are returned unchanged.
     """
     if len(text) > _MAX_QUANTITY_TEXT_LENGTH:
-        rule = f"is no quantity, because it has more than {_MAX_QUANTITY_TEXT_LENGTH} characters"
-        remedy = f"Write a number and its units, as in '2.5 {units.removesuffix('1')}'."
+        rule = f"is not a quantity, because it has more than {_MAX_QUANTITY_TEXT_LENGTH} characters"
+        remedy = f"Write a number and its units, for example '2.5 {units.removesuffix('1')}'."
         raise InvalidValue(quantity_name, text, rule, remedy=remedy)
     match = _NUMBER_PATTERN.match(text.strip())
     powers = _parse_unit_powers(text.strip()[match.end() :].strip()) if match else None
     if match is None or powers is None:
         example = f"2.5 {units}".removesuffix(" 1")
-        remedy = f"Write a number and its units, as in '{example}', with a decimal point."
-        raise InvalidValue(quantity_name, text, "is no quantity", remedy=remedy)
+        remedy = f"Write a number with a decimal point, and its units, for example '{example}'."
+        raise InvalidValue(quantity_name, text, "is not a quantity", remedy=remedy)
     number = float(match[0])
     if not math.isfinite(number):
         return number
@@ -268,7 +268,7 @@ def _parse_quantity(quantity_name: str, text: str, units: str) -> Fraction | flo
     scale, exponents = _multiply_known_units(powers)
     wanted = _multiply_known_units(_parse_unit_powers(units.removeprefix("1")) or [])[1]
     if exponents == (wanted[0], wanted[1] + 2, *wanted[2:]):
-        rule = "is of force, and stress is force over area"
+        rule = "is a force, but stress is force divided by area"
         raise InvalidValue(quantity_name, text, rule, remedy="Divide it by the area of the fault.")
     if exponents != wanted:
         raise _incompatible_units_error(quantity_name, text, units)
@@ -276,10 +276,8 @@ def _parse_quantity(quantity_name: str, text: str, units: str) -> Fraction | flo
 
 
 def _incompatible_units_error(quantity_name: str, value: Any, units: str) -> InvalidValue:
-    rule = f"has units of another kind than {units}"
-    return InvalidValue(
-        quantity_name, value, rule, remedy=f"Give it in {units}, or a multiple of it."
-    )
+    rule = f"has units that are incompatible with {units}"
+    return InvalidValue(quantity_name, value, rule, remedy=f"Use {units} or a multiple of it.")
 
 
 def _parse_unit_powers(unit_text: str) -> list[tuple[str, int]] | None:
@@ -310,17 +308,21 @@ def _compute_factor_with_pint(
         pint = importlib.import_module("pint")
     except ImportError as error:
         usual = ", ".join(n for n in _KNOWN_UNITS if n != "kg" and n.isascii())
-        remedy = f"{_PINT_INSTALL_ADVICE}, write it in {usual}, or give a number in {units}."
+        remedy = f"{_PINT_INSTALL_ADVICE}, use the units {usual}, or pass a number in {units}."
         remedy = _suggest_unit_with_other_capitals(units_and_powers) or remedy
         raise InvalidValue(
-            quantity_name, text, "has units that are not known here", remedy=remedy
+            quantity_name,
+            text,
+            "has units that are unknown without the library pint",
+            remedy=remedy,
         ) from error
     registry = pint.get_application_registry()
     try:
         unit = math.prod(registry.parse_units(unit) ** power for unit, power in units_and_powers)
     except Exception as error:  # Both pint and the Python parser may raise errors of other types.
         remedy = (
-            _suggest_unit_with_other_capitals(units_and_powers) or f"Write it as in '2.5 {units}'."
+            _suggest_unit_with_other_capitals(units_and_powers)
+            or f"Write, for example, '2.5 {units}'."
         )
         rule = f"has units that pint does not know ({error})"
         raise InvalidValue(quantity_name, text, rule, remedy=remedy) from error

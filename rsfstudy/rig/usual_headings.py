@@ -167,9 +167,12 @@ def _read_column_with_units(
         if column.units:  # The type of the values implies the units.
             return column
         whole = f"{spec.heading} ({_USUAL_UNITS.get(name, 'MPa')})"
-        remedy = f"Write them in the file, as in {whole}, or here: --columns '{name}={whole},...' "
+        remedy = (
+            f"Write the units in the file, for example {whole}, or pass --columns "
+            f"'{name}={whole},...' "
+        )
         remedy += f"(columns={{'{name}': '{whole}', ...}})."
-        raise InvalidValue("heading", selection, "states no units", remedy=remedy)
+        raise InvalidValue("heading", selection, "has no units", remedy=remedy)
     return table.read_column(name, spec)
 
 
@@ -208,10 +211,10 @@ def _find_usual_heading(column_name: str, table: Table) -> dict[str, str]:
     meant = [text for text in meant if parts[text][1] == column_name] or meant
     if len(meant) > 1:
         remedy = (
-            f"Say which, as in --columns '{column_name}={meant[-1]}' "
+            f"Select one of them, for example --columns '{column_name}={meant[-1]}' "
             f"(columns={{'{column_name}': ...}})."
         )
-        rule = "may be any of several columns"
+        rule = "matches several columns"
         raise InvalidValue("column", column_name, rule, choices=meant, remedy=remedy).with_location(
             table.location
         )
@@ -246,13 +249,13 @@ def missing_columns_error(table: Table, rule: str) -> InvalidValue:
     else:
         shown = "1 (s)", "2 (um)", "3"
     remedy = (
-        f"Say which is which: --columns 'time={shown[0]},displacement={shown[1]},friction="
-        f"{shown[2]}', or columns={{'time': '{shown[0]}', 'displacement': '{shown[1]}', "
-        f"'friction': '{shown[2]}'}}."
+        "Select the columns, for example --columns "
+        f"'time={shown[0]},displacement={shown[1]},friction={shown[2]}', or columns={{'time': "
+        f"'{shown[0]}', 'displacement': '{shown[1]}', 'friction': '{shown[2]}'}}."
     )
     header = ", ".join(table.headings)[:200]
     if not table.has_headings:
-        rule = f"states no headings, and {rule}"
+        rule = f"has no headings, and {rule}"
         header = f"{len(table.headings)} columns without headings"
     return InvalidValue("header", header, rule, remedy=remedy).with_location(table.location)
 

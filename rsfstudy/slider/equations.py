@@ -233,7 +233,9 @@ def _build_rupture_equations(
     """Build the equations in ruptures. Raise TypeError if there is no inertia."""
     a, friction, others = scene.a, scene.friction_functions, _state_names(scene)[1:]
     if scene.dynamics.build_rupture_rate_function is None:
-        raise TypeError(f"{scene.dynamics.name} has no equations of ruptures")
+        raise TypeError(
+            f"the dynamics {scene.dynamics.name!r} do not define equations for ruptures"
+        )
     by_time, by_path, by_path_with_time = build_rate_functions_in_rupture(
         friction, scene.dynamics.build_rupture_rate_function
     )

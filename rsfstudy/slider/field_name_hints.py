@@ -10,23 +10,24 @@ from collections.abc import Iterable, Mapping
 from typing import Any
 
 _STIFFNESS_HINT = (
-    "stiffness_ratio (over the critical stiffness) or stiffness (k D_c/sigma_*; of a rig with "
-    "units, as in '0.05 MPa/um')"
+    "stiffness_ratio (over the critical stiffness) or stiffness (k D_c/sigma_*; with units for a "
+    "rig, for example '0.05 MPa/um')"
 )
 _INERTIA_HINT = (
-    "Write inertia=True, and period for its period of free oscillation in s; or state the rig."
+    "Write inertia=True, and pass the period of free oscillation in s as period. Alternatively, "
+    "create the scene from a rig."
 )
 _LOAD_VELOCITY_HINT = (
-    "Write load_velocity_ratio, which is V_0/V_*; of a rig load_velocity with units."
+    "Write load_velocity_ratio, which is V_0/V_*, or load_velocity with units for a rig."
 )
-_DURATION_HINT = "It belongs to rsfstudy.simulate(scene, duration=...)."
+_DURATION_HINT = "Pass duration to rsfstudy.simulate(scene, duration=...)."
 
 
 def _rig_quantity_hint(symbol: str, name: str) -> str:
     """Return an error hint for a quantity that rigs have but scenes do not have."""
     return (
-        f"{symbol} is {name} of a rig: Rig({name}=...), or an axis or another value of a "
-        "study that has one."
+        f"{symbol} is the quantity {name} of a rig. Pass Rig({name}=...), or use an axis or an "
+        "override of a study with a rig."
     )
 
 
@@ -38,7 +39,7 @@ def _map_names_to_same_value(space_separated_names: str, value: str) -> dict[str
 _HINT_BY_WRONG_FIELD_NAME: Mapping[str, str] = {
     **_map_names_to_same_value("k K kappa spring_constant", f"Write {_STIFFNESS_HINT}."),
     **_map_names_to_same_value("b B", "Write b_over_a, which is b/a."),
-    **_map_names_to_same_value("a_minus_b b_minus_a ab", "Write b_over_a, which is b/a, beside a."),
+    **_map_names_to_same_value("a_minus_b b_minus_a ab", "Write a and b_over_a, which is b/a."),
     **_map_names_to_same_value("A", "Write a."),
     **_map_names_to_same_value(
         "Dc dc D_c d_c DC L dcrit slip_distance", _rig_quantity_hint("D_c", "slip_distance")
@@ -60,13 +61,14 @@ _HINT_BY_WRONG_FIELD_NAME: Mapping[str, str] = {
         "kc k_c kcr k_cr k_ratio k_over_kc k_kc", "Write stiffness_ratio, which is k/k_cr."
     ),
     **_map_names_to_same_value(
-        "tau tau0 tau_0", "Write initial_stress, over sigma_*, above that of steady sliding."
+        "tau tau0 tau_0",
+        "Write initial_stress, which is the difference from steady sliding divided by sigma_*.",
     ),
     **_map_names_to_same_value(
         "theta theta0 theta_0", "Write initial_state, which is b ln(theta/theta_*)."
     ),
     **_map_names_to_same_value("m M mass", _INERTIA_HINT),
-    **_map_names_to_same_value("eta damping", "Write radiation_damping: eta V_*/sigma_*."),
+    **_map_names_to_same_value("eta damping", "Write radiation_damping, which is eta V_*/sigma_*."),
     **_map_names_to_same_value("T", "Write period, in s."),
     **_map_names_to_same_value("evolution evolution_law state_law friction_law", "Write law."),
     **_map_names_to_same_value("duration t_end tmax", _DURATION_HINT),
@@ -143,7 +145,7 @@ def hint_for_unknown_choice(slot_name: str, value: Any, choices: Iterable[str]) 
         return ""
     plain = _normalise_name(value)
     if slot_name == "law" and plain == "nagata":
-        return "Write stress_dependence=..., beside any law."
+        return "Write stress_dependence=..., which can be combined with any law."
     return f"Write {slot_name}={plain!r}." if plain in choices else ""
 
 
@@ -170,4 +172,4 @@ def hint_for_positional_argument(
             return found
     if isinstance(value, Mapping):
         return "Write Scene(**fields)."
-    return "Name the field, as in Scene(law='slowness', stiffness_ratio=0.8)."
+    return "Pass fields by name, for example Scene(law='slowness', stiffness_ratio=0.8)."

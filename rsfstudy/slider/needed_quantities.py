@@ -26,11 +26,11 @@ PORE_PRESSURE, EFFECTIVE_NORMAL_STRESS = "pore_pressure", "effective_normal_stre
 QUANTITIES_A_PART_MAY_NEED: Mapping[str, str] = {
     SLIP_RATE: "ln(V/V_*)",
     STATE: "the states of the law",
-    FRICTION_COEFFICIENT: "tau/sigma = mu_* + a ln(V/V_*) + the sum of the states",
+    FRICTION_COEFFICIENT: "friction coefficient tau/sigma = mu_* + a ln(V/V_*) + sum of the states",
     SHEAR_STRESS: "frictional shear stress tau over sigma_*",
     NORMAL_STRESS: "normal stress over sigma_*",
-    PORE_PRESSURE: "pore pressure above that of the surroundings, over sigma_*",
-    EFFECTIVE_NORMAL_STRESS: "normal stress less pore pressure, over sigma_*",
+    PORE_PRESSURE: "pore pressure minus the pressure of the surroundings, over sigma_*",
+    EFFECTIVE_NORMAL_STRESS: "normal stress minus pore pressure, over sigma_*",
 }
 #: Quantities that the functions of a law receive. The friction coefficient is computed from the
 #: slip rate and the state.
@@ -135,7 +135,7 @@ def _causes_of_unknown_quantities(scene: SceneView) -> list[_CauseOfUnknownQuant
         found.append(_CauseOfUnknownQuantity(NORMAL_STRESS, cause, "set normal_stress='constant'"))
     if parts.loading.changes_normal_stress:
         cause = f"the loading {parts.loading.name!r}"
-        remedy = "leave normal stress and pore pressure out of the loading"
+        remedy = "remove normal stress and pore pressure from the loading"
         found += [
             _CauseOfUnknownQuantity(name, cause, remedy) for name in (NORMAL_STRESS, PORE_PRESSURE)
         ]
@@ -156,7 +156,7 @@ def _causes_of_unknown_friction(scene: SceneView) -> list[_CauseOfUnknownQuantit
         causes.append(("regularised=True", "set regularised=False"))
     if any(temperature.activation):
         cause = f"temperature={temperature.name!r}"
-        causes.append((cause, "leave the activation terms out"))
+        causes.append((cause, "remove the activation terms"))
     return [_CauseOfUnknownQuantity(FRICTION_COEFFICIENT, *texts) for texts in causes]
 
 
@@ -182,7 +182,10 @@ def _missing_quantities_error(
     if wanted > {change.unknown_quantity_name for change in changes}:
         causes, remedies = "in any scene", "write the unknown as a state of a law"
     named = " and ".join(missing_quantity_names)
-    rule = f"needs {named}, which its rates do not receive {causes}: they receive "
+    rule = (
+        f"requires {named}, but its rates do not receive {named} {causes}. The available "
+        "quantities are "
+    )
     rule += ", ".join(sorted(known)) or "no quantity"
     remedy = f"{remedies[:1].upper()}{remedies[1:]}, or use a part that does not need {named}."
     return InvalidValue(slot_name, part.name, rule, remedy=remedy)

@@ -155,9 +155,12 @@ def _part_parameters_padded_with_nan(
         else part.parameter_values(scene)
     )
     if len(own) > length:
-        rule = f"states {len(own)} numbers, and there are places for {length}"
+        rule = f"has {len(own)} parameters, but at most {length} are allowed"
         raise InvalidValue(
-            "parameter_values", part.name, rule, remedy="Make fewer of them, as quotients."
+            "parameter_values",
+            part.name,
+            rule,
+            remedy="Combine parameters, for example as quotients.",
         )
     return (*own, *(math.nan,) * (length - len(own)))
 

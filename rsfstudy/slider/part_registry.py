@@ -87,9 +87,9 @@ SLOTS: tuple[Slot, ...] = (
         dynamics.Dynamics,
         dynamics.BUILT_IN_PARTS,
         "quasi_static",
-        "what balances the spring besides friction",
+        "force that balances the spring in addition to friction",
     ),
-    Slot("loading", loading.Loading, loading.BUILT_IN_PARTS, "step", "what the load point does"),
+    Slot("loading", loading.Loading, loading.BUILT_IN_PARTS, "step", "motion of the load point"),
     Slot(
         "temperature",
         temperature.Temperature,
@@ -266,12 +266,12 @@ def check_and_register_part(slot: Slot, part: Any) -> UserPart:
 def _check_user_part(slot: Slot, part: Any) -> None:
     """Raise ``InvalidValue`` if a class cannot fill a slot."""
     if not isinstance(part, type) or not issubclass(part, slot.base_class):
-        rule = f"is no class that fills the slot {slot.name}"
+        rule = f"is not a class that defines the {slot.name} of a scene"
         remedy = f"Derive a class from {slot.base_class.__module__}.{slot.base_class.__name__}."
         raise InvalidValue(slot.name, part, rule, remedy=remedy)
     params = vars(part).get("__dataclass_params__")
     if params is None or not params.frozen:
-        remedy = "Write @dataclass(frozen=True, kw_only=True) above its class."
+        remedy = "Add the decorator @dataclass(frozen=True, kw_only=True) to the class."
         raise InvalidValue(slot.name, part, "must be a frozen dataclass", remedy=remedy)
     _check_part_name(slot, part)
     _check_part_fields(slot, part)
@@ -280,7 +280,10 @@ def _check_user_part(slot: Slot, part: Any) -> None:
     for name in part.required_functions():
         function = getattr_static(part, name, None)
         if not isinstance(getattr(function, "__func__", None), FunctionType):
-            rule, remedy = f"states no {name}", f"Write {name} = staticmethod(a plain function)."
+            rule, remedy = (
+                (f"does not define {name}"),
+                f"Write {name} = staticmethod(a plain function).",
+            )
             raise InvalidValue(slot.name, part, rule, remedy=remedy)
 
 
@@ -303,19 +306,23 @@ def _check_unknowns_excluded_from_distance(slot: Slot, part: type[Part]) -> None
 def _check_part_name(slot: Slot, part: UserPart) -> None:
     """Raise ``InvalidValue`` if the name of a part is invalid or in use."""
     name: object = getattr(part, "name", None)
-    rule = "" if is_variable_name(name) else f"must be named by a Python identifier, not {name!r}"
+    rule = (
+        ""
+        if is_variable_name(name)
+        else (f"must have a Python identifier as its name (got {name!r})")
+    )
     for other in SLOTS:
         if name in other.built_in_parts:
-            rule = f"takes the name of a part of rsfstudy, {name!r}"
+            rule = f"has the name {name!r} of a part of rsfstudy"
         elif name in other.user_parts and _module_and_qualified_name(
             other.user_parts[name]
         ) != _module_and_qualified_name(part):
             rule = (
-                f"takes the name {name!r} of "
+                f"has the name {name!r} of "
                 f"{'.'.join(_module_and_qualified_name(other.user_parts[name]))}"
             )
     if rule:
-        remedy = f'Write name = "..." in {_module_and_qualified_name(part)[1]}.'
+        remedy = f'Define another name = "..." in {_module_and_qualified_name(part)[1]}.'
         raise InvalidValue(slot.name, part, rule, remedy=remedy)
 
 
@@ -340,10 +347,13 @@ def _check_part_fields(slot: Slot, part: type[Part]) -> None:
             PART_CLASS_BY_FIELD_NAME.get(stated.name),
         )
         if about is None:
-            rule, state = "says neither what it is nor its rule", "State it by number() or flag()."
+            rule, state = (
+                ("has neither a description nor a rule for its values"),
+                ("Declare the field with number() or flag()."),
+            )
             raise InvalidValue(what, name, rule, remedy=state)
         if not is_variable_name(name):
-            rule = "must be a Python identifier, its accents composed (NFC)"
+            rule = "must be a Python identifier in Unicode normalisation form NFC"
             raise InvalidValue(what, name, rule)
         if owner is None:
             taken = name in RESERVED_NAMES | SLOT_NAMES
@@ -351,9 +361,9 @@ def _check_part_fields(slot: Slot, part: type[Part]) -> None:
             known = owner.__dataclass_fields__[name].metadata["about"]
             taken = about != known or owner not in slot.built_in_parts.values()
         if taken:
-            rule = "is the name of something else, of "
+            rule = "is already the name of a field of "
             rule += owner.name if owner else "every scene"
-            raise InvalidValue(what, name, rule, remedy="Give it another name.")
+            raise InvalidValue(what, name, rule, remedy="Choose another name.")
 
 
 def register_user_parts(parts: Iterable[UserPart]) -> None:
@@ -451,7 +461,7 @@ def scene_field_quantities(user_parts: Iterable[UserPart]) -> dict[str, Quantity
     for kind in map(class_of_part, user_parts):
         for about in (find_slot_of_part_class(kind).field_quantity, *part_field_quantities(kind)):
             if found.setdefault(about.name, about) != about:
-                rule = "is the name of something else, of another part"
+                rule = "is already the name of a field of another part"
                 raise InvalidValue(f"field of {kind.name}", about.name, rule)
     return found
 

@@ -454,7 +454,9 @@ def validate_field_value(part_class: type[Part], field_name: str, value: Any) ->
         return bool(value)
     if flagged or not isinstance(value, Real):
         has_units = isinstance(value, str) and value.strip()[:1].isdigit()
-        remedy = "Units are those of a rig: state it, as rsfstudy.Rig." * has_units
+        remedy = (
+            "Values with units require a rig. Create the scene with rsfstudy.Rig(...).scene(...)."
+        ) * has_units
         raise InvalidValue(field_name, value, "must be a number", remedy=remedy)
     try:
         plain = float(value)

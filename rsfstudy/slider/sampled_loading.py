@@ -30,7 +30,7 @@ from rsfstudy.slider.user_loadings import UserLoading
 #: decrease of normal stress from sigma_* at the sample, and rate of normal stress after the sample.
 TIME_COLUMN, VELOCITY_COLUMN, STRESS_FALL_COLUMN, STRESS_RATE_COLUMN = range(4)
 _NORMAL_STRESS_UNKNOWNS = (
-    Quantity("recorded_fall", "$P$", "1", "imposed fall of normal stress", "sigma_*"),
+    Quantity("recorded_fall", "$P$", "1", "imposed decrease of normal stress", "sigma_*"),
 )
 
 
@@ -135,7 +135,9 @@ class SampledHistory(UserLoading):
             If the name is not a Python identifier.
         """
         if not is_variable_name(name):
-            raise InvalidValue("name", name, "must be a Python identifier: it names the history")
+            raise InvalidValue(
+                "name", name, "must be a Python identifier, because it is the name of the history"
+            )
         columns = np.zeros((len(time), STRESS_RATE_COLUMN + 1))
         columns[:, TIME_COLUMN], columns[:, VELOCITY_COLUMN] = time - time[0], velocity
         if normal_stress_fall is not None:

@@ -179,7 +179,7 @@ def _select_part(slot: Slot, field_values: Mapping[str, Any]) -> UserPart:
         return slot.built_in_parts[name]
     if value is not None:
         others = ", ".join(slot.part_class_by_selecting_field) or "the other fields"
-        remedy = f"Those of rsfstudy are called for by {others}."
+        remedy = f"To select a loading of rsfstudy, set one of the fields {others}."
         raise InvalidValue(slot.name, value, "is unknown", choices=slot.user_parts, remedy=remedy)
     for caller, part in slot.part_class_by_selecting_field.items():
         value = field_values.get(caller)
@@ -248,7 +248,9 @@ def build_field_index(part_classes: tuple[type[Part], ...]) -> FieldIndex:
     places = {name: place for place, part in enumerate(kinds) for name in field_names(part)}
     if len(places) < sum(len(field_names(part)) for part in kinds):
         names = ", ".join(part.name for part in owned.values())
-        raise InvalidValue("parts", names, "have a field of one name", remedy="Rename one.")
+        raise InvalidValue(
+            "parts", names, "have fields with the same name", remedy="Rename one of the fields."
+        )
     refusing: dict[str, type[Part]] = {}
     idle: dict[str, Any] = {}
     foreign: set[str] = set()

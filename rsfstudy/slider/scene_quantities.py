@@ -94,11 +94,16 @@ class SceneQuantities(SceneBase):
         ratio = self.parts.slider.stiffness_ratio
         assert ratio is not None  # The slider has either a stiffness or a stiffness ratio.
         if not 0.0 < self.critical_stiffness < math.inf:
-            rule = f"is of a critical stiffness at V_* that is {self.critical_stiffness:g}"
-            raise InvalidValue("stiffness_ratio", ratio, rule, remedy="Give stiffness itself.")
+            rule = (
+                "cannot be used, because the critical stiffness at V_* is "
+                f"{self.critical_stiffness:g}"
+            )
+            raise InvalidValue(
+                "stiffness_ratio", ratio, rule, remedy="Pass stiffness instead of stiffness_ratio."
+            )
         stiffness = float(ratio * self.critical_stiffness)
         if not stiffness > 0.0:
-            rule = "is so small that the stiffness is rounded to 0"
+            rule = "is so small that the stiffness would be rounded to 0"
             raise InvalidValue("stiffness_ratio", ratio, rule, remedy="Choose a larger ratio.")
         return stiffness
 

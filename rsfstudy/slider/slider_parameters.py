@@ -42,14 +42,14 @@ class SliderParameters(Part):
         0.76,
         r"$\mu_*$",
         "1",
-        "steady-state friction coefficient at the reference rate",
+        "steady-state friction coefficient at the reference slip rate",
         rule=POSITIVE,
     )
     stiffness_ratio: float | None = number(
         None,
         r"$k/k_{cr}(V_*)$",
         "1",
-        "stiffness over critical stiffness at V_star without radiation damping",
+        "stiffness divided by the critical stiffness at V_star without radiation damping",
         rule=POSITIVE,
     )
     stiffness: float | None = number(
@@ -57,21 +57,25 @@ class SliderParameters(Part):
     )
     period: float = number(5.0, "$T$", "s", "period of free oscillation", rule=POSITIVE)
     reference_rate: float = number(
-        1.17e-8, "$V_*/D_c$", "s-1", "reference slip rate over slip distance", rule=POSITIVE
+        1.17e-8, "$V_*/D_c$", "s-1", "reference slip rate divided by slip distance", rule=POSITIVE
     )
     instability_norm: float = number(
-        5e-4, r"$VT/(2\pi D_c)$", "1", "slip rate norm that counts as unstable", rule=POSITIVE
+        5e-4,
+        r"$VT/(2\pi D_c)$",
+        "1",
+        "slip rate norm above which the motion counts as unstable",
+        rule=POSITIVE,
     )
 
     initial_stress: float = number(
         0.0,
         r"$(\tau_0-\tau_*)/\sigma_*$",
         "1",
-        "shear stress at the beginning, above that of steady sliding at V_star",
+        "initial shear stress minus the shear stress in steady sliding at V_star",
         "sigma_*",
     )
     initial_state: float = number(
-        0.0, r"$\Theta_0$", "1", "state variable at the beginning; 0 in steady sliding at V_star"
+        0.0, r"$\Theta_0$", "1", "initial state variable; 0 in steady sliding at V_star"
     )
 
     name = "slider"
@@ -82,11 +86,14 @@ class SliderParameters(Part):
         See ``Part.check``.
         """
         if self.initial_stress <= -self.mu_star:
-            rule = f"must exceed -mu_star = {-self.mu_star:g}: shear stress is that of forward slip"
+            rule = (
+                f"must exceed -mu_star = {-self.mu_star:g}, because the shear stress must be "
+                "positive"
+            )
             raise self.field_error("initial_stress", rule)
         if self.initial_state and scene.parts.law.state_count > 1:
-            rule = f"has no meaning for {scene.parts.law.name}, whose states share it"
-            remedy = "Leave it out, and come to it by a protocol."
+            rule = f"has no meaning for {scene.parts.law.name}, because the law has several states"
+            remedy = "Leave it out, and reach the initial state by a loading protocol."
             raise self.field_error("initial_state", rule, remedy)
 
 
@@ -114,9 +121,6 @@ def with_stiffness_default(field_values: dict[str, Any]) -> dict[str, Any]:
     """
     given = [name for name in ALTERNATIVE_STIFFNESS_FIELDS if name in field_values]
     if len(given) == 2:
-        rule = (
-            f"give stiffness or stiffness_ratio (here {field_values['stiffness_ratio']:g}), not "
-            "both"
-        )
+        rule = f"cannot be combined with stiffness_ratio (got {field_values['stiffness_ratio']:g})"
         raise InvalidValue("stiffness", field_values["stiffness"], rule)
     return field_values if given else {**field_values, "stiffness_ratio": 1.0}

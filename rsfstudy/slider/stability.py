@@ -332,7 +332,7 @@ def spring_response_to_normal_stress(
     if scene.parts.temperature.unknowns:
         remedy = "Set temperature='isothermal', or simulate the oscillation."
         name = scene.parts.temperature.name
-        raise InvalidValue("temperature", name, "has no linear response here", remedy=remedy)
+        raise InvalidValue("temperature", name, "has no linear response in rsfstudy", remedy=remedy)
     still = scene.under_steady_loading
     steady = _require_steady_sliding(still, log_slip_rate)
     psis = (*steady.states, *(0.0 for _unknown in scene.pressure_source.unknowns))
@@ -365,5 +365,5 @@ def _require_steady_sliding(scene: SceneView, log_slip_rate: float) -> SteadySli
     """Return steady sliding, or raise ``ValueError`` if it does not exist."""
     steady = steady_sliding(scene, log_slip_rate)
     if steady is None:
-        raise ValueError(f"there is no steady sliding at ln(V/V_*) = {log_slip_rate:g}")
+        raise ValueError(f"steady sliding does not exist at ln(V/V_*) = {log_slip_rate:g}")
     return steady

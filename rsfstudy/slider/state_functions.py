@@ -328,16 +328,25 @@ def check_steady_states(scene: SceneView) -> None:
         psis = steady_states(rate, 0.0, p)
         change = max(map(abs, evolutions(rate, psis, 0.0, 1.0, p)))
         if not change <= still:
-            rule = f"changes by {change:.3g} per D_c in steady sliding at ln(V/V_*) = {rate:g}"
-            remedy = "Write steady_states(log_slip_rate, shift, p) for it."
+            rule = (
+                f"has a state that changes by {change:.3g} per D_c in steady sliding at "
+                f"ln(V/V_*) = {rate:g}"
+            )
+            remedy = "Define steady_states(log_slip_rate, shift, p) in the law."
             raise InvalidValue("law", law.name, rule, remedy=remedy)
         if rate == 0.0 and not abs(sum(psis)) <= still:
-            rule = f"has states that add up to {sum(psis):.3g} at V_*, where friction is mu_*"
-            raise InvalidValue("law", law.name, rule, remedy="Measure them from V_*.")
+            rule = (
+                f"has states with the sum {sum(psis):.3g} at V_*, but the sum must be 0 "
+                "because friction at V_* is mu_*"
+            )
+            raise InvalidValue("law", law.name, rule, remedy="Define the states relative to V_*.")
         away = np.linalg.eigvals(_evolution_jacobian(evolutions, rate, psis, scene.a, p)).real.max()
         if away > _REST_TOLERANCE:
-            rule = f"moves away from steady sliding at ln(V/V_*) = {rate:g}, by {away:.3g} per D_c"
-            remedy = "See whether its evolution has the sign of dPsi/d(delta)."
+            rule = (
+                f"moves away from steady sliding at ln(V/V_*) = {rate:g} with a growth rate of "
+                f"{away:.3g} per D_c"
+            )
+            remedy = "Check that its evolution function has the sign of dPsi/d(delta)."
             raise InvalidValue("law", law.name, rule, remedy=remedy)
 
 

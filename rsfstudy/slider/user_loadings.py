@@ -48,8 +48,8 @@ class UserLoading(Loading, ABC):
         back = np.asarray(self.segment_table)[:, SEGMENT_VELOCITY] < 0.0
         if back.any() and not scene.parts.law.regularised:
             name, value, place = self.locate_load_point_reversal(int(np.argmax(back)))
-            rule = "moves the load point back, and friction is that of forward slip"
-            remedy = "Set regularised=True, by which slip reverses with shear stress."
+            rule = "moves the load point backwards, but friction is defined for forward slip only"
+            remedy = "Set regularised=True, which permits reversed slip."
             raise InvalidValue(name, value, rule, remedy=remedy).with_location(place)
         super().check(scene)
 
@@ -166,12 +166,14 @@ def protocol(segments: Sequence[Segment | Mapping[str, float]], name: str = "pro
     1.0
     """
     if not is_variable_name(name):
-        raise InvalidValue("name", name, "must be a Python identifier: it names the protocol")
+        raise InvalidValue(
+            "name", name, "must be a Python identifier, because it is the name of the protocol"
+        )
     if isinstance(segments, str | Mapping) or not isinstance(segments, Sequence):
-        remedy = "Read a file by rsfstudy.read_protocol."
+        remedy = "Read a file with rsfstudy.read_protocol."
         raise InvalidValue("protocol", segments, "must be a list of segments", remedy=remedy)
     if not segments:
-        remedy = 'State one at least, as in [{"velocity": 10}].'
+        remedy = 'Pass at least one segment, for example [{"velocity": 10}].'
         raise InvalidValue("protocol", segments, "has no segments", remedy=remedy)
     history: list[Segment] = []
     for number, stated in enumerate(segments, start=1):
@@ -179,10 +181,15 @@ def protocol(segments: Sequence[Segment | Mapping[str, float]], name: str = "pro
         history.append(_parse_segment(stated, before, f"segment {number}"))
     for number, segment in enumerate(history[:-1], start=1):
         if segment.duration == math.inf:
-            remedy = "State its duration or its distance; only the last goes on for ever."
-            raise InvalidValue("duration", math.inf, "never ends", remedy=remedy).with_location(
-                f"segment {number}"
+            remedy = (
+                "Set its duration or its distance, because only the last segment can be infinite."
             )
+            raise InvalidValue(
+                "duration",
+                math.inf,
+                "is infinite, but the segment is not the last one",
+                remedy=remedy,
+            ).with_location(f"segment {number}")
     return Protocol(name=name, input_segments=tuple(history))
 
 
@@ -196,8 +203,8 @@ def _parse_segment(declared_segment: Any, previous_normal_stress: float, locatio
         if isinstance(declared_segment, Segment):
             return _build_validated_segment(*declared_segment)
         if not isinstance(declared_segment, Mapping):
-            remedy = 'Write {"velocity": 10, "duration": 2}.'
-            raise InvalidValue("segment", declared_segment, "is no segment", remedy=remedy)
+            remedy = 'Write, for example, {"velocity": 10, "duration": 2}.'
+            raise InvalidValue("segment", declared_segment, "is not a segment", remedy=remedy)
         for key in declared_segment:
             if key not in SEGMENT_MAPPING_KEYS:
                 raise InvalidValue("segment", key, "is unknown", choices=SEGMENT_MAPPING_KEYS)
@@ -213,15 +220,17 @@ def _parse_segment(declared_segment: Any, previous_normal_stress: float, locatio
             declared_segment.get("duration", math.inf),
         )
         if velocity is None:
-            raise InvalidValue("velocity", None, "must be stated", remedy="0 holds the load point.")
+            raise InvalidValue(
+                "velocity", None, "is required", remedy="Use 0 to hold the load point."
+            )
         if "distance" in declared_segment:
             distance = declared_segment["distance"]
             if "duration" in declared_segment:
-                rule = f"give duration or distance (here {distance!r}), not both"
+                rule = f"cannot be combined with distance (got {distance!r})"
                 raise InvalidValue("duration", duration, rule)
             distance = _read_positive_number(declared_segment, "distance", "positive and finite")
             duration = distance / _read_positive_number(
-                declared_segment, "velocity", "positive where a distance is stated"
+                declared_segment, "velocity", "positive in a segment with a distance"
             )
         return _build_validated_segment(
             velocity, declared_segment.get("step", 0.0), duration, previous_normal_stress
@@ -243,15 +252,15 @@ def _build_validated_segment(
 ) -> Segment:
     """Return a ``Segment`` whose values have been validated."""
     if not _is_number(velocity) or not math.isfinite(velocity):
-        remedy = "0 holds the load point."
+        remedy = "Use 0 to hold the load point."
         raise InvalidValue("velocity", velocity, "must be a finite number", remedy=remedy)
     if not _is_number(step) or not math.isfinite(step):
         raise InvalidValue("step", step, "must be a finite number")
     if not _is_number(duration) or not duration > 0.0:
-        remedy = "Leave out what lasts no time."
+        remedy = "Remove segments without duration."
         raise InvalidValue("duration", duration, "must be positive", remedy=remedy)
     if not _is_number(normal_stress) or not -1.0 < normal_stress < math.inf:
-        rule = "must be greater than -1: it is what imposed normal stress exceeds sigma_* by"
+        rule = "must be greater than -1, because it is the imposed normal stress minus sigma_*"
         raise InvalidValue("normal_stress", normal_stress, rule)
     return Segment(float(velocity), float(step), float(duration), float(normal_stress))
 

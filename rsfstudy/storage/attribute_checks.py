@@ -66,7 +66,7 @@ def check_motion_variables_are_numeric(dataset: xr.Dataset) -> None:
     for name, values in dataset.variables.items():
         if along and values.dims == along and values.dtype.kind not in "fiub":
             raise DataError(
-                f"{shorten_text(name)} is {values.dtype}, and must be numbers. "
+                f"{shorten_text(name)} is {values.dtype}, but must be numeric. "
                 f"{_INVALID_ATTRIBUTE_REMEDY}"
             )
 
@@ -75,12 +75,12 @@ def _check_text_attribute(attribute_path: str, value: object, max_characters: in
     """Check the type and length of a string attribute."""
     if not isinstance(value, str):
         raise DataError(
-            f"{attribute_path} is {shorten_text(value)}, and must be a text. "
+            f"{attribute_path} is {shorten_text(value)}, but must be a string. "
             f"{_INVALID_ATTRIBUTE_REMEDY}"
         )
     if len(value) > max_characters:
         raise DataError(
-            f"{attribute_path} has {len(value):,} characters, at most "
+            f"{attribute_path} has {len(value):,} characters, but the maximum is "
             f"{max_characters:,}. {_INVALID_ATTRIBUTE_REMEDY}"
         )
 
@@ -93,7 +93,7 @@ def _check_flag_values_and_meanings(variable_name: str, attributes: Mapping[Any,
     meanings = str(attributes.get("flag_meanings", "")).split()
     if values.dtype.kind not in "iuf" or len(values) != len(meanings):
         raise DataError(
-            f"{shorten_text(variable_name)}.flag_values must be numbers, one for each "
-            f"of the {len(meanings)} "
-            f"flag_meanings (got {shorten_text(values.tolist())}). {_INVALID_ATTRIBUTE_REMEDY}"
+            f"{shorten_text(variable_name)}.flag_values must contain one number for each of the "
+            f"{len(meanings)} flag_meanings (got {shorten_text(values.tolist())}). "
+            f"{_INVALID_ATTRIBUTE_REMEDY}"
         )

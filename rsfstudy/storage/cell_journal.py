@@ -51,7 +51,7 @@ WHERE type NOT IN ('table', 'index') OR tbl_name NOT IN ('fingerprint', 'cells')
 _KEYS_PER_QUERY = 900
 #: Maximum time in s that a run waits for another run to release the journal.
 _LOCK_TIMEOUT = 5.0
-_UNUSABLE_JOURNAL_REMEDY = "Choose another --output, or start over with --fresh."
+_UNUSABLE_JOURNAL_REMEDY = "Choose another --output, or start again with --fresh."
 
 
 class CellJournal:
@@ -113,7 +113,7 @@ class CellJournal:
     def _build_unusable_journal_error(self, error: Exception) -> DataError:
         """Build the error for a journal that cannot be opened."""
         if _is_database_locked_error(error):
-            rule = f"another run uses {self._path}: let it end, or choose another --output."
+            rule = f"another run uses {self._path}. Wait until it ends, or choose another --output."
             return DataError(rule)
         return DataError(f"cannot use {self._path}: {error}. {_UNUSABLE_JOURNAL_REMEDY}")
 
@@ -128,7 +128,8 @@ class CellJournal:
             if others:
                 found = shorten_text(others[0][0])
                 raise DataError(
-                    f"{self._path} holds {found}, which is not ours. {_UNUSABLE_JOURNAL_REMEDY}"
+                    f"{self._path} contains {found}, which rsfstudy did not create. "
+                    f"{_UNUSABLE_JOURNAL_REMEDY}"
                 )
             row = self._db.execute("SELECT json FROM fingerprint").fetchone()
             if row is None:
@@ -156,15 +157,15 @@ class CellJournal:
                     self._db.execute("UPDATE fingerprint SET json = ?", (merged,))
                 return
             told = "; ".join(
-                f"{name}: {shorten_text(there, 70)} there, {shorten_text(now, 70)} now"
+                f"{name}: {shorten_text(there, 70)} in the journal, {shorten_text(now, 70)} in "
+                "this run"
                 for name, (there, now) in differ.items()
             )
         except (AttributeError, RecursionError, TypeError, ValueError):
             told = "its fingerprint is damaged"
         raise DataError(
-            f"{self._path} holds cells computed differently: {told}. "
-            "Mixing them would be wrong: start over with --fresh (fresh=True), or choose "
-            "another --output (output=)."
+            f"{self._path} contains cells that were computed with other settings ({told}). Start "
+            "again with --fresh (fresh=True), or choose another --output (output=)."
         )
 
     def __enter__(self) -> CellJournal:
@@ -195,7 +196,7 @@ class CellJournal:
                     "INSERT OR REPLACE INTO cells VALUES (?, ?, ?, ?, ?, ?, ?)", cells
                 )
         except sqlite3.Error as error:
-            raise DataError(f"cannot add to {self._path}: {error}.") from error
+            raise DataError(f"cannot write to {self._path}: {error}.") from error
 
     def statuses(self, cell_keys: np.ndarray) -> np.ndarray:
         """Return the statuses of cells.
@@ -250,7 +251,7 @@ class CellJournal:
                 _fill_cell_columns(columns, places, rows)
             except (KeyError, OverflowError, TypeError, ValueError) as error:
                 raise DataError(
-                    f"{self._path} is damaged: a cell is not what was written. "
+                    f"{self._path} is damaged: a cell does not match its checksum. "
                     f"{_UNUSABLE_JOURNAL_REMEDY}"
                 ) from error
         return columns

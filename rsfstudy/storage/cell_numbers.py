@@ -44,9 +44,9 @@ def find_cell_number(dataset: xr.Dataset, coordinate_values: Mapping[str, Any]) 
         values = dataset[dimension].values
         if dimension not in coordinate_values:
             if values.size > 1:
-                rule = f"leaves {dimension} open"
+                rule = f"does not select a value of {dimension}"
                 remedy = (
-                    f"Name one value of each axis (--cell is repeated). {dimension} has "
+                    f"Pass one value for each axis (repeat --cell). The values of {dimension} are "
                     f"{format_list(values.tolist(), ', ')}."
                 )
                 raise InvalidValue("cell", dict(coordinate_values), rule, remedy=remedy)
@@ -54,7 +54,7 @@ def find_cell_number(dataset: xr.Dataset, coordinate_values: Mapping[str, Any]) 
             continue
         number = _find_index_on_axis(values, coordinate_values[dimension])
         if number is None:
-            rule = "is not on its axis"
+            rule = "is not a point of its axis"
             raise InvalidValue(
                 dimension, coordinate_values[dimension], rule, choices=map(str, values)
             )

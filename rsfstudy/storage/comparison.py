@@ -19,6 +19,7 @@ import xarray as xr
 from rsfstudy._deprecation import add_former_member_names
 from rsfstudy.error_boundary import wrap_methods_in_error_boundary
 from rsfstudy.errors import InvalidValue
+from rsfstudy.former_data_names import rename_former_fields
 from rsfstudy.status import Status
 from rsfstudy.storage.fingerprints import find_fingerprint_differences
 from rsfstudy.storage.rebuild_from_file import find_primary_output
@@ -234,7 +235,10 @@ def compare_results(first: xr.Dataset, second: xr.Dataset) -> Comparison:
     alone = [int(_finished_cell_mask(dataset).sum() - known.sum()) for dataset in both]
     return Comparison(
         declaration=find_fingerprint_differences(
-            *(dict(_flatten_declaration(json.loads(d.attrs["declaration"]))) for d in both)
+            *(
+                dict(_flatten_declaration(rename_former_fields(json.loads(d.attrs["declaration"]))))
+                for d in both
+            )
         ),
         origin=find_fingerprint_differences(
             *(_read_versions_and_machine(dataset) for dataset in both)
@@ -258,7 +262,9 @@ def _add_axes_of_other_dataset(dataset: xr.Dataset, other: xr.Dataset) -> xr.Dat
         if dimension in cells:
             continue
         if dimension not in dataset.coords or dataset[dimension].ndim:
-            rule = "is an axis of one of the two, and the other does not say where on it it is"
+            rule = (
+                "is an axis of only one of the datasets, and the other dataset has no value of it"
+            )
             raise InvalidValue("axis", str(dimension), rule)
         measured = [n for n, values in dataset.data_vars.items() if cells <= set(values.dims)]
         wider = dataset[measured].expand_dims(dimension)
@@ -297,8 +303,10 @@ def _check_same_axis_points(first: xr.Dataset, second: xr.Dataset) -> None:
         else:
             same = np.array_equal(x, y)
         if not same:
-            rule = f"has other values of {name} in the two, for points of the same names"
-            remedy = "They are results for other cells, and have no number in common."
+            rule = (
+                f"has points with the same label but different values of {name} in the two datasets"
+            )
+            remedy = "The datasets contain different cells and cannot be compared."
             raise InvalidValue("axis", ", ".join(map(str, one.dims)), rule, remedy=remedy)
 
 
@@ -308,15 +316,15 @@ def _uncompared_variables(aligned_datasets: Sequence[xr.Dataset]) -> dict[str, s
     unequal = {
         str(d) for d in first["status"].dims if set(first.indexes[d]) != set(second.indexes[d])
     }
-    why = {str(n): "only the first has them" for n in first.data_vars if n not in second}
-    why |= {str(n): "only the second has them" for n in second.data_vars if n not in first}
+    why = {str(n): "only in the first dataset" for n in first.data_vars if n not in second}
+    why |= {str(n): "only in the second dataset" for n in second.data_vars if n not in first}
     for name in map(str, first.data_vars):
         if name in why:
             continue
         if set(first[name].dims) != set(second[name].dims):
-            why[name] = "they lie along other axes"
+            why[name] = "the dimensions differ"
         elif not unequal <= set(first[name].dims):
-            why[name] = "they draw on cells that only one has"
+            why[name] = "computed from cells that only one dataset contains"
     return why
 
 

@@ -79,10 +79,9 @@ def check_content(dataset: xr.Dataset, path: str) -> None:
 def _build_damaged_file_error(path: str, part_name: str) -> DataError:
     """Build the error for a file that does not match its digest."""
     return DataError(
-        f"{path} is damaged, or was edited: {shorten_text(part_name)} is not what was "
-        "written. Run the study "
-        f"again. If you changed it on purpose, delete the attribute {DIGEST_ATTRIBUTE} and save "
-        "the file again."
+        f"{path} is damaged or was edited, because {shorten_text(part_name)} does not match its "
+        "digest. Run the study again. If you changed the file on purpose, delete the attribute "
+        f"{DIGEST_ATTRIBUTE} and save the file again."
     )
 
 

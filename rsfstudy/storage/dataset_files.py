@@ -25,6 +25,7 @@ import xarray as xr
 
 from rsfstudy.error_boundary import find_stacklevel_of_user_code
 from rsfstudy.errors import DataError, RsfStudyError, RsfStudyWarning, shorten_text
+from rsfstudy.former_data_names import rename_former_variables
 from rsfstudy.netcdf_encoding import copy_with_cf_encoding, encoding_without_fill_values
 from rsfstudy.path_checks import check_path
 from rsfstudy.storage import content_digest, schema
@@ -95,15 +96,17 @@ def write_dataset(dataset: xr.Dataset, path: Path) -> xr.Dataset:
             file.write(_DIGEST_TRAILER_PREFIX + _hash_file_contents(beside, beside.stat().st_size))
         with xr.open_dataset(beside, engine="netcdf4") as back:
             if not stored.identical(back.load()):
-                raise DataError(f"{path} was not written: what was read back differs.")
+                raise DataError(
+                    f"{path} was not written, because the data that were read back differ."
+                )
         with open(beside, "rb") as file:
             os.fsync(file.fileno())
         os.replace(beside, path)
     except (OSError, RuntimeError) as error:
         # HDF5 reports a full disk as a RuntimeError.
         raise DataError(
-            f"cannot write {path}: {error}. Nothing was replaced; make room, or choose another "
-            "--output."
+            f"cannot write {path}: {error}. No file was replaced. Free some disk space, or choose "
+            "another --output."
         ) from error
     finally:
         with contextlib.suppress(OSError):  # The error above reports an invalid directory.
@@ -189,7 +192,9 @@ def _check_store_digest(path: Path) -> bool:
     if _STORE_DIGEST_ATTRIBUTE in attributes and attributes[_STORE_DIGEST_ATTRIBUTE] != _hash_store(
         path
     ):
-        raise DataError(f"{path} is damaged, or was edited: its files are not what was written.")
+        raise DataError(
+            f"{path} is damaged or was edited, because its files do not match the digest."
+        )
     return _STORE_DIGEST_ATTRIBUTE in attributes
 
 
@@ -205,7 +210,9 @@ def _check_file_digest(path: Path) -> bool:
     if not trailer.startswith(_DIGEST_TRAILER_PREFIX):
         return False
     if trailer != _DIGEST_TRAILER_PREFIX + _hash_file_contents(path, size):
-        raise DataError(f"{path} is damaged, or was edited: its bytes are not what was written.")
+        raise DataError(
+            f"{path} is damaged or was edited, because its contents do not match the digest."
+        )
     return True
 
 
@@ -251,7 +258,7 @@ def read_dataset(path: Path) -> xr.Dataset:
         raise
     except Exception as error:  # HDF5, Zarr and xarray raise errors of many types.
         raise DataError(f"{where} cannot be read: {shorten_text(error)}") from error
-    dataset = copy_with_cf_encoding(dataset)
+    dataset = rename_former_variables(copy_with_cf_encoding(dataset))
     try:
         check_variable_attributes(dataset)
         if schema.is_of_single_scene(dataset):
@@ -261,7 +268,9 @@ def read_dataset(path: Path) -> xr.Dataset:
     except DataError as error:
         raise DataError(f"{where}: {error}") from error
     if not sealed and not (path.is_dir() and "layout" not in dataset.attrs):
-        said = f"{where} has no digest: another program saved it, and may have changed it"
+        said = (
+            f"{where} has no digest, because another program saved the file and may have changed it"
+        )
         warnings.warn(said, RsfStudyWarning, stacklevel=find_stacklevel_of_user_code())
     return dataset
 
@@ -274,13 +283,16 @@ def _check_readable_path(path: Path, file_description: str) -> None:
     check_path("file", path)
     if not path.exists():
         raise DataError(
-            f"{file_description} does not exist. Run the study first, or name another file."
+            f"{file_description} does not exist. Run the study first, or pass the path of another "
+            "file."
         )
     if path.is_dir() and not (path / "zarr.json").is_file():
-        raise DataError(f"{file_description} is a directory, and no Zarr store.")
+        raise DataError(f"{file_description} is a directory, but not a Zarr store.")
     for part in path.rglob("*") if path.is_dir() else [path]:
         if not (part.is_file() or part.is_dir()) or (part != path and part.is_symlink()):
-            raise DataError(f"{shorten_text(part)} is no file, but a pipe, a device or a link.")
+            raise DataError(
+                f"{shorten_text(part)} is a pipe, a device or a link, and not a regular file."
+            )
 
 
 def _check_zarr_codecs(path: Path) -> None:
@@ -290,8 +302,8 @@ def _check_zarr_codecs(path: Path) -> None:
         for codec in about.get("codecs", []):
             if codec["name"] not in _ALLOWED_ZARR_CODECS:
                 raise DataError(
-                    f"{path} was not written by rsfstudy: {file.parent.name} is coded by "
-                    f"{codec['name']!r}, which may run code."
+                    f"{path} was not written by rsfstudy: {file.parent.name} uses the codec "
+                    f"{codec['name']!r}, which could run arbitrary code."
                 )
 
 

@@ -68,12 +68,14 @@ def find_selected_cell_number(dataset: xr.Dataset, study: Study) -> int:
     for name, values in build_dimension_coordinates(study).items():
         given = dataset[name].values.ravel() if name in dataset.coords else np.array([])
         if given.size != 1:
-            remedy = f"Select a cell first, as in dataset.isel({name}=0)."
-            raise InvalidValue(name, given.tolist(), "leaves the cell open", remedy=remedy)
+            remedy = f"Select a cell first, for example dataset.isel({name}=0)."
+            raise InvalidValue(name, given.tolist(), "does not select a single cell", remedy=remedy)
         found = np.flatnonzero(values == given[0])
         if not found.size:
-            remedy = "Ask before you convert it to other units."
-            raise InvalidValue(name, given[0], "is not on that axis of the study", remedy=remedy)
+            remedy = "Use the dataset before its units were converted."
+            raise InvalidValue(
+                name, given[0], "is not a point of this axis of the study", remedy=remedy
+            )
         places.append(int(found[0]))
     return int(np.ravel_multi_index(places, study.shape))
 
@@ -114,15 +116,17 @@ def read_scene_from_attributes(dataset: xr.Dataset) -> Scene:
         pressure, stress = (bool(told.attrs.get(n)) for n in ("of_pressure", "of_stress"))
         sampled = SampledHistory.from_table(told.values, stress, loading, of_pressure=pressure)
         if sampled.digest != digest:
-            raise invalid_part_error("history_samples", f"are not those of the scene ({digest})")
+            raise invalid_part_error(
+                "history_samples", f"do not match the digest of the scene ({digest})"
+            )
         own[SceneFields.normalise_value("loading", sampled)] = sampled
     for slot in SceneFields.SLOTS:
         name = plain.get(slot.name)
         if isinstance(name, str) and name not in {*slot.built_in_parts, *own}:
             remedy = (
-                "Make a scene with the class itself first, so that its name is known; commands are "
-                "told it by --study FILE."
+                "Create a scene with the class first, which registers the part. For commands, "
+                "pass --study FILE."
             )
-            rule = "is a user's own, and not known here"
+            rule = "is a user-defined part that is not registered"
             raise InvalidValue(slot.name, name, rule, remedy=remedy)
     return build_scene_from_stored(plain, own, "scene")

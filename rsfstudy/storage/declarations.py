@@ -18,6 +18,7 @@ import msgspec
 from rsfstudy import measures, reductions
 from rsfstudy.axes import Axis
 from rsfstudy.errors import InvalidValue
+from rsfstudy.former_data_names import rename_former_fields
 from rsfstudy.measures import Measure
 from rsfstudy.motion import Accuracy
 from rsfstudy.reductions import Reduction
@@ -32,7 +33,7 @@ from rsfstudy.storage.plain_data import (
 )
 from rsfstudy.study import Claim, load_study, study_names
 
-MISSING_STUDY_FILE_REMEDY = "Name the file that declares it: --study FILE (study=)."
+MISSING_STUDY_FILE_REMEDY = "Pass the file that defines it: --study FILE (study=)."
 #: Maximum number of claims of a study. Checking a larger number of claims would take minutes.
 _MAX_CLAIMS = 10_000
 #: Type of the integer fields of measures and reductions. The range is limited because a larger
@@ -98,7 +99,7 @@ class StoredAxis(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
             named = Axis(self.dimension, self.values, self.units, self.drawn)
         except InvalidValue as error:
             path = f"declaration.axes.{self.dimension}"
-            raise invalid_part_error(path, f"is refused ({error})") from error
+            raise invalid_part_error(path, f"is invalid ({error})") from error
         if not user_parts:
             return named
         rows = [SceneFields.replace_names_by_user_parts(row, user_parts) for row in named.rows]
@@ -188,7 +189,8 @@ def parse_declaration(plain_data: Any) -> StoredDeclaration:
     DataError
         If an entry is missing, unknown or invalid.
     """
-    declared = convert_plain_data(plain_data, StoredDeclaration, "declaration")
+    current = rename_former_fields(plain_data)
+    declared = convert_plain_data(current, StoredDeclaration, "declaration")
     # Other fields of measures and reductions are checked when a study is built.
     convert_plain_data(declared.measure, _StoredMeasure, "declaration.measure")
     convert_plain_data(declared.reductions, list[_StoredReduction], "declaration.reductions")
@@ -350,8 +352,6 @@ def build_reduction(plain_reduction: Mapping[str, Any], path_in_file: str) -> Re
         If a field is missing, unknown or invalid.
     """
     values: dict[str, Any] = dict(plain_reduction)
-    if values["kind"] == "spread":  # Older files use this name.
-        values |= {"kind": "range", "over": values.pop("on", "")}
     kind = _find_class("reduction", Reduction, reductions, values.pop("kind"))
     made: Reduction = build_from_plain_data(values, kind, path_in_file, integer_type=_Count)
     return made

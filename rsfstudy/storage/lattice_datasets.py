@@ -25,11 +25,11 @@ from rsfstudy.vocabulary import find_coverage_content_type
 CF_AND_ACDD_CONVENTIONS = "CF-1.11, ACDD-1.3"
 _COMMENT_ON_DIMENSIONLESS_UNITS = (
     "Quantities are dimensionless: stress in sigma_*, slip in D_c, time in D_c/V_*, slip rate in "
-    "V_*; the attribute scale of a variable says which."
+    "V_*. The attribute scale of a variable contains its scale."
 )
 _COMMENT_ON_RIG_UNITS = (
-    " Axes are in the units that they state; sigma_star, slip_distance and reference_velocity are "
-    "the scales of each cell."
+    " Axes have the units in their attributes. sigma_star, slip_distance and reference_velocity "
+    "are the scales of each cell."
 )
 #: Names of the root attributes that users can set with environment variables. For example, the
 #: variable ``RSFSTUDY_LICENSE`` sets the attribute ``license``.
@@ -153,7 +153,7 @@ def root_attributes(
         "Conventions": CF_AND_ACDD_CONVENTIONS,
         "project": "rsfstudy",
         "naming_authority": "rsfstudy",
-        "processing_level": "numerical model results, and what they are reduced to",
+        "processing_level": "numerical model results and reductions",
         "id": study.name,
         "source": f"rsfstudy {version}, numerical model of a spring-slider",
         "history": f"{when} {provenance['command']}",

@@ -37,9 +37,8 @@ def invalid_part_error(path_in_file: str, reason: str) -> DataError:
         Error to raise.
     """
     return DataError(
-        f"{shorten_text(path_in_file).lstrip('.')} {reason}. It was not written by this "
-        "version of rsfstudy, or "
-        "was edited: run the study again."
+        f"{shorten_text(path_in_file).lstrip('.')} {reason}. The file was edited, or was not "
+        "written by this version of rsfstudy. Run the study again."
     )
 
 
@@ -76,7 +75,7 @@ def convert_plain_data(plain_data: Any, annotated_type: Any, path_in_file: str) 
         if field := re.fullmatch("Object .* (required|unknown) field `(.*)`", why):
             rule = "is missing" if field[1] == "required" else "is unknown"
             raise invalid_part_error(f"{place}.{field[2]}", rule) from error
-        raise invalid_part_error(place, f"is refused ({shorten_text(why)})") from error
+        raise invalid_part_error(place, f"is invalid ({shorten_text(why)})") from error
 
 
 @cache
@@ -193,4 +192,4 @@ def call_with_fields(constructor: Any, values: Mapping[str, Any], path_in_file: 
     try:
         return constructor(**values)
     except InvalidValue as error:
-        raise invalid_part_error(f"{path_in_file}.{error.name}", f"is refused ({error})") from error
+        raise invalid_part_error(f"{path_in_file}.{error.name}", f"is invalid ({error})") from error

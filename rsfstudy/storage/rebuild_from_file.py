@@ -69,17 +69,19 @@ def rebuild_study(results: xr.Dataset, study_file: str | Path | None = None) -> 
         points = results.sizes.get(axis.dimension)
         declared_points = len(axis.build())
         if declared_points != points:
-            rule = f"has {declared_points} points in the declaration, and {points} in the file"
+            rule = (
+                f"has {declared_points} points in the declaration, but {points} points in the file"
+            )
             raise invalid_part_error(axis.dimension, rule)
     held = stored_loadings.read_loadings(results)
     if study_file is None and depends_on_user_code(results):
-        rule = "is a user's own, and code is never taken from a results file"
+        rule = "is user-defined, and code is never loaded from a results file"
         remedy, named_in = (
             MISSING_STUDY_FILE_REMEDY,
             schema.read_provenance(results)["declared_in"],
         )
         if named_in:
-            remedy += f" It was {shorten_text(named_in)}."
+            remedy += f" The study was declared in {shorten_text(named_in)}."
         name, value = find_user_part_missing_from_file(declared, held) or (
             "measure",
             declared.measure["name"],
@@ -87,7 +89,10 @@ def rebuild_study(results: xr.Dataset, study_file: str | Path | None = None) -> 
         raise InvalidValue(name, value, rule, remedy=remedy)
     named = None if study_file is None else load_study(str(study_file))
     if named and named.name != declared.name:
-        rule = f"declares the study {named.name!r}, and the results are of {declared.name!r}"
+        rule = (
+            f"declares the study {named.name!r}, but the results belong to the study "
+            f"{declared.name!r}"
+        )
         raise InvalidValue("study", str(study_file), rule)
     study = study_from_declaration(declared, held, named)
     _check_axes(study, results)
@@ -118,8 +123,8 @@ def study_of_dataset(results: xr.Dataset) -> Study:
     """
     declared, about = schema.read_declaration(results), schema.read_provenance(results)
     if depends_on_user_code(results):
-        rule = "has code of a user's own, and code is never taken from a dataset"
-        remedy = f"Import the study from the file that declares it. {about['declared_in']}"
+        rule = "contains user-defined code, and code is never loaded from a dataset"
+        remedy = f"Import the study from the file that declares the study. {about['declared_in']}"
         raise InvalidValue("study", declared.name, rule, remedy=remedy.strip())
     return study_from_declaration(declared, stored_loadings.read_loadings(results))
 
@@ -154,10 +159,12 @@ def _check_axes(study: Study, results: xr.Dataset) -> None:
     """Check that the axes of the results match the declaration."""
     dims = results["status"].dims
     if dims != study.dimensions:
-        raise invalid_part_error("status", f"lies along {dims}, not the axes of the declaration")
+        raise invalid_part_error(
+            "status", f"has the dimensions {dims}, which differ from the axes of the declaration"
+        )
     for name, values in build_dimension_coordinates(study).items():
         if values.tolist() != results[name].values.tolist():
-            raise invalid_part_error(name, "is not that axis of the declaration")
+            raise invalid_part_error(name, "differs from the axis in the declaration")
 
 
 def study_from_declaration(
@@ -212,7 +219,7 @@ def study_from_declaration(
             parts["rig"] = build_rig(declaration.laboratory)
         return Study(**parts)
     except InvalidValue as error:
-        raise invalid_part_error("declaration", f"makes no study ({error})") from error
+        raise invalid_part_error("declaration", f"is not a valid study ({error})") from error
 
 
 def _collect_known_user_parts(study: Study | None) -> Mapping[str, UserPart]:

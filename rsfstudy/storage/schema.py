@@ -25,8 +25,9 @@ from rsfstudy.storage.plain_data import convert_plain_data, invalid_part_error
 from rsfstudy.vocabulary import QUANTITY_BY_NAME
 
 #: Version of the file layout. A file without a version number has layout 1. In layout 1, the digest
-#: of each variable was stored as an attribute of the variable.
-FILE_LAYOUT_VERSION = 2
+#: of each variable was stored as an attribute of the variable. In layouts 1 and 2, some variables
+#: of fits and some fields of claims and reductions had other names (module ``former_data_names``).
+FILE_LAYOUT_VERSION = 3
 
 
 class RootAttributes(TypedDict):
@@ -92,10 +93,10 @@ class StoredProvenance(TypedDict):
 
 
 #: NumPy dtype kinds that variables may have, and a description of these kinds for error messages.
-_ALLOWED_DTYPE_KINDS = ("iufbOUT", "numbers or texts")
+_ALLOWED_DTYPE_KINDS = ("iufbOUT", "numbers or strings")
 _REQUIRED_VARIABLES = {
     "status": ("i", "whole numbers"),
-    "message": ("OUT", "texts"),
+    "message": ("OUT", "strings"),
     "rhs_evaluations": ("iu", "whole numbers"),
     "wall_time": ("f", "numbers"),
 }
@@ -117,14 +118,16 @@ def check_results(dataset: xr.Dataset) -> None:
     layout = dataset.attrs.get("layout", 1)
     if not isinstance(layout, int | np.integer) or not 1 <= layout <= FILE_LAYOUT_VERSION:
         raise DataError(
-            f"layout is {shorten_text(layout)}, and this version of rsfstudy reads 1 to "
-            f"{FILE_LAYOUT_VERSION}: open it with the version that its attribute source names."
+            f"layout is {shorten_text(layout)}, but this version of rsfstudy reads the layouts 1 "
+            f"to {FILE_LAYOUT_VERSION}. Open the file with the version of rsfstudy in its "
+            "attribute source."
         )
     attrs = convert_plain_data({"reduced_despite": "", **dataset.attrs}, RootAttributes, "")
     name = read_declaration(dataset).name
     if attrs["id"] != name or not name.isidentifier():
         raise invalid_part_error(
-            "id", f"is {shorten_text(attrs['id'])!r}, and the declared study {shorten_text(name)!r}"
+            "id",
+            f"is {shorten_text(attrs['id'])!r}, but the declared study is {shorten_text(name)!r}",
         )
     for variable in _REQUIRED_VARIABLES:
         if variable not in dataset.data_vars:
@@ -132,19 +135,23 @@ def check_results(dataset: xr.Dataset) -> None:
         if dataset[variable].dims != dataset["status"].dims:
             dims = dataset[variable].dims
             raise invalid_part_error(
-                variable, f"lies along {dims}, and status along {dataset['status'].dims}"
+                variable,
+                f"has the dimensions {dims}, but status has the dimensions "
+                f"{dataset['status'].dims}",
             )
     for key, values in dataset.variables.items():
         if key in QUANTITY_BY_NAME or key in dataset.coords:  # Users may add other variables.
             _check_dtype_kind(str(key), values)
     for name in map(str, dataset["status"].dims):
         if name not in dataset.coords or dataset[name].dims != (name,):
-            raise invalid_part_error(name, "is no coordinate along the dimension of its name")
+            raise invalid_part_error(name, "is not a dimension coordinate")
         if not dataset.indexes[name].is_unique:
             raise invalid_part_error(name, "has the same value more than once")
     unknown = np.setdiff1d(dataset["status"].values, [int(status) for status in Status])
     if unknown.size:
-        raise invalid_part_error("status", f"is {unknown[0]} in a cell, which is the code of none")
+        raise invalid_part_error(
+            "status", f"is {unknown[0]} in a cell, which is not the code of a status"
+        )
 
 
 def is_of_single_scene(dataset: xr.Dataset) -> bool:
@@ -181,10 +188,9 @@ def check_contains_study_results(dataset: xr.Dataset, file_description: str) -> 
     if is_of_single_scene(dataset):
         title = shorten_text(dataset.attrs.get("title", "untitled"))
         raise DataError(
-            f"{file_description} is of one scene ({title}), not the results of a study. "
-            "Open its file with "
-            "xarray.open_dataset; rsfstudy.plot_motion(dataset), or dataset.rsf.plot(), "
-            "draws a motion."
+            f"{file_description} contains a single scene ({title}), not the results of a study. "
+            "Open the file with xarray.open_dataset. To draw a motion, use "
+            "rsfstudy.plot_motion(dataset) or dataset.rsf.plot()."
         )
 
 
@@ -283,7 +289,9 @@ def read_json_attribute(dataset: xr.Dataset, attribute_name: str) -> Any:
     try:
         return json.loads(dataset.attrs[attribute_name])
     except (TypeError, ValueError, RecursionError) as error:
-        raise invalid_part_error(attribute_name, f"is no JSON ({shorten_text(error)})") from error
+        raise invalid_part_error(
+            attribute_name, f"is not valid JSON ({shorten_text(error)})"
+        ) from error
 
 
 def _check_dtype_kind(variable_name: str, values: xr.Variable) -> None:
@@ -291,6 +299,8 @@ def _check_dtype_kind(variable_name: str, values: xr.Variable) -> None:
     kinds, wanted = _REQUIRED_VARIABLES.get(variable_name, _ALLOWED_DTYPE_KINDS)
     kind = values.dtype.kind
     if kind not in kinds:
-        raise invalid_part_error(variable_name, f"holds {values.dtype}, and must hold {wanted}")
+        raise invalid_part_error(
+            variable_name, f"contains {values.dtype}, but must contain {wanted}"
+        )
     if kind == "O" and not all(isinstance(text, str) for text in values.values.flat):
-        raise invalid_part_error(variable_name, f"holds objects, and must hold {wanted}")
+        raise invalid_part_error(variable_name, f"contains objects, but must contain {wanted}")

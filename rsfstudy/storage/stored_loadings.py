@@ -18,11 +18,11 @@ from rsfstudy.storage.plain_data import invalid_part_error
 #: Name of the rows and description of the columns, for each kind of loading table.
 _DESCRIPTION_OF_SAMPLE_ROWS = (
     "sample",
-    "time, load point velocity, fall and rate of normal stress",
+    "time, load point velocity, decrease of normal stress, and rate of normal stress",
 )
 _DESCRIPTION_OF_SEGMENT_ROWS = (
     "segment",
-    "load point velocity and step, duration, and normal stress above sigma_star",
+    "load point velocity, displacement step, duration, and normal stress minus sigma_star",
 )
 
 #: Names of the attributes that show whether a sampled history imposes velocity, normal stress or
@@ -93,7 +93,8 @@ def read_loadings(results: xr.Dataset) -> Mapping[str, UserLoading]:
             or values.shape[1] != SampledHistory.COLUMN_COUNT
         ):
             raise invalid_part_error(
-                str(key), f"holds no loading of {SampledHistory.COLUMN_COUNT} columns"
+                str(key),
+                f"is not the table of a loading with {SampledHistory.COLUMN_COUNT} columns",
             )
         if "of_stress" in values.attrs:
             of = {key: bool(values.attrs.get(key, False)) for key in _FLAGS_OF_SAMPLED_HISTORIES}

@@ -64,7 +64,9 @@ class ZarrStore:
         """
         if importlib.util.find_spec("zarr") is None:
             remedy = "pip install 'rsfstudy[zarr]'."
-            raise InvalidValue("format", "zarr", "needs a package", remedy=remedy)
+            raise InvalidValue(
+                "format", "zarr", "requires a package that is not installed", remedy=remedy
+            )
 
     def check_does_not_exist(self) -> None:
         """Check that the store does not exist.
@@ -76,8 +78,8 @@ class ZarrStore:
         """
         if self.path.exists():
             raise DataError(
-                f"{self.path} is there already, and whoever has it open would read half of each. "
-                "Move it away, or choose another --output."
+                f"{self.path} already exists, and replacing it would corrupt the data of programs "
+                "that have opened it. Move the store, or choose another --output."
             )
 
     def write(
@@ -179,6 +181,6 @@ def _write_lattice(
         how = {"append_dim": first}
         back = xr.open_dataset(path, **ZARR_OPEN_OPTIONS)[list(slab)].isel({first: some})
         if not xr.Dataset(slab).equals(back.drop_vars(list(back.coords))):
-            raise DataError(f"{path} was not written: what was read back differs.")
+            raise DataError(f"{path} was not written, because the data that were read back differ.")
         finished += int((columns.statuses != int(Status.PENDING)).sum())
     return finished

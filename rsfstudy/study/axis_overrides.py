@@ -36,9 +36,9 @@ def select_axis_points(axis: Axis, labels_or_numbers: Sequence[Any]) -> Axis:
     rows: dict[Any, AxisRow] = dict(zip(axis.labels or range(len(axis)), axis.rows, strict=True))
     for point in labels_or_numbers:
         if point not in rows:
-            rule, choices = "is no point of the axis", axis.labels or ()
+            rule, choices = "is not a point of the axis", axis.labels or ()
             if axis.has_numbered_points:
-                rule += f": they are numbered from 0 to {len(axis) - 1}"
+                rule += f". The points are numbered from 0 to {len(axis) - 1}"
             raise InvalidValue(axis.dimension, point, rule, choices=choices)
     if axis.labels is not None:
         return Axis(axis.dimension, {label: rows[label] for label in labels_or_numbers}, axis.units)
@@ -76,8 +76,11 @@ def replace_field_values(axis: Axis, field_name: str, values: Sequence[Any]) -> 
     """
     if axis.has_numbered_points:
         if len(values) != 1:
-            rule = f"varies along the axis {axis.dimension}: all of its points take one value"
-            raise InvalidValue(field_name, values, rule, remedy="Give one value.")
+            rule = (
+                f"varies along the axis {axis.dimension}, so an override must be a single "
+                "value for all points"
+            )
+            raise InvalidValue(field_name, values, rule, remedy="Pass a single value.")
         return axis.with_rows([{**row, field_name: values[0]} for row in axis.rows], axis.units)
     assert axis.labels is not None
     for value in values:

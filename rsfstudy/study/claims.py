@@ -16,7 +16,7 @@ import numpy as np
 import pandas as pd
 import xarray as xr
 
-from rsfstudy._deprecation import add_former_member_names
+from rsfstudy._deprecation import accept_former_keyword_names, add_former_member_names
 from rsfstudy.error_boundary import wrap_methods_in_error_boundary
 from rsfstudy.errors import InvalidValue
 from rsfstudy.rig import DatasetUnits
@@ -32,18 +32,19 @@ VERDICTS = (REPRODUCED_VERDICT, DIFFERS_VERDICT, UNDECIDED_VERDICT, NOT_APPLICAB
 CLAIM_RELATIONS = ("equals", "below", "above")
 #: Columns of the table of verdicts on claims.
 _VERDICT_TABLE_COLUMNS = (
-    *("id", "claim", "source", "relation", "published", "ours"),
-    *("tolerance", "reason", "verdict", "expected", "because", "moved"),
+    *("id", "claim", "source", "relation", "published", "computed"),
+    *("tolerance", "reason", "verdict", "expected", "difference_reason", "verdict_changed"),
 )
 #: Default reason for the tolerance of a claim. The default is accepted only for inequalities.
 TOLERANCE_REASON_OF_INEQUALITY = "an inequality"
 _EXPECTED_VERDICTS = (REPRODUCED_VERDICT, DIFFERS_VERDICT)
 _TEXT_FIELDS = (
-    *("id", "statement", "source", "variable", "minus_variable", "reason", "because"),
-    *("relation", "expected"),
+    *("id", "statement", "source", "variable", "baseline_variable", "reason"),
+    *("difference_reason", "relation", "expected"),
 )
 
 
+@accept_former_keyword_names
 @add_former_member_names
 @wrap_methods_in_error_boundary
 @dataclass(frozen=True, kw_only=True)
@@ -71,14 +72,14 @@ class Claim:
         Reason for the tolerance. Required if ``relation`` is ``"equals"``.
     relation : {"equals", "below", "above"}, default: "equals"
         Expected relation of the result to the published value.
-    minus : mapping of str to object, optional
-        Coordinate values that select a second value. If ``minus`` is given, the first value minus
-        the second value is compared with the published value.
-    minus_variable : str, optional
+    baseline : mapping of str to object, optional
+        Coordinate values that select a second value. If ``baseline`` is given, the second value is
+        subtracted from the first value, and the difference is compared with the published value.
+    baseline_variable : str, optional
         Name of the variable of the second value. The default is ``variable``.
     expected : {"reproduced", "differs"}, default: "reproduced"
         Expected verdict.
-    because : str, optional
+    difference_reason : str, optional
         Reason for the expected verdict ``"differs"``.
 
     Raises
@@ -118,37 +119,37 @@ class Claim:
     tolerance: float = 0.0
     reason: str = TOLERANCE_REASON_OF_INEQUALITY
     relation: str = "equals"
-    minus: Mapping[str, Any] = field(default_factory=dict)
-    minus_variable: str = ""
+    baseline: Mapping[str, Any] = field(default_factory=dict)
+    baseline_variable: str = ""
     expected: str = REPRODUCED_VERDICT
-    because: str = ""
+    difference_reason: str = ""
 
     def __post_init__(self) -> None:
         """Check the arguments."""
         for name in _TEXT_FIELDS:
             if not isinstance(getattr(self, name), str):
-                rule = f"must be a text, in claim {self.id}"
+                rule = f"must be a string, in claim {self.id}"
                 raise InvalidValue(name, getattr(self, name), rule)
         if self.relation not in CLAIM_RELATIONS:
             raise InvalidValue("relation", self.relation, "is unknown", choices=CLAIM_RELATIONS)
         if self.relation == "equals" and self.reason == TOLERANCE_REASON_OF_INEQUALITY:
-            rule = f"must tell why the tolerance is {self.tolerance}, in claim {self.id}"
+            rule = f"must give the reason for the tolerance {self.tolerance}, in claim {self.id}"
             raise InvalidValue("reason", self.reason, rule)
         if self.expected not in _EXPECTED_VERDICTS:
             raise InvalidValue(
-                "expected", self.expected, "is no verdict", choices=_EXPECTED_VERDICTS
+                "expected", self.expected, "is not an expected verdict", choices=_EXPECTED_VERDICTS
             )
         for name in ("published", "tolerance"):
             value = getattr(self, name)
             if not _is_number(value) or not math.isfinite(value):
                 raise InvalidValue(name, value, f"must be a number, in claim {self.id}")
-        for name in ("where", "minus"):
+        for name in ("where", "baseline"):
             if not isinstance(getattr(self, name), Mapping):
                 rule = f"must map coordinates to values, in claim {self.id}"
                 raise InvalidValue(name, getattr(self, name), rule)
             for value in getattr(self, name).values():
                 if not isinstance(value, str) and not _is_number(value):
-                    rule = f"must be a text or a number, in claim {self.id}"
+                    rule = f"must be a string or a number, in claim {self.id}"
                     raise InvalidValue(name, value, rule)
 
     @classmethod
@@ -191,7 +192,7 @@ class Claim:
         dict of str to object
             Parameters of the claim.
         """
-        return {**asdict(self), "where": dict(self.where), "minus": dict(self.minus)}
+        return {**asdict(self), "where": dict(self.where), "baseline": dict(self.baseline)}
 
     def check_selection(self, dataset: xr.Dataset) -> None:
         """Check that the claim applies to a dataset.
@@ -208,17 +209,17 @@ class Claim:
             the verdict would always be ``"not applicable"``.
         """
         variables, coordinates = map(str, dataset.data_vars), [str(n) for n in dataset.coords]
-        for variable in filter(None, (self.variable, self.minus_variable)):
+        for variable in filter(None, (self.variable, self.baseline_variable)):
             if variable not in dataset:
-                rule = f"is no variable of the results, in claim {self.id}"
+                rule = f"is not a variable of the results, in claim {self.id}"
                 raise InvalidValue("variable", variable, rule, choices=sorted(variables))
-        for name in [*self.where, *self.minus]:
+        for name in [*self.where, *self.baseline]:
             if name not in coordinates:
-                rule = f"is no coordinate of the results, in claim {self.id}"
+                rule = f"is not a coordinate of the results, in claim {self.id}"
                 raise InvalidValue("where", name, rule, choices=sorted(coordinates))
         if self.verdict(dataset)[1] == NOT_APPLICABLE_VERDICT:
-            rule = f"is no place of the lattice, in claim {self.id}"
-            raise InvalidValue("where", {**self.where, **self.minus}, rule)
+            rule = f"is not a point of the lattice, in claim {self.id}"
+            raise InvalidValue("where", {**self.where, **self.baseline}, rule)
 
     def verdict(self, dataset: xr.Dataset) -> tuple[float, str]:
         """Compare the result with the published value.
@@ -238,22 +239,22 @@ class Claim:
             point. The claim is undecided if the value at the selected point is NaN.
         """
         try:
-            ours = _select_single_value(dataset, self.variable, self.where)
-            if self.minus:
-                ours -= _select_single_value(
-                    dataset, self.minus_variable or self.variable, self.minus
+            computed = _select_single_value(dataset, self.variable, self.where)
+            if self.baseline:
+                computed -= _select_single_value(
+                    dataset, self.baseline_variable or self.variable, self.baseline
                 )
         except KeyError:
             return math.nan, NOT_APPLICABLE_VERDICT
-        if math.isnan(ours):
-            return ours, UNDECIDED_VERDICT
-        distance = ours - self.published
+        if math.isnan(computed):
+            return computed, UNDECIDED_VERDICT
+        distance = computed - self.published
         holds = {
             "equals": abs(distance) <= self.tolerance,
             "below": distance < self.tolerance,
             "above": distance > -self.tolerance,
         }[self.relation]
-        return ours, REPRODUCED_VERDICT if holds else DIFFERS_VERDICT
+        return computed, REPRODUCED_VERDICT if holds else DIFFERS_VERDICT
 
 
 def build_verdict_table(
@@ -278,25 +279,33 @@ def build_verdict_table(
     Returns
     -------
     VerdictTable
-        Table of the claims and verdicts. The column ``moved`` is True if an applicable claim does
-        not have the expected verdict.
+        Table of the claims and verdicts. The column ``verdict_changed`` is True if an applicable
+        claim does not have the expected verdict.
     """
     along = {str(name) for name in dataset.coords if dataset[name].ndim > 0}
-    moved_base = [
+    is_other_study = [
         name for name in study_overrides if name not in along
     ] or DatasetUnits.SCALES_ATTRIBUTE in dataset.attrs
     rows = []
     for claim in claims:
-        ours, verdict = claim.verdict(dataset)
-        if moved_base or not _has_all_overridden_dimensions(
+        computed, verdict = claim.verdict(dataset)
+        if is_other_study or not _has_all_overridden_dimensions(
             dataset, claim.variable, study_overrides
         ):
             verdict = NOT_APPLICABLE_VERDICT
-        moved = verdict not in (claim.expected, NOT_APPLICABLE_VERDICT)
-        about = claim.id, claim.statement, claim.source, claim.relation, claim.published, ours
-        why = claim.tolerance, claim.reason, verdict, claim.expected, claim.because, moved
+        changed = verdict not in (claim.expected, NOT_APPLICABLE_VERDICT)
+        about = claim.id, claim.statement, claim.source, claim.relation, claim.published, computed
+        why = (
+            claim.tolerance,
+            claim.reason,
+            verdict,
+            claim.expected,
+            claim.difference_reason,
+            changed,
+        )
         rows.append((*about, *why))
-    return VerdictTable(pd.DataFrame(rows, columns=_VERDICT_TABLE_COLUMNS).astype({"moved": bool}))
+    table = pd.DataFrame(rows, columns=_VERDICT_TABLE_COLUMNS)
+    return VerdictTable(table.astype({"verdict_changed": bool}))
 
 
 def _is_number(value: object) -> bool:

@@ -48,14 +48,16 @@ def check_types(study_fields: Mapping[str, Any]) -> None:
         If an attribute has a wrong type, or if there are no axes.
     """
     for name, kind in (_TYPES_OF_STUDY_FIELDS | _ITEM_TYPES_OF_STUDY_LISTS).items():
-        given = study_fields[name]
-        if name in _ITEM_TYPES_OF_STUDY_LISTS and not isinstance(given, list | tuple):
+        given, is_list = study_fields[name], name in _ITEM_TYPES_OF_STUDY_LISTS
+        if is_list and not isinstance(given, list | tuple):
             raise InvalidValue(name, given, f"must be a list of {kind.__name__} objects")
-        for value in given if name in _ITEM_TYPES_OF_STUDY_LISTS else [given]:
+        for value in given if is_list else [given]:
             if not isinstance(value, kind) and not (name == "rig" and value is None):
-                raise InvalidValue(name, value, f"must be made of {kind.__name__} objects")
+                rule = f"must be an object of the class {kind.__name__}"
+                rule = f"must contain {kind.__name__} objects" if is_list else rule
+                raise InvalidValue(name, value, rule)
     if not study_fields["axes"]:
-        raise InvalidValue("axes", study_fields["axes"], "must hold at least one axis")
+        raise InvalidValue("axes", study_fields["axes"], "must contain at least one axis")
 
 
 def check_name_clashes(
@@ -82,16 +84,23 @@ def check_name_clashes(
     known = list(measure.variables)
     for reduction in reductions:
         if not is_variable_name(reduction.name) or reduction.name in RESERVED_NAMES:
-            raise InvalidValue("reduction", reduction.name, "names something else, or nothing")
+            raise InvalidValue(
+                "reduction", reduction.name, "is reserved or is not a valid variable name"
+            )
         if reduction.of not in known:
-            raise InvalidValue("reduction of", reduction.of, "is not measured", choices=known)
+            raise InvalidValue(
+                "variable of a reduction",
+                reduction.of,
+                "is not a result of the study",
+                choices=known,
+            )
         known.append(reduction.name)
     taken = {*known, *measure.inner_coordinates, *(RESERVED_NAMES - set(SceneFields.NAMES))}
     for axis in axes:
         check_fields_not_solved_by_measure(measure, axis.fields)
         for name in (axis.dimension, *axis.fields):
             if name in taken:
-                raise InvalidValue("axis", name, "is the name of something measured")
+                raise InvalidValue("axis", name, "is already the name of a result")
 
 
 def check_fields_not_solved_by_measure(measure: Measure, field_names: Sequence[str]) -> None:
@@ -112,7 +121,7 @@ def check_fields_not_solved_by_measure(measure: Measure, field_names: Sequence[s
     """
     for name in field_names:
         if {name, RigAxes.RATIO_FIELD_BY_DIMENSIONAL_NAME.get(name)} & set(measure.solved_fields):
-            rule = f"{measure.name} solves for {name}; it cannot be an axis or be set"
+            rule = f"is computed by {measure.name}, so it cannot be an axis or an override"
             raise InvalidValue(name, "...", rule, remedy="Leave it out.")
 
 
@@ -139,7 +148,10 @@ def check_user_fields(
     taken |= {*RESERVED_NAMES, *QUANTITY_BY_NAME, *(reduction.name for reduction in reductions)}
     for name in user_field_names[len(SceneFields.NAMES) :]:
         if name in taken - SceneFields.SLOT_NAMES:
-            rule, remedy = "is the name of something else", "Rename the field of your part."
+            rule, remedy = (
+                "is already used for another quantity",
+                ("Rename the field of the user-defined part."),
+            )
             raise InvalidValue("field", name, rule, remedy=remedy)
 
 
@@ -172,16 +184,18 @@ def check_axis_fields(
     known = dict.fromkeys((*scene_field_names, *measure.plain_fields, *in_units))
     for axis in axes:
         if not axis.is_single_field and axis.dimension in (*scene_field_names, *axis.fields):
-            rule = "is a field: a zipped axis needs a name of its own"
+            rule = "is the name of a field, so it cannot be the name of a zipped axis"
             raise InvalidValue("axis", axis.dimension, rule)
         if axis.units and scenes_on_rig is None:
-            remedy = "Give the study its rig: Study(rig=rig)."
-            raise InvalidValue("axis", axis.dimension, "is in units of a rig", remedy=remedy)
+            remedy = "Pass the rig to the study: Study(rig=rig)."
+            raise InvalidValue(
+                "axis", axis.dimension, "has units, but the study has no rig", remedy=remedy
+            )
         for name in axis.fields:
             if name not in known:
                 rule = (
-                    "is not a field of a scene, nor a number, flag or text of the measure "
-                    f"{measure.name}"
+                    "is neither a field of a scene nor a number, flag or string field of the "
+                    f"measure {measure.name}"
                 )
                 raise unknown_name_error("field", name, rule, known)
 
@@ -210,8 +224,8 @@ def check_outputs_are_same_in_all_cells(
         if _describe_measure_outputs(changed) != given:
             present = measure.plain_fields.items()
             guilty = [n for n, v in changed.plain_fields.items() if (n, v) not in present]
-            rule = "decides which numbers are measured, which all cells must share"
-            remedy = "Make a study of each value."
+            rule = "changes which results are computed, but all cells must have the same results"
+            remedy = "Create a separate study for each value."
             raise InvalidValue("axis", ", ".join(guilty), rule, remedy=remedy)
 
 
@@ -260,9 +274,14 @@ def check_override_of_partly_set_field(
         ):
             continue
         some = format_list(stating, ", ")
-        rule = f"is stated by some points of {axis.dimension} alone ({some}), and that of {point} "
-        rule += f"is {format_value(held[field_name])}: it would stay"
-        remedy = f"Select points of one kind too, as in '{axis.dimension}={stating[0]}'."
+        rule = (
+            f"is set only at some points of {axis.dimension} ({some}). The override would not "
+            f"change the value at {point}, "
+        )
+        rule += f"which is {format_value(held[field_name])}"
+        remedy = (
+            f"Also select points that set the field, for example '{axis.dimension}={stating[0]}'."
+        )
         raise InvalidValue(field_name, new_value, rule, remedy=remedy)
 
 
@@ -287,7 +306,7 @@ def check_axes_are_distinct(axes: Sequence[Axis]) -> None:
             for n in (axis.dimension, *axis.fields)
         }:
             if name in taken:
-                rule = f"varies {name!r}, as {taken[name]!r} does already"
+                rule = f"varies {name!r}, which the axis {taken[name]!r} already varies"
                 raise InvalidValue("axis", axis.dimension, rule)
             taken[name] = axis.dimension
 

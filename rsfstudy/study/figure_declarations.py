@@ -150,7 +150,9 @@ class Panel:
     def __post_init__(self) -> None:
         """Check the argument ``log``."""
         if isinstance(self.log, str) and not set(self.log) <= {"x", "y"}:
-            raise InvalidValue("log", self.log, "must name axes", choices=("x", "y", "xy"))
+            raise InvalidValue(
+                "log", self.log, "must contain only x and y", choices=("x", "y", "xy")
+            )
 
 
 @accept_former_keyword_names
@@ -296,9 +298,11 @@ def check_figure(plot: Any) -> None:
     if isinstance(plot, Figure):
         return
     if not hasattr(plot, "__name__") or not callable(getattr(plot, "draw", plot)):
-        rule = "must be a name, a Figure, or a function or module of yours that draws"
-        raise InvalidValue("plot", plot, rule, remedy="Write def name(dataset, axes): ...")
+        rule = "must be a name, a Figure, or a user-defined function or module that draws"
+        raise InvalidValue(
+            "plot", plot, rule, remedy="Define, for example, def name(dataset, axes): ..."
+        )
     name = name_of_figure(plot, "")
     if not is_variable_name(name) or name in GENERIC_FIGURE_NAMES or name in study_names():
-        rule = "needs a name of its own, which no figure of rsfstudy has"
+        rule = "must have a valid name that differs from the names of the figures of rsfstudy"
         raise InvalidValue("plot", name, rule)

@@ -141,9 +141,11 @@ class Study:
     def __post_init__(self) -> None:
         """Check the declaration."""
         if not isinstance(self.name, str) or not self.name.isidentifier():
-            raise InvalidValue("name", self.name, "must be a Python identifier: it names files")
+            raise InvalidValue(
+                "name", self.name, "must be a Python identifier, because it is used in file names"
+            )
         if len(self.name.encode()) > _MAX_NAME_BYTES:
-            rule = f"must have at most {_MAX_NAME_BYTES} bytes, because it names files"
+            rule = f"must have at most {_MAX_NAME_BYTES} bytes, because it is used in file names"
             raise InvalidValue("name", self.name, rule)
         for name in ("title", "summary", "source_file"):
             Axis.check_storable_text(name, getattr(self, name))
@@ -577,14 +579,14 @@ class Study:
             return None
         if axis.labels is not None:
             rule = (
-                f"states what {_EQUIVALENT_FIELD_BY_FIELD_NAME[field_name]} does along "
-                f"{axis.dimension}"
+                f"is equivalent to {_EQUIVALENT_FIELD_BY_FIELD_NAME[field_name]}, which varies "
+                f"along {axis.dimension}"
             )
             raise InvalidValue(
                 field_name,
                 values,
                 rule,
-                remedy=f"Give {_EQUIVALENT_FIELD_BY_FIELD_NAME[field_name]}.",
+                remedy=f"Override {_EQUIVALENT_FIELD_BY_FIELD_NAME[field_name]} instead.",
             )
         return self._make_axis(field_name, values)
 

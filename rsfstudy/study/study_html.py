@@ -47,9 +47,9 @@ def study_html(
     measured = [(find_quantity(name, known_quantities), None) for name in measure.variables]
     return (
         html_quantities_table(along, heading)
-        + _html_details("what all cells share", html_quantities_table(shared))
+        + _html_details("fields of all cells", html_quantities_table(shared))
         + _html_details(
-            f"what {measure.name} gives in each",
+            f"results of {measure.name} in each cell",
             html_quantities_table(measured, with_values=False),
         )
     )

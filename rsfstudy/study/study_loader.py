@@ -51,9 +51,15 @@ def load_study(name_or_file: str) -> Study:
         )
     if name_or_file not in study_names():
         near = difflib.get_close_matches(name_or_file, study_names(), n=3, cutoff=0.5)
-        remedy = "`rsfstudy list` shows all; or name a file: path/to/study.py."
+        remedy = (
+            "Run `rsfstudy list` for all names, or pass the path of a study file "
+            "(path/to/study.py)."
+        )
         if os.path.isfile(f"{name_or_file}.py"):
-            near, remedy = [], f"There is a file {name_or_file}.py here: name it {name_or_file}.py."
+            near, remedy = (
+                [],
+                (f"To load the file in the current directory, write {name_or_file}.py."),
+            )
         raise InvalidValue("study", name_or_file, "is unknown", choices=near, remedy=remedy)
     study: Study = importlib.import_module(f"{STUDIES_PACKAGE}.{name_or_file}").study
     return study
@@ -70,11 +76,11 @@ def _import_study_file(study_file: Path) -> ModuleType:
     try:
         path = study_file.resolve(strict=True)
         if not path.is_file():  # Reading a pipe or a device may block.
-            raise InvalidValue("study", str(study_file), "is no file, but a directory or the like")
+            raise InvalidValue("study", str(study_file), "is not a regular file")
         path.read_bytes()
     except (OSError, RuntimeError) as error:  # Circular links raise a RuntimeError.
         reason = getattr(error, "strerror", None) or error
-        raise InvalidValue("study", str(study_file), f"is no file ({reason})") from error
+        raise InvalidValue("study", str(study_file), f"cannot be read ({reason})") from error
     spec = importlib.util.spec_from_file_location(f"study_file_{path.stem}", path)
     assert spec is not None
     assert spec.loader is not None
@@ -128,9 +134,15 @@ def _study_in_module(module: ModuleType, study_name: str) -> Study:
     study = getattr(module, "study", None)
     if not isinstance(study, Study):
         raise InvalidValue(
-            "study", study_name, "declares no study", remedy="Write study = Study(...)."
+            "study",
+            study_name,
+            "does not define a study",
+            remedy="Define, for example, study = Study(...).",
         )
     if study.name in study_names():
-        rule = f"calls its study {study.name!r}, the name of a named study: their files would mix"
-        raise InvalidValue("study", study_name, rule, remedy="Give it a name of its own.")
+        rule = (
+            f"has a study called {study.name!r}, which is the name of a study of rsfstudy, so "
+            "both studies would write the same files"
+        )
+        raise InvalidValue("study", study_name, rule, remedy="Choose another name.")
     return study

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import textwrap
-from typing import Any
+from collections.abc import Mapping
+from typing import Any, ClassVar
 
 import pandas as pd
 
 from rsfstudy.errors import escape_control_characters
+from rsfstudy.former_data_names import NEW_VERDICT_COLUMNS, TableWithFormerColumns
 from rsfstudy.quantities import HtmlMarkup
 
 _SIGN_BY_CLAIM_RELATION = {"equals": "", "below": "< ", "above": "> "}
@@ -20,10 +22,10 @@ _COLUMNS_PRINTED_ON_TERMINAL = (
     "claim",
     "relation",
     "published",
-    "ours",
+    "computed",
     "tolerance",
     "verdict",
-    "moved",
+    "verdict_changed",
 )
 
 
@@ -49,9 +51,9 @@ def _format_row_for_terminal(verdict_row: dict[Any, Any]) -> dict[str, str]:
         "id": textwrap.shorten(str(verdict_row["id"]), _CLAIM_ID_WIDTH, placeholder="..."),
         "claim": " ".join(str(verdict_row["claim"]).split()),
         "published": format_published_value(verdict_row),
-        "ours": f"{verdict_row['ours']:.6g}",
+        "computed": f"{verdict_row['computed']:.6g}",
         "tolerance": f"{verdict_row['tolerance']:.3g}",
-        "verdict": f"{verdict_row['verdict']}{', moved' * bool(verdict_row['moved'])}",
+        "verdict": verdict_row["verdict"] + ", unexpected" * bool(verdict_row["verdict_changed"]),
     }
 
 
@@ -70,16 +72,13 @@ def _align_columns(rows: list[dict[str, str]]) -> str:
     return "\n".join(line.rstrip() for line in lines)
 
 
-class VerdictTable(pd.DataFrame):
+class VerdictTable(TableWithFormerColumns):
     """Table of the verdicts on claims, with one row per claim.
 
     Selections from the table are ordinary data frames.
     """
 
-    @property
-    def _constructor(self) -> type[pd.DataFrame]:
-        """Class of the data frames that result from selections in the table."""
-        return pd.DataFrame
+    NEW_COLUMNS: ClassVar[Mapping[str, str]] = NEW_VERDICT_COLUMNS
 
     def __repr__(self) -> str:
         """Format the table for a terminal."""
@@ -113,15 +112,15 @@ def format_verdict_row(verdict_row: dict[Any, Any]) -> dict[str, str]:
         with the name of the study.
     """
     reason = f"{verdict_row['tolerance']:.3g}: {verdict_row['reason']}"
-    if verdict_row["because"]:
-        reason += f". It differs because {verdict_row['because']}"
+    if verdict_row["difference_reason"]:
+        reason += f". The result differs because {verdict_row['difference_reason']}"
     of = f"{verdict_row['study']}: " if "study" in verdict_row else ""
     return {
         "id": str(verdict_row["id"]),
         "claim": f"{of}{verdict_row['claim']}",
         "published": format_published_value(verdict_row),
-        "ours": "-" if pd.isna(verdict_row["ours"]) else f"{verdict_row['ours']:.6g}",
+        "computed": "-" if pd.isna(verdict_row["computed"]) else f"{verdict_row['computed']:.6g}",
         "tolerance and reason": reason,
         "verdict": verdict_row["verdict"]
-        + f", expected {verdict_row['expected']}" * bool(verdict_row["moved"]),
+        + f", expected {verdict_row['expected']}" * bool(verdict_row["verdict_changed"]),
     }

@@ -64,7 +64,7 @@ def main(
         nodes.scale(jobs=jobs)
         client.wait_for_workers(1)
         dataset = rsfstudy.run(study, client=client, **choices)
-    print(rsfstudy.check(dataset)[["id", "claim", "published", "ours", "verdict"]].to_string())
+    print(rsfstudy.check(dataset)[["id", "claim", "published", "computed", "verdict"]].to_string())
 
 
 @click.command()

@@ -512,7 +512,8 @@ def claims() -> str:
     """
     rows = (
         (f"`{name}`", claim.id, strip_markup(claim.statement), strip_markup(claim.source),
-         format_published_value(claim.describe()), claim.tolerance, strip_markup(claim.because))
+         format_published_value(claim.describe()), claim.tolerance,
+         strip_markup(claim.difference_reason))
         for name, study in _studies().items()
         for claim in study.claims
     )  # fmt: skip

@@ -11,7 +11,7 @@ from rsfstudy.parts import Loading, number
 @dataclass(frozen=True, kw_only=True)
 class HoldAndReload(Loading):
     rest_time: float = number(
-        100.0, "$t_h$", "1", "time of the hold", rule="must be greater than 0", scale="D_c/V_*"
+        100.0, "$t_h$", "1", "hold time", rule="must be greater than 0", scale="D_c/V_*"
     )
 
     name = "hold_and_reload"

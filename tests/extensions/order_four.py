@@ -31,7 +31,7 @@ class OrderFour(Stepper):
         while True:
             towards = length * motion.direction
             if motion.clock + 0.1 * towards == motion.clock:
-                self.failure = "a step would be shorter than the spacing of numbers"
+                self.failure = "the required step size is smaller than the spacing"
                 return NO_STEP
             if motion.evaluations_slow + motion.evaluations_fast > motion.budget:
                 return BUDGET_SPENT

@@ -53,9 +53,9 @@ class Check(CommandResult):
         The status is 1 if a verdict changed, if a cell failed or has not been computed, or if a
         study or a claim was not checked.
         """
-        moved = self.verdicts is not None and bool(self.verdicts["moved"].any())
+        changed = self.verdicts is not None and bool(self.verdicts["verdict_changed"].any())
         complete = all(one.is_complete for one in self.studies)
-        failed = moved or not complete or self.unapplied_claims or self.not_run
+        failed = changed or not complete or self.unapplied_claims or self.not_run
         return EXIT_STATUS_FAILED if failed else EXIT_STATUS_OK
 
     def json_fields(self) -> dict[str, Any]:

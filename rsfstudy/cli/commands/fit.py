@@ -276,7 +276,7 @@ def _print_steps(record: Record) -> None:
         {
             "step": str(number),
             "time (s)": f"{step.start:.6g}",
-            "lasts (s)": f"{step.end - step.start:.6g}",
+            "duration (s)": f"{step.end - step.start:.6g}",
             "V0 (um/s)": f"{step.velocity_before:.6g}",
             "V1 (um/s)": f"{step.velocity_after:.6g}",
             **_format_normal_stresses_of_step(step, stressed),

@@ -116,5 +116,5 @@ def _print_healing(result: HealingResult) -> None:
     print_pieces(summarise_holds(result.table))
     value, stderr = (result.stiffness[n].item() for n in ("stiffness", "stiffness_stderr"))
     if math.isfinite(value):
-        print_line(f"stiffness over normal stress: {format_with_error(value, stderr)} 1/um")
+        print_line(f"stiffness divided by normal stress: {format_with_error(value, stderr)} 1/um")
     print_line(f"wrote {' and '.join(map(str, result.files))}", soft_wrap=True)

@@ -109,7 +109,9 @@ class Runs(CommandResult):
 @options.budget_option
 @options.worker_options
 @click.option("--fresh", is_flag=True, help="Recompute all cells, including finished cells.")
-@click.option("--keep-going", is_flag=True, help="Continue even if all of the first cells fail.")
+@click.option(
+    "--keep-going", is_flag=True, help="Continue the run even if all of the first cells fail."
+)
 @click.option("--despite-failures", is_flag=True, help="Compute reductions even if cells failed.")
 @click.option(
     "--format",

@@ -54,7 +54,7 @@ def check_function_never_raises(
                 f"cannot compile {_describe_parts_defined_in_file(code.co_filename)} ({where}): it "
                 "raises an error"
             )
-            remedy = "Return math.nan instead, which ends the motion; or use the engine scipy."
+            remedy = "Return math.nan instead, which ends the motion, or use engine='scipy'."
             raise InvalidValue("engine", "compiled", rule, remedy=remedy)
     named = (function.__globals__.get(name) for name in function.__code__.co_names)
     for reached in (*named, *(cell.cell_contents for cell in function.__closure__ or ())):
@@ -90,7 +90,7 @@ def compilation_error(error: Exception) -> InvalidValue:
         text = text[: place.start()]
     cause = text.strip().rpartition("\n")[2]
     rule = f"cannot compile {what}{where}: {cause}"
-    remedy = "Compute with numbers, tuples and math only, or use the engine scipy."
+    remedy = "Use only numbers, tuples and the module math, or use engine='scipy'."
     return InvalidValue("engine", "compiled", rule, remedy=remedy)
 
 

@@ -231,8 +231,8 @@ def _cache_entry_folder(entry_name: str) -> Path | None:
 def _warn_folder_not_private(folder: Path) -> None:
     """Log a warning that other users can write to a folder, once per folder."""
     _logger.warning(
-        "%s: others own it or may write to it, and nothing compiled is kept there or taken from "
-        "it. Remove it, or choose another place (XDG_CACHE_HOME).",
+        "%s is not private to the current user, so rsfstudy does not use it as a cache of "
+        "compiled functions. Remove the directory, or set XDG_CACHE_HOME to another directory.",
         folder,
     )
 
@@ -253,7 +253,7 @@ def _compile_in_temporary_folder(
     aside = Path(tempfile.mkdtemp(prefix=f"{folder.name}.", dir=folder.parent))
     try:
         entry = aside / _CACHE_ENTRY_FILE_NAME
-        entry.write_text("# Stands for a function that rsfstudy has compiled.\n")
+        entry.write_text("# Placeholder for a function that rsfstudy has compiled.\n")
         os.utime(entry, (0, 0))  # The cache of Numba depends on the modification time.
         ready = compile_with_cache_path(str(entry))
         with contextlib.suppress(OSError):  # Another process may have renamed its folder earlier.

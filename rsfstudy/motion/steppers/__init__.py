@@ -52,7 +52,7 @@ class Stepper(ABC):
         add_new_names_for_former_members(cls)
 
     def __init__(self, systems: tuple[Equations, ...], methods: Mapping[str, str]) -> None:
-        self.systems, self.failure = systems, "no step is long enough"
+        self.systems, self.failure = systems, "the step size became too small"
 
     @abstractmethod
     def begin_regime(self, motion: Any, workspace: Any) -> None:

@@ -163,7 +163,7 @@ class SciPyStepper(Stepper):
         while solver.status == "running":
             if not self._take_solver_step(motion, solver) or solver.status == "failed":
                 raise MotionStopped(
-                    Status.INTEGRATION_FAILED, f"a step cannot be ended: {self.failure}"
+                    Status.INTEGRATION_FAILED, f"a step could not be repeated: {self.failure}"
                 )
             clocks.append(solver.t)
             within.append(solver.dense_output())
@@ -222,7 +222,7 @@ class SciPyStepper(Stepper):
         known, self._max_evaluations, self.failure = (
             solver.njev,
             motion.budget,
-            "the budget is spent",
+            "the evaluation budget is exceeded",
         )
         try:
             with np.errstate(over="ignore", invalid="ignore", divide="ignore"):

@@ -86,5 +86,5 @@ def _read(source: Source) -> Table:
             return found if isinstance(found, Table) else _read(found)
     if source.is_file:
         raise DataError(f"{source.origin}: has an unknown format. Export the table as a CSV file.")
-    remedy = "Give the path of a file, a mapping of arrays, a DataFrame, a Dataset or a Record."
-    raise InvalidValue("record", source.origin, "is no record", remedy=remedy)
+    remedy = "Pass the path of a file, a mapping of arrays, a DataFrame, a Dataset or a Record."
+    raise InvalidValue("record", source.origin, "is not a record", remedy=remedy)

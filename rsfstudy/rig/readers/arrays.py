@@ -180,7 +180,7 @@ def _build_table(source: Any, keys: list[Any], headings: list[str]) -> Table:
     def load(index: int, quantity_name: str) -> Column:
         values, units = _to_floats_and_units(quantity_name, source[keys[index]])
         if values.ndim != 1:
-            raise InvalidValue(quantity_name, values.shape, "must lie along one dimension")
+            raise InvalidValue(quantity_name, values.shape, "must have one dimension")
         return Column(values, units)
 
     return Table(headings, "record", load)

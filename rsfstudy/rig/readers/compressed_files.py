@@ -74,6 +74,6 @@ def decompress(source: Source) -> Source:
     if len(content) > limit:
         raise DataError(
             f"{source.origin}: contains more than {limit:,} bytes after decompression, which is "
-            "more than a text of this size contains. Decompress the file before you read it."
+            "too much for a text file of this size. Decompress the file before you read it."
         )
     return replace(source, content=content)

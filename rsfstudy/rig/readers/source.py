@@ -64,7 +64,7 @@ class Source:
             return self.content[:_BYTES_OF_FILE_SIGNATURE]
         check_regular_file("record", self.origin)
         if not self.path.exists():
-            raise DataError(f"there is no file {self.origin}")
+            raise DataError(f"the file {self.origin} does not exist")
         return self._read(_BYTES_OF_FILE_SIGNATURE)
 
     def read_bytes(self) -> bytes:
@@ -161,7 +161,11 @@ class Table:
             return found[0]
         if not found and heading.isdecimal() and 1 <= int(heading[:9]) <= len(self.headings):
             return int(heading) - 1
-        rule = f"heads {len(found)} columns, and must head one" if found else "is not in the table"
+        rule = (
+            (f"is the heading of {len(found)} columns, but must be the heading of exactly one")
+            if found
+            else "is not in the table"
+        )
         remedy = f"Columns can also be selected by their numbers, from 1 to {len(self.headings)}."
         raise InvalidValue(
             "column", heading, rule, choices=self.headings, remedy=remedy

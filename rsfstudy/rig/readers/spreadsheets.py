@@ -123,7 +123,7 @@ def _build_table_of_cells(cells: pd.DataFrame, name: str, decimal: str) -> Table
     ]
     layout = detect_layout([f"sep={_MARK}", *lines], decimal)
     if not layout.headings:
-        remedy = f"Its first row reads, for instance, {EXAMPLE_OF_TABLE_HEADER}."
+        remedy = f"Write a first row such as {EXAMPLE_OF_TABLE_HEADER}."
         raise InvalidValue("table", name, "has no header", remedy=remedy)
     # The line with the separator comes before the cells.
     body = cells.iloc[layout.body_line - 2 :]
@@ -153,6 +153,6 @@ def _number_in_cell(cell: Any, quantity_name: str, column: Column, row: int) -> 
     number = cell if isinstance(cell, int | float) else parse_number(str(cell).replace(",", "."))
     if number is None or not math.isfinite(number):
         remedy = "Format the cells of the column as numbers."
-        wrong = InvalidValue(quantity_name, str(cell), "is no number", remedy=remedy)
+        wrong = InvalidValue(quantity_name, str(cell), "is not a number", remedy=remedy)
         raise wrong.with_location(column.location(row))
     return float(number)

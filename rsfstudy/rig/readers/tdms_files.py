@@ -77,7 +77,7 @@ def read_tdms(source: Source) -> Table:
     groups = {group.name: group.channels() for group in file.groups()}
     names = [name for name, channels in groups.items() if channels]
     if not names or (source.sheet and source.sheet not in names):
-        raise InvalidValue("sheet", source.sheet, "is no group with channels", choices=names)
+        raise InvalidValue("sheet", source.sheet, "is not a group with channels", choices=names)
     channels = groups[source.sheet or names[0]]
     headings = merge_headings_with_units(
         [channel.name for channel in channels], [_units_of_channel(of) for of in channels]

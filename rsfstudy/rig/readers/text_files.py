@@ -120,7 +120,7 @@ def read_text(source: Source) -> Table:
     has_headings = layout.header_line > 0
     location = f"{name}, line {layout.header_line}" if has_headings else name
     if not layout.headings:
-        remedy = f"Its first line reads, for instance, {EXAMPLE_OF_TABLE_HEADER}."
+        remedy = f"Write a first line such as {EXAMPLE_OF_TABLE_HEADER}."
         raise InvalidValue("table", name, "has no header", remedy=remedy)
 
     def load(index: int, quantity_name: str) -> Column:
@@ -233,9 +233,9 @@ def _check_row_lengths(rows: _Rows, layout: TextLayout, name: str) -> None:
         while len(row) > size and not row[-1].strip():
             row.pop()
         if len(row) != size:
-            rule = f"has {len(row)} fields, and the header {size}"
+            rule = f"has {len(row)} fields, but the header has {size}"
             remedy = (
-                "Numbers have a decimal point, or pass decimal=',' (--decimal ',')."
+                "Use decimal points, or pass decimal=',' (--decimal ',')."
                 if len(row) > size
                 else ""
             )
@@ -285,10 +285,10 @@ class _FieldConverter(NamedTuple):
         pointed = text.replace(",", ".", 1) if self.decimal == "," and "." not in text else text
         found = parse_number(pointed)
         if found is None:
-            remedy = "Write digits alone, as in 1.5e-3; units stand in the header."
+            remedy = "Write only the number, for example 1.5e-3, and write the units in the header."
             if "," in text:
-                remedy = "Write a decimal point, or pass decimal=',' (--decimal ',')."
-            wrong = InvalidValue(self.quantity_name, text, "is no number", remedy=remedy)
+                remedy = "Use a decimal point, or pass decimal=',' (--decimal ',')."
+            wrong = InvalidValue(self.quantity_name, text, "is not a number", remedy=remedy)
             raise wrong.with_location(self.column.location(row))
         if not math.isfinite(found):
             raise InvalidValue(self.quantity_name, text.strip(), "must be finite").with_location(

@@ -63,7 +63,7 @@ def read_xlook(source: Source) -> Table:
     if not 0 < used <= _MAX_COLUMNS:
         raise DataError(
             f"{path}: has an unknown binary format. Formats that can be read: {_FORMATS}. Export "
-            f"the table as a CSV file. (As a file of xlook, it would have {used} columns.)"
+            f"the table as a CSV file. As an xlook file, it would have {used} columns."
         )
     if len(data) < _DATA_START_BYTE:
         raise DataError(f"{path}: ends within the headers of an xlook file")

@@ -332,7 +332,7 @@ class Inertia(Dynamics):
         m \frac{dV}{dt} = \tau - \sigma \mu, \quad m = k \left(\frac{T}{2 \pi}\right)^2.
     """
 
-    inertia: bool = flag(False, "whether the slider has mass")
+    inertia: bool = flag(False, "1 if the slider has mass, otherwise 0")
 
     name = "inertia"
     selected_by = "inertia"
@@ -365,5 +365,5 @@ class Inertia(Dynamics):
 
         See ``Part.rejection_error``.
         """
-        rule = "stands in for mass, and this scene has mass"
-        return InvalidValue(name, value, rule, remedy="Leave one of them out.")
+        rule = "approximates inertia, but this scene has inertia"
+        return InvalidValue(name, value, rule, remedy="Omit one of the two.")

@@ -139,7 +139,7 @@ class RadiationDamping(Dynamics):
         0.0,
         r"$\eta V_*/\sigma_*$",
         "1",
-        "stress that waves carry away at V_star",
+        "stress radiated by waves at V_star",
         "sigma_*",
         rule=NON_NEGATIVE,
     )

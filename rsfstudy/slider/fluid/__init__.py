@@ -91,7 +91,7 @@ PORE_PRESSURE_QUANTITY = Quantity(
     "pore_pressure",
     r"$(p-p_\infty)/\sigma_*$",
     "1",
-    "pore pressure above that of the surroundings",
+    "pore pressure minus the pressure of the surroundings",
     "sigma_*",
 )
 
@@ -113,7 +113,7 @@ def declare_dilatancy_field(default: float) -> Any:
         default,
         r"$\epsilon/(\beta\sigma_*)$",
         "1",
-        "pore pressure that undrained dilatancy takes for each unit of ln V",
+        "decrease of pore pressure due to undrained dilatancy, per unit of ln V",
         "sigma_*",
         rule=NON_NEGATIVE,
     )
@@ -131,10 +131,11 @@ def declare_drainage_field() -> Any:
         1.0,
         "$c^*D_c/V_*$",
         "1",
-        "rate at which pore pressure drains",
+        "rate of pore pressure diffusion",
         "V_*/D_c",
         rule=POSITIVE,
-        remedy="Nearly undrained is a small number, and without drainage there is no steady state.",
+        remedy="Use a small value for nearly undrained conditions, because no steady state "
+        "exists without drainage.",
     )
 
 

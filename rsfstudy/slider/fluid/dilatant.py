@@ -97,7 +97,7 @@ class DilatantFluid(Fluid):
             "porosity",
             r"$(\varphi-\varphi_0)/(\beta\sigma_*)$",
             "1",
-            "porosity above that of steady sliding at V_star",
+            "porosity minus the porosity in steady sliding at V_star",
             "beta sigma_*",
         ),
         PORE_PRESSURE_QUANTITY,
@@ -111,8 +111,10 @@ class DilatantFluid(Fluid):
         See ``Part.check``.
         """
         if lacks_critical_stiffness(scene):
-            rule = f"leaves no critical stiffness with dilatancy = {self.dilatancy:g}"
-            raise self.field_error("drainage", rule, "Give stiffness itself, or raise drainage.")
+            rule = f"gives no critical stiffness with dilatancy = {self.dilatancy:g}"
+            raise self.field_error(
+                "drainage", rule, "Pass stiffness instead of stiffness_ratio, or increase drainage."
+            )
 
     def highest_pressure(self, log_slip_rate: float, states: Numbers) -> float:
         r"""Compute an upper bound of the future pore pressure.

@@ -111,7 +111,7 @@ class ThermalFluid(Fluid):
         1.0,
         r"$\Lambda_p T_*/\sigma_*$",
         "1",
-        "undrained pore pressure by a temperature rise of T_star",
+        "undrained increase of pore pressure due to a temperature rise of T_star",
         "sigma_*",
         rule=NON_NEGATIVE,
         omit_if_default=True,
@@ -173,5 +173,7 @@ class ThermalFluid(Fluid):
             remedy = "Set temperature='shear_heating', or choose another fluid."
             raise InvalidValue("fluid", self.name, rule, remedy=remedy)
         if lacks_critical_stiffness(scene):
-            rule = "leaves no critical stiffness with thermal pressurisation"
-            raise self.field_error("drainage", rule, "Give stiffness itself, or raise drainage.")
+            rule = "gives no critical stiffness with thermal pressurisation"
+            raise self.field_error(
+                "drainage", rule, "Pass stiffness instead of stiffness_ratio, or increase drainage."
+            )

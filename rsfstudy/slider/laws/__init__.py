@@ -72,7 +72,7 @@ def declare_cutoff_velocity_field() -> Any:
         "1",
         "cut-off velocity of the evolution effect",
         rule=POSITIVE,
-        remedy="For a law without a cut-off, set law.",
+        remedy="For a law without a cut-off velocity, set law to another law.",
     )
 
 
@@ -147,9 +147,11 @@ class LawBase(Part):
         "1",
         "effect of shear stress on the state variable",
         rule=NON_NEGATIVE,
-        remedy="Zero leaves the effect out.",
+        remedy="Zero removes the effect.",
     )
-    regularised: bool = flag(False, "whether slip may reverse, with the sign of shear stress")
+    regularised: bool = flag(
+        False, "1 if slip can reverse with the sign of the shear stress, otherwise 0"
+    )
 
     derived_properties = ("has_closed_orbits", "scale_free", "relaxation")
     defining_methods = frozenset({"evolution", "evolutions"})
@@ -196,7 +198,7 @@ class LawBase(Part):
 
         Subclasses must override ``b_over_a`` as a property or as a field.
         """
-        raise TypeError(f"{type(self).__name__} states no b_over_a")
+        raise TypeError(f"{type(self).__name__} does not define b_over_a")
 
     def parameter_values(self, scene: SceneView) -> Numbers:
         """Return the parameters that precede the fields of the law in ``p``.
@@ -259,8 +261,13 @@ class LawBase(Part):
         if not unknown and loading.changes_normal_stress:
             unknown = "normal stress that the loading changes"
         if self.stress_dependence and unknown:
-            rule = f"is known for normal stress in proportion to shear stress, not for {unknown}"
-            remedy = "Leave it out, or state `coupling` where the proportion is constant."
+            rule = (
+                "requires normal stress that is proportional to shear stress, which is not "
+                f"the case for {unknown}"
+            )
+            remedy = (
+                "Leave it out, or define `coupling` if the ratio of the two stresses is constant."
+            )
             raise self.field_error("stress_dependence", rule, remedy)
         pressed = source.unknowns and not loading.has_load_point_unknown
         if scene.parts.temperature.unknowns:
@@ -269,8 +276,11 @@ class LawBase(Part):
             source if pressed else None if scene.dynamics.allows_reversed_slip else scene.dynamics
         )
         if self.regularised and one_way:
-            rule = f"has no meaning for {one_way.name}, whose equations hold ln V"
-            raise self.field_error("regularised", rule, "Leave one of them out.")
+            rule = (
+                f"has no meaning for {one_way.name}, because its equations contain ln V, which "
+                "requires forward slip"
+            )
+            raise self.field_error("regularised", rule, "Omit one of the two.")
 
 
 @add_former_member_names
@@ -375,19 +385,27 @@ class Law(LawBase):
         """
         super().check(scene)
         if not self.b_over_a and (self.depends_on_stress or scene.parts.normal_stress.state_effect):
-            rule = "has no meaning where stress acts on the state variable: by alpha/b or c/b"
-            remedy = "Leave alpha and stress_dependence out, or give another b_over_a."
+            rule = (
+                "has no meaning if stress acts on the state variable, because its effects are "
+                "alpha/b and c/b"
+            )
+            remedy = "Leave alpha and stress_dependence out, or pass another value of b_over_a."
             raise self.field_error("b_over_a", rule, remedy)
         if not self.b_over_a and scene.parts.slider.initial_state:
-            rule = "is of a state variable that has no effect where b_over_a is 0"
+            rule = "has no effect, because b_over_a is 0"
             raise scene.parts.slider.field_error("initial_state", rule, "Leave initial_state out.")
         if 0.0 < abs(self.b_over_a) < MIN_B_OVER_A:
             raise self.field_error(
-                "b_over_a", f"must be 0, or at least {MIN_B_OVER_A:g} in size", "Give 0."
+                "b_over_a",
+                f"must be 0, or must have an absolute value of at least {MIN_B_OVER_A:g}",
+                "Give 0.",
             )
         least = self.min_weakening_b_over_a
         if self.b_over_a <= least and lacks_critical_stiffness(scene):
-            rule = f"must exceed {least:.6g}: without rate weakening there is no critical stiffness"
+            rule = (
+                f"must exceed {least:.6g}, because there is no critical stiffness without rate "
+                "weakening"
+            )
             raise self.field_error("b_over_a", rule, MISSING_CRITICAL_STIFFNESS_REMEDY)
 
 
@@ -398,7 +416,8 @@ B_OVER_A_STANDING_FOR_ZERO = 1e-60
 MIN_B_OVER_A = 1e-30
 #: Advice to the user in error messages about a missing critical stiffness.
 MISSING_CRITICAL_STIFFNESS_REMEDY = (
-    "Sliding is then stable at every stiffness, or at none: give stiffness itself."
+    "Sliding is then stable at every stiffness or unstable at every stiffness. Pass stiffness "
+    "instead of stiffness_ratio."
 )
 
 

@@ -78,16 +78,16 @@ class TwoStateLaw(LawBase):
     """
 
     b1_over_a: float = number(
-        1.0, "$b_1/a$", "1", "evolution effect of the first state over direct effect"
+        1.0, "$b_1/a$", "1", "evolution effect of the first state divided by the direct effect"
     )
     b2_over_a: float = number(
-        0.84, "$b_2/a$", "1", "evolution effect of the second state over direct effect"
+        0.84, "$b_2/a$", "1", "evolution effect of the second state divided by the direct effect"
     )
     length_ratio: float = number(
         1.0 / 0.048,
         "$L_2/D_c$",
         "1",
-        "slip distance of the second state over that of the first",
+        "slip distance of the second state divided by the slip distance of the first state",
         rule=POSITIVE,
     )
 
@@ -125,8 +125,8 @@ class TwoStateLaw(LawBase):
         replace ``b_over_a``.
         """
         if name == "b_over_a":
-            rule = f"is b1_over_a + b2_over_a for {cls.name}, and follows from them"
-            return InvalidValue(name, value, rule, remedy="Give those.")
+            rule = f"follows from b1_over_a and b2_over_a for {cls.name}, because it is their sum"
+            return InvalidValue(name, value, rule, remedy="Pass b1_over_a and b2_over_a.")
         return super().rejection_error(name, value)
 
     def check(self, scene: SceneView) -> None:
@@ -137,11 +137,11 @@ class TwoStateLaw(LawBase):
         """
         super().check(scene)
         if not self.state_change_over_a:
-            rule = "must not be 0 where b1_over_a is: no state has an effect"
-            raise self.field_error("b2_over_a", rule, "Give one of them.")
+            rule = "must not be 0 if b1_over_a is 0, because no state would have an effect"
+            raise self.field_error("b2_over_a", rule, "Pass a nonzero value for one of them.")
         if lacks_critical_stiffness(scene):
             rule = (
-                f"with b1_over_a = {self.b1_over_a:g} and length_ratio = {self.length_ratio:g} "
-                "gives no critical stiffness"
+                f"gives no critical stiffness with b1_over_a = {self.b1_over_a:g} and "
+                f"length_ratio = {self.length_ratio:g}"
             )
             raise self.field_error("b2_over_a", rule, MISSING_CRITICAL_STIFFNESS_REMEDY)

@@ -159,7 +159,7 @@ class Loading(Part):
             rule = f"has no meaning for fluid={fluid.name!r}"
             rule += ", whose pore pressure changes normal stress"
             value = getattr(self, name or "name")
-            remedy = "Leave one of them out."
+            remedy = "Omit one of the two."
             raise InvalidValue(name or "loading", value, rule, remedy=remedy)
 
     def _check_segment_durations(self) -> None:
@@ -167,8 +167,8 @@ class Loading(Part):
         for n, (begins, ends, *_others) in enumerate(self.segment_table):
             if ends - begins < MIN_SEGMENT_DURATION and ends > 0.0:
                 least = f"{MIN_SEGMENT_DURATION:g} D_c/V_*"
-                rule = f"must be {least} at least, and more than the rounding of time"
-                remedy = "Leave out what lasts no time."
+                rule = f"must be at least {least}, and larger than the rounding error of the time"
+                remedy = "Remove segments without duration."
                 wrong = InvalidValue("duration", self.segments[n].duration, rule, remedy=remedy)
                 raise wrong.with_location(f"segment {n + 1}")
 
@@ -180,7 +180,7 @@ class Loading(Part):
     @property
     def segments(self) -> tuple[Segment, ...]:
         """Segments of the loading. The last segment has an infinite duration."""
-        raise TypeError(f"{type(self).__name__} loads nothing")
+        raise TypeError(f"{type(self).__name__} does not define segments")
 
     def describe(self) -> dict[str, Any]:
         """Return the loading history as plain data.
@@ -278,10 +278,10 @@ class Loading(Part):
         """
         owners = (p for p in BUILT_IN_PARTS.values() if str(name) in p.__dataclass_fields__)
         wanted = " or ".join(p.selected_by for p in owners if p.selected_by not in ("", name))
-        remedy = f"Leave it out, or state {wanted} too." if wanted else "Leave it out."
+        remedy = f"Leave it out, or also set {wanted}." if wanted else "Leave it out."
         # The name of a protocol is an attribute of the instance, not of the class.
         of = getattr(cls, "name", cls.__name__)
-        return InvalidValue(name, value, f"has no meaning for {of}", remedy=remedy)
+        return InvalidValue(name, value, f"has no meaning for the loading {of!r}", remedy=remedy)
 
 
 def declare_load_velocity_field() -> Any:
@@ -299,7 +299,7 @@ def declare_load_velocity_field() -> Any:
         "load point velocity after the step",
         "V_*",
         rule=NON_NEGATIVE,
-        remedy="0 holds the load point.",
+        remedy="Use 0 to hold the load point.",
     )
 
 

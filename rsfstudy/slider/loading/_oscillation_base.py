@@ -103,7 +103,7 @@ class OscillationBase(LoadingWithFinalLoadVelocity):
         None,
         r"$\phi_o$",
         "degree",
-        "angle by which the oscillation is ahead of a sine where it begins",
+        "phase of the sinusoidal oscillation at its beginning",
         omit_if_default=True,
     )
     oscillation_cycles: float | None = number(
@@ -112,7 +112,7 @@ class OscillationBase(LoadingWithFinalLoadVelocity):
         "1",
         "number of cycles after which the oscillation ends",
         rule=POSITIVE,
-        remedy="Leave it out for one that goes on for ever.",
+        remedy="Leave it out for an oscillation that does not end.",
         omit_if_default=True,
     )
 
@@ -129,8 +129,11 @@ class OscillationBase(LoadingWithFinalLoadVelocity):
         super().check(scene)
         free = 2.0 * math.pi * scene.inertial_time
         if self.oscillation_period < free and not scene.has_mass:
-            rule = f"is below the period of free oscillation, T V_*/D_c = {free:.3g}: mass matters"
-            remedy = "Set inertia=True, or give a longer one."
+            rule = (
+                f"is shorter than the period of free oscillation, T V_*/D_c = {free:.3g}, so "
+                "inertia cannot be neglected"
+            )
+            remedy = "Set inertia=True, or use a longer period."
             raise self.field_error("oscillation_period", rule, remedy)
 
     @property

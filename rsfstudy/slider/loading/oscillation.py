@@ -56,8 +56,14 @@ class NormalStressOscillation(_oscillation_base.OscillationBase):
     name = "oscillation"
     selected_by = "oscillation_amplitude"
     unknowns = (
-        Quantity("oscillation_ahead", "$y$", "1", "oscillation a quarter ahead", "sigma_*"),
-        Quantity("oscillation_relief", "$P$", "1", "imposed fall of normal stress", "sigma_*"),
+        Quantity(
+            "oscillation_ahead",
+            "$y$",
+            "1",
+            "oscillation with a phase shift of a quarter period",
+            "sigma_*",
+        ),
+        Quantity("oscillation_relief", "$P$", "1", "imposed decrease of normal stress", "sigma_*"),
     )
 
     def check(self, scene: SceneView) -> None:
@@ -66,7 +72,7 @@ class NormalStressOscillation(_oscillation_base.OscillationBase):
         See ``Part.check``.
         """
         if self.oscillation_amplitude >= 1.0:
-            remedy = "Normal stress stays positive: it oscillates by less than all of it."
+            remedy = "The normal stress must stay positive during the oscillation."
             raise self.field_error("oscillation_amplitude", "must be less than 1", remedy)
         super().check(scene)
 

@@ -80,26 +80,26 @@ class NormalStressRamp(LoadingWithFinalLoadVelocity):
         0.0,
         r"$\Delta\sigma/\sigma_*$",
         "1",
-        "change of imposed normal stress at a steady rate",
+        "change of imposed normal stress at a constant rate",
         "sigma_*",
         rule="must be greater than -1",
-        remedy="Normal stress stays positive: a fall is by less than all of it.",
+        remedy="The normal stress must stay positive.",
     )
     ramp_duration: float = number(
         1.0,
         r"$t_r V_*/D_c$",
         "1",
-        "time for which imposed normal stress changes",
+        "duration of the change of imposed normal stress",
         "D_c/V_*",
         rule=POSITIVE,
-        remedy="A sudden change is normal_stress_step.",
+        remedy="For a sudden change, use normal_stress_step.",
     )
     load_velocity_ratio: float | None = declare_load_velocity_field()
 
     name = "ramp"
     selected_by = "normal_stress_ramp"
     unknowns = (
-        Quantity("ramp_left", "$P$", "1", "imposed normal stress that is yet to come", "sigma_*"),
+        Quantity("ramp_left", "$P$", "1", "remaining change of imposed normal stress", "sigma_*"),
     )
     of_pressure = False
     auxiliary_rates = staticmethod(pending_normal_stress_rates)

@@ -41,7 +41,7 @@ class SlideHoldSlide(LoadingWithFinalLoadVelocity):
         0.0,
         "$t_h V_*/D_c$",
         "1",
-        "time for which the load point is held",
+        "duration of the hold of the load point",
         "D_c/V_*",
         rule=NON_NEGATIVE,
     )

@@ -50,7 +50,7 @@ class StepLoading(LoadingWithFinalLoadVelocity):
         "sudden change of imposed normal stress",
         "sigma_*",
         rule="must be greater than -1",
-        remedy="Normal stress stays positive: a fall is by less than all of it.",
+        remedy="The normal stress must stay positive.",
     )
 
     name = "step"

@@ -48,7 +48,7 @@ class VelocityOscillation(_oscillation_base.OscillationBase):
         None,
         "$A_V$",
         "1",
-        "amplitude of an oscillation of load point velocity, over its mean",
+        "amplitude of an oscillation of load point velocity, divided by the mean velocity",
         rule=NON_NEGATIVE,
         omit_if_default=True,
     )
@@ -57,8 +57,14 @@ class VelocityOscillation(_oscillation_base.OscillationBase):
     selected_by = "velocity_oscillation"
     has_load_point_unknown = True
     unknowns = (
-        Quantity("load_point_behind", "$y$", "1", "load point a quarter behind", "sigma_*"),
-        Quantity("load_point_ahead", "$P$", "1", "stress by the load point", "sigma_*"),
+        Quantity(
+            "load_point_behind",
+            "$y$",
+            "1",
+            "load point displacement with a delay of a quarter period",
+            "sigma_*",
+        ),
+        Quantity("load_point_ahead", "$P$", "1", "stress due to the load point", "sigma_*"),
     )
 
     def check(self, scene: SceneView) -> None:
@@ -68,11 +74,14 @@ class VelocityOscillation(_oscillation_base.OscillationBase):
         The mean velocity must not be zero.
         """
         if (self.velocity_oscillation or 0.0) > 1.0 and not scene.parts.law.regularised:
-            rule = "must be 1 or less: the load point moves back, and friction is of forward slip"
-            remedy = "Set regularised=True, by which slip reverses with shear stress."
+            rule = (
+                "must be 1 or less, because the load point would move backwards, and friction "
+                "is defined for forward slip only"
+            )
+            remedy = "Set regularised=True, which permits reversed slip."
             raise self.field_error("velocity_oscillation", rule, remedy)
         if self.load_velocity == 0.0:
-            rule = "must be greater than 0: velocity_oscillation is over it"
+            rule = "must be greater than 0, because velocity_oscillation is relative to it"
             raise self.field_error("load_velocity_ratio", rule)
         super().check(scene)
 

@@ -42,16 +42,16 @@ class VelocityRamp(Loading):
         0.0,
         r"$\Delta V_0/V_*$",
         "1",
-        "change of load point velocity at a steady rate",
+        "change of load point velocity at a constant rate",
         "V_*",
         rule="must be -1 or greater",
-        remedy="-1 ends with a load point at rest.",
+        remedy="With -1, the load point is at rest after the ramp.",
     )
     velocity_ramp_duration: float = number(
         10.0,
         r"$t_r V_*/D_c$",
         "1",
-        "time for which load point velocity changes",
+        "duration of the change of load point velocity",
         "D_c/V_*",
         rule=POSITIVE,
     )
@@ -59,7 +59,7 @@ class VelocityRamp(Loading):
         64.0,
         "",
         "1",
-        "number of stairs that stand for a ramp of load point velocity",
+        "number of steps that approximate a ramp of load point velocity",
         rule=POSITIVE_INTEGER,
     )
 

@@ -39,16 +39,16 @@ class VelocitySteps(Loading):
         0.0,
         "",
         "1",
-        "number of steps of load point velocity, there and back in turn",
+        "number of load point velocity steps, alternately to the new velocity and back",
         rule=NON_NEGATIVE_INTEGER,
     )
     velocity_ratio: float = number(
         10.0,
         "$r$",
         "1",
-        "load point velocity after the first step over V_star",
+        "load point velocity after the first step divided by V_star",
         rule=POSITIVE,
-        remedy="Below 1 the first step is down; hold_time holds the load point.",
+        remedy="Use a value below 1 for a first step down, and hold_time to hold the load point.",
     )
     displacement_between_steps: float = number(
         20.0,

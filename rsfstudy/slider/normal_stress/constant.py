@@ -32,6 +32,9 @@ class ConstantNormalStress(NormalStress):
         See ``Part.check``.
         """
         if scene.parts.loading.changes_normal_stress:
-            remedy = "Set normal_stress='imposed', or 'variable' where it follows shear stress too."
-            rule = "is changed by the loading"
+            remedy = (
+                "Set normal_stress='imposed', or normal_stress='variable' if it also "
+                "depends on shear stress."
+            )
+            rule = "cannot be combined with a loading that changes normal stress"
             raise InvalidValue("normal_stress", self.name, rule, remedy=remedy)

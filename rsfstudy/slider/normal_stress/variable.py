@@ -119,9 +119,12 @@ class VariableNormalStress(NormalStressWithStateEffect):
         :math:`\sigma_3` must be positive, and less than 90 degrees.
         """
         if self.phi >= 90.0:
-            remedy = "At 90 degrees it no longer varies: set normal_stress='constant'."
+            remedy = "For constant normal stress (90 degrees), set normal_stress='constant'."
             raise self.field_error("phi", "must lie between 0 and 90 degrees", remedy)
         lowest = math.degrees(math.atan(scene.mu_star))
         if self.phi <= lowest:
-            rule = f"must exceed atan(mu_star) = {lowest:.6g} degrees: sigma_3 is negative below"
-            raise self.field_error("phi", rule, "Raise phi or lower mu_star.")
+            rule = (
+                f"must exceed atan(mu_star) = {lowest:.6g} degrees, because sigma_3 would be "
+                "negative"
+            )
+            raise self.field_error("phi", rule, "Increase phi, or decrease mu_star.")

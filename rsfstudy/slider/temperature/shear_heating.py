@@ -96,7 +96,7 @@ class ShearHeating(Temperature):
         1e-3,
         r"$\sigma_* D_c/(\rho c w T_*)$",
         "1",
-        "temperature rise over T_star by slip of D_c at unit shear stress",
+        "temperature rise due to slip of D_c at unit shear stress, divided by T_star",
         rule=NON_NEGATIVE,
         omit_if_default=True,
     )
@@ -107,7 +107,8 @@ class ShearHeating(Temperature):
         "cooling rate of the fault",
         "V_*/D_c",
         rule=POSITIVE,
-        remedy="Nearly adiabatic is a small number, and without cooling there is no steady state.",
+        remedy="Use a small value for nearly adiabatic conditions, because no steady state "
+        "exists without cooling.",
         omit_if_default=True,
     )
     direct_activation: float = number(
@@ -133,7 +134,7 @@ class ShearHeating(Temperature):
             "temperature_rise",
             r"$(T-T_*)/T_*$",
             "1",
-            "temperature above that of steady sliding at V_star",
+            "temperature minus the temperature in steady sliding at V_star",
             "T_*",
         ),
     )
@@ -178,13 +179,15 @@ class ShearHeating(Temperature):
             law = scene.parts.law
             if law.state_count > 1:
                 name = "direct_activation" if self.direct_activation else "evolution_activation"
-                rule = f"is for laws with one state, and law={law.name!r} has {law.state_count}"
+                rule = f"requires a law with one state, but law={law.name!r} has {law.state_count}"
                 raise self.field_error(name, rule, "Leave it out, or choose another law.")
             hottest = self.cooling / scene.mu_star
             if self.heating >= hottest:
-                rule = f"must be less than cooling/mu_star = {hottest:g}: otherwise the "
+                rule = f"must be less than cooling/mu_star = {hottest:g}, because otherwise the "
                 rule += "surroundings would be colder than absolute zero"
-                raise self.field_error("heating", rule, "Lower it, or raise cooling.")
+                raise self.field_error("heating", rule, "Decrease it, or increase cooling.")
         if lacks_critical_stiffness(scene):
-            rule = "leaves no critical stiffness at V_*"
-            raise self.field_error("heating", rule, "Give stiffness itself, or raise cooling.")
+            rule = "gives no critical stiffness at V_*"
+            raise self.field_error(
+                "heating", rule, "Pass stiffness instead of stiffness_ratio, or increase cooling."
+            )

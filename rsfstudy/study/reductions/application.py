@@ -117,12 +117,15 @@ def apply_reductions(
     lost = int(
         (failed_cell_mask(dataset["status"]) & (dataset["status"] != int(Status.PENDING))).sum()
     )
-    despite = {"despite": f"{lost} failed cells are left out"} if lost and despite_failures else {}
+    despite = {"despite": f"{lost} failed cells are omitted"} if lost and despite_failures else {}
     drawn: dict[str, xr.DataArray] = {}
     for reduction in reductions:
         if reduction.of not in dataset:
             raise InvalidValue(
-                "of", reduction.of, "is not measured", choices=_reducible_variable_names(dataset)
+                "of",
+                reduction.of,
+                "is not a result of the study",
+                choices=_reducible_variable_names(dataset),
             )
         leaves_out = despite and not reduction.uses_failed_cells
         support = mask_failures(dataset) if leaves_out else dataset
@@ -133,7 +136,7 @@ def apply_reductions(
         found: object = reduction(support)  # A user-defined reduction may return any object.
         if not isinstance(found, xr.Dataset):
             rule = "must return an xarray.Dataset of the new variables"
-            remedy = "Write return self.results('how it was found', {'': values})."
+            remedy = "Write, for example, return self.results('description', {'': values})."
             what = f"result of {reduction.kind}"
             raise InvalidValue(what, type(found).__name__, rule, remedy=remedy)
         made = add_propagated_errors(reduction, support, found)
@@ -141,13 +144,18 @@ def apply_reductions(
         quantities = describe_reduction_results(reduction, dataset, made)
         for name, values in made.data_vars.items():
             if name in dataset:
-                rule = f"would replace {name!r} by what it makes of {reduction.of!r}"
+                rule = (
+                    f"would replace the variable {name!r} by a result computed from "
+                    f"{reduction.of!r}"
+                )
                 raise InvalidValue("reduction", reduction.name, rule)
             drawn[str(name)] = worst_status_along_other_dims(
                 reduction.support_status(support["status"]), values.dims
             )
             if bool(failed_cell_mask(drawn[str(name)]).any()):
-                values.attrs.setdefault("refused", "cells it draws on failed or are missing")
+                values.attrs.setdefault(
+                    "refused", "some of the required cells failed or are missing"
+                )
             said = {key: values.attrs[key] for key in ("comment", "refused") if key in values.attrs}
             about = find_quantity(str(name), quantities).attributes
             about |= {"coverage_content_type": find_coverage_content_type(str(name)), **said}

@@ -34,7 +34,8 @@ UnitFieldsByResultSuffix = Mapping[str, Sequence[str]]
 
 #: Value of the attribute ``comment`` of propagated errors.
 PROPAGATED_ERROR_COMMENT = (
-    "errors of the cells it draws on, each times the derivative by it, in absolute value"
+    "sum of the errors of the cells, each multiplied by the absolute value of the derivative "
+    "with respect to the cell"
 )
 #: Suffixes of the names of variables that contain standard errors, bounds of confidence intervals,
 #: covariances or correlations.
@@ -132,7 +133,7 @@ class Reduction(ConstructorKeywordCheckMixin):
         TypeError
             If a subclass does not override this method.
         """
-        raise TypeError(f"{type(self).__name__} reduces nothing")
+        raise TypeError(f"{type(self).__name__} does not define __call__")
 
     def results(self, comment: str, values: Mapping[str, xr.DataArray]) -> xr.Dataset:
         """Assemble a dataset of results.
@@ -359,10 +360,10 @@ def dimension_of_coordinate(dataset: xr.Dataset | xr.DataArray, coordinate_name:
             str(n) for n, c in dataset.coords.items() if c.ndim == 1 and n != coordinate_name
         ]
         raise InvalidValue(
-            "on", coordinate_name, "must be a coordinate along one dimension", choices=choices
+            "on", coordinate_name, "must be a coordinate with one dimension", choices=choices
         )
     if dataset[coordinate_name].dtype.kind not in "iuf":
-        raise InvalidValue("on", coordinate_name, "must be a coordinate of numbers")
+        raise InvalidValue("on", coordinate_name, "must be a numeric coordinate")
     return str(dataset[coordinate_name].dims[0])
 
 

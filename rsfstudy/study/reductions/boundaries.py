@@ -254,7 +254,10 @@ class Inverse(Reduction):
             vectorize=True,
         )
         note = f"{self.on} at which {self.of} reaches {self.levels}"
-        missed = "places where a curve through the cells may be, and uncertainty of the level"
+        missed = (
+            "range of possible crossings of the curve through the cells, and uncertainty of "
+            "the level"
+        )
         return xr.Dataset(
             {
                 self.name: crossing.assign_attrs(comment=note),

@@ -62,7 +62,7 @@ class Difference(Reduction):
     reference: str | float = ""
     kind: ClassVar[str] = "difference"
     unit_fields: ClassVar[UnitFieldsByResultSuffix] = {"": ("of",)}
-    formula: ClassVar[str] = "{of} less {reference}"
+    formula: ClassVar[str] = "{of} minus {reference}"
 
     def compare(self, values: xr.DataArray, reference: xr.DataArray) -> xr.DataArray:
         """Subtract the reference from the values.
@@ -196,7 +196,7 @@ class RelativeDifference(Difference):
 
     kind: ClassVar[str] = "relative_difference"
     unit_fields: ClassVar[UnitFieldsByResultSuffix] = {}
-    formula: ClassVar[str] = "1 - {of} over {reference}"
+    formula: ClassVar[str] = "1 - {of} / {reference}"
 
     def compare(self, values: xr.DataArray, reference: xr.DataArray) -> xr.DataArray:
         """Compute the relative difference.
@@ -316,7 +316,7 @@ class Range(Reduction):
         )
         found = (of.max(dimension) - of.min(dimension)).where(known)
         span = "" if self.within is None else " from {:g} to {:g}".format(*self.within)
-        note = f"largest less least {self.of} over {self.over}{span}"
+        note = f"largest minus smallest {self.of} along {self.over}{span}"
         return xr.Dataset({self.name: found.assign_attrs(comment=note)})
 
     def derivatives(self, dataset: xr.Dataset) -> DerivativesByVariable:
@@ -389,7 +389,9 @@ class ClosedFormRatio(Reduction):
     def __post_init__(self) -> None:
         """Check that the closed-form solution exists."""
         if self.form not in CLOSED_FORMS:
-            raise InvalidValue("form", self.form, "is no closed form", choices=CLOSED_FORMS)
+            raise InvalidValue(
+                "form", self.form, "is not a closed-form solution", choices=CLOSED_FORMS
+            )
 
     def __call__(self, dataset: xr.Dataset) -> xr.Dataset:
         """Compute the ratio in each cell.
@@ -410,7 +412,7 @@ class ClosedFormRatio(Reduction):
             return xr.Dataset()
         exact = self._evaluate_closed_form(dataset)
         note = f"{form.formula}: {form.literature_citation}"
-        ratio = (dataset[self.of] / exact).assign_attrs(comment=f"{self.of} over {note}")
+        ratio = (dataset[self.of] / exact).assign_attrs(comment=f"{self.of} divided by {note}")
         beside = {f"{self.name}_closed_form": exact.assign_attrs(comment=note)}
         return xr.Dataset({self.name: ratio, **beside})
 

@@ -12,6 +12,7 @@ from typing import ClassVar
 import numpy as np
 import xarray as xr
 
+from rsfstudy._deprecation import accept_former_keyword_names, add_former_member_names
 from rsfstudy.error_boundary import wrap_methods_in_error_boundary
 from rsfstudy.study.reductions.base import (
     DerivativesByVariable,
@@ -142,7 +143,7 @@ class LinearFit(Reduction):
         span = "all {on}" if self.within is None else "{0:g} <= {on} <= {1:g}"
         span = span.format(*(self.within or ()), on=self.on)
         law = self.formula.format(**vars(self))
-        result = self.results(f"least squares of {law} over {span}", found)
+        result = self.results(f"least-squares fit of {law} for {span}", found)
         return result.drop_vars([c for c in result.coords if dimension in result[c].dims])
 
     def derivatives(self, dataset: xr.Dataset) -> DerivativesByVariable:
@@ -212,19 +213,21 @@ class LinearFit(Reduction):
         return on
 
 
+@accept_former_keyword_names
+@add_former_member_names
 @wrap_methods_in_error_boundary
 @dataclass(frozen=True)
 class ProportionalFit(LinearFit):
     """Linear fit with a fixed intercept.
 
-    The equation ``of - minus = name * on`` is fitted by unweighted least squares. If the intercept
-    ``minus`` is not 0, as in ``V_0/V_* - 1``, the variable and the slope are regarded as
+    The equation ``of - intercept = name * on`` is fitted by unweighted least squares. If the
+    intercept is not 0, as in ``V_0/V_* - 1``, the variable and the slope are regarded as
     dimensionless.
 
     Parameters
     ----------
     name : str
-        Name of the slope in ``of - minus = name * on``.
+        Name of the slope in ``of - intercept = name * on``.
     of : str
         Name of the variable to fit.
     on : str
@@ -232,7 +235,7 @@ class ProportionalFit(LinearFit):
     within : tuple of (float, float), optional
         Range of coordinate values that are fitted, including both ends. By default, all values of
         the coordinate are fitted.
-    minus : float, default: 0.0
+    intercept : float, default: 0.0
         Value of the variable at the origin of the coordinate.
 
     Examples
@@ -243,15 +246,15 @@ class ProportionalFit(LinearFit):
     ...     {"step": ("ratio", [1.5, 2.0]), "status": ("ratio", [0, 0])},
     ...     coords={"ratio": [1.0, 2.0]},
     ... )
-    >>> fit = ProportionalFit(name="zeta", of="step", on="ratio", minus=1.0)
+    >>> fit = ProportionalFit(name="zeta", of="step", on="ratio", intercept=1.0)
     >>> float(fit(dataset)["zeta"])
     0.5
     """
 
-    minus: float = 0.0
+    intercept: float = 0.0
     parameter_count: ClassVar[int] = 1
     kind: ClassVar[str] = "proportional_fit"
-    formula: ClassVar[str] = "{of} = {minus:g} + {name} * {on}"
+    formula: ClassVar[str] = "{of} = {intercept:g} + {name} * {on}"
 
     def centre_values(self, values: xr.DataArray, dimension: str) -> xr.DataArray:
         """Return the values unchanged, because the intercept is fixed.
@@ -283,7 +286,7 @@ class ProportionalFit(LinearFit):
         xarray.DataArray
             Values minus the intercept.
         """
-        return values - self.minus
+        return values - self.intercept
 
 
 @wrap_methods_in_error_boundary

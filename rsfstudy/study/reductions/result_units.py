@@ -63,12 +63,12 @@ def describe_reduction_results(
         )
         across = {*of.dims} - {*reduction_results[name].dims} | {vars(reduction).get("along")}
         if varied := find_varying_scale(dataset, f"{of.attrs.get('scale')} {scale}", across):
-            why = f"; of cells in units of {varied}, which varies"
+            why = f"; combines cells in units of {varied}, which varies between the cells"
             reduction_results[name].attrs["comment"] = (
                 reduction_results[name].attrs.get("comment", "") + why
             )
         # A fit with a fixed dimensionless intercept applies to dimensionless values.
-        scale = "" if varied or scale == "1" or vars(reduction).get("minus") else scale
+        scale = "" if varied or scale == "1" or vars(reduction).get("intercept") else scale
         about = find_quantity(name, found)
         if not end and name not in stated and (about.units, about.scale) != (units, scale):
             about = Quantity(name, "", units, name.replace("_", " "))  # same name, other quantity

@@ -40,7 +40,7 @@ class SobolIndices(Reduction):
     ----------
     name : str
         Prefix of the names of the results, which are ``<name>_first_order`` and ``<name>_total``.
-        The bounds of their confidence intervals have the suffixes ``_low`` and ``_high``. The
+        The bounds of their confidence intervals have the suffixes ``_ci_low`` and ``_ci_high``. The
         results have the dimension ``input``, whose labels are the sampled quantities.
     of : str
         Name of the variable whose variance is analysed.
@@ -69,7 +69,7 @@ class SobolIndices(Reduction):
     >>> indices = SobolIndices(name="sobol", of="drop")(dataset)
     >>> indices["input"].values.tolist()
     ['a', 'b']
-    >>> "sobol_total_high" in indices
+    >>> "sobol_total_ci_high" in indices
     True
     """
 
@@ -87,8 +87,9 @@ class SobolIndices(Reduction):
         for order in _SOBOL_INDEX_NAMES:
             text = f"{order.replace('_', '-')} Sobol index of {self.of.replace('_', ' ')}"
             yield f"{self.name}_{order}", text
-            for end in ("low", "high"):
-                yield f"{self.name}_{order}_{end}", f"{end} end of the 95 % interval of the {text}"
+            for end, word in (("ci_low", "lower"), ("ci_high", "upper")):
+                about = f"{word} end of the 95 % confidence interval of the {text}"
+                yield f"{self.name}_{order}_{end}", about
 
     def __call__(self, dataset: xr.Dataset) -> xr.Dataset:
         """Compute the indices for each point along the other dimensions.
@@ -118,14 +119,14 @@ class SobolIndices(Reduction):
             if not bool(bad.isel(dict(zip(others, place, strict=True)))) and np.ptp(values) > 0.0:
                 found[place] = _indices_with_intervals(values.reshape(-1, d + 2).T)
         lost = int(of.isnull().sum())
-        about = {"comment": f"samples drawn anew {_BOOTSTRAP_RESAMPLES} times for the intervals"}
+        about = {"comment": f"confidence intervals from {_BOOTSTRAP_RESAMPLES} bootstrap resamples"}
         if lost:
             about["refused"] = (
-                f"{lost} of {of.size} cells have no number, and the indices need all: narrower "
-                "distributions, away from where answers end, may have them"
+                f"{lost} of {of.size} cells have no value, but the indices require all cells. Use "
+                "narrower distributions"
             )
         elif np.isnan(found).any():
-            about["refused"] = f"cells failed, or {self.of} is the same everywhere"
+            about["refused"] = f"cells failed, or {self.of} has the same value in all cells"
         names = iter(name for name, _text in self._result_descriptions())
         return xr.Dataset(
             {
@@ -139,13 +140,16 @@ class SobolIndices(Reduction):
     def _sampled_inputs(self, dataset: xr.Dataset) -> list[str]:
         """Return the names of the sampled quantities."""
         if self.over not in dataset[self.of].dims:
-            raise InvalidValue("over", self.over, f"is no dimension of {self.of}")
+            raise InvalidValue("over", self.over, f"is not a dimension of {self.of}")
         drawn: dict[str, Any] = json.loads(dataset[self.over].attrs.get("drawn", "{}"))
         inputs = list(drawn.get("of", ()))
         points, rest = divmod(dataset.sizes[self.over], len(inputs) + 2)
         if drawn.get("method") != "saltelli" or rest or points & (points - 1):
-            rule = "was not drawn for Sobol indices, or only a part of it is here"
-            remedy = "Draw it by Axis.samples(..., n, method='saltelli'), n a power of two."
+            rule = "was not drawn for Sobol indices, or is incomplete"
+            remedy = (
+                "Draw the samples with Axis.samples(..., n, method='saltelli'), where n is "
+                "a power of two."
+            )
             raise InvalidValue("over", self.over, rule, remedy=remedy)
         return inputs
 

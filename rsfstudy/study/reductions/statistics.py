@@ -52,8 +52,8 @@ class _SampleStatistic(Reduction):
 
     over: str = "sample"
     long_names: ClassVar[Mapping[str, str]] = {
-        "_stderr": "standard error, by sampling, of {name}",
-        "_points": "samples with a number for {name}",
+        "_stderr": "sampling standard error of {name}",
+        "_points": "number of samples with a value of {name}",
     }
     unit_fields: ClassVar[UnitFieldsByResultSuffix] = {"": ("of",), "_stderr": ("of",)}
     #: Description of the statistic for the attribute ``comment`` of the results.
@@ -82,7 +82,7 @@ class _SampleStatistic(Reduction):
         TypeError
             If a subclass does not override this method.
         """
-        raise TypeError(f"{type(self).__name__} is no statistic")
+        raise TypeError(f"{type(self).__name__} does not define compute")
 
     def __call__(self, dataset: xr.Dataset) -> xr.Dataset:
         """Compute the statistic along the dimension of the samples.
@@ -108,11 +108,14 @@ class _SampleStatistic(Reduction):
         count = of.notnull().sum(self.over)
         bad = refused_result_mask(dataset, self.of, self.over)
         if varied := find_varying_scale(dataset, of.attrs.get("scale", ""), {self.over}):
-            bad, why = xr.ones_like(bad), f"{self.of} is in units of {varied}, which varies"
+            bad, why = (
+                xr.ones_like(bad),
+                (f"{self.of} is in units of {varied}, which varies between the samples"),
+            )
         elif bool(bad.any()):
             why = "samples failed or are missing"
         elif bool((count < self.min_samples).any()):
-            why = f"needs {self.min_samples} samples with a number"
+            why = f"requires at least {self.min_samples} samples with a value"
         known, said = (count >= self.min_samples) & ~bad, {"refused": why} if why else {}
         value, stderr = (
             result.where(known).drop_attrs(deep=False).assign_attrs(said)
@@ -433,7 +436,7 @@ class Quantile(_SampleStatistic):
         )
         down, up = found[self.name] - low, high - found[self.name]
         error = down.where(down > up, up)
-        note = "by quantiles of values less and plus errors"
+        note = "from quantiles of the values minus and plus their errors"
         error = error.where(abs(error) < np.inf).assign_attrs(comment=note)
         return found.assign({f"{self.name}_error": error})
 
@@ -485,14 +488,14 @@ class StatusShares(Reduction):
     kind: ClassVar[str] = "status_shares"
     uses_failed_cells: ClassVar[bool] = True
     long_names: ClassVar[Mapping[str, str]] = {
-        "": "share of samples that ended so",
-        "_stderr": "standard error, by sampling, of {name}",
+        "": "fraction of samples with this status",
+        "_stderr": "sampling standard error of {name}",
     }
 
     @property
     def quantities(self) -> Sequence[Quantity]:
         """Quantities that describe the shares, their errors and the new dimension."""
-        return [*super().quantities, Quantity("ended", "", "", "status with which a sample ended")]
+        return [*super().quantities, Quantity("ended", "", "", "status of a sample")]
 
     def support_status(self, status: xr.DataArray) -> xr.DataArray:
         """Replace the status of all computed cells by ``OK``.
@@ -584,7 +587,7 @@ class Logarithm(Reduction):
         """
         of = dataset[self.of]
         logarithm: xr.DataArray = xr.apply_ufunc(np.log, of.where(of > 0.0))
-        note = {"comment": f"natural logarithm of {self.of} in its unit"}
+        note = {"comment": f"natural logarithm of the numerical value of {self.of}"}
         return xr.Dataset({self.name: logarithm.drop_attrs(deep=False).assign_attrs(note)})
 
     def derivatives(self, dataset: xr.Dataset) -> DerivativesByVariable:
@@ -614,6 +617,6 @@ def _select_sampled_variable(
     """
     of = dataset[reduction.of].reset_coords(drop=True)
     if reduction.over not in of.dims:
-        rule = f"is no dimension of {reduction.of}"
+        rule = f"is not a dimension of {reduction.of}"
         raise InvalidValue("over", reduction.over, rule, choices=map(str, of.dims))
     return of

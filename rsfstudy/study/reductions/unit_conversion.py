@@ -76,7 +76,10 @@ class InUnits(Reduction):
         InvalidValue
             If the variable has no scale.
         """
-        about = {"units": self.units, "comment": f"{self.of}, each cell by its own scales"}
+        about = {
+            "units": self.units,
+            "comment": f"{self.of}, converted in each cell with the scales of the cell",
+        }
         values = (dataset[self.of] * self._scale_factor(dataset)).drop_attrs(deep=False)
         return xr.Dataset({self.name: values.assign_attrs(about)})
 
@@ -100,7 +103,9 @@ class InUnits(Reduction):
         """Compute the scale of each cell in the requested units."""
         scale = DatasetUnits(dataset).scale_of(self.of)
         if scale is None:
-            raise InvalidValue("of", self.of, "is a pure number, in no units of a rig")
+            raise InvalidValue(
+                "of", self.of, "has no scale, so it cannot be converted to units of a rig"
+            )
         return xr.DataArray(
             scale.factor / float(compute_conversion_factor(self.name, self.units, scale.units))
         )

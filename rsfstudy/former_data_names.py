@@ -1,0 +1,190 @@
+"""Former names of variables and fields in files, and of columns in tables.
+
+Variables and declarations of older files are renamed when a file is read. The former name of a
+column still selects the column of a table, with a ``DeprecationWarning``, until version 1.0.0.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any, ClassVar
+
+import pandas as pd
+import xarray as xr
+
+from rsfstudy._deprecation import warn_renamed
+
+#: New names of variables, by former name and by the beginning of the ``long_name`` that the
+#: variable had. The ``long_name`` excludes user-defined variables of the same name.
+_NEW_NAME_BY_FORMER_NAME_AND_DESCRIPTION = {
+    ("criterion", "Akaike's criterion"): "aic",
+    ("whiteness", "chance of as much correlation"): "p_value",
+    ("effective_samples", "number of independent samples"): "n_eff",
+    ("innovation", "residual freed of correlation"): "whitened_residual",
+    ("noise_size", "standard deviation of the noise"): "noise_sd",
+}
+#: Former suffixes of the ends of confidence intervals, with their new suffixes, and the beginnings
+#: of the ``long_name`` that these variables had.
+_NEW_SUFFIX_BY_FORMER_SUFFIX = {"_low": "_ci_low", "_high": "_ci_high"}
+_FORMER_DESCRIPTIONS_OF_INTERVAL_ENDS = tuple(
+    f"{end} end of the 95 % interval of the" for end in ("lower", "upper", "low", "high")
+)
+#: New names of the fields of claims and of reductions, and of the outputs of measures.
+_NEW_CLAIM_FIELDS = {
+    "minus": "baseline",
+    "minus_variable": "baseline_variable",
+    "because": "difference_reason",
+}
+_NEW_FIELDS_BY_REDUCTION_KIND = {
+    "proportional_fit": {"minus": "intercept"},
+    "spread": {"on": "over"},
+}
+_NEW_REDUCTION_KINDS = {"spread": "range"}
+_NEW_OUTPUTS_BY_MEASURE = {"synthetic_fit": {"criterion": "aic"}}
+#: New names of the columns of the table of verdicts, by former name.
+NEW_VERDICT_COLUMNS: Mapping[str, str] = {
+    "ours": "computed",
+    "moved": "verdict_changed",
+    "because": "difference_reason",
+}
+
+
+def rename_former_fields(declaration: Any) -> Any:
+    """Replace the former names in the stored declaration of a study.
+
+    Parameters
+    ----------
+    declaration : object
+        Declaration as plain data. Invalid data are returned unchanged.
+
+    Returns
+    -------
+    object
+        Declaration with the current names of the fields.
+    """
+    if not isinstance(declaration, Mapping):
+        return declaration
+    current = dict(declaration)
+    measure = current.get("measure")
+    name = measure.get("name") if isinstance(measure, Mapping) else None
+    outputs = _NEW_OUTPUTS_BY_MEASURE.get(name, {}) if isinstance(name, str) else {}
+    for key, rename in (("claims", _rename_claim_fields), ("reductions", _rename_reduction_fields)):
+        if isinstance(listed := current.get(key), list):
+            current[key] = [
+                rename(one, outputs) if isinstance(one, Mapping) else one for one in listed
+            ]
+    return current
+
+
+def _rename_claim_fields(claim: Mapping[str, Any], outputs: Mapping[str, str]) -> dict[str, Any]:
+    """Replace the former names of the fields of a claim."""
+    current = {_NEW_CLAIM_FIELDS.get(key, key): value for key, value in claim.items()}
+    return _rename_outputs(current, ("variable", "baseline_variable"), outputs)
+
+
+def _rename_reduction_fields(
+    reduction: Mapping[str, Any], outputs: Mapping[str, str]
+) -> dict[str, Any]:
+    """Replace the former names of the kind and the fields of a reduction."""
+    kind = reduction.get("kind")
+    if not isinstance(kind, str):
+        return dict(reduction)
+    new = _NEW_FIELDS_BY_REDUCTION_KIND.get(kind, {})
+    current = {new.get(key, key): value for key, value in reduction.items()}
+    current["kind"] = _NEW_REDUCTION_KINDS.get(kind, kind)
+    return _rename_outputs(current, ("of",), outputs)
+
+
+def _rename_outputs(
+    fields: dict[str, Any], keys: tuple[str, ...], outputs: Mapping[str, str]
+) -> dict[str, Any]:
+    """Replace the former names of outputs in the values of the given fields."""
+    for key in keys:
+        if isinstance(name := fields.get(key), str):
+            fields[key] = outputs.get(name, name)
+    return fields
+
+
+def rename_former_variables(dataset: xr.Dataset) -> xr.Dataset:
+    """Rename the variables of a dataset that have a former name.
+
+    Parameters
+    ----------
+    dataset : xarray.Dataset
+        Contents of a file.
+
+    Returns
+    -------
+    xarray.Dataset
+        Dataset whose variables have their current names. If no variable has a former name, the
+        function returns the same object.
+    """
+    new = {
+        name: current
+        for name, values in dataset.data_vars.items()
+        if (current := _current_name(str(name), str(values.attrs.get("long_name", "")))) != name
+    }
+    if not new:
+        return dataset
+    renamed = dataset.rename_vars(new)
+    for values in renamed.variables.values():
+        if named := str(values.attrs.get("ancillary_variables", "")).split():
+            values.attrs["ancillary_variables"] = " ".join(new.get(name, name) for name in named)
+    return renamed
+
+
+def _current_name(variable_name: str, description: str) -> str:
+    """Return the current name of a variable."""
+    for (former, beginning), new in _NEW_NAME_BY_FORMER_NAME_AND_DESCRIPTION.items():
+        if variable_name == former and description.startswith(beginning):
+            return new
+    for former, new in _NEW_SUFFIX_BY_FORMER_SUFFIX.items():
+        if (
+            variable_name.endswith(former)
+            and not variable_name.endswith(new)
+            and description.startswith(_FORMER_DESCRIPTIONS_OF_INTERVAL_ENDS)
+        ):
+            return variable_name.removesuffix(former) + new
+    return variable_name
+
+
+class TableWithFormerColumns(pd.DataFrame):
+    """Data frame whose columns can also be selected by their former names.
+
+    A selection is an ordinary data frame with the requested names. A subclass defines
+    ``NEW_COLUMNS``.
+    """
+
+    #: New column names by former name. A key that begins with an underscore is a suffix.
+    NEW_COLUMNS: ClassVar[Mapping[str, str]] = {}
+
+    @property
+    def _constructor(self) -> type[pd.DataFrame]:
+        """Class of the data frames that result from selections in the table."""
+        return pd.DataFrame
+
+    def _find_column(self, key: Any) -> Any:
+        """Return the current name of a column, and warn if the key is a former name."""
+        if not isinstance(key, str) or key in self.columns:
+            return key
+        for former, new in self.NEW_COLUMNS.items():
+            is_match = key.endswith(former) if former.startswith("_") else key == former
+            current = key.removesuffix(former) + new
+            if is_match and current in self.columns:
+                warn_renamed(key, current, "the table")
+                return current
+        return key
+
+    def __getitem__(self, key: Any) -> Any:
+        """Select a column, several columns, or rows."""
+        if isinstance(key, list):
+            names = [self._find_column(one) for one in key]
+            selected = super().__getitem__(names)
+            return selected if names == key else selected.set_axis(key, axis="columns")
+        return super().__getitem__(self._find_column(key))
+
+    def __getattr__(self, name: str) -> Any:  # type: ignore[misc]
+        """Return a column as an attribute."""
+        if not name.startswith("_") and (current := self._find_column(name)) != name:
+            return self[current]
+        return super().__getattr__(name)
