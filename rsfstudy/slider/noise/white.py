@@ -59,7 +59,8 @@ class WhiteNoise(Noise):
 
     References
     ----------
-    Wong and Zakai (1965), Ann. Math. Stat. 36, 1560-1564; Gualandi et al. (2023), Sci. Adv. 9.
+    Wong and Zakai (1965), Ann. Math. Stat. 36, 1560-1564; Gualandi et al.
+    (2023), Earth Planet. Sci. Lett. 604, 117995.
     """
 
     stress_noise: float = number(
@@ -149,7 +150,7 @@ class WhiteNoise(Noise):
         first = math.floor(start / interval + _MIN_DISTANCE_OVER_INTERVAL)
         stop, late = end / interval - _MIN_DISTANCE_OVER_INTERVAL, start - first * interval
         while first < stop:
-            count = int(min(_SAMPLES_PER_BLOCK, math.ceil(stop - first)))
+            count = math.ceil(min(stop - first, _SAMPLES_PER_BLOCK))
             times = interval * np.arange(first, first + count + 1)
             times[0] += late
             if first + count >= stop:
