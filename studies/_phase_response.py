@@ -2,7 +2,8 @@ r"""Phase response of a limit cycle, and the recurrence times of a slider with w
 
 A small change of the spring stress :math:`f` at some point of the cycle shifts all later events in
 time. The phase response :math:`Z` is the time by which they come earlier, per unit change of each
-unknown. It is the periodic solution of the adjoint of the linearised equations :math:`dy/dt = F(y)`,
+unknown. The phase response is the periodic solution of the adjoint of the linearised equations
+:math:`dy/dt = F(y)`,
 
 .. math::
 
