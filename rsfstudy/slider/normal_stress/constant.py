@@ -31,10 +31,10 @@ class ConstantNormalStress(NormalStress):
 
         See ``Part.check``.
         """
-        if scene.parts.loading.changes_normal_stress:
+        if scene.changes_normal_stress:
             remedy = (
                 "Set normal_stress='imposed', or normal_stress='variable' if it also "
                 "depends on shear stress."
             )
-            rule = "cannot be combined with a loading that changes normal stress"
+            rule = "cannot be combined with a loading or noise that changes normal stress"
             raise InvalidValue("normal_stress", self.name, rule, remedy=remedy)
