@@ -171,3 +171,14 @@ def test_declarations_of_older_files_are_understood():
         older["claims"][0][former] = older["claims"][0].pop(new)
     assert parse_declaration(older) == parse_declaration(json.loads(json.dumps(declared)))
     assert older["claims"][0]["because"] == "a misprint"
+
+
+def test_claims_on_intervals_of_sobol_indices_are_understood():
+    declared = study_loader.load_study("what_matters").describe()
+    current = json.loads(json.dumps(declared))
+    older = json.loads(json.dumps(declared))
+    renamed = [one for one in older["claims"] if "_ci_" in one["variable"]]
+    for claim in renamed:
+        claim["variable"] = claim["variable"].replace("_ci_", "_")
+    assert renamed
+    assert parse_declaration(older) == parse_declaration(current)
