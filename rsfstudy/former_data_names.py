@@ -40,7 +40,12 @@ _NEW_FIELDS_BY_REDUCTION_KIND = {
     "spread": {"on": "over"},
 }
 _NEW_REDUCTION_KINDS = {"spread": "range"}
-_NEW_OUTPUTS_BY_MEASURE = {"synthetic_fit": {"criterion": "aic"}}
+_NEW_OUTPUTS_BY_MEASURE = {
+    "synthetic_fit": {"criterion": "aic"},
+    "fit": {
+        former: new for (former, _text), new in _NEW_NAME_BY_FORMER_NAME_AND_DESCRIPTION.items()
+    },
+}
 #: New names of the columns of the table of verdicts, by former name.
 NEW_VERDICT_COLUMNS: Mapping[str, str] = {
     "ours": "computed",
@@ -67,13 +72,29 @@ def rename_former_fields(declaration: Any) -> Any:
     current = dict(declaration)
     measure = current.get("measure")
     name = measure.get("name") if isinstance(measure, Mapping) else None
-    outputs = _NEW_OUTPUTS_BY_MEASURE.get(name, {}) if isinstance(name, str) else {}
+    outputs = dict(_NEW_OUTPUTS_BY_MEASURE.get(name, {})) if isinstance(name, str) else {}
+    outputs |= _new_names_of_sobol_intervals(current.get("reductions"))
     for key, rename in (("claims", _rename_claim_fields), ("reductions", _rename_reduction_fields)):
         if isinstance(listed := current.get(key), list):
             current[key] = [
                 rename(one, outputs) if isinstance(one, Mapping) else one for one in listed
             ]
     return current
+
+
+def _new_names_of_sobol_intervals(reductions: Any) -> dict[str, str]:
+    """Return the new names of the confidence intervals of Sobol indices."""
+    names = [
+        reduction.get("name")
+        for reduction in (reductions if isinstance(reductions, list) else [])
+        if isinstance(reduction, Mapping) and reduction.get("kind") == "sobol_indices"
+    ]
+    return {
+        f"{name}_{order}{former}": f"{name}_{order}{new}"
+        for name in names
+        for order in ("first_order", "total")
+        for former, new in _NEW_SUFFIX_BY_FORMER_SUFFIX.items()
+    }
 
 
 def _rename_claim_fields(claim: Mapping[str, Any], outputs: Mapping[str, str]) -> dict[str, Any]:

@@ -105,9 +105,9 @@ def interval_claim(name: str, order: str, end: str) -> Claim:
     where = "begins below" if end == "low" else "ends above"
     return Claim(
         id="W1",
-        statement=f"displacement: interval of the {order} index of {name} {where} 1/2",
+        statement=f"displacement: confidence interval of the {order} index of {name} {where} 1/2",
         source="ln(D_c a/(b - a)), a difference of two logarithms of equal variance",
-        variable=f"displacement_{order}_{end}",
+        variable=f"displacement_{order}_ci_{end}",
         where={"input": name},
         relation="below" if end == "low" else "above",
         published=0.5,

@@ -221,7 +221,7 @@ def test_a_scheduler_by_tls():
 )
 def test_a_scheduler_that_does_not_answer_is_named(address):
     with (
-        pytest.raises(RunError, match=re.escape(f"no Dask scheduler answers at {address!r}")),
+        pytest.raises(RunError, match=re.escape(f"no Dask scheduler responds at {address!r}")),
         clusters.connect_to_cluster(address, timeout=0.3),
     ):
         pass
@@ -231,7 +231,7 @@ def test_a_port_that_listens_and_says_nothing():
     with socket.create_server(("127.0.0.1", 0)) as server:
         address = f"tcp://127.0.0.1:{server.getsockname()[1]}"
         with (
-            pytest.raises(RunError, match="no Dask scheduler answers"),
+            pytest.raises(RunError, match="no Dask scheduler responds"),
             clusters.connect_to_cluster(address, timeout=0.3),
         ):
             pass

@@ -17,10 +17,12 @@ from study_runs import call_main, have_same_numbers, run
 import rsfstudy
 from rsfstudy.execution import provenance
 from rsfstudy.former_data_names import rename_former_variables
+from rsfstudy.reporting.fit_tables import FitTable
 from rsfstudy.status import Status
 from rsfstudy.storage import schema
 from rsfstudy.storage.declarations import parse_declaration
 from rsfstudy.study import study_loader
+from rsfstudy.study.verdict_table import VerdictTable
 
 #: Files written by rsfstudy 0.1.0, before files contained a layout number: a study with its
 #: journal and as a Zarr store, a named study narrowed with --set, a study with failed cells, and
@@ -171,3 +173,33 @@ def test_declarations_of_older_files_are_understood():
         older["claims"][0][former] = older["claims"][0].pop(new)
     assert parse_declaration(older) == parse_declaration(json.loads(json.dumps(declared)))
     assert older["claims"][0]["because"] == "a misprint"
+
+
+def test_claims_on_intervals_of_sobol_indices_are_understood():
+    declared = study_loader.load_study("what_matters").describe()
+    current = json.loads(json.dumps(declared))
+    older = json.loads(json.dumps(declared))
+    renamed = [one for one in older["claims"] if "_ci_" in one["variable"]]
+    for claim in renamed:
+        claim["variable"] = claim["variable"].replace("_ci_", "_")
+    assert renamed
+    assert parse_declaration(older) == parse_declaration(current)
+
+
+def test_former_columns_of_tables_are_selected_with_a_warning():
+    verdicts = VerdictTable({"id": ["C1"], "computed": [2.0], "verdict_changed": [True]})
+    with pytest.warns(DeprecationWarning, match="'ours' of the table is now called 'computed'"):
+        assert verdicts["ours"].tolist() == [2.0]
+    with pytest.warns(DeprecationWarning, match="'moved'.*'verdict_changed'"):
+        assert verdicts.moved.tolist() == [True]
+    with pytest.warns(DeprecationWarning, match="'ours'.*'computed'"):
+        assert verdicts[["id", "ours"]].to_dict("list") == {"id": ["C1"], "ours": [2.0]}
+    fits = FitTable({"a": [0.01], "a_stderr": [1e-3], "aic": [5.0]})
+    with pytest.warns(DeprecationWarning, match="'a_std'.*'a_stderr'"):
+        assert fits[["a", "a_std"]].to_dict("list") == {"a": [0.01], "a_std": [1e-3]}
+    with pytest.warns(DeprecationWarning, match="'criterion'.*'aic'"):
+        assert fits.criterion.tolist() == [5.0]
+    with pytest.raises(KeyError, match="b_std"):
+        fits["b_std"]
+    with pytest.raises(AttributeError, match="because"):
+        verdicts.because  # noqa: B018

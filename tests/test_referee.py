@@ -164,7 +164,7 @@ def test_published_curves_pass_to_the_last_place_that_is_written(number):
         (
             2,
             lambda told, _p: {"slip_rate": told["slip_rate"] * 1e6},
-            "slip_rate is 1e+06 times the known answer. With this convention corrected, 1",
+            "slip_rate is 1e+06 times the reference value. With this convention corrected, 1",
         ),
         (
             12,
@@ -221,7 +221,7 @@ def test_conventions_of_the_problem_explain_a_difference(number, changes, explan
             lambda rate: -rate,
             "growth_rate has the opposite sign. With this convention corrected, 12.0 digits",
         ),
-        (lambda rate: rate / (2.0 * math.pi), "growth_rate is 1/(2 pi) times the known answer"),
+        (lambda rate: rate / (2.0 * math.pi), "growth_rate is 1/(2 pi) times the reference value"),
         # A factor combined with an offset would explain any value.
         (lambda rate: 1.7 * rate, "no common difference of conventions explains the disagreement"),
         (lambda rate: -1.3 * rate, "no common difference of conventions explains the disagreement"),
@@ -242,7 +242,7 @@ def test_a_factor_near_one_is_worded_by_its_difference_from_one(off, tmp_path):
     )
     sign = "-" if off < 0.0 else "+"
     said = " ".join(ran.stdout.split())
-    assert f"slip_rate is (1 {sign} 3e-07) times the known answer" in said
+    assert f"slip_rate is (1 {sign} 3e-07) times the reference value" in said
 
 
 def test_digits_that_do_not_pass_are_not_rounded_up(tmp_path):

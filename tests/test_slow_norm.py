@@ -70,7 +70,7 @@ def test_a_norm_near_the_load_point_is_told_once(capsys):
     print_file_summary(FileSummary(in_units, "falls.nc"))
     assert "3.142 um/s" in capsys.readouterr().out
     quiet = {"workers": 0, "output": None, "progress": False}
-    with pytest.warns(UserWarning, match=re.escape(f"2 of 2 answers: {SLOW}")) as told:
+    with pytest.warns(UserWarning, match=re.escape(f"2 of 2 results: {SLOW}")) as told:
         results = rsfstudy.run(STUDY, **quiet)
     assert len(told) == 1
     assert results.unstable.values.tolist() == [1.0, 1.0]

@@ -243,7 +243,7 @@ def connect_to_cluster(scheduler_address: str, *, timeout: float = 30.0) -> Iter
             client = Client(scheduler_address, timeout=timeout)
         except Exception as error:  # Dask raises errors of many types for a wrong address.
             raise RunError(
-                f"no Dask scheduler answers at {shorten_text(scheduler_address)!r}: "
+                f"no Dask scheduler responds at {shorten_text(scheduler_address)!r}: "
                 f"{shorten_text(error) or 'the connection timed out'}. Start one with `dask "
                 "scheduler` (the certificates for tls:// are read from the Dask configuration), "
                 "or omit --scheduler."

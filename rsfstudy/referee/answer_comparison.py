@@ -391,7 +391,7 @@ def _iterate_answers_in_other_conventions(
         if usual is not None:
             yield f"{name} {usual[0]}", reported | {name: reported[name] / usual[1]}
         elif several and math.isfinite(factor) and factor:
-            words = f"{name} is {_format_factor(factor)} times the known answer"
+            words = f"{name} is {_format_factor(factor)} times the reference value"
             yield words, reported | {name: reported[name] / factor}
         if several:
             apart = float(np.median(reported[name] - answer[name]))
@@ -418,7 +418,7 @@ def _find_common_conversion_factor(factor: float, tolerance: float) -> tuple[str
     for words, usual in _COMMON_CONVERSION_FACTOR_BY_NAME.items():
         if math.isclose(abs(factor), usual, rel_tol=tolerance):
             sign = "-" if factor < 0.0 else ""
-            return f"is {sign}{words} times the known answer", math.copysign(usual, factor)
+            return f"is {sign}{words} times the reference value", math.copysign(usual, factor)
     return None
 
 

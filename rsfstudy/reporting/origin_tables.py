@@ -133,4 +133,4 @@ def note_on_norms_near_load_velocity(dataset: xr.Dataset) -> str:
         return ""
     ok = dataset["message"].values[dataset["status"].values == int(Status.OK)]
     near = [text for text in ok.tolist() if text.startswith(CriticalStep.SLOW_NORM_WARNING_PREFIX)]
-    return f"{len(near)} of {pluralize(len(ok), 'answer')}: {near[0]}" if near else ""
+    return f"{len(near)} of {pluralize(len(ok), 'result')}: {near[0]}" if near else ""
