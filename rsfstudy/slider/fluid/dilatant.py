@@ -1,7 +1,8 @@
-"""Dilatancy with drainage (Segall and Rice 1995).
+"""Dilatancy or compaction with drainage (Segall and Rice 1995).
 
-Pores open when the slip rate increases. The pore pressure then falls until fluid flows in from the
-surroundings.
+If the dilatancy is positive, pores open when the slip rate increases. The pore pressure then falls
+until fluid flows in from the surroundings. If the dilatancy is negative, pores close when the slip
+rate increases, and the pore pressure rises.
 """
 
 from __future__ import annotations
@@ -15,6 +16,7 @@ from rsfstudy.slider.fluid import (
     Fluid,
     declare_dilatancy_field,
     declare_drainage_field,
+    declare_porosity_length_field,
 )
 from rsfstudy.slider.laws import lacks_critical_stiffness
 from rsfstudy.slider.parameter_layout import FLUID, LARGEST_LOG_SLOWNESS
@@ -29,8 +31,9 @@ def porosity_and_pressure_rates(
 
     The class ``Fluid`` describes the arguments. The states are the porosity
     :math:`(\varphi - \varphi_0)/(\beta \sigma_*)` and the pore pressure :math:`P`. The function
-    reads the dilatancy :math:`\epsilon/(\beta \sigma_*)` from ``p[FLUID]`` and the drainage
-    :math:`c^* D_c/V_*` from ``p[FLUID + 1]``.
+    reads the dilatancy :math:`\epsilon/(\beta \sigma_*)` from ``p[FLUID]``, the drainage
+    :math:`c^* D_c/V_*` from ``p[FLUID + 1]`` and the ratio :math:`D_c/L_\varphi` of the slip
+    distances of friction and porosity from ``p[FLUID + 2]``.
 
     Notes
     -----
@@ -38,16 +41,16 @@ def porosity_and_pressure_rates(
 
     .. math::
 
-        D_c \frac{d\varphi}{d\delta}
+        L_\varphi \frac{d\varphi}{d\delta}
           = -\left(\varphi - \varphi_0 - \epsilon \ln\frac{V}{V_*}\right), \quad
           \frac{dp}{dt} = c^* (p_\infty - p) - \frac{1}{\beta} \frac{d\varphi}{dt}.
 
     References
     ----------
-    Segall and Rice (1995), J. Geophys. Res. 100, 22155-22171.
+    Segall and Rice (1995), J. Geophys. Res. 100, 22155-22171, with :math:`L_\varphi = D_c`.
     """
     porosity, pressure = states
-    opening = slip_per_independent_variable * (p[FLUID] * log_slip_rate - porosity)
+    opening = slip_per_independent_variable * (p[FLUID] * log_slip_rate - porosity) * p[FLUID + 2]
     time = slip_per_independent_variable * math.exp(min(-log_slip_rate, LARGEST_LOG_SLOWNESS))
     return opening, -p[FLUID + 1] * time * pressure - opening
 
@@ -72,24 +75,31 @@ def steady_porosity_and_pressure(log_slip_rate: float, p: Numbers) -> Numbers:
 class DilatantFluid(Fluid):
     r"""Dilatant pore fluid with drainage to the surroundings.
 
-    The pores open when the slip rate increases, which decreases the pore pressure. The initial pore
-    pressure is the pressure of the surroundings, as in steady sliding.
+    The pores open when the slip rate increases, which decreases the pore pressure. If the dilatancy
+    is negative, the pores close when the slip rate increases, which increases the pore pressure.
+    The initial pore pressure is the pressure of the surroundings, as in steady sliding.
 
     Parameters
     ----------
     dilatancy : float, default: 0.01
         Dilatancy :math:`\epsilon/(\beta \sigma_*)`. Without drainage, an increase of :math:`\ln V`
-        by 1 decreases the pore pressure by the dilatancy, in units of :math:`\sigma_*`.
+        by 1 decreases the pore pressure by the dilatancy, in units of :math:`\sigma_*`. A negative
+        value describes compaction.
     drainage : float, default: 1.0
         Drainage rate :math:`c^* D_c/V_*`.
+    porosity_length : float, default: 1.0
+        Slip distance :math:`L_\varphi/D_c` over which the porosity approaches its steady value. The
+        slip distance of the friction law is :math:`D_c`.
 
     References
     ----------
-    Segall and Rice (1995), J. Geophys. Res. 100, 22155-22171.
+    Segall and Rice (1995), J. Geophys. Res. 100, 22155-22171, and, for compaction with a slip
+    distance of its own, Gualandi et al. (2023), Earth Planet. Sci. Lett. 604, 117995.
     """
 
     dilatancy: float = declare_dilatancy_field(0.01)
     drainage: float = declare_drainage_field()
+    porosity_length: float = declare_porosity_length_field()
 
     name = "dilatant"
     unknowns = (
@@ -118,11 +128,18 @@ class DilatantFluid(Fluid):
         r"""Compute an upper bound of the future pore pressure.
 
         See ``Fluid.highest_pressure``. The upper bound follows from the drainage rate and from the
-        largest rate at which pores can close. The largest closing rate is :math:`V (\varphi -
-        \varphi_0 - \epsilon \ln(V/V_*))`.
+        largest rate at which pores can close. The closing rate is :math:`V (\varphi - \varphi_0 -
+        \epsilon \ln(V/V_*)) D_c/L_\varphi`. If the dilatancy is negative, the porosity may first
+        increase while slip is slow, and the closing rate is largest when the slip rate increases
+        again. The upper bound therefore includes the steady porosity at the lowest slip rate.
         """
-        closing = max(states[0] - self.dilatancy * log_slip_rate, self.dilatancy)
-        return max(states[1], math.exp(log_slip_rate) * closing / self.drainage)
+        closing = max(
+            states[0] - self.dilatancy * log_slip_rate,
+            self.dilatancy,
+            -self.dilatancy * (LARGEST_LOG_SLOWNESS + log_slip_rate),
+        )
+        closing_rate = math.exp(log_slip_rate) * closing / self.porosity_length
+        return max(states[1], closing_rate / self.drainage)
 
     @property
     def effects(self) -> tuple[str, ...]:
@@ -130,8 +147,8 @@ class DilatantFluid(Fluid):
         return ("dilatancy",)
 
     def parameter_values(self, scene: SceneView) -> Numbers:
-        """Return the dilatancy and the drainage rate.
+        """Return the dilatancy, the drainage rate and the inverse of the length.
 
-        See ``Part.parameter_values``.
+        See ``Part.parameter_values``. The length is ``porosity_length``.
         """
-        return self.dilatancy, self.drainage
+        return self.dilatancy, self.drainage, 1.0 / self.porosity_length

@@ -16,6 +16,7 @@ from rsfstudy.slider.fluid import (
     Fluid,
     declare_dilatancy_field,
     declare_drainage_field,
+    declare_porosity_length_field,
 )
 from rsfstudy.slider.fluid.dilatant import (
     DilatantFluid,
@@ -88,6 +89,9 @@ class ThermalFluid(Fluid):
     dilatancy : float, default: 0.0
         Dilatancy :math:`\epsilon/(\beta \sigma_*)` (see ``DilatantFluid``). Without dilatancy, the
         porosity is not an unknown.
+    porosity_length : float, default: 1.0
+        Slip distance :math:`L_\varphi/D_c` over which the porosity evolves (see ``DilatantFluid``).
+        Without dilatancy, the slip distance has no effect.
 
     Notes
     -----
@@ -118,6 +122,7 @@ class ThermalFluid(Fluid):
     )
     dilatancy: float = declare_dilatancy_field(0.0)
     drainage: float = declare_drainage_field()
+    porosity_length: float = declare_porosity_length_field()
 
     name = "thermal"
 
@@ -156,12 +161,12 @@ class ThermalFluid(Fluid):
         return ("thermal_pressurisation", *("dilatancy",) * bool(self.dilatancy))
 
     def parameter_values(self, scene: SceneView) -> Numbers:
-        """Return the dilatancy and the drainage rate.
+        """Return the dilatancy, the drainage rate and the inverse of the length.
 
         See ``Part.parameter_values``. The pressurisation factor is a parameter of the part
         ``temperature``.
         """
-        return self.dilatancy, self.drainage
+        return DilatantFluid.parameter_values(self, scene)  # type: ignore[arg-type]
 
     def check(self, scene: SceneView) -> None:
         """Check that the temperature changes and that the stiffness ratio is defined.
