@@ -1,9 +1,14 @@
 r"""Deterministic model of the laboratory earthquakes of Gualandi et al. (2023).
 
 The model is a spring-slider with the slip law, radiation damping and a pore fluid. The pores close
-when the slip rate increases, and the porosity evolves over a slip distance of its own. Near 17 MPa
-and 20 MPa, the motion is chaotic although the loading is steady. The stochastic model of the paper
-adds white noise to shear stress and to effective normal stress, which this module does not do.
+when the slip rate increases, and the porosity evolves over a slip distance of its own. Between 16.6
+and 21.9 MPa, the cycle of one event is unstable, and long and short recurrence intervals alternate.
+The coefficient of variation (CV) of the intervals is then the difference of the two intervals
+divided by their sum. At all other normal stresses of the experiments, all intervals are equal.
+
+The stochastic model of the paper adds white noise to shear stress and to effective normal stress
+at constant slip rate, so the noise also acts on the state variable. Scenes with noise of stress
+differ from this model, because the slip rate responds to the noise immediately.
 
 Gualandi et al. denote the unknowns by :math:`x = \ln(V/V_0)`, :math:`y = (\tau - \mu_0 \sigma)/(a
 \sigma)`, :math:`z = (\varphi - \varphi_0)/(\lambda \beta \sigma)` and :math:`u = -p/(\lambda
