@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from rsfstudy.critical_steps.critical_step import CriticalStep
     from rsfstudy.critical_steps.triggered import Triggered
     from rsfstudy.fitting.fit_measure import Fit
+    from rsfstudy.limit_cycles.event_statistics import EventStatistics
     from rsfstudy.limit_cycles.limit_cycle import LimitCycle
     from rsfstudy.measure_base._declaration_checks import OutputValue, PlainValue
     from rsfstudy.measure_base.elasticities import Elasticities
@@ -35,6 +36,7 @@ else:
             "critical_steps.critical_step": ("CriticalStep",),
             "critical_steps.triggered": ("Triggered",),
             "fitting.fit_measure": ("Fit",),
+            "limit_cycles.event_statistics": ("EventStatistics",),
             "limit_cycles.limit_cycle": ("LimitCycle",),
             "measure_base._declaration_checks": ("OutputValue", "PlainValue"),
             "measure_base.elasticities": ("Elasticities",),
@@ -52,6 +54,7 @@ else:
 __all__ = [
     "CriticalStep",
     "Elasticities",
+    "EventStatistics",
     "Fit",
     "Healing",
     "LimitCycle",

@@ -106,6 +106,7 @@ MOTION_STATE_DTYPE = np.dtype(
         ("unknowns_fast", "i8"),  # number of unknowns in ruptures
         ("states", "i8"),  # number of states
         ("unknowns_behind_fluid", "i8"),  # number of fluid unknowns, which are last
+        ("noise_rate_index", "i8"),  # index of the rate of noise in the parameters, or 0
     ]
 )
 #: Byte formats of two groups of fields of the motion state: the arguments and the counters. Packing

@@ -141,7 +141,7 @@ def _reset_loading_unknowns(scene: Scene, states: Numbers) -> Numbers:
     The unknowns of the loading follow the states of the friction law and the temperature. Unknowns
     of the previous loading are removed.
     """
-    begun, parts = scene.parts.loading.initial_unknowns(scene), scene.parts
+    begun, parts = scene.stress_loading.initial_unknowns(scene), scene.parts
     kept = parts.law.state_count + len(parts.temperature.unknowns)
     return (*states[:kept], *begun, *states[kept + len(begun) : scene.state_count])
 

@@ -21,6 +21,7 @@ from rsfstudy.motion.motion_driver import MotionDriver, get_motion_driver
 from rsfstudy.motion.recording import Recording
 from rsfstudy.motion.regime_switching import compute_switch_thresholds, inertia_matters_at
 from rsfstudy.motion.segment_chains import (
+    begin_noise,
     drop_settling_if_unstable,
     find_remaining_segment_chains,
     iterate_segment_start_events,
@@ -351,6 +352,7 @@ class Integrator:
         """
         chains = list_segment_chains(scene, only_last_segment=start is not None)
         with_time = with_time or until < math.inf or len(chains) > 1 or len(chains[0][1]) > 1
+        with_time = with_time or scene.parts.noise.is_active
         time, slip, before, told = 0.0, 0.0, None, scene.parts.loading.reported_segment_count
         if resume_from is not None:
             chains, start = find_remaining_segment_chains(scene, resume_from)
@@ -363,7 +365,10 @@ class Integrator:
             is_last = number == len(chains) - 1
             asked = select_event_specs(scene, acting, event_specs, is_last_chain=is_last)
             table = truncate_segments_at(table, until)
-            end = float(table[-1, SEGMENT_END])
+            end, further, parameters = float(table[-1, SEGMENT_END]), iter(()), None
+            if scene.parts.noise.is_active:
+                start, parameters, table, further = begin_noise(acting, start, table)
+                told = 0  # Every loading segment starts a chain, which reports its start.
             motion = get_motion_driver(
                 acting, self.engine, self.accuracy.methods, with_time=with_time
             ).iterate_events(
@@ -382,6 +387,8 @@ class Integrator:
                 initial_imposed_stress=acting.parameter_values[LOADING + 2]
                 if acting.parts.loading.has_load_point_unknown
                 else None,
+                parameters=parameters,
+                further_kinks=further,
             )
             motion = drop_settling_if_unstable(scene, motion)
             if before is None and end == math.inf:  # The motion consists of a single chain.

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Iterator, Sequence
+from itertools import islice
 from typing import Any
 
 import numpy as np
@@ -47,6 +48,8 @@ _MIN_EVENT_ROWS, _RECORDING_ROWS = 64, 4096
 _make_named_tuple_without_checks = tuple.__new__
 _STEP_TOO_SHORT_TEXT = "a step would be shorter than the spacing of numbers around the clock"
 _EMPTY_RECORDING_TABLES = array_layout.RECORD_NEVER, np.empty(0), np.empty((0, FIRST_STATE_COLUMN))
+#: Index of the segment table in the arguments of the loop that follow the motion state.
+_KINKS_ARGUMENT = 5
 _EMPTY_KINK_TABLE_AND_ZERO_COUNT = np.empty((0, SEGMENT_STRESS_FALL + 1)), 0
 
 
@@ -123,6 +126,7 @@ class MotionDriver:
         recording: Recording | None = None,
         kinks_and_reported_count: tuple[np.ndarray, int] = _EMPTY_KINK_TABLE_AND_ZERO_COUNT,
         initial_imposed_stress: float | None = None,
+        further_kinks: Iterator[np.ndarray] = iter(()),
     ) -> Iterator[Event]:
         """Yield the events of a motion in the order of their occurrence.
 
@@ -159,6 +163,9 @@ class MotionDriver:
             stress is the last unknown minus its initial value. The unknown ``spring_stress`` does
             not include the imposed shear stress. The spring stress in events and recordings
             includes the imposed shear stress.
+        further_kinks : iterator of ndarray, optional
+            Further rows of the segment table in a scene with noise. The driver requests them when
+            the motion reaches the last row.
 
         Yields
         ------
@@ -220,14 +227,14 @@ class MotionDriver:
         columns = array_layout.EVENT_POINT + array_layout.FIRST_STATE + states
         events = np.empty((max(_MIN_EVENT_ROWS, 2 * len(event_specs) + 4), columns))
         block = np.empty(workspace.workspace_size(self._unknowns, states, len(event_specs)))
-        arguments = (
+        arguments = [
             *machine.as_loop_arguments(y, last, block),
             (*self._scales_and_functions, tuple(switch_thresholds), numbers, before),
             *machine.as_loop_arguments(
                 asked.copy(), kinks_and_reported_count[0], samples, events, rows
             ),
             stepper,
-        )
+        ]
         regimes, psis = self._regimes, array_layout.EVENT_POINT + array_layout.FIRST_STATE
         run, end, known = machine.get_loop_function(), array_layout.PAUSED, (0, 0, 0, 0)
         while end == array_layout.PAUSED:
@@ -253,6 +260,10 @@ class MotionDriver:
                     Event, (kind, spec, time, slip, point, name, work, clock)
                 )
             work_meter.check_budget()
+            if state.get_state_field("kinks_ahead") == 0.0:
+                for table in islice(further_kinks, 1):
+                    arguments[_KINKS_ARGUMENT] = machine.as_loop_arguments(table)[0]
+                    state.set_kinks_ahead(len(table))
         if end != array_layout.MOTION_ENDED:
             raise _motion_stopped_error(end, state, regimes, stepper)
 
@@ -296,6 +307,7 @@ def get_motion_driver(
         if scene.parts.loading.unknowns
         else 0,
         may_reverse=scene.parts.law.regularised,
+        noise_rate_index=len(scene.parameter_values) - 1 if scene.parts.noise.is_active else 0,
         starts_at_point=1,
         may_terminate=1,
         has_clock=with_time,

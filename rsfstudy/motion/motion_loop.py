@@ -146,7 +146,8 @@ def advance_motion(
     -------
     int
         Return code, for example ``PAUSED`` or ``MOTION_ENDED``. After ``PAUSED``, the caller reads
-        the tables and calls the function again.
+        the tables and calls the function again. With noise, the loop pauses at the start of the
+        last segment, so that the caller can append the next segments.
     """
     motion = motion_memory[0]
     motion.event_rows = motion.recorded_rows = 0
@@ -196,6 +197,7 @@ def advance_motion(
                 motion.next_step_length = 0.0
         if end == REGIME_ENDED and (
             motion.must_report
+            or (motion.noise_rate_index > 0 and motion.kinks_ahead == 0)
             or are_tables_full(motion, workspace.event_spec_count, event_table, recording_table)
         ):
             motion.must_report, end = 0, PAUSED

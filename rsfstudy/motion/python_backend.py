@@ -146,6 +146,16 @@ class PythonMotionState(SimpleNamespace):
             *(self.event_rows, self.recorded_rows, self.jacobians),
         )
 
+    def set_kinks_ahead(self, count: int) -> None:
+        """Set the number of remaining kinks.
+
+        Parameters
+        ----------
+        count : int
+            Number of remaining kinks.
+        """
+        self.kinks_ahead = count
+
     def get_state_field(self, field_name: str) -> float:
         """Return the value of a field of the motion state.
 

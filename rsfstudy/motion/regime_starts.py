@@ -26,6 +26,7 @@ from rsfstudy.parts import (
     LOG_LOAD_VELOCITY,
     SEGMENT_END,
     SEGMENT_LOG_VELOCITY,
+    SEGMENT_NOISE_RATE,
     SEGMENT_START,
     SEGMENT_STRESS_FALL,
     SEGMENT_STRESS_RATE,
@@ -89,6 +90,8 @@ def start_next_segment(motion, workspace, last_point, kinks, recording_table):
             n, SEGMENT_STRESS_RATE
         ]
         last_point[relief] = kinks[n, SEGMENT_STRESS_FALL]
+    if motion.noise_rate_index > 0:
+        p[motion.noise_rate_index] = kinks[n, SEGMENT_NOISE_RATE]
 
 
 def enter_initial_regime(

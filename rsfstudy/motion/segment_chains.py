@@ -10,7 +10,14 @@ import numpy as np
 from rsfstudy.motion.event_spec_table import find_events_at_jump
 from rsfstudy.motion.events import Event, EventKind, EventSpecification
 from rsfstudy.motion.initial_points import point_after_loading_jump
-from rsfstudy.parts import SEGMENT_END, SEGMENT_START
+from rsfstudy.parts import (
+    LOADING,
+    SEGMENT_END,
+    SEGMENT_NOISE_RATE,
+    SEGMENT_START,
+    SEGMENT_STRESS_FALL,
+    SEGMENT_STRESS_RATE,
+)
 from rsfstudy.slider import SINGLE_ENDLESS_SEGMENT_TABLE, MotionPoint, Numbers, Scene
 
 
@@ -96,6 +103,42 @@ def truncate_segments_at(segment_table: np.ndarray, end_time: float) -> np.ndarr
     return cut
 
 
+def begin_noise(
+    scene: Scene, start: MotionPoint, segment_table: np.ndarray
+) -> tuple[MotionPoint, Numbers, np.ndarray, Iterator[np.ndarray]]:
+    """Return the initial values and the segment tables of a segment with noise.
+
+    Parameters
+    ----------
+    scene : Scene
+        Scene with noise during the loading segment.
+    start : MotionPoint
+        First point of the loading segment.
+    segment_table : ndarray
+        Table with a single row, the loading segment without noise.
+
+    Returns
+    -------
+    start : MotionPoint
+        First point, with the normal stress of the noise.
+    parameters : tuple of float
+        Parameters during the first row of ``table``.
+    table : ndarray
+        First block of the segment table with noise.
+    further_tables : iterator of ndarray
+        Further blocks of the segment table.
+    """
+    begin, end = (float(segment_table[0, column]) for column in (SEGMENT_START, SEGMENT_END))
+    tables = scene.parts.noise.iterate_segments(begin, end, scene.load_velocity)
+    table = next(tables)
+    parameters = list(scene.parameter_values)
+    parameters[-1] = float(table[0, SEGMENT_NOISE_RATE])
+    if scene.parts.noise.unknowns:
+        parameters[LOADING] = float(table[0, SEGMENT_STRESS_RATE])
+        start = start._replace(psis=(*start.psis[:-1], float(table[0, SEGMENT_STRESS_FALL])))
+    return start, tuple(parameters), table, tables
+
+
 def iterate_segment_start_events(
     event: Event,
     point_and_parameters_before: tuple[MotionPoint, Numbers],
@@ -163,6 +206,7 @@ def select_event_specs(
     """
     settling = [spec for spec in event_specs if spec.kind is EventKind.SETTLED]
     may_settle = is_last_chain and not chain_scene.parts.loading.unknowns
+    may_settle = may_settle and not chain_scene.parts.noise.is_active
     if may_settle and any(spec.terminal for spec in settling):
         may_settle = not _is_steady_sliding_unstable(scene)
     if may_settle or not settling:

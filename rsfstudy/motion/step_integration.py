@@ -101,7 +101,7 @@ def slip_since_start(motion, clock, time, spring_stress, parameters):
     r"""Compute the slip since the start of the motion.
 
     Slip is the independent variable of a rigid slider. For other sliders, slip is computed from the
-    spring stress :math:`f = f_0 + K (V_0 t - \delta)`.
+    spring stress :math:`f = f_0 + K (V_0 t - \delta)`, less the change of spring stress by noise.
 
     Parameters
     ----------
@@ -123,6 +123,8 @@ def slip_since_start(motion, clock, time, spring_stress, parameters):
     """
     if motion.slip_is_clock:
         return clock
+    if motion.noise_rate_index > 0:
+        spring_stress -= parameters[motion.noise_rate_index] * time
     return motion.slip + (
         parameters[LOAD_VELOCITY] * time
         - (spring_stress - motion.spring_stress) / parameters[STIFFNESS]

@@ -99,7 +99,7 @@ def choose_friction_quantity_for_events(scene: Scene) -> tuple[str, float]:
         Friction coefficient minus the quantity.
     """
     parts = scene.parts
-    stressed = parts.normal_stress.normal_stress is not None or parts.loading.unknowns
+    stressed = parts.normal_stress.normal_stress is not None or scene.stress_loading.unknowns
     if not stressed and not parts.law.regularised:
         return "spring_stress", scene.mu_star
     return "apparent_friction", 0.0

@@ -29,7 +29,12 @@ from functools import cache, reduce
 from typing import NamedTuple
 
 from rsfstudy._deprecation import add_former_member_names
-from rsfstudy.slider import friction_relation, state_functions, temperature_functions
+from rsfstudy.slider import (
+    friction_relation,
+    path_length,
+    state_functions,
+    temperature_functions,
+)
 from rsfstudy.slider.parts import Function, Numbers
 from rsfstudy.slider.scene_view import SceneView
 
@@ -80,6 +85,9 @@ class FrictionFunctions(NamedTuple):
         Number of states.
     indices_of_states_in_distance : tuple of int
         Indices of the states from which the distance from steady sliding is computed.
+    spring_stress_rate : callable
+        Function ``(load, slip, velocity_ratios, p)`` that returns the derivative of the spring
+        stress with respect to displacement, including noise.
     """
 
     strength: Function
@@ -97,6 +105,7 @@ class FrictionFunctions(NamedTuple):
     load_point_stress_change: Function
     state_count: int
     indices_of_states_in_distance: tuple[int, ...]
+    spring_stress_rate: Function = path_length.spring_stress_rate
 
 
 def build_friction_functions(scene: SceneView) -> FrictionFunctions:
@@ -113,7 +122,7 @@ def build_friction_functions(scene: SceneView) -> FrictionFunctions:
         Friction functions of the scene. All scenes with the same combination of parts have the same
         functions.
     """
-    law, source, loading = scene.parts.law, scene.pressure_source, scene.parts.loading
+    law, source, loading = scene.parts.law, scene.pressure_source, scene.stress_loading
     oscillates, law_states = loading.has_load_point_unknown, law.state_count
     boundary = -1 - len(scene.parts.fluid.unknowns) if loading.has_stress_unknowns else 0
     strength, effective, outer, derivatives = _build_stress_functions(
@@ -155,6 +164,9 @@ def build_friction_functions(scene: SceneView) -> FrictionFunctions:
         load_point_stress_change=friction_relation.build_pressure_function(-1 if oscillates else 0),
         state_count=scene.state_count,
         indices_of_states_in_distance=(*range(law_states), *compared),
+        spring_stress_rate=path_length.spring_stress_rate_with_noise
+        if scene.parts.noise.is_active
+        else path_length.spring_stress_rate,
     )
     if not scene.parts.temperature.unknowns:
         return functions

@@ -133,7 +133,7 @@ def _causes_of_unknown_quantities(scene: SceneView) -> list[_CauseOfUnknownQuant
     if parts.normal_stress.normal_stress is not None:
         cause = f"normal_stress={parts.normal_stress.name!r}"
         found.append(_CauseOfUnknownQuantity(NORMAL_STRESS, cause, "set normal_stress='constant'"))
-    if parts.loading.changes_normal_stress:
+    if scene.changes_normal_stress:
         cause = f"the loading {parts.loading.name!r}"
         remedy = "leave normal stress and pore pressure out of the loading"
         found += [

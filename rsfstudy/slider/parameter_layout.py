@@ -3,7 +3,8 @@
 The tuple starts with the parameters that every scene has, followed by the parameters of each slot.
 The parameters of the law are ``p[LAW]``, ``p[LAW + 1]`` and so on. The parameters of the law come
 last, because a law can have any number of parameters. Only if the temperature changes, its
-parameters follow those of the law. The module also defines the columns of segment tables and limits
+parameters follow those of the law. In a scene with noise, the last two parameters are the inertial
+time and the rate at which noise changes the spring stress. The module also defines the columns of segment tables and limits
 that prevent overflow.
 """
 
@@ -42,7 +43,8 @@ BOUNDARY_PRESSURE_RATE = DYNAMICS - 1
 
 #: Columns of the segment table of a loading: start time, end time, load point velocity V_0/V_*, its
 #: logarithm, rate of normal stress, and decrease of normal stress at the start. The last two
-#: columns are NaN if the loading has no unknowns.
+#: columns are NaN if the loading has no unknowns. The segment tables of noise have another column,
+#: the rate at which noise changes the spring stress.
 (
     SEGMENT_START,
     SEGMENT_END,
@@ -50,7 +52,8 @@ BOUNDARY_PRESSURE_RATE = DYNAMICS - 1
     SEGMENT_LOG_VELOCITY,
     SEGMENT_STRESS_RATE,
     SEGMENT_STRESS_FALL,
-) = range(6)
+    SEGMENT_NOISE_RATE,
+) = range(7)
 
 #: Upper limit of ln(V/V_*). Larger slip rates occur only in trial steps that the integrator
 #: rejects, because a motion ends at ln(V/V_*) = 276 with the status ``slip_rate_unbounded``.
@@ -116,7 +119,9 @@ def pack_friction_parameter_values(scene: SceneView) -> Numbers:
         *_part_parameters_padded_with_nan(parts.dynamics, scene, LAW - DYNAMICS),
     )
     last = collect_parameter_values(law, scene), temperature_parameter_values(scene)
-    return (*common, *own, *last[0], *last[1])
+    # The last parameter of a scene with noise is the rate at which noise changes the spring stress.
+    noise = (scene.inertial_time, 0.0) if parts.noise.is_active else ()
+    return (*common, *own, *last[0], *last[1], *noise)
 
 
 def temperature_parameter_values(scene: SceneView) -> Numbers:

@@ -18,7 +18,7 @@ from typing import Any, TypeVar
 
 from rsfstudy.errors import InvalidValue
 from rsfstudy.quantities import Quantity, is_variable_name
-from rsfstudy.slider import dynamics, fluid, laws, loading, normal_stress, temperature
+from rsfstudy.slider import dynamics, fluid, laws, loading, noise, normal_stress, temperature
 from rsfstudy.slider.field_name_hints import canonical_law_name
 from rsfstudy.slider.needed_quantities import check_names_of_needed_quantities
 from rsfstudy.slider.parts import Part, field_names, is_boolean_field, part_field_quantities
@@ -96,6 +96,14 @@ SLOTS: tuple[Slot, ...] = (
         temperature.BUILT_IN_PARTS,
         "isothermal",
         "temperature of the fault",
+        omit_if_default=True,
+    ),
+    Slot(
+        "noise",
+        noise.Noise,
+        noise.BUILT_IN_PARTS,
+        "none",
+        "noise that is added to the loading",
         omit_if_default=True,
     ),
 )

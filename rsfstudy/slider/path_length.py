@@ -25,7 +25,7 @@ from __future__ import annotations
 
 import math
 
-from rsfstudy.slider.parameter_layout import LOAD_VELOCITY, LOG_LOAD_VELOCITY
+from rsfstudy.slider.parameter_layout import LOAD_VELOCITY, LOG_LOAD_VELOCITY, STIFFNESS
 from rsfstudy.slider.parts import Numbers
 
 #: Lower limit of ln(V/V_*), equal to the natural logarithm of 10^-290. If the load point does not
@@ -99,6 +99,40 @@ def time_per_displacement(velocity_ratio_values: VelocityRatios, p: Numbers) -> 
     if p[LOAD_VELOCITY] != 0.0:
         return slower * fraction / abs(p[LOAD_VELOCITY])
     return math.exp(-max(x, STOPPED_LOG_SLIP_RATE))
+
+
+def spring_stress_rate(
+    load: float, slip: float, velocity_ratio_values: VelocityRatios, p: Numbers
+) -> float:
+    r"""Compute the derivative of the spring stress with respect to displacement.
+
+    Parameters
+    ----------
+    load, slip : float
+        Load point velocity and slip rate, divided by the magnitude of the slip rate.
+    velocity_ratio_values : tuple of float
+        Output of `velocity_ratios`.
+    p : tuple of float
+        Parameters of the scene.
+
+    Returns
+    -------
+    float
+        Derivative :math:`K (V_0 - V)/(V + V_0)`.
+    """
+    return p[STIFFNESS] * (load - slip) * velocity_ratio_values[2]
+
+
+def spring_stress_rate_with_noise(
+    load: float, slip: float, velocity_ratio_values: VelocityRatios, p: Numbers
+) -> float:
+    """Compute the derivative of the spring stress in a scene with noise.
+
+    The last parameter of the scene is the rate at which noise changes the spring stress. See
+    `spring_stress_rate` for the arguments.
+    """
+    steady = spring_stress_rate(load, slip, velocity_ratio_values, p)
+    return steady + p[-1] * time_per_displacement(velocity_ratio_values, p)
 
 
 def displacement_per_path_length(path_slope: float) -> float:

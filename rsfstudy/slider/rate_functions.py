@@ -25,12 +25,13 @@ from collections.abc import Callable
 from functools import cache
 
 from rsfstudy.slider.friction import FrictionFunctions
-from rsfstudy.slider.parameter_layout import LOAD_VELOCITY, MU_STAR, STIFFNESS, A
+from rsfstudy.slider.parameter_layout import LOAD_VELOCITY, MU_STAR, A
 from rsfstudy.slider.parts import Function, Numbers
 from rsfstudy.slider.path_length import (
     LOG_SLIP_RATE_PER_PATH_LENGTH,
     VelocityRatios,
     displacement_per_path_length,
+    spring_stress_rate_with_noise,
     time_per_displacement,
     velocity_ratios,
 )
@@ -59,21 +60,22 @@ def build_displacement_rate_function(
         friction_functions.load_point_stress,
         1 + friction_functions.state_count,
     )
+    spring_stress_rate = friction_functions.spring_stress_rate
 
     def forward_rates(state: Numbers, p: Numbers) -> tuple[float, Numbers, VelocityRatios]:
         psis = state[1:end]
         log_slip_rate, _g, shift = force_balance_function(state[0], psis, p)
         ratios = velocity_ratios(log_slip_rate, p)
         x, slower, fraction = ratios
-        loading = p[STIFFNESS] * (slower - 1.0) * fraction
+        loading = spring_stress_rate(slower, 1.0, ratios, p)
         return loading, evolutions(x, psis, shift, fraction, p), ratios
 
     def reversible_rates(state: Numbers, p: Numbers) -> tuple[float, Numbers, VelocityRatios]:
         _loading, changes, ratios = forward_rates(state, p)
-        _x, slower, fraction = ratios
+        slower = ratios[1]
         slip = math.copysign(1.0, p[MU_STAR] + state[0] + imposed(state[1:end], p))
         load = math.copysign(slower, p[LOAD_VELOCITY])
-        return p[STIFFNESS] * (load - slip) * fraction, changes, ratios
+        return spring_stress_rate(load, slip, ratios, p), changes, ratios
 
     return reversible_rates if allows_reversed_slip else forward_rates
 
@@ -154,6 +156,8 @@ def build_rate_functions_in_rupture(
         third function appends the derivative of inertial time.
     """
     rupture_rate_function = build_rupture_rate_function(friction_functions)
+    if friction_functions.spring_stress_rate is spring_stress_rate_with_noise:
+        rupture_rate_function = _add_noise_to_rupture_rates(rupture_rate_function)
     end = 2 + friction_functions.state_count
     times = build_tuple_scaling_function(end)
 
@@ -167,6 +171,19 @@ def build_rate_functions_in_rupture(
         return (*times(by, along), along)
 
     return rupture_rate_function, rates_along_path, rates_along_path_with_time
+
+
+def _add_noise_to_rupture_rates(rupture_rate_function: Function) -> Function:
+    """Add the noise of the spring stress to the derivatives with respect to inertial time.
+
+    The last two parameters of a scene with noise are the inertial time and the rate of the noise.
+    """
+
+    def rates_with_noise(state: Numbers, p: Numbers) -> Numbers:
+        by = rupture_rate_function(state, p)
+        return (by[0] + p[-2] * p[-1], *by[1:])
+
+    return rates_with_noise
 
 
 @cache

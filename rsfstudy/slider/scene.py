@@ -29,6 +29,7 @@ from rsfstudy.slider import (
 from rsfstudy.slider.dynamics.quasi_static import QuasiStatic
 from rsfstudy.slider.loading.step import StepLoading
 from rsfstudy.slider.needed_quantities import check_needed_quantities
+from rsfstudy.slider.noise.none import NoNoise
 from rsfstudy.slider.parts import Numbers
 from rsfstudy.slider.scene_assembly import SceneParts
 from rsfstudy.slider.scene_caching import cached_attribute
@@ -209,6 +210,18 @@ class Scene(SceneFunctions, SceneQuantities):
         Cooling rate :math:`c_{th} D_c/V_*`, for scenes with shear heating.
     direct_activation, evolution_activation : float, default: 0.0
         Activation terms :math:`Q/(R T_*)` of the direct effect and of the evolution effect.
+    noise : str or type, default: "none"
+        Noise that is added to the loading. With "white", the noise of the stresses is a Wiener
+        process. With "correlated", the noise is bounded and has a correlation time.
+    stress_noise, normal_stress_noise : float, default: 0.0
+        Amplitudes of the noise of shear stress and normal stress, in :math:`\sigma_*` per
+        :math:`\sqrt{D_c/V_*}`.
+    noise_interval : float, default: 0.05
+        Sampling interval of the noise in :math:`D_c/V_*`.
+    noise_seed : float, default: 0
+        Seed of the noise, a whole number.
+    noise_correlation_time : float, default: 1.0
+        Correlation time of correlated noise in :math:`D_c/V_*`.
     dynamics : type, optional
         User-defined class of dynamics. By default the fields ``inertia`` and ``radiation_damping``
         select the dynamics, and motion is quasi-static if neither is set.
@@ -221,7 +234,7 @@ class Scene(SceneFunctions, SceneQuantities):
     ----------
     parts : SceneParts
         Parts of the scene: ``slider``, ``law``, ``normal_stress``, ``fluid``, ``dynamics``,
-        ``loading`` and ``temperature``. Each field of the scene belongs to one of the parts.
+        ``loading``, ``temperature`` and ``noise``. Each field of the scene belongs to one of the parts.
 
     Raises
     ------
@@ -303,12 +316,13 @@ class Scene(SceneFunctions, SceneQuantities):
     def under_steady_loading(self) -> Scene:
         """Scene under a steadily moving load point, for stability analyses.
 
-        If the loading has unknowns, the load point of the returned scene moves at the velocity of
-        the last segment. If the loading has no unknowns, the property is the scene itself.
+        If the loading has unknowns or noise, the load point of the returned scene moves at the
+        velocity of the last segment, without noise. Otherwise the property is the scene itself.
         """
-        if not self.parts.loading.unknowns:
+        if not self.stress_loading.unknowns and not self.parts.noise.is_active:
             return self
-        return self.with_segment(loading.Segment(self.load_velocity))
+        steady = self.with_segment(loading.Segment(self.load_velocity))
+        return Scene(steady.parts._replace(noise=NoNoise()))
 
     def segment_scene(self, segment_index: int) -> Scene:
         """Return the scene during one segment of its loading.
@@ -335,7 +349,7 @@ class Scene(SceneFunctions, SceneQuantities):
         """Sequences of loading segments that follow each other without a jump.
 
         A jump is a sudden change of load point displacement or normal stress, or the end of a
-        segment with unknowns. Each sequence is a tuple of two elements: the scene during the first
+        segment with unknowns. With noise, each sequence has a single segment. Each sequence is a tuple of two elements: the scene during the first
         segment, and an array of shape (segments, 6) with the rows of the segment table. The columns
         of the table are defined in ``parameter_layout``.
         """
@@ -346,6 +360,7 @@ class Scene(SceneFunctions, SceneQuantities):
         )
         if self.parts.law.regularised:  # After reversed slip, a hold may have no solution.
             breaks = breaks | (table[:, parameter_layout.SEGMENT_VELOCITY] == 0.0)
+        breaks = breaks | self.parts.noise.is_active
         first = np.flatnonzero(breaks[1:]) + 1
         acting = map(self.segment_scene, (0, *first.tolist()))
         return tuple(zip(acting, np.split(table, first), strict=True))
@@ -381,7 +396,7 @@ class Scene(SceneFunctions, SceneQuantities):
 
         See ``stability.critical_stiffness`` for the definition.
         """
-        slider, law, stress, pores, *_others, heat = self.parts
+        slider, law, stress, pores, *_others, heat, _noise = self.parts
         return _critical_stiffness(slider.a, slider.mu_star, law, stress, pores, heat)
 
 

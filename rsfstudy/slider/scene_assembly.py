@@ -12,11 +12,12 @@ from functools import cache
 from typing import Any, NamedTuple
 
 from rsfstudy.errors import InvalidValue
-from rsfstudy.slider import dynamics, fluid, laws, loading, normal_stress, temperature
+from rsfstudy.slider import dynamics, fluid, laws, loading, noise, normal_stress, temperature
 from rsfstudy.slider.field_name_hints import (
     hint_for_unknown_choice,
     hint_for_unknown_field,
 )
+from rsfstudy.slider.noise.none import NoNoise
 from rsfstudy.slider.part_registry import (
     PART_CLASS_BY_FIELD_NAME,
     PART_SELECTING_FIELDS,
@@ -59,6 +60,8 @@ class SceneParts(NamedTuple):
         Loading history.
     temperature : Temperature
         Temperature of the fault.
+    noise : Noise
+        Noise that is added to the loading.
     """
 
     slider: SliderParameters
@@ -68,6 +71,7 @@ class SceneParts(NamedTuple):
     dynamics: dynamics.Dynamics
     loading: loading.Loading
     temperature: temperature.Temperature = Isothermal()
+    noise: noise.Noise = NoNoise()
 
 
 def build_parts(field_values: Mapping[str, Any]) -> SceneParts:

@@ -11,6 +11,7 @@ from rsfstudy.slider.dynamics import Dynamics
 from rsfstudy.slider.fluid import Fluid
 from rsfstudy.slider.fluid._boundary_pressure import FluidWithBoundaryPressure
 from rsfstudy.slider.loading import Loading, Segment
+from rsfstudy.slider.noise import Noise
 from rsfstudy.slider.scene_base import SceneBase
 from rsfstudy.slider.scene_caching import cached_attribute
 
@@ -39,15 +40,28 @@ class SceneQuantities(SceneBase):
         """Part that defines the dynamics."""
         return self.parts.dynamics
 
+    @property
+    def stress_loading(self) -> Loading | Noise:
+        """Part whose unknowns impose stress.
+
+        The part is the noise if the noise changes normal stress, and otherwise the loading.
+        """
+        return self.parts.noise if self.parts.noise.unknowns else self.parts.loading
+
+    @property
+    def changes_normal_stress(self) -> bool:
+        """True if the loading or the noise changes normal stress."""
+        return self.parts.loading.changes_normal_stress or self.parts.noise.changes_normal_stress
+
     @cached_attribute
-    def pressure_source(self) -> Fluid | Loading | FluidWithBoundaryPressure:
+    def pressure_source(self) -> Fluid | Loading | Noise | FluidWithBoundaryPressure:
         """Part whose unknowns change the effective normal stress.
 
         If the loading has unknowns, the pressure source is the loading. Otherwise, the pressure
         source is the fluid. If both the loading and the fluid have unknowns, the pressure source
         combines both parts. In the combination, the loading imposes the pressure around the fault.
         """
-        imposed, pores = self.parts.loading, self.parts.fluid
+        imposed, pores = self.stress_loading, self.parts.fluid
         if not imposed.unknowns:
             return pores
         return FluidWithBoundaryPressure(imposed, pores) if pores.unknowns else imposed
@@ -144,7 +158,8 @@ class SceneQuantities(SceneBase):
     @property
     def is_perturbed(self) -> bool:
         """True if the motion deviates from steady sliding at V_*."""
-        return self.starts_unsteady or self.parts.loading.perturbs_steady_sliding
+        loaded = self.parts.loading.perturbs_steady_sliding or self.parts.noise.is_active
+        return self.starts_unsteady or loaded
 
     @property
     def starts_unsteady(self) -> bool:

@@ -49,6 +49,14 @@ class SceneView(Protocol):
         """Dynamics of the slider."""
 
     @property
+    def stress_loading(self) -> Any:
+        """Part whose unknowns impose stress: the noise or the loading."""
+
+    @property
+    def changes_normal_stress(self) -> bool:
+        """True if the loading or the noise changes normal stress."""
+
+    @property
     def pressure_source(self) -> Any:
         """Part with auxiliary unknowns: the fluid, the loading or a combination of both."""
 

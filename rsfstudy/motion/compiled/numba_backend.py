@@ -176,6 +176,16 @@ class NumbaMotionState:
         """
         return array_layout.COUNTER_FORMAT.unpack_from(self._bytes, array_layout.CALL_FORMAT.size)
 
+    def set_kinks_ahead(self, count: int) -> None:
+        """Set the number of remaining kinks.
+
+        Parameters
+        ----------
+        count : int
+            Number of remaining kinks.
+        """
+        self.memory["kinks_ahead"] = count
+
     def get_state_field(self, field_name: str) -> float:
         """Return the value of a field of the motion state.
 

@@ -100,8 +100,9 @@ def build_slip_rate_functions(friction_functions: FrictionFunctions) -> tuple[Fu
         friction_functions.state_sum,
         friction_functions.evolutions,
     )
-    contribution, ahead = (
+    contribution, spring_stress_rate, ahead = (
         friction_functions.state_contribution,
+        friction_functions.spring_stress_rate,
         build_state_step_function(friction_functions.state_count),
     )
 
@@ -123,9 +124,10 @@ def build_slip_rate_functions(friction_functions: FrictionFunctions) -> tuple[Fu
         if weight <= NEGLIGIBLE_SECOND_ORDER_WEIGHT:
             return first
         trails = slope * first / p[A]
-        slowed, slower, fraction = velocity_ratios(x - trails, p)
+        ratios = velocity_ratios(x - trails, p)
+        slowed, slower, fraction = ratios
         shift = strength(spring_stress - first, psis, p)[2]
-        loading = p[STIFFNESS] * (slower - 1.0) * fraction
+        loading = spring_stress_rate(slower, 1.0, ratios, p)
         changes = evolutions(slowed, psis, shift, fraction, p)
         growing = (slope * loading - contribution(changes, spring_stress, psis, p)) / p[A]
         _x, growing_ahead, slope_ahead, weight_ahead, _shift = quasi_static_values(
@@ -147,8 +149,9 @@ def build_slip_rate_functions(friction_functions: FrictionFunctions) -> tuple[Fu
         a = p[A]
         value, slope, shift, _shift_slope = strength(spring_stress, psis, p)
         x = (value - state_sum(psis)) / a
-        clamped, slower, fraction = velocity_ratios(x, p)
-        loading = p[STIFFNESS] * (slower - 1.0) * fraction
+        ratios = velocity_ratios(x, p)
+        clamped, slower, fraction = ratios
+        loading = spring_stress_rate(slower, 1.0, ratios, p)
         changes = evolutions(clamped, psis, shift, fraction, p)
         growing = (slope * loading - contribution(changes, spring_stress, psis, p)) / a
         return x, growing, slope, compute_inertia_weight(x, slower, p), shift

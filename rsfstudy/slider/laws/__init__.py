@@ -256,7 +256,7 @@ class LawBase(Part):
         loading, source = scene.parts.loading, scene.pressure_source
         bends = stress.normal_stress is not None and not stress.coupling
         unknown = fluid.name if fluid.unknowns else stress.name if bends else ""
-        if not unknown and loading.changes_normal_stress:
+        if not unknown and scene.changes_normal_stress:
             unknown = "normal stress that the loading changes"
         if self.stress_dependence and unknown:
             rule = f"is known for normal stress in proportion to shear stress, not for {unknown}"

@@ -31,7 +31,7 @@ class ConstantNormalStress(NormalStress):
 
         See ``Part.check``.
         """
-        if scene.parts.loading.changes_normal_stress:
+        if scene.changes_normal_stress:
             remedy = "Set normal_stress='imposed', or 'variable' where it follows shear stress too."
             rule = "is changed by the loading"
             raise InvalidValue("normal_stress", self.name, rule, remedy=remedy)

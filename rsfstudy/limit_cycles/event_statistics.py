@@ -1,0 +1,298 @@
+r"""Statistics of the events of motions that do not repeat.
+
+The recurrence intervals of a slider with noise, and of a slider in chaos, have a distribution. The
+measure ``EventStatistics`` computes moments of this distribution. Three errors are reported
+separately: the error of the integrator on the path of the noise, the error of the sampled path, and
+the standard error for a finite number of events.
+
+Under white noise, :math:`\ln V` is as rough as the path, so the slip rate crosses each level many
+times. Event detection in scenes with noise therefore uses two levels. An event begins when the slip
+rate first exceeds a multiple of the load point velocity, and it ends when the slip rate falls below
+the load point velocity. In scenes without noise, the events are the cycles of ``iterate_cycles``.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass
+from itertools import islice, pairwise
+from typing import ClassVar, NamedTuple
+
+import numpy as np
+
+from rsfstudy.error_boundary import wrap_methods_in_error_boundary
+from rsfstudy.errors import InvalidValue
+from rsfstudy.limit_cycles.limit_cycle import INITIAL_PERTURBATION_DISPLACEMENT
+from rsfstudy.limit_cycles.stick_slip_cycles import iterate_cycles
+from rsfstudy.measure_base import Measure, Outcome
+from rsfstudy.motion import EventKind, Integrator, fall, rise
+from rsfstudy.parts import Segment
+from rsfstudy.quantities import Output
+from rsfstudy.slider import Scene
+from rsfstudy.status import Status
+
+#: Minimum numerical error, divided by the requested relative accuracy.
+_MIN_ERROR_OVER_RTOL = 0.06
+#: Statistics and described quantities, with their symbols and scales.
+_STATISTICS = (
+    ("mean", r"\langle {}\rangle", "mean"),
+    ("sd", "s({})", "standard deviation"),
+    ("cv", "CV({})", "coefficient of variation"),
+)
+_QUANTITIES = (
+    ("recurrence_interval", "t_r", "recurrence interval", "D_c/V_*"),
+    ("static_stress_drop", r"\Delta\tau_s", "static stress drop", "sigma_*"),
+)
+
+
+def _create_outputs() -> Iterator[Output]:
+    """Yield the outputs of the measure."""
+    for name, symbol, text, scale in _QUANTITIES:
+        for statistic, pattern, described in _STATISTICS:
+            about = f"{described} of the {text}"
+            math_symbol = f"${pattern.format(symbol)}$"
+            size = "" if statistic == "cv" else scale
+            full = f"{name}_{statistic}"
+            yield Output(full, math_symbol, "1", about, scale=size, error=True)
+            for suffix, kind in (
+                ("stderr", "standard error of the"),
+                ("path_error", "error by the sampling interval of noise of the"),
+            ):
+                yield Output(f"{full}_{suffix}", math_symbol, "1", f"{kind} {about}", scale=size)
+
+
+class _Event(NamedTuple):
+    """Event of a motion: time of its beginning in D_c/V_*, and static stress drop in sigma_*."""
+
+    time: float
+    stress_drop: float
+
+
+@wrap_methods_in_error_boundary
+@dataclass(frozen=True)
+class EventStatistics(Measure):
+    r"""Moments of recurrence intervals and stress drops of successive events.
+
+    The measure serves scenes with noise, and scenes without noise whose motion may be chaotic. If
+    a scene has noise, the recurrence interval is the time between the beginnings of successive
+    events. The static stress drop is the spring stress at which the slip rate last exceeded the
+    load point velocity before the event, minus the spring stress at the end of the event. Without
+    noise, both quantities have the same definitions as in ``LimitCycle``, and differ between
+    successive cycles.
+
+    If the motion settles to steady sliding, the status is ``no_limit_cycle``. If a scene with noise
+    has too few events, the status is ``work_budget_spent``.
+
+    Parameters
+    ----------
+    cycles : int, default: 200
+        Number of recurrence intervals.
+    discarded_cycles : int, default: 10
+        Number of recurrence intervals at the beginning that are discarded.
+    checked_cycles : int, default: 20
+        Number of recurrence intervals for which the numerical errors are computed.
+    slip_rate_ratio : float, default: 10.0
+        Ratio of the slip rate to the load point velocity at which an event begins, in scenes with
+        noise.
+
+    Raises
+    ------
+    InvalidValue
+        If a number of cycles is not a whole number, if fewer than four intervals are counted or
+        checked, or if the ratio of slip rates is not above 1.
+
+    Notes
+    -----
+    For each statistic ``x``, the outputs contain three errors:
+
+    - ``x_error`` is the error of the integrator on the given path: the difference of ``x`` between
+      two tolerances.
+    - ``x_path_error`` is the error due to the sampling interval :math:`h` of the noise: the
+      difference of ``x`` between the intervals :math:`h` and :math:`h/2` on the same path. The
+      value is zero without noise.
+    - ``x_stderr`` is the standard error for independent events. With the number of intervals
+      :math:`n`, the standard deviation :math:`s`, the coefficient of variation :math:`c` and the
+      kurtosis :math:`\kappa`, the standard errors of the mean, :math:`s` and :math:`c` are
+
+    .. math::
+
+        \frac{s}{\sqrt{n}}, \quad s \sqrt{\frac{\kappa - 1}{4 n}}, \quad
+          c \sqrt{\frac{\kappa - 1}{4 n} + \frac{c^2}{n}}.
+
+    The first two errors refer to the first ``checked_cycles`` intervals, which usually overestimate
+    the errors of all intervals. If the motion is chaotic, motions with two tolerances separate, and
+    the errors are about as large as the standard error for the checked intervals.
+
+    Examples
+    --------
+    >>> from rsfstudy import Accuracy, Scene
+    >>> from rsfstudy.measures import EventStatistics
+    >>> scene = Scene(
+    ...     normal_stress="constant",
+    ...     stiffness_ratio=0.8,
+    ...     radiation_damping=1e-3,
+    ...     noise="white",
+    ...     stress_noise=1e-5,
+    ...     noise_interval=0.5,
+    ... )
+    >>> measure = EventStatistics(cycles=8, discarded_cycles=4, checked_cycles=4)
+    >>> outcome = measure(scene, Accuracy(rtol=1e-4))
+    >>> round(outcome.values["recurrence_interval_mean"], 1)
+    9.1
+    """
+
+    cycles: int = 200
+    discarded_cycles: int = 10
+    checked_cycles: int = 20
+    slip_rate_ratio: float = 10.0
+    name: ClassVar[str] = "event_statistics"
+    primary_output = "recurrence_interval_cv"
+    outputs = (
+        Output("interval_count", "$n$", "1", "number of recurrence intervals"),
+        Output("record_length", "", "1", "total duration of the intervals", scale="D_c/V_*"),
+        *_create_outputs(),
+    )
+    #: Smallest number of intervals, below which the moments have no meaning.
+    MIN_CYCLES: ClassVar[int] = 4
+
+    @property
+    def typical_work(self) -> int:
+        """Typical number of right-hand-side evaluations per cell."""
+        return 2_000 * (self.cycles + self.discarded_cycles + 4 * self.checked_cycles)
+
+    def __post_init__(self) -> None:
+        """Check the fields of the measure."""
+        for name, least in (
+            ("cycles", self.MIN_CYCLES),
+            ("discarded_cycles", 0),
+            ("checked_cycles", self.MIN_CYCLES),
+        ):
+            value = getattr(self, name)
+            if isinstance(value, bool) or not value >= least or value % 1:
+                raise InvalidValue(name, value, f"must be a whole number from {least}")
+        if not 1.0 < self.slip_rate_ratio < math.inf:
+            raise InvalidValue("slip_rate_ratio", self.slip_rate_ratio, "must be above 1")
+
+    def compute(self, scene: Scene, integrator: Integrator) -> Outcome:
+        """Compute the statistics and their errors.
+
+        Parameters
+        ----------
+        scene : Scene
+            Scene to evaluate.
+        integrator : Integrator
+            Integrator with the requested accuracy.
+
+        Returns
+        -------
+        Outcome
+            Status, results and message.
+        """
+        if scene.log_load_velocity == -math.inf:
+            return Outcome(Status.NO_LIMIT_CYCLE, message="the load point is held")
+        if not scene.is_perturbed:
+            scene = scene.with_segment(Segment(1.0, INITIAL_PERTURBATION_DISPLACEMENT))
+        events = self._events(scene, integrator, self.cycles)
+        checked = min(self.checked_cycles, self.cycles)
+        if len(events) <= self.cycles:
+            return Outcome(Status.NO_LIMIT_CYCLE, message="the motion settles to steady sliding")
+        refined, halved = self._events(scene, integrator.refined(), checked), events
+        noise = scene.parts.noise
+        if noise.is_active:
+            finer = scene.with_(noise_interval=0.5 * scene.noise_interval)
+            halved = self._events(finer, integrator, checked)
+        if min(len(refined), len(halved)) <= checked:
+            why = "with other tolerances the motion settles: ask for a smaller rtol"
+            return Outcome(Status.UNVERIFIED, message=why)
+        values = {
+            "interval_count": float(self.cycles),
+            "record_length": events[-1].time - events[0].time,
+        }
+        for number, (name, *_about) in enumerate(_QUANTITIES):
+            found, few, fine, half = (
+                _compute_moments(_samples(part)[number])
+                for part in (
+                    events,
+                    *(part[: checked + 1] for part in (events, refined, halved)),
+                )
+            )
+            stderrs = _compute_standard_errors(_samples(events)[number])
+            for i, (statistic, *_rest) in enumerate(_STATISTICS):
+                full, scale = f"{name}_{statistic}", found[i]
+                error = integrator.estimate_error(few[i], fine[i], _MIN_ERROR_OVER_RTOL, scale)
+                values |= {
+                    full: found[i],
+                    f"{full}_error": error,
+                    f"{full}_stderr": stderrs[i],
+                    f"{full}_path_error": abs(few[i] - half[i]),
+                }
+        return Outcome(Status.OK, values)
+
+    def _events(self, scene: Scene, integrator: Integrator, cycles: int) -> list[_Event]:
+        """Return the events that delimit the intervals, without the discarded events.
+
+        The list is shorter than ``cycles + 1`` if the motion settles.
+        """
+        events = (
+            self._iterate_noisy_events(scene, integrator)
+            if scene.parts.noise.is_active
+            else _iterate_smooth_events(scene, integrator)
+        )
+        return list(islice(events, self.discarded_cycles, self.discarded_cycles + cycles + 1))
+
+    def _iterate_noisy_events(self, scene: Scene, integrator: Integrator) -> Iterator[_Event]:
+        """Yield the events of a scene with noise, detected with two levels of slip rate."""
+        arrest = scene.log_load_velocity
+        asked = (
+            rise("log_slip_rate", arrest),
+            rise("log_slip_rate", arrest + math.log(self.slip_rate_ratio)),
+            fall("log_slip_rate", arrest),
+        )
+        before, begun = math.nan, math.nan
+        for event in integrator.follow(scene, asked, with_time=True):
+            if event.kind is EventKind.SEGMENT:
+                before, begun = math.nan, math.nan
+            elif event.specification == asked[0] and math.isnan(begun):
+                before = event.point.spring_stress
+            elif event.specification == asked[1] and math.isnan(begun):
+                begun = event.time
+            elif event.specification == asked[2] and not math.isnan(begun):
+                yield _Event(begun, before - event.point.spring_stress)
+                begun = math.nan
+
+
+def _iterate_smooth_events(scene: Scene, integrator: Integrator) -> Iterator[_Event]:
+    """Yield the cycles of a scene without noise as events."""
+    time = 0.0
+    for cycle in iterate_cycles(scene, integrator, None):
+        if cycle is None:
+            return
+        time += cycle.recurrence_interval
+        yield _Event(time, cycle.primary_output_values()[1])
+
+
+def _samples(events: list[_Event]) -> tuple[np.ndarray, np.ndarray]:
+    """Return the recurrence intervals, and the stress drops of the events that end them."""
+    intervals = [after.time - before.time for before, after in pairwise(events)]
+    return np.array(intervals), np.array([event.stress_drop for event in events[1:]])
+
+
+def _compute_moments(samples: np.ndarray) -> tuple[float, float, float]:
+    """Return the mean, the standard deviation and the coefficient of variation."""
+    mean, deviation = float(samples.mean()), float(samples.std(ddof=1))
+    return mean, deviation, deviation / mean
+
+
+def _compute_standard_errors(samples: np.ndarray) -> tuple[float, float, float]:
+    """Return the standard errors of the moments of independent samples."""
+    _mean, deviation, variation = _compute_moments(samples)
+    count, centred = len(samples), samples - samples.mean()
+    variance = float(np.mean(centred**2))
+    kurtosis = float(np.mean(centred**4)) / variance**2 if variance > 0.0 else 1.0
+    spread = (kurtosis - 1.0) / (4.0 * count)
+    return (
+        deviation / math.sqrt(count),
+        deviation * math.sqrt(spread),
+        variation * math.sqrt(spread + variation**2 / count),
+    )

@@ -1,0 +1,122 @@
+r"""Noise of shear stress and normal stress that is added to the loading.
+
+Each module of this package defines one kind of noise. The function ``discover_parts`` finds the
+modules automatically. Noise is a sampled path, not a term of the equations: between two samples, the
+stress changes at a constant rate, and the integrators follow the resulting motion to their
+tolerance. For noise that is independent of the motion, the motion converges to the solution of the
+stochastic differential equation as the sampling interval decreases (Wong-Zakai theorem). The module
+``_paths`` computes the paths from the seed. The base class is ``Noise``.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+
+from rsfstudy.quantities import Quantity
+from rsfstudy.slider.loading import ramp
+from rsfstudy.slider.parts import Numbers, Part, discover_parts
+from rsfstudy.slider.scene_view import SceneView
+
+
+@dataclass(frozen=True, kw_only=True)
+class Noise(Part):
+    r"""Base class of the noise that is added to the loading.
+
+    A subclass sets ``is_active`` to True and defines the methods ``iterate_segments`` and
+    ``changes_normal_stress``.
+
+    Examples
+    --------
+    >>> from rsfstudy import Scene
+    >>> Scene().parts.noise.name
+    'none'
+    >>> scene = Scene(noise="white", stress_noise=1e-4, noise_interval=0.05, noise_seed=3)
+    >>> scene.parts.noise.is_active
+    True
+    """
+
+    #: True if the noise changes the motion.
+    is_active: ClassVar[bool] = False
+    has_load_point_unknown: ClassVar[bool] = False
+    of_pressure: ClassVar[bool] = False
+    auxiliary_rates = staticmethod(ramp.pending_normal_stress_rates)
+    auxiliary_steady_states = staticmethod(ramp.zero_pending_normal_stress)
+
+    @property
+    def changes_normal_stress(self) -> bool:
+        """True if the noise changes normal stress."""
+        return False
+
+    @property
+    def unknowns(self) -> tuple[Quantity, ...]:  # type: ignore[override]
+        """Unknowns of the noise.
+
+        If the noise changes normal stress, the decrease of normal stress is an unknown. Noise of
+        shear stress does not need an unknown, because it changes the rate of the spring stress.
+        """
+        return _NORMAL_STRESS_UNKNOWNS if self.changes_normal_stress else ()
+
+    @property
+    def has_stress_unknowns(self) -> bool:
+        """True if the noise has unknowns that change normal stress."""
+        return bool(self.unknowns)
+
+    def initial_unknowns(self, scene: SceneView) -> Numbers:
+        """Return the decrease of normal stress at the start of the path, which is zero.
+
+        Parameters
+        ----------
+        scene : Scene
+            Scene that the noise belongs to.
+
+        Returns
+        -------
+        tuple of float
+            One value per unknown.
+        """
+        return (0.0,) * len(self.unknowns)
+
+    def parameter_values(self, scene: SceneView) -> Numbers:
+        """Return the initial rate of normal stress.
+
+        See ``Part.parameter_values``. The event loop replaces the value at each sample.
+        """
+        return (0.0,) * len(self.unknowns)
+
+    def iterate_segments(
+        self, start: float, end: float, velocity: float
+    ) -> Iterator[np.ndarray]:
+        """Yield the segment table of the noise in blocks.
+
+        Parameters
+        ----------
+        start, end : float
+            Start and end of a loading segment in :math:`D_c/V_*`. The end may be infinite.
+        velocity : float
+            Load point velocity :math:`V_0/V_*` during the loading segment.
+
+        Yields
+        ------
+        ndarray of shape (rows, 7)
+            Successive rows of the segment table, whose columns ``parameter_layout`` defines.
+        """
+        nothing = math.nan, math.nan, 0.0
+        yield np.array([[start, end, velocity, _log_magnitude(velocity), *nothing]])
+
+
+_NORMAL_STRESS_UNKNOWNS = (
+    Quantity("noise_fall", "$P$", "1", "fall of normal stress by noise", "sigma_*"),
+)
+
+
+def _log_magnitude(velocity: float) -> float:
+    """Return the logarithm of the magnitude of a velocity."""
+    return math.log(abs(velocity)) if velocity else -math.inf
+
+
+BUILT_IN_PARTS = discover_parts(__name__, __path__)

@@ -1,0 +1,125 @@
+r"""Sample paths of noise that depend only on a seed and on the time.
+
+A path is defined at all dyadic times :math:`H j/2^l` of a base interval :math:`H`. The base interval
+is a power of two times the sampling interval. The level :math:`l = 0` contains independent
+increments. Each further level inserts the midpoints by a bridge: the value at a midpoint is normally
+distributed about a mean of both neighbours. A longer path therefore begins with the shorter path,
+and half the sampling interval refines the same path.
+
+The random numbers are raw 64-bit words of the counter-based generator Philox. The key is the seed,
+and the counter contains the level and the index of the midpoint, so any section of a path can be
+computed without the preceding sections.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+from scipy.special import ndtri
+
+#: Binary exponent of the base interval: it is at least 2**31 and less than 2**32.
+_BASE_EXPONENT = 32
+#: Number of words that the generator returns for each value of its counter.
+_WORDS_PER_COUNT = 4
+
+
+class Path(NamedTuple):
+    r"""Path of unit noise, as a function of time in :math:`D_c/V_*`.
+
+    Without a correlation time, the path is a Wiener process with the variance :math:`t`. With the
+    correlation time :math:`t_c`, it is the Ornstein-Uhlenbeck process
+    :math:`dn = -n \, dt/t_c + dW`, whose standard deviation approaches :math:`\sqrt{t_c/2}`. Both
+    processes start at zero.
+
+    Parameters
+    ----------
+    seed : int
+        Seed of the random numbers.
+    stream : int
+        Number of an independent path with the same seed.
+    correlation_time : float or None
+        Correlation time :math:`t_c`, or None for a Wiener process.
+    """
+
+    seed: int
+    stream: int
+    correlation_time: float | None = None
+
+    def sample(self, interval: float, first: int, count: int) -> np.ndarray:
+        """Return the path at multiples of the sampling interval.
+
+        Parameters
+        ----------
+        interval : float
+            Sampling interval.
+        first : int
+            Index of the first sample, whose time is ``first * interval``.
+        count : int
+            Number of samples.
+
+        Returns
+        -------
+        ndarray of shape (count,)
+            Values of the path.
+        """
+        mantissa, exponent = math.frexp(interval)
+        level = _BASE_EXPONENT - exponent
+        base = math.ldexp(mantissa, _BASE_EXPONENT)
+        return self._sample_level(base, level, first, first + count)
+
+    def _sample_level(self, base: float, level: int, first: int, stop: int) -> np.ndarray:
+        """Return the path at the times ``base/2**level`` times first, ..., stop - 1."""
+        if level == 0:
+            return self._sample_base(base, stop)[first:]
+        spacing = math.ldexp(base, 1 - level)
+        left, right = first // 2, stop // 2
+        parents = self._sample_level(base, level - 1, left, right + 1)
+        weight, deviation = self._bridge(spacing)
+        values = np.empty(2 * len(parents) - 1)
+        values[::2] = parents
+        values[1::2] = weight * (parents[:-1] + parents[1:]) + deviation * self._normals(
+            level, left, right - left
+        )
+        return values[first - 2 * left : stop - 2 * left]
+
+    def _sample_base(self, base: float, stop: int) -> np.ndarray:
+        """Return the first values of the path at multiples of the base interval."""
+        values, normals = [0.0], self._normals(0, 0, max(stop - 1, 0))
+        kept, deviation = self._transition(base)
+        for normal in normals.tolist():
+            values.append(kept * values[-1] + deviation * normal)
+        return np.array(values[:stop])
+
+    def _transition(self, spacing: float) -> tuple[float, float]:
+        """Return the factor of the last value, and the deviation of the next value."""
+        if self.correlation_time is None:
+            return 1.0, math.sqrt(spacing)
+        decay = 2.0 * spacing / self.correlation_time
+        return math.exp(-0.5 * decay), math.sqrt(-0.5 * self.correlation_time * math.expm1(-decay))
+
+    def _bridge(self, spacing: float) -> tuple[float, float]:
+        r"""Return the weight of both neighbours and the deviation of a midpoint.
+
+        With the correlation :math:`\rho` over half the spacing, the weight is
+        :math:`\rho/(1 + \rho^2)`, and the variance of the Ornstein-Uhlenbeck process is reduced by
+        the factor :math:`(1 - \rho^2)/(1 + \rho^2)`.
+        """
+        if self.correlation_time is None:
+            return 0.5, 0.5 * math.sqrt(spacing)
+        ratio = 0.5 * spacing / self.correlation_time
+        correlation = math.exp(-ratio)
+        variance = 0.5 * self.correlation_time * math.tanh(ratio)
+        return correlation / (1.0 + correlation * correlation), math.sqrt(variance)
+
+    def _normals(self, level: int, first: int, count: int) -> np.ndarray:
+        """Return normally distributed numbers of a level."""
+        skipped = first % _WORDS_PER_COUNT
+        generator = np.random.Philox(
+            key=np.array([self.seed, self.stream], dtype=np.uint64),
+            counter=np.array([first // _WORDS_PER_COUNT, level, 0, 0], dtype=np.uint64),
+        )
+        words = np.atleast_1d(generator.random_raw(skipped + count))[skipped:]
+        uniform = ((words >> np.uint64(11)).astype(float) + 0.5) * 2.0**-53
+        return np.asarray(ndtri(uniform))

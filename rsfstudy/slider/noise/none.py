@@ -1,0 +1,15 @@
+"""Loading without noise."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from rsfstudy.slider.noise import Noise
+
+
+@dataclass(frozen=True, kw_only=True)
+class NoNoise(Noise):
+    """Loading without noise."""
+
+    name = "none"
+    rejection_hint = "without noise", "set noise='white' or noise='correlated'"
