@@ -58,6 +58,8 @@ DILATANCY = -0.017e-3
 COMPRESSIBILITY = 0.075 * (1e-9 + 1e-11)
 #: Shear modulus in Pa (G) and density in kg/m^3 (rho_v) of quartz.
 SHEAR_MODULUS, DENSITY = 31e9, 2.65e3
+#: Amplitude of the noise of shear stress in Pa per square root of L_1/v_0 (half of epsilon_0 tau).
+STRESS_NOISE = 0.5 * 0.004e6
 #: Ratio of the damping coefficient (eta) to that of plane waves in quartz, G/(2 c_s).
 DAMPING_FACTOR = 20.0
 

@@ -14,6 +14,7 @@ from hypothesis import strategies as st
 from scipy.interpolate import PchipInterpolator
 from test_steady import PLAIN
 
+import rsfstudy
 from rsfstudy import Scene, simulate
 from rsfstudy.errors import InvalidValue
 from rsfstudy.motion.accuracy import Accuracy
@@ -146,12 +147,47 @@ def test_critical_stiffness_with_a_porosity_length(dilatancy, rate, drainage, st
 
 def test_a_porosity_length_of_one_changes_no_bit():
     """With the slip distance of friction, the rates are those of Segall and Rice."""
-    p = dilatant(0.004, 0.3).parameter_values
-    assert dilatant(0.004, 0.3, porosity_length=1.0) == dilatant(0.004, 0.3)
+    plain, longer = dilatant(0.004, 0.3), dilatant(0.004, 0.3, porosity_length=2.0)
+    assert dilatant(0.004, 0.3, porosity_length=1.0) == plain
+    assert math.isnan(plain.parameter_values[FLUID + 2])
     for x, porosity, pressure, slip in np.random.default_rng(58).normal(size=(100, 4)).tolist():
-        opening = slip * (0.004 * x - porosity)
-        rates = DilatantFluid.auxiliary_rates(x, (porosity, pressure), slip, p)
-        assert rates == (opening, -0.3 * (slip * math.exp(-x)) * pressure - opening)
+        opening, drains = slip * (0.004 * x - porosity), -0.3 * (slip * math.exp(-x)) * pressure
+        for scene, opened in ((plain, opening), (longer, 0.5 * opening)):
+            rates = scene.parts.fluid.auxiliary_rates
+            found = rates(x, (porosity, pressure), slip, scene.parameter_values)
+            assert found == (opened, drains - opened)
+
+
+def test_a_porosity_length_needs_a_constant_pressure_around_the_fault():
+    """The parameters of the fluid and of the loading share the same places."""
+    pressure = rsfstudy.history({"time": [0.0, 1.0, 2.0], "pore_pressure": [0.0, 0.01, 0.02]})
+    imposed = {"normal_stress": "imposed", "loading": pressure}
+    assert dilatant(**imposed).state_count == 4
+    with pytest.raises(InvalidValue, match=r"porosity_length = 2.0: must be 1 if the loading"):
+        dilatant(**imposed, porosity_length=2.0)
+
+
+def leaking(log_slip_rate, states, share, p):
+    return share * (p[FLUID] * log_slip_rate - states[0]), -share * p[FLUID + 2] * states[1]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Leaking(DilatantFluid):
+    """User-defined fluid that derives from the dilatant fluid and has another parameter."""
+
+    leak: float = number(0.3, "", "1", "leak per slip")
+
+    name = "leaking"
+    auxiliary_rates = staticmethod(leaking)
+
+
+def test_a_derived_fluid_keeps_the_places_of_its_parameters():
+    """The field of the base class is rejected, because other rates do not read it."""
+    scene = Scene(fluid=Leaking, dilatancy=0.004, leak=0.7, **CONSTANT)
+    assert scene.parameter_values[FLUID : FLUID + 3] == (0.004, 1.0, 0.7)
+    assert scene.parts.fluid.auxiliary_rates is leaking
+    with pytest.raises(InvalidValue, match="has no effect on the rates of the fluid 'leaking'"):
+        scene.with_(porosity_length=2.0)
 
 
 @pytest.mark.parametrize("length", [0.0, -1.0])

@@ -36,7 +36,7 @@ from rsfstudy.slider.scene_view import SceneView
 #: Index of the first parameter of each slot. A loading with unknowns stores its parameters in the
 #: elements that are reserved for the parameters of the fluid. The parameter tuple is kept short,
 #: because compiled functions copy all of its elements in each call.
-NORMAL_STRESS, FLUID, DYNAMICS, LAW = 8, 10, 14, 16
+NORMAL_STRESS, FLUID, DYNAMICS, LAW = 8, 10, 13, 15
 LOADING = FLUID
 #: Index of the rate of the imposed pressure if both the loading and the fluid have parameters.
 BOUNDARY_PRESSURE_RATE = DYNAMICS - 1

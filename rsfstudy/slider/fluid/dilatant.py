@@ -20,7 +20,7 @@ from rsfstudy.slider.fluid import (
 )
 from rsfstudy.slider.laws import lacks_critical_stiffness
 from rsfstudy.slider.parameter_layout import FLUID, LARGEST_LOG_SLOWNESS
-from rsfstudy.slider.parts import Numbers
+from rsfstudy.slider.parts import Function, Numbers
 from rsfstudy.slider.scene_view import SceneView
 
 
@@ -31,9 +31,8 @@ def porosity_and_pressure_rates(
 
     The class ``Fluid`` describes the arguments. The states are the porosity
     :math:`(\varphi - \varphi_0)/(\beta \sigma_*)` and the pore pressure :math:`P`. The function
-    reads the dilatancy :math:`\epsilon/(\beta \sigma_*)` from ``p[FLUID]``, the drainage
-    :math:`c^* D_c/V_*` from ``p[FLUID + 1]`` and the ratio :math:`D_c/L_\varphi` of the slip
-    distances of friction and porosity from ``p[FLUID + 2]``.
+    reads the dilatancy :math:`\epsilon/(\beta \sigma_*)` from ``p[FLUID]`` and the drainage
+    :math:`c^* D_c/V_*` from ``p[FLUID + 1]``.
 
     Notes
     -----
@@ -41,18 +40,88 @@ def porosity_and_pressure_rates(
 
     .. math::
 
-        L_\varphi \frac{d\varphi}{d\delta}
+        D_c \frac{d\varphi}{d\delta}
           = -\left(\varphi - \varphi_0 - \epsilon \ln\frac{V}{V_*}\right), \quad
           \frac{dp}{dt} = c^* (p_\infty - p) - \frac{1}{\beta} \frac{d\varphi}{dt}.
 
     References
     ----------
-    Segall and Rice (1995), J. Geophys. Res. 100, 22155-22171, with :math:`L_\varphi = D_c`.
+    Segall and Rice (1995), J. Geophys. Res. 100, 22155-22171
+    """
+    porosity, pressure = states
+    opening = slip_per_independent_variable * (p[FLUID] * log_slip_rate - porosity)
+    time = slip_per_independent_variable * math.exp(min(-log_slip_rate, LARGEST_LOG_SLOWNESS))
+    return opening, -p[FLUID + 1] * time * pressure - opening
+
+
+def rates_with_porosity_length(
+    log_slip_rate: float, states: Numbers, slip_per_independent_variable: float, p: Numbers
+) -> Numbers:
+    r"""Compute the rates if porosity has a slip distance of its own.
+
+    The function differs from ``porosity_and_pressure_rates`` in the slip distance
+    :math:`L_\varphi` of the porosity. It reads :math:`D_c/L_\varphi` from ``p[FLUID + 2]``.
+
+    Notes
+    -----
+    The rate of porosity is
+
+    .. math::
+
+        L_\varphi \frac{d\varphi}{d\delta}
+          = -\left(\varphi - \varphi_0 - \epsilon \ln\frac{V}{V_*}\right).
     """
     porosity, pressure = states
     opening = slip_per_independent_variable * (p[FLUID] * log_slip_rate - porosity) * p[FLUID + 2]
     time = slip_per_independent_variable * math.exp(min(-log_slip_rate, LARGEST_LOG_SLOWNESS))
     return opening, -p[FLUID + 1] * time * pressure - opening
+
+
+def choose_porosity_rates(porosity_length: float) -> Function:
+    """Return the function for the rates of porosity and pore pressure.
+
+    Parameters
+    ----------
+    porosity_length : float
+        Slip distance of the porosity in :math:`D_c`.
+
+    Returns
+    -------
+    callable
+        Function ``auxiliary_rates``. If the slip distance is :math:`D_c`, the function does not
+        read the slip distance.
+    """
+    return porosity_and_pressure_rates if porosity_length == 1.0 else rates_with_porosity_length
+
+
+def check_porosity_length(fluid: Fluid, scene: SceneView) -> None:
+    """Check that the scene supports the slip distance of the porosity.
+
+    The parameters of a loading with unknowns are stored at the places of the parameters of the
+    fluid, so these loadings leave no place for a slip distance of the porosity.
+
+    Parameters
+    ----------
+    fluid : DilatantFluid or ThermalFluid
+        Fluid of the scene.
+    scene : Scene
+        Scene that the fluid belongs to.
+
+    Raises
+    ------
+    InvalidValue
+        If the slip distance is not 1, and the loading has unknowns or a user-defined fluid has
+        other rates.
+    """
+    if getattr(fluid, "porosity_length", 1.0) == 1.0:
+        return
+    loading, remedy = scene.parts.loading, "Leave porosity_length out."
+    if fluid.auxiliary_rates is not rates_with_porosity_length:
+        rule = f"has no effect on the rates of the fluid {fluid.name!r}"
+        raise fluid.field_error("porosity_length", rule, remedy)
+    if loading.unknowns:
+        rule = f"must be 1 if the loading {loading.name!r} changes the pore pressure"
+        raise fluid.field_error("porosity_length", rule, remedy)
 
 
 def steady_porosity_and_pressure(log_slip_rate: float, p: Numbers) -> Numbers:
@@ -115,11 +184,17 @@ class DilatantFluid(Fluid):
     auxiliary_rates = staticmethod(porosity_and_pressure_rates)
     auxiliary_steady_states = staticmethod(steady_porosity_and_pressure)
 
+    def __post_init__(self) -> None:
+        """Choose the rates of porosity, unless a subclass defines other rates."""
+        if self.porosity_length != 1.0 and self.auxiliary_rates is porosity_and_pressure_rates:
+            object.__setattr__(self, "auxiliary_rates", rates_with_porosity_length)
+
     def check(self, scene: SceneView) -> None:
-        """Check that the stiffness ratio of the scene is defined.
+        """Check the porosity length, and that the stiffness ratio is defined.
 
         See ``Part.check``.
         """
+        check_porosity_length(self, scene)
         if lacks_critical_stiffness(scene):
             rule = f"leaves no critical stiffness with dilatancy = {self.dilatancy:g}"
             raise self.field_error("drainage", rule, "Give stiffness itself, or raise drainage.")
@@ -147,8 +222,12 @@ class DilatantFluid(Fluid):
         return ("dilatancy",)
 
     def parameter_values(self, scene: SceneView) -> Numbers:
-        """Return the dilatancy, the drainage rate and the inverse of the length.
+        """Return the dilatancy and the drainage rate.
 
-        See ``Part.parameter_values``. The length is ``porosity_length``.
+        See ``Part.parameter_values``. If the porosity length is not 1, its inverse is the third
+        value.
         """
-        return self.dilatancy, self.drainage, 1.0 / self.porosity_length
+        plain = self.dilatancy, self.drainage
+        if self.auxiliary_rates is not rates_with_porosity_length:
+            return plain
+        return *plain, 1.0 / self.porosity_length

@@ -20,7 +20,8 @@ from rsfstudy.slider.fluid import (
 )
 from rsfstudy.slider.fluid.dilatant import (
     DilatantFluid,
-    porosity_and_pressure_rates,
+    check_porosity_length,
+    choose_porosity_rates,
     steady_porosity_and_pressure,
 )
 from rsfstudy.slider.laws import lacks_critical_stiffness
@@ -134,7 +135,7 @@ class ThermalFluid(Fluid):
     @property
     def auxiliary_rates(self) -> Function:  # type: ignore[override]
         """Function that computes the rates of the unknowns, except for heating."""
-        return porosity_and_pressure_rates if self.dilatancy else pressure_rate
+        return choose_porosity_rates(self.porosity_length) if self.dilatancy else pressure_rate
 
     @property
     def auxiliary_steady_states(self) -> Function:  # type: ignore[override]
@@ -161,7 +162,7 @@ class ThermalFluid(Fluid):
         return ("thermal_pressurisation", *("dilatancy",) * bool(self.dilatancy))
 
     def parameter_values(self, scene: SceneView) -> Numbers:
-        """Return the dilatancy, the drainage rate and the inverse of the length.
+        """Return the same parameters as for a dilatant fluid.
 
         See ``Part.parameter_values``. The pressurisation factor is a parameter of the part
         ``temperature``.
@@ -169,7 +170,7 @@ class ThermalFluid(Fluid):
         return DilatantFluid.parameter_values(self, scene)  # type: ignore[arg-type]
 
     def check(self, scene: SceneView) -> None:
-        """Check that the temperature changes and that the stiffness ratio is defined.
+        """Check the temperature, the porosity length and the stiffness ratio.
 
         See ``Part.check``.
         """
@@ -177,6 +178,8 @@ class ThermalFluid(Fluid):
             rule = f"has no meaning for temperature={scene.parts.temperature.name!r}"
             remedy = "Set temperature='shear_heating', or choose another fluid."
             raise InvalidValue("fluid", self.name, rule, remedy=remedy)
+        if self.dilatancy:
+            check_porosity_length(self, scene)
         if lacks_critical_stiffness(scene):
             rule = "leaves no critical stiffness with thermal pressurisation"
             raise self.field_error("drainage", rule, "Give stiffness itself, or raise drainage.")
