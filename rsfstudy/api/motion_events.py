@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import math
 from collections.abc import Callable
 
@@ -68,12 +69,13 @@ def find_motion_events(
                 f"{name} is not there, along time: it is no motion as simulate gives it"
             )
     times, *rest = (np.asarray(motion[name], dtype=float) for name in names)
+    arrest = _arrest_level(motion, scene)
     if slip_rate is None:
         loads = [segment.load_velocity for segment in scene().parts.loading.segments]
         slip_rate = _EVENT_SLIP_RATE_OVER_LOAD_VELOCITY * max([1.0, *loads])
     if not 0.0 < slip_rate < math.inf:
         raise InvalidValue("slip_rate", slip_rate, "must be positive and finite, over V_*")
-    rows = InterpolatedMotionRows(times, np.column_stack(rest), math.log10(slip_rate))
+    rows = InterpolatedMotionRows(times, np.column_stack(rest), math.log10(slip_rate), arrest)
     found = [rows.measure_event(*ends) for ends in rows.iterate_event_row_spans()]
     about = {name: motion[name].attrs for name in names}
     catalogue = build_event_catalogue(found, about).assign_attrs(slip_rate_threshold=slip_rate)
@@ -84,6 +86,18 @@ def find_motion_events(
             DatasetUnits(catalogue).slip_rate_from_log("peak_log10_slip_rate", size, rate.units)
         )
     return catalogue
+
+
+def _arrest_level(motion: xr.Dataset, scene: Callable[[], Scene]) -> float | None:
+    """Return the logarithm (base 10) of the slip rate at which events end.
+
+    In a scene with noise, an event ends when the slip rate falls below the lowest load point
+    velocity above zero. In other scenes, the function returns None.
+    """
+    if json.loads(motion.attrs.get("scene", "{}")).get("noise", "none") == "none":
+        return None
+    loads = [abs(segment.load_velocity) for segment in scene().parts.loading.segments]
+    return math.log10(min((load for load in loads if load), default=1.0))
 
 
 class InterpolatedMotionRows:
@@ -97,21 +111,28 @@ class InterpolatedMotionRows:
         Values in each row: log10 slip rate, slip, and shear stress.
     event_slip_rate_level : float
         Logarithm (base 10) of the threshold of the slip rate.
+    arrest_slip_rate_level : float, optional
+        Logarithm (base 10) of the slip rate at which an event with noise ends. By default, an event
+        ends at the threshold at which it begins.
     """
 
-    def __init__(self, times: np.ndarray, values: np.ndarray, event_slip_rate_level: float) -> None:
+    def __init__(
+        self,
+        times: np.ndarray,
+        values: np.ndarray,
+        event_slip_rate_level: float,
+        arrest_slip_rate_level: float | None = None,
+    ) -> None:
         """Initialise the interpolation.
 
         Parameters
         ----------
-        times, values, event_slip_rate_level
+        times, values, event_slip_rate_level, arrest_slip_rate_level
             See the class.
         """
-        self._times, self._values, self._event_slip_rate_level = (
-            times,
-            values,
-            event_slip_rate_level,
-        )
+        self._times, self._values = times, values
+        self._event_slip_rate_level = event_slip_rate_level
+        self._arrest_slip_rate_level = arrest_slip_rate_level
 
     def iterate_event_row_spans(self) -> list[tuple[int, int]]:
         """Return the first and the last row of each event above the threshold.
@@ -121,8 +142,17 @@ class InterpolatedMotionRows:
         list of (int, int)
             Pair of row numbers for each event.
         """
-        above = label(self._values[:, 0] > self._event_slip_rate_level)[0]
-        return [(part.start, part.stop - 1) for (part,) in find_objects(above)]
+        rates = self._values[:, 0]
+        above = label(rates > self._event_slip_rate_level)[0]
+        spans = [(part.start, part.stop - 1) for (part,) in find_objects(above)]
+        if self._arrest_slip_rate_level is None:
+            return spans
+        merged = spans[:1]
+        for first, last in spans[1:]:
+            if rates[merged[-1][1] : first].min() > self._arrest_slip_rate_level:
+                first = merged.pop()[0]
+            merged.append((first, last))
+        return merged
 
     def measure_event(self, first_row: int, last_row: int) -> EventNumbers:
         """Measure the quantities of an event with their interpolation errors.
@@ -143,11 +173,7 @@ class InterpolatedMotionRows:
         """
         end, stress = len(self._times) - 1, self._values[:, 2]
         peak = first_row + int(np.argmax(self._values[first_row : last_row + 1, 0]))
-        highest, lowest = first_row, last_row
-        while highest > 0 and stress[highest - 1] >= stress[highest]:
-            highest -= 1
-        while lowest < end and stress[lowest + 1] <= stress[lowest]:
-            lowest += 1
+        highest, lowest = self._find_stress_drop_rows(first_row, last_row)
         top = highest + int(np.argmax(stress[highest : peak + 1]))
         bottom = peak + int(np.argmin(stress[peak : lowest + 1]))
         (begin, slip), begun = (
@@ -174,6 +200,26 @@ class InterpolatedMotionRows:
             "static_stress_drop": (before - after, before_error + after_error),
             "dynamic_stress_drop": (before - at_peak, before_error + peak_error),
         }, cut
+
+    def _find_stress_drop_rows(self, first_row: int, last_row: int) -> tuple[int, int]:
+        """Return the rows that contain the stress drop of an event.
+
+        Without noise, shear stress rises until the first row and falls until the last row. With
+        noise, slip is faster than the arrest level between the rows.
+        """
+        end, stress, rates = len(self._times) - 1, self._values[:, 2], self._values[:, 0]
+        level, highest, lowest = self._arrest_slip_rate_level, first_row, last_row
+        if level is None:
+            while highest > 0 and stress[highest - 1] >= stress[highest]:
+                highest -= 1
+            while lowest < end and stress[lowest + 1] <= stress[lowest]:
+                lowest += 1
+        else:
+            while highest > 0 and rates[highest] > level:
+                highest -= 1
+            while lowest < end and rates[lowest] > level:
+                lowest += 1
+        return highest, lowest
 
     def _interpolate_after_row(self, row: int, row_count: int) -> KroghInterpolator:
         """Interpolate around the interval between a row and the next row.

@@ -2,7 +2,8 @@
 
 The package contains the measure ``LimitCycle`` and the algorithms that the measure uses: the
 detection of cycles along a motion, the return map, and the search for a periodic orbit. The measure
-``EventStatistics`` describes the events of motions that do not repeat. The package never computes the response to a single step, and never reads or writes a file.
+``EventStatistics`` describes the events of motions that do not repeat. The package never computes
+the response to a single step, and never reads or writes a file.
 """
 
 from __future__ import annotations

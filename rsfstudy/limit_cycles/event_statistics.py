@@ -130,16 +130,16 @@ class EventStatistics(Measure):
     >>> from rsfstudy.measures import EventStatistics
     >>> scene = Scene(
     ...     normal_stress="constant",
-    ...     stiffness_ratio=0.8,
-    ...     radiation_damping=1e-3,
+    ...     stiffness_ratio=0.5,
+    ...     radiation_damping=1e-4,
     ...     noise="white",
     ...     stress_noise=1e-5,
-    ...     noise_interval=0.5,
+    ...     noise_interval=2.0,
     ... )
-    >>> measure = EventStatistics(cycles=8, discarded_cycles=4, checked_cycles=4)
+    >>> measure = EventStatistics(cycles=4, discarded_cycles=2, checked_cycles=4)
     >>> outcome = measure(scene, Accuracy(rtol=1e-4))
     >>> round(outcome.values["recurrence_interval_mean"], 1)
-    9.1
+    18.8
     """
 
     cycles: int = 200

@@ -365,7 +365,7 @@ class Integrator:
             is_last = number == len(chains) - 1
             asked = select_event_specs(scene, acting, event_specs, is_last_chain=is_last)
             table = truncate_segments_at(table, until)
-            end, further, parameters = float(table[-1, SEGMENT_END]), iter(()), None
+            end, further, parameters = float(table[-1, SEGMENT_END]), None, None
             if scene.parts.noise.is_active:
                 start, parameters, table, further = begin_noise(acting, start, table)
                 told = 0  # Every loading segment starts a chain, which reports its start.

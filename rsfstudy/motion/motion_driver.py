@@ -126,7 +126,7 @@ class MotionDriver:
         recording: Recording | None = None,
         kinks_and_reported_count: tuple[np.ndarray, int] = _EMPTY_KINK_TABLE_AND_ZERO_COUNT,
         initial_imposed_stress: float | None = None,
-        further_kinks: Iterator[np.ndarray] = iter(()),
+        further_kinks: Iterator[np.ndarray] | None = None,
     ) -> Iterator[Event]:
         """Yield the events of a motion in the order of their occurrence.
 
@@ -260,7 +260,7 @@ class MotionDriver:
                     Event, (kind, spec, time, slip, point, name, work, clock)
                 )
             work_meter.check_budget()
-            if state.get_state_field("kinks_ahead") == 0.0:
+            if further_kinks is not None and state.get_state_field("kinks_ahead") == 0.0:
                 for table in islice(further_kinks, 1):
                     arguments[_KINKS_ARGUMENT] = machine.as_loop_arguments(table)[0]
                     state.set_kinks_ahead(len(table))

@@ -4,8 +4,8 @@ The tuple starts with the parameters that every scene has, followed by the param
 The parameters of the law are ``p[LAW]``, ``p[LAW + 1]`` and so on. The parameters of the law come
 last, because a law can have any number of parameters. Only if the temperature changes, its
 parameters follow those of the law. In a scene with noise, the last two parameters are the inertial
-time and the rate at which noise changes the spring stress. The module also defines the columns of segment tables and limits
-that prevent overflow.
+time and the rate at which noise changes the spring stress. The module also defines the columns of
+segment tables and limits that prevent overflow.
 """
 
 from __future__ import annotations

@@ -1,8 +1,8 @@
 r"""Noise of shear stress and normal stress that is added to the loading.
 
 Each module of this package defines one kind of noise. The function ``discover_parts`` finds the
-modules automatically. Noise is a sampled path, not a term of the equations: between two samples, the
-stress changes at a constant rate, and the integrators follow the resulting motion to their
+modules automatically. Noise is a sampled path, not a term of the equations. Between two samples,
+the stress changes at a constant rate, and the integrators follow the resulting motion to their
 tolerance. For noise that is independent of the motion, the motion converges to the solution of the
 stochastic differential equation as the sampling interval decreases (Wong-Zakai theorem). The module
 ``_paths`` computes the paths from the seed. The base class is ``Noise``.
@@ -81,16 +81,7 @@ class Noise(Part):
         """
         return (0.0,) * len(self.unknowns)
 
-    def parameter_values(self, scene: SceneView) -> Numbers:
-        """Return the initial rate of normal stress.
-
-        See ``Part.parameter_values``. The event loop replaces the value at each sample.
-        """
-        return (0.0,) * len(self.unknowns)
-
-    def iterate_segments(
-        self, start: float, end: float, velocity: float
-    ) -> Iterator[np.ndarray]:
+    def iterate_segments(self, start: float, end: float, velocity: float) -> Iterator[np.ndarray]:
         """Yield the segment table of the noise in blocks.
 
         Parameters

@@ -1,10 +1,10 @@
 r"""Sample paths of noise that depend only on a seed and on the time.
 
-A path is defined at all dyadic times :math:`H j/2^l` of a base interval :math:`H`. The base interval
-is a power of two times the sampling interval. The level :math:`l = 0` contains independent
-increments. Each further level inserts the midpoints by a bridge: the value at a midpoint is normally
-distributed about a mean of both neighbours. A longer path therefore begins with the shorter path,
-and half the sampling interval refines the same path.
+A path is defined at all dyadic times :math:`H j/2^l` of a base interval :math:`H`. The base
+interval is the product of a power of two and the sampling interval. The level :math:`l = 0`
+contains independent increments. Each further level inserts the midpoints by a bridge: the value at
+a midpoint is normally distributed about a mean of both neighbours. A longer path therefore begins
+with the shorter path, and half the sampling interval refines the same path.
 
 The random numbers are raw 64-bit words of the counter-based generator Philox. The key is the seed,
 and the counter contains the level and the index of the midpoint, so any section of a path can be

@@ -6,7 +6,8 @@ from dataclasses import dataclass
 
 from rsfstudy.slider.noise._paths import Path
 from rsfstudy.slider.noise.white import WhiteNoise
-from rsfstudy.slider.parts import POSITIVE, number
+from rsfstudy.slider.parts import POSITIVE, Numbers, number
+from rsfstudy.slider.scene_view import SceneView
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -44,6 +45,13 @@ class CorrelatedNoise(WhiteNoise):
     )
 
     name = "correlated"
+
+    def parameter_values(self, scene: SceneView) -> Numbers:
+        """Return the initial rate of normal stress.
+
+        See ``WhiteNoise.parameter_values``.
+        """
+        return super().parameter_values(scene)
 
     def path(self, stream: int) -> Path:
         """Return the path of unit noise.

@@ -11,7 +11,13 @@ import numpy as np
 from rsfstudy.errors import InvalidValue
 from rsfstudy.slider.noise import Noise, _log_magnitude
 from rsfstudy.slider.noise._paths import Path
-from rsfstudy.slider.parts import NON_NEGATIVE, NON_NEGATIVE_INTEGER, POSITIVE, number
+from rsfstudy.slider.parts import (
+    NON_NEGATIVE,
+    NON_NEGATIVE_INTEGER,
+    POSITIVE,
+    Numbers,
+    number,
+)
 from rsfstudy.slider.scene_view import SceneView
 
 #: Number of samples that are computed at once.
@@ -113,8 +119,8 @@ class WhiteNoise(Noise):
     def check(self, scene: SceneView) -> None:
         """Check that the loading of the scene can be combined with noise.
 
-        See ``Part.check``. Noise can be added to loadings that consist of a few segments at constant
-        velocity.
+        See ``Part.check``. Noise can be added to loadings that consist of segments at constant
+        velocity, but not to records.
         """
         loading, fluid = scene.parts.loading, scene.parts.fluid
         if loading.unknowns or loading.reported_segment_count < len(loading.segments) - 1:
@@ -125,6 +131,13 @@ class WhiteNoise(Noise):
             rule = f"has no meaning for fluid={fluid.name!r}"
             rule += ", whose pore pressure changes normal stress"
             raise self.field_error("normal_stress_noise", rule, "Leave one of them out.")
+
+    def parameter_values(self, scene: SceneView) -> Numbers:
+        """Return the initial rate of normal stress.
+
+        See ``Part.parameter_values``. The event loop replaces the value at each sample.
+        """
+        return (0.0,) * len(self.unknowns)
 
     def path(self, stream: int) -> Path:
         """Return the path of unit noise.
