@@ -23,10 +23,11 @@ import numpy as np
 import pytest
 import xarray as xr
 
-import rsfstudy
-
 # The console reads its width from the environment at import time, so the console is imported
 # before any test changes the environment.
+from rsfstudy.named_studies._gualandi import NORMAL_STRESSES
+
+import rsfstudy
 from rsfstudy import Axis, Scene, Study
 from rsfstudy.cli import command_line, commands  # noqa: F401
 from rsfstudy.critical_steps.critical_step import CriticalStep
@@ -166,6 +167,13 @@ REDUCED_AXES = {
     "instability_norm": {
         "boundary": ["slowness at k_cr", "slowness at 1.5 k_cr", "slip at a/(b-a) = 4"],
         "instability_norm": np.geomspace(5e-6, 5e-2, 33)[::4],
+    },
+    "laboratory_recurrence": {
+        "experiment": [
+            *(f"{stress:g} MPa" for stress in NORMAL_STRESSES),
+            "15.001 MPa, noise",
+            "24.976 MPa, noise",
+        ],
     },
     "law_choice": {"seed": [0, 1]},
     "law_identification": {"seed": list(range(6))},
