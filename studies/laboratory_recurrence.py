@@ -11,23 +11,19 @@ and on the normal stress. In their model, shear stress and normal stress fluctua
 rate, so the state variable takes up the noise. In this study, the slip rate takes up the noise.
 """
 
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
-from itertools import islice
-from typing import Any, ClassVar
+from collections.abc import Sequence
+from typing import Any
 
-import numpy as np
 import xarray as xr
 
-from rsfstudy import Accuracy, Axis, Claim, Figure, Integrator, Panel, Scene, Study
-from rsfstudy.limit_cycles.event_statistics import EventStatistics, _Event
-from rsfstudy.motion import maximum, minimum
+from rsfstudy import Accuracy, Axis, Claim, Figure, Panel, Study
 from rsfstudy.study.figure_declarations import Axes
 
 from ._gualandi import (
     NORMAL_STRESSES,
     REFERENCES,
     STRESS_NOISE,
+    PeakStatistics,
     build_gualandi_rig,
     build_gualandi_scene,
 )
@@ -39,46 +35,6 @@ STOCHASTIC_MODEL = (5.6, 7.5, 6.0, 8.4, 11.4, 13.3, 14.6, 17.0, 11.5, 6.4, 2.7, 
 EXPERIMENTS = (23.3, 5.4, 6.6, 8.4, 7.0, 13.5, 14.7, 16.4, 23.9, 13.1, 3.6, 3.9)
 #: Normal stresses at which long and short intervals alternate.
 ALTERNATING = (17.003, 20.002)
-
-
-@dataclass(frozen=True)
-class PeakStatistics(EventStatistics):
-    """Statistics of the intervals between peaks of slip rate.
-
-    The fields are described in ``EventStatistics``. If the scene has noise, slip rates have many
-    peaks, and the events are those of ``EventStatistics``. Without noise, an event is a peak of the
-    slip rate. If long and short intervals alternate, the CV of the intervals between peaks differs
-    from the CV of the intervals between maxima of spring stress, which ``EventStatistics`` uses.
-    """
-
-    name: ClassVar[str] = "peak_statistics"
-
-    def _events(self, scene: Scene, integrator: Integrator, cycles: int) -> list[_Event]:
-        """Return the events that delimit the intervals.
-
-        See ``EventStatistics``.
-        """
-        if scene.parts.noise.is_active:
-            return super()._events(scene, integrator, cycles)
-        first = self.discarded_cycles
-        return list(islice(_iterate_peaks(scene, integrator), first, first + cycles + 1))
-
-
-def _iterate_peaks(scene: Scene, integrator: Integrator) -> Iterator[_Event]:
-    """Yield the peaks of slip rate with their stress drops."""
-    fastest, highest, lowest = (
-        maximum("log_slip_rate"),
-        maximum("spring_stress"),
-        minimum("spring_stress"),
-    )
-    time, stress = np.nan, np.nan
-    for event in integrator.follow(scene, (fastest, highest, lowest), with_time=True):
-        if event.specification == fastest:
-            time = event.time
-        elif event.specification == highest:
-            stress = event.point.spring_stress
-        elif event.specification == lowest and not np.isnan(time):
-            yield _Event(time, stress - event.point.spring_stress)
 
 
 def experiment_fields(normal_stress: float, noise: str) -> dict[str, Any]:
