@@ -1,4 +1,4 @@
-r"""Deterministic model and event statistics of the laboratory earthquakes of Gualandi et al. (2023).
+r"""Deterministic model of the laboratory earthquakes of Gualandi et al. (2023).
 
 The model is a spring-slider with the slip law, radiation damping and a pore fluid. The pores close
 when the slip rate increases, and the porosity evolves over a slip distance of its own. Between 16.6
