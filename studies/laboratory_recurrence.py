@@ -23,10 +23,10 @@ from ._gualandi import (
     NORMAL_STRESSES,
     REFERENCES,
     STRESS_NOISE,
-    PeakStatistics,
     build_gualandi_rig,
     build_gualandi_scene,
 )
+from ._peak_statistics import PeakStatistics
 
 SOURCE = "Gualandi et al. (2023), deterministic model, and independent integration"
 #: CV in per cent of the stochastic model of Gualandi et al. and of the experiments, at the normal
