@@ -243,6 +243,16 @@ MOTIONS: dict[str, Motion | Track] = {
     "slip, dilatant": frozen_motion(
         "slip", VARIABLE, DILATANT, STEP_UP, watches=(*EXTREMA, fall("normal_stress", 1.01))
     ),
+    "slip, compaction, damped": frozen_motion(
+        "slip",
+        CONSTANT,
+        DAMPING,
+        STEP_UP,
+        fluid="dilatant",
+        dilatancy=-0.02,
+        porosity_length=5.0,
+        drainage=0.1,
+    ),
     "slowness, dilatant, slips": frozen_motion(
         "slowness", CONSTANT, LESS_DILATANT, UNSTABLE_STEP_UP, rows=9
     ),

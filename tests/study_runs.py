@@ -23,10 +23,11 @@ import numpy as np
 import pytest
 import xarray as xr
 
-import rsfstudy
-
 # The console reads its width from the environment at import time, so the console is imported
 # before any test changes the environment.
+from rsfstudy.named_studies._gualandi import NORMAL_STRESSES
+
+import rsfstudy
 from rsfstudy import Axis, Scene, Study
 from rsfstudy.cli import command_line, commands  # noqa: F401
 from rsfstudy.critical_steps.critical_step import CriticalStep
@@ -167,11 +168,19 @@ REDUCED_AXES = {
         "boundary": ["slowness at k_cr", "slowness at 1.5 k_cr", "slip at a/(b-a) = 4"],
         "instability_norm": np.geomspace(5e-6, 5e-2, 33)[::4],
     },
+    "laboratory_recurrence": {
+        "experiment": [
+            *(f"{stress:g} MPa" for stress in NORMAL_STRESSES),
+            "15.001 MPa, noise",
+            "24.976 MPa, noise",
+        ],
+    },
     "law_choice": {"seed": [0, 1]},
     "law_identification": {"seed": list(range(6))},
     "laws": {"stiffness_ratio": [0.5, 1.0, 2.0]},
     "laws_cycles": {"load_velocity_ratio": [2.0, 250.0]},
     "laws_velocity_steps": {"stiffness_ratio": [1.25, 1.75]},
+    "noisy_recurrence": {"sample": [0, 1]},
     "rate_step_lattice": {"stiffness_ratio": [1.0, 1.5, 2.0]},
     "rate_step_stiffness": {"stiffness_ratio": np.linspace(1.0, 2.0, 21)[[0, 2, 5, 10, 15, 20]]},
     "slide_hold_slide": {"hold_time": [1.0, 1e4, 1e5, 1e6, 1e7, 1e8]},
@@ -200,6 +209,10 @@ REDUCED_AXES = {
 }
 
 
+#: Fields of the measures of expensive studies, with smaller values.
+REDUCED_MEASURES = {"noisy_recurrence": {"cycles": 600}}
+
+
 #: Studies whose motions use the compiled engine, which ``test_compiled`` compares with SciPy.
 COMPILED_ONLY_STUDIES = (
     "bounded_slip", "coverage", "dilatant_cycles", "dilatant_steps", "displacement_boundary",
@@ -218,6 +231,7 @@ def reduced_study(name: str) -> Study:
     study, points = study_loader.load_study(name), REDUCED_AXES.get(name, {})
     if name in COMPILED_ONLY_STUDIES:
         study = replace(study, accuracy=replace(study.accuracy, engine=COMPILED))
+    study = replace(study, measure=study.measure.with_(**REDUCED_MEASURES.get(name, {})))
     if kinds := points.get("process"):
         claims = [claim for claim in study.claims if claim.where["process"] in kinds]
         study = replace(study, claims=claims)

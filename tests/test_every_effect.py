@@ -41,6 +41,7 @@ EFFECTS = [
     {"stress_dependence": 0.5},
     {"fluid": "dilatant", "dilatancy": 0.004, "drainage": 0.1},
     {"fluid": "dilatant", "dilatancy": 0.004, "drainage": 3.0},
+    {"fluid": "dilatant", "dilatancy": -0.004, "drainage": 0.1, "porosity_length": 10.0},
     {"fluid": "dilatant", "dilatancy": 0.004, "drainage": 0.7, "radiation_damping": 1e-4},
 ]
 #: Effects of heat. The activation terms require a law with one state.
@@ -49,7 +50,7 @@ ACTIVATED = {**HEAT, "direct_activation": 30.0, "evolution_activation": 20.0}
 PRESSURISED = {**HEAT, "fluid": "thermal", "pressurisation": 2.0, "drainage": 0.5}
 HEAT_EFFECTS = [
     ACTIVATED,
-    {**PRESSURISED, "dilatancy": 0.004, "radiation_damping": 1e-4},
+    {**PRESSURISED, "dilatancy": 0.004, "porosity_length": 0.3, "radiation_damping": 1e-4},
     {**ACTIVATED, **PRESSURISED, "stress_dependence": 0.0},
 ]
 #: All laws and normal stresses, with each effect that is compatible with both.
@@ -160,10 +161,11 @@ def test_critical_stiffness_is_where_growth_begins(fields):
     log_slip_rate=st.floats(-3.0, 3.0),
     log_norm=st.none() | st.floats(-6.0, 0.3),
     log_damping=st.none() | st.floats(-25.0, 0.0),
-    dilatancy=st.none() | st.floats(0.0, 0.01),
+    dilatancy=st.none() | st.floats(-0.01, 0.01),
+    log_length=st.floats(-1.0, 1.0),
 )
 def test_the_measure_finds_the_threshold_of_growth(
-    law, alpha, phi, log_slip_rate, log_norm, log_damping, dilatancy
+    law, alpha, phi, log_slip_rate, log_norm, log_damping, dilatancy, log_length
 ):
     """Two independent computations of the critical stiffness agree.
 
@@ -183,6 +185,7 @@ def test_the_measure_finds_the_threshold_of_growth(
         fields["radiation_damping"] = math.exp(log_damping)
     if dilatancy is not None:
         fields |= {"fluid": "dilatant", "dilatancy": dilatancy}
+        fields["porosity_length"] = 10.0**log_length
     outcome = LinearStability()(Scene(**fields), Accuracy())
     assert outcome.status in (
         Status.OK,
@@ -234,6 +237,13 @@ def test_slip_rate_grows_as_the_unknowns_change(fields):
         {"law": "cut_off", "cutoff_velocity_ratio": 5.0, "stress_dependence": 0.5, **CONSTANT},
         {"law": "cut_off", "cutoff_velocity_ratio": 5.0, "inertia": True, "period": 3e7},
         {"law": "slip", "fluid": "dilatant", "dilatancy": 0.005, "drainage": 1.0},
+        {
+            "law": "slip",
+            "fluid": "dilatant",
+            "dilatancy": -0.005,
+            "porosity_length": 5.0,
+            **CONSTANT,
+        },
         {"law": "slowness", "fluid": "dilatant", "inertia": True, **CONSTANT},
         {"law": "slowness", "fluid": "dilatant", "radiation_damping": 1e-4, "alpha": 0.0},
         {"law": "two_slip_states"},

@@ -14,7 +14,9 @@ from hypothesis import strategies as st
 from scipy.interpolate import PchipInterpolator
 from test_steady import PLAIN
 
+import rsfstudy
 from rsfstudy import Scene, simulate
+from rsfstudy.errors import InvalidValue
 from rsfstudy.motion.accuracy import Accuracy
 from rsfstudy.motion.engines import ENGINES
 from rsfstudy.motion.events import EventKind, maximum
@@ -82,19 +84,145 @@ def test_critical_stiffness_is_the_closed_form(a, b_over_a, part, log_drainage, 
     assert ours == pytest.approx(exact, rel=1e-9)
 
 
+def compaction_polynomial(scene: Scene, stiffness: float) -> np.ndarray:
+    """Return the growth rates p at V_* from the characteristic polynomial.
+
+    The polynomial is K (p + 1)(p + r)(p + c) + p {[a (p + 1) - b](p + r)(p + c) + E r p (p + 1)},
+    where r is the inverse of the porosity length and E is mu_* times the dilatancy.
+    """
+    p = np.polynomial.Polynomial([0.0, 1.0])
+    r, c, effect = 1.0 / scene.porosity_length, scene.drainage, scene.mu_star * scene.dilatancy
+    friction = (scene.a * (p + 1.0) - scene.b) * (p + r) * (p + c) + effect * r * p * (p + 1.0)
+    return (stiffness * (p + 1.0) * (p + r) * (p + c) + p * friction).roots()
+
+
+@given(
+    st.floats(-0.02, 0.006),
+    st.floats(-2.0, 2.0),
+    st.floats(-2.0, 1.0),
+    st.sampled_from(LAWS),
+)
+def test_growth_rates_with_a_porosity_length(dilatancy, log_length, log_drainage, law):
+    """The growth rates are the roots of the characteristic polynomial.
+
+    At the critical stiffness, the largest real part of the roots changes sign.
+    """
+    scene = dilatant(
+        dilatancy, 10.0**log_drainage, porosity_length=10.0**log_length,
+        law=law, a=0.01, b_over_a=1.5, mu_star=0.6, stiffness=0.01, **CONSTANT,
+    )  # fmt: skip
+    critical = scene.critical_stiffness
+    assert 0.0 < critical < math.inf
+    for ratio in (0.98, 1.02):
+        exact = compaction_polynomial(scene, ratio * critical)
+        ours = stability.linear_growth_rates(scene.with_(stiffness=ratio * critical), 0.0)
+        assert bool(exact.real.max() > 0.0) is (ratio < 1.0)
+        # The roots of a polynomial lose digits if two roots are close to each other.
+        assert ours.real.max() == pytest.approx(exact.real.max(), rel=1e-5, abs=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("dilatancy", "rate", "drainage", "stiffness"),
+    [
+        (0.002, 1.0, 0.1, 0.0030672500594662),
+        (0.002, 0.1, 0.1, 0.0047332168863169),
+        (0.002, 10.0, 1.0, 0.0049183074200377),
+        (-0.002, 1.0, 1.0, 0.0057943617196895),
+        (-0.002, 0.1, 0.1, 0.0052638880796745),
+    ],
+)
+def test_critical_stiffness_with_a_porosity_length(dilatancy, rate, drainage, stiffness):
+    """Dilatancy lowers the critical stiffness, and compaction raises it.
+
+    The values are the stiffness at which roots of the characteristic polynomial are
+    imaginary. Without a fluid, the critical stiffness is 0.005. ``dilatancy`` is multiplied by
+    mu_*, and ``rate`` is the inverse of the porosity length.
+    """
+    scene = dilatant(
+        dilatancy / 0.6, drainage, porosity_length=1.0 / rate,
+        a=0.01, b_over_a=1.5, mu_star=0.6, **CONSTANT,
+    )  # fmt: skip
+    assert scene.critical_stiffness == pytest.approx(stiffness, rel=1e-13)
+
+
+def test_a_porosity_length_of_one_changes_no_bit():
+    """With the slip distance of friction, the rates are those of Segall and Rice."""
+    plain, longer = dilatant(0.004, 0.3), dilatant(0.004, 0.3, porosity_length=2.0)
+    assert dilatant(0.004, 0.3, porosity_length=1.0) == plain
+    assert math.isnan(plain.parameter_values[FLUID + 2])
+    for x, porosity, pressure, slip in np.random.default_rng(58).normal(size=(100, 4)).tolist():
+        opening, drains = slip * (0.004 * x - porosity), -0.3 * (slip * math.exp(-x)) * pressure
+        for scene, opened in ((plain, opening), (longer, 0.5 * opening)):
+            rates = scene.parts.fluid.auxiliary_rates
+            found = rates(x, (porosity, pressure), slip, scene.parameter_values)
+            assert found == (opened, drains - opened)
+
+
+def test_a_porosity_length_needs_a_constant_pressure_around_the_fault():
+    """The parameters of the fluid and of the loading share the same places."""
+    pressure = rsfstudy.history({"time": [0.0, 1.0, 2.0], "pore_pressure": [0.0, 0.01, 0.02]})
+    imposed = {"normal_stress": "imposed", "loading": pressure}
+    assert dilatant(**imposed).state_count == 4
+    with pytest.raises(InvalidValue, match=r"porosity_length = 2.0: must be 1 if the loading"):
+        dilatant(**imposed, porosity_length=2.0)
+
+
+def leaking(log_slip_rate, states, share, p):
+    return share * (p[FLUID] * log_slip_rate - states[0]), -share * p[FLUID + 2] * states[1]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Leaking(DilatantFluid):
+    """User-defined fluid that derives from the dilatant fluid and has another parameter."""
+
+    leak: float = number(0.3, "", "1", "leak per slip")
+
+    name = "leaking"
+    auxiliary_rates = staticmethod(leaking)
+
+
+def test_a_derived_fluid_keeps_the_places_of_its_parameters():
+    """The field of the base class is rejected, because other rates do not read it."""
+    scene = Scene(fluid=Leaking, dilatancy=0.004, leak=0.7, **CONSTANT)
+    assert scene.parameter_values[FLUID : FLUID + 3] == (0.004, 1.0, 0.7)
+    assert scene.parts.fluid.auxiliary_rates is leaking
+    with pytest.raises(InvalidValue, match="has no effect on the rates of the fluid 'leaking'"):
+        scene.with_(porosity_length=2.0)
+
+
+@pytest.mark.parametrize("length", [0.0, -1.0])
+def test_a_porosity_length_must_be_positive(length):
+    with pytest.raises(InvalidValue, match="porosity_length = .* must be greater than 0"):
+        dilatant(porosity_length=length)
+
+
+@pytest.mark.parametrize("dilatancy", [0.02, -0.02])
+def test_a_frozen_porosity_has_no_effect(dilatancy):
+    """The limit of a very long porosity length is a drained fault."""
+    fields = {"a": 0.01, "stiffness": 0.03, "load_velocity_ratio": 3.0, **CONSTANT}
+    frozen = simulate(dilatant(dilatancy, 1.0, porosity_length=1e9, **fields), duration=5.0)
+    drained = simulate(Scene(**fields), times=frozen.time.values)
+    np.testing.assert_allclose(frozen.log10_slip_rate, drained.log10_slip_rate, atol=1e-6)
+    assert float(abs(frozen.porosity).max()) < 1e-9
+
+
 # ---- the relation and the equations --------------------------------------------------------------
 
 
 @pytest.mark.parametrize("rate", [0.1, 20.0])
 @pytest.mark.parametrize("drainage", [1e-9, 0.5, 30.0])
-def test_a_rigid_slider_after_a_step_of_its_slip_rate(rate, drainage):
+@pytest.mark.parametrize(("dilatancy", "length"), [(0.01, 1.0), (0.01, 0.3), (-0.01, 4.0)])
+def test_a_rigid_slider_after_a_step_of_its_slip_rate(rate, drainage, dilatancy, length):
     """Porosity, pressure and stress agree with closed forms.
 
-    The closed forms are phi = E ln V (1 - exp(-s)) and P = -E ln V [exp(-s) - exp(-c s)]/(c
-    - 1), where c is the ratio of drainage to slip rate. The stress is friction times 1 - P,
-    with the closed form for the slip law.
+    The closed forms are phi = E ln V [1 - exp(-r s)] and P = -r E ln V [exp(-r s) - exp(-c
+    s)]/(c - r), where c is the ratio of drainage to slip rate and r is the inverse of the porosity
+    length. The stress is friction times 1 - P, with the closed form for the slip law.
     """
-    scene = dilatant(0.01, drainage, load_velocity_ratio=rate, **CONSTANT)
+    scene = dilatant(
+        dilatancy, drainage, porosity_length=length, load_velocity_ratio=rate, **CONSTANT
+    )
+    r = 1.0 / length
     x, c, start = math.log(rate), drainage / rate, scene.a * math.log(rate)
     recording = Recording(sample_times=np.array([0.1, 0.7, 2.0, 5.0]))
     equations = equations_at_imposed_slip_rate(scene, x)
@@ -109,8 +237,8 @@ def test_a_rigid_slider_after_a_step_of_its_slip_rate(rate, drainage):
         )
         porosity, pressure = row[FIRST_STATE_COLUMN + 1 :]
         assert slip == asked
-        assert porosity == pytest.approx(0.01 * x * -math.expm1(-slip), abs=1e-11)
-        exact = -0.01 * x * (math.exp(-slip) - math.exp(-c * slip)) / (c - 1.0)
+        assert porosity == pytest.approx(dilatancy * x * -math.expm1(-r * slip), abs=1e-11)
+        exact = -r * dilatancy * x * (math.exp(-r * slip) - math.exp(-c * slip)) / (c - r)
         assert pressure == pytest.approx(exact, abs=1e-10)
         coefficient = 0.76 + scene.a * x + scene.b * x * math.expm1(-slip)
         stress = (1.0 - exact) * coefficient - 0.76
@@ -160,6 +288,32 @@ def test_without_dilatancy_the_fluid_does_nothing(law, stress):
     peaks = [found.values["max_log10_slip_rate"] for found in (one, other)]
     errors = [found.values["max_log10_slip_rate_error"] for found in (one, other)]
     assert peaks[1] == pytest.approx(peaks[0], abs=sum(errors))
+
+
+@pytest.mark.parametrize("dilatancy", [0.01, -0.01])
+@pytest.mark.parametrize("length", [0.3, 1.0, 7.0])
+def test_pressure_at_any_slip_rate_stays_below_its_bound(dilatancy, length):
+    """The bound of pore pressure holds for random sequences of slip rates.
+
+    At constant slip rate, porosity and pressure have the closed forms of a rigid slider. With
+    compaction, the largest pressure follows an increase of slip rate after slow slip.
+    """
+    random = np.random.default_rng(585)
+    for drainage in (0.02, 0.11, 300.0):
+        fluid = dilatant(dilatancy, drainage, porosity_length=length).parts.fluid
+        # The first step of the slip rate is the one at which fast drainage approaches the bound.
+        rates, states = np.array([-1.0, *random.uniform(-9.0, 1.0, 40)]), [(0.0, 0.0)]
+        for x in rates.tolist():
+            slip, (porosity, pressure) = 10.0 ** random.uniform(-3.0, 0.5), states[-1]
+            r, c, closing = 1.0 / length, drainage * math.exp(-x), porosity - dilatancy * x
+            left, drained = math.exp(-r * slip), math.exp(-c * slip)
+            closed = r * closing * (left - drained) / (c - r)
+            states.append((dilatancy * x + closing * left, pressure * drained + closed))
+        for n, now in enumerate(states[:-1]):
+            for end in range(n + 1, len(states)):
+                highest = max(pressure for _porosity, pressure in states[n : end + 1])
+                bound = fluid.highest_pressure(float(rates[n:end].max()), now)
+                assert highest <= bound * (1.0 + 1e-12)
 
 
 # ---- measures ------------------------------------------------------------------------------------

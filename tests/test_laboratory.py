@@ -64,7 +64,7 @@ CALLS: dict[str, dict] = {
     "ramp_duration": {"normal_stress_ramp": 0.01},
     "velocity_ramp_duration": {"velocity_ramp": 2.0},
     "load_velocity_ratio": {},
-    **{name: {"fluid": "dilatant"} for name in ("dilatancy", "drainage")},
+    **{name: {"fluid": "dilatant"} for name in ("dilatancy", "drainage", "porosity_length")},
     "weakening_velocity_ratio": {"law": "flash_heating"},
     "cooling": {"temperature": "shear_heating"},
     "pressurisation": {"temperature": "shear_heating", "fluid": "thermal"},

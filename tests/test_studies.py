@@ -65,6 +65,8 @@ WIDE = {
     "fit_coverage_joint J1": "chance: binomial standard deviations",
     "fit_coverage_joint J2": "chance: binomial standard deviations",
     "injection I1": "one bound for all: how far pressure goes in 2 D_c/V_*",
+    "laboratory_recurrence L1": "read from a figure, and events may be timed in several ways",
+    "laboratory_recurrence L3": "errors of reading a figure, and sampling errors",
     "law_identification I1": "two digits are told",
     "law_identification I2": "chance: standard deviations of a standard deviation",
     "laws L1": "truncation of differences; laws that are nearly straight have less of it",

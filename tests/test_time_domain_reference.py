@@ -56,6 +56,11 @@ EVENTFUL = {
               stiffness=0.008),
         12.0,
     ),
+    "compaction": (
+        scene(**CONSTANT, **WAVES, fluid="dilatant", dilatancy=-0.01, drainage=0.1,
+              porosity_length=5.0, stiffness=0.008),
+        25.0,
+    ),
     "flash": (scene(law="flash_heating", **FLASH, **CONSTANT, **WAVES, stiffness=0.012), 12.0),
     "hot": (scene(law="slowness", **CONSTANT, **HEAT, **WAVES, stiffness=0.0065), 12.0),
     "pressurised": (
@@ -82,7 +87,7 @@ MOTIONS = {
     ),
     "dilatant, inclined, mass": (
         scene(phi=65.0, alpha=0.0, fluid="dilatant", dilatancy=0.004, drainage=0.7, **MASS,
-              stiffness=0.0065),
+              porosity_length=3.0, stiffness=0.0065),
         12.0,
     ),
     "flash, mass": (
@@ -106,7 +111,7 @@ MOTIONS = {
                           stiffness=0.016), 12.0),
     "pressurised, dilatant, inclined, mass": (
         scene(phi=65.0, alpha=0.0, **HEAT, **MASS, fluid="thermal", pressurisation=0.5,
-              dilatancy=0.004, drainage=0.7, stiffness=0.0065), 8.0
+              dilatancy=-0.004, porosity_length=0.4, drainage=0.7, stiffness=0.0065), 8.0
     ),
     "pressurised, inclined, waves": (
         scene(law="slowness", **INCLINED, **HEAT, **WAVES, fluid="thermal", pressurisation=2.0,

@@ -12,7 +12,7 @@ dependence N, the equations are
     df = K (V_0 - V) dt
     f = g + eta (V - 1), or K eps**2 V d(ln V) = (f - g) dt with inertia
     dTheta = V b h(u) dt - (alpha ds + N dg)/s,  u = Theta/b + ln V
-    dphi = V (dilatancy ln V - phi) dt,  dp = -drainage p dt - dphi
+    dphi = V (dilatancy ln V - phi) dt/porosity_length,  dp = -drainage p dt - dphi
 
 With the temperature rise Y, the friction coefficient and u contain further terms, and heating
 raises the pressure:
@@ -212,7 +212,7 @@ class TimeDomainMotion:
             for b, length, state in zip(self.bs, self.lengths, states, strict=True)
         ]
         warming = of["heating"] * ((mu + g) * v - mu) - of["cooling"] * warm
-        opening = v * (of["dilatancy"] * x - pores) if self.wet else 0.0
+        opening = v * (of["dilatancy"] * x - pores) / of["porosity_length"] if self.wet else 0.0
         draining = -of["drainage"] * pressure - opening if self.wet else 0.0
         draining += of["pressurisation"] * warming
         df, nagata = self.stiffness * (velocity - v), of["stress_dependence"]

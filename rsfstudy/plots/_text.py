@@ -59,6 +59,7 @@ _SHORT_AXIS_NAMES_OF_QUANTITIES = {
     "oscillation_amplitude": "amplitude",
     "oscillation_period": "period",
     "peak_log10_slip_rate": "peak slip rate",
+    "porosity_length": "porosity length",
     "slip": "slip",
     "static_stress_drop": "static stress drop",
     "stiffness_ratio": "stiffness",

@@ -141,10 +141,12 @@ class Scene(SceneFunctions, SceneQuantities):
         stress.
     dilatancy : float, default: 0.01
         Dilatancy :math:`\epsilon/(\beta \sigma_*)` of the dilatant fluid: the decrease of pore
-        pressure under undrained conditions if :math:`\ln V` increases by 1. The default for the
-        thermal fluid is 0.
+        pressure under undrained conditions if :math:`\ln V` increases by 1. If the dilatancy is
+        negative, pores close when the slip rate increases. The default for the thermal fluid is 0.
     drainage : float, default: 1.0
         Drainage rate :math:`c^* D_c/V_*` of the dilatant or thermal fluid.
+    porosity_length : float, default: 1.0
+        Slip distance of the porosity of the dilatant or thermal fluid, in :math:`D_c`.
     pressurisation : float, default: 1.0
         Pressurisation factor :math:`\Lambda_p T_*/\sigma_*` of the thermal fluid: the increase of
         pore pressure under undrained conditions if the temperature rises by :math:`T_*`.

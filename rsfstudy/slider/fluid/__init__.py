@@ -16,7 +16,6 @@ from typing import Any
 from rsfstudy.quantities import Quantity
 from rsfstudy.slider.needed_quantities import PORE_PRESSURE, SLIP_RATE
 from rsfstudy.slider.parts import (
-    NON_NEGATIVE,
     POSITIVE,
     Numbers,
     Part,
@@ -99,6 +98,8 @@ PORE_PRESSURE_QUANTITY = Quantity(
 def declare_dilatancy_field(default: float) -> Any:
     """Declare the field ``dilatancy`` of a fluid.
 
+    The value may be negative. The pores then close when the slip rate increases.
+
     Parameters
     ----------
     default : float
@@ -115,7 +116,25 @@ def declare_dilatancy_field(default: float) -> Any:
         "1",
         "decrease of pore pressure due to undrained dilatancy, per unit of ln V",
         "sigma_*",
-        rule=NON_NEGATIVE,
+    )
+
+
+def declare_porosity_length_field() -> Any:
+    """Declare the field ``porosity_length`` of a fluid.
+
+    Returns
+    -------
+    dataclasses.Field
+        Field for a dataclass, with a default of 1.
+    """
+    return number(
+        1.0,
+        r"$L_\varphi/D_c$",
+        "1",
+        "slip distance over which porosity evolves",
+        "D_c",
+        rule=POSITIVE,
+        omit_if_default=True,
     )
 
 

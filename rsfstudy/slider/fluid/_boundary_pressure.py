@@ -20,6 +20,7 @@ from rsfstudy.slider.scene_view import SceneView
 
 if TYPE_CHECKING:
     from rsfstudy.slider.loading import Loading
+    from rsfstudy.slider.noise import Noise
 
 
 @cache
@@ -95,7 +96,7 @@ class FluidWithBoundaryPressure:
         Fluid with unknowns, the last of which is the pore pressure in the fault.
     """
 
-    loading: Loading
+    loading: Loading | Noise
     fluid: Fluid
 
     @property

@@ -1,7 +1,8 @@
-"""Dilatancy with drainage (Segall and Rice 1995).
+"""Dilatancy or compaction with drainage (Segall and Rice 1995).
 
-Pores open when the slip rate increases. The pore pressure then falls until fluid flows in from the
-surroundings.
+If the dilatancy is positive, pores open when the slip rate increases. The pore pressure then falls
+until fluid flows in from the surroundings. If the dilatancy is negative, pores close when the slip
+rate increases, and the pore pressure rises.
 """
 
 from __future__ import annotations
@@ -15,10 +16,11 @@ from rsfstudy.slider.fluid import (
     Fluid,
     declare_dilatancy_field,
     declare_drainage_field,
+    declare_porosity_length_field,
 )
 from rsfstudy.slider.laws import lacks_critical_stiffness
 from rsfstudy.slider.parameter_layout import FLUID, LARGEST_LOG_SLOWNESS
-from rsfstudy.slider.parts import Numbers
+from rsfstudy.slider.parts import Function, Numbers
 from rsfstudy.slider.scene_view import SceneView
 
 
@@ -44,12 +46,82 @@ def porosity_and_pressure_rates(
 
     References
     ----------
-    Segall and Rice (1995), J. Geophys. Res. 100, 22155-22171.
+    Segall and Rice (1995), J. Geophys. Res. 100, 22155-22171
     """
     porosity, pressure = states
     opening = slip_per_independent_variable * (p[FLUID] * log_slip_rate - porosity)
     time = slip_per_independent_variable * math.exp(min(-log_slip_rate, LARGEST_LOG_SLOWNESS))
     return opening, -p[FLUID + 1] * time * pressure - opening
+
+
+def rates_with_porosity_length(
+    log_slip_rate: float, states: Numbers, slip_per_independent_variable: float, p: Numbers
+) -> Numbers:
+    r"""Compute the rates if porosity has a slip distance of its own.
+
+    The function differs from ``porosity_and_pressure_rates`` in the slip distance
+    :math:`L_\varphi` of the porosity. It reads :math:`D_c/L_\varphi` from ``p[FLUID + 2]``.
+
+    Notes
+    -----
+    The rate of porosity is
+
+    .. math::
+
+        L_\varphi \frac{d\varphi}{d\delta}
+          = -\left(\varphi - \varphi_0 - \epsilon \ln\frac{V}{V_*}\right).
+    """
+    porosity, pressure = states
+    opening = slip_per_independent_variable * (p[FLUID] * log_slip_rate - porosity) * p[FLUID + 2]
+    time = slip_per_independent_variable * math.exp(min(-log_slip_rate, LARGEST_LOG_SLOWNESS))
+    return opening, -p[FLUID + 1] * time * pressure - opening
+
+
+def choose_porosity_rates(porosity_length: float) -> Function:
+    """Return the function for the rates of porosity and pore pressure.
+
+    Parameters
+    ----------
+    porosity_length : float
+        Slip distance of the porosity in :math:`D_c`.
+
+    Returns
+    -------
+    callable
+        Function ``auxiliary_rates``. If the slip distance is :math:`D_c`, the function does not
+        read the slip distance.
+    """
+    return porosity_and_pressure_rates if porosity_length == 1.0 else rates_with_porosity_length
+
+
+def check_porosity_length(fluid: Fluid, scene: SceneView) -> None:
+    """Check that the scene supports the slip distance of the porosity.
+
+    The parameters of a loading with unknowns are stored at the places of the parameters of the
+    fluid, so these loadings leave no place for a slip distance of the porosity.
+
+    Parameters
+    ----------
+    fluid : DilatantFluid or ThermalFluid
+        Fluid of the scene.
+    scene : Scene
+        Scene that the fluid belongs to.
+
+    Raises
+    ------
+    InvalidValue
+        If the slip distance is not 1, and the loading has unknowns or a user-defined fluid has
+        other rates.
+    """
+    if getattr(fluid, "porosity_length", 1.0) == 1.0:
+        return
+    loading, remedy = scene.parts.loading, "Leave porosity_length out."
+    if fluid.auxiliary_rates is not rates_with_porosity_length:
+        rule = f"has no effect on the rates of the fluid {fluid.name!r}"
+        raise fluid.field_error("porosity_length", rule, remedy)
+    if loading.unknowns:
+        rule = f"must be 1 if the loading {loading.name!r} changes the pore pressure"
+        raise fluid.field_error("porosity_length", rule, remedy)
 
 
 def steady_porosity_and_pressure(log_slip_rate: float, p: Numbers) -> Numbers:
@@ -72,24 +144,31 @@ def steady_porosity_and_pressure(log_slip_rate: float, p: Numbers) -> Numbers:
 class DilatantFluid(Fluid):
     r"""Dilatant pore fluid with drainage to the surroundings.
 
-    The pores open when the slip rate increases, which decreases the pore pressure. The initial pore
-    pressure is the pressure of the surroundings, as in steady sliding.
+    The pores open when the slip rate increases, which decreases the pore pressure. If the dilatancy
+    is negative, the pores close when the slip rate increases, which increases the pore pressure.
+    The initial pore pressure is the pressure of the surroundings, as in steady sliding.
 
     Parameters
     ----------
     dilatancy : float, default: 0.01
         Dilatancy :math:`\epsilon/(\beta \sigma_*)`. Without drainage, an increase of :math:`\ln V`
-        by 1 decreases the pore pressure by the dilatancy, in units of :math:`\sigma_*`.
+        by 1 decreases the pore pressure by the dilatancy, in units of :math:`\sigma_*`. A negative
+        value describes compaction.
     drainage : float, default: 1.0
         Drainage rate :math:`c^* D_c/V_*`.
+    porosity_length : float, default: 1.0
+        Slip distance :math:`L_\varphi/D_c` over which the porosity approaches its steady value. The
+        slip distance of the friction law is :math:`D_c`.
 
     References
     ----------
-    Segall and Rice (1995), J. Geophys. Res. 100, 22155-22171.
+    Segall and Rice (1995), J. Geophys. Res. 100, 22155-22171, and, for compaction with a slip
+    distance of its own, Gualandi et al. (2023), Earth Planet. Sci. Lett. 604, 117995.
     """
 
     dilatancy: float = declare_dilatancy_field(0.01)
     drainage: float = declare_drainage_field()
+    porosity_length: float = declare_porosity_length_field()
 
     name = "dilatant"
     unknowns = (
@@ -105,11 +184,17 @@ class DilatantFluid(Fluid):
     auxiliary_rates = staticmethod(porosity_and_pressure_rates)
     auxiliary_steady_states = staticmethod(steady_porosity_and_pressure)
 
+    def __post_init__(self) -> None:
+        """Choose the rates of porosity, unless a subclass defines other rates."""
+        if self.porosity_length != 1.0 and self.auxiliary_rates is porosity_and_pressure_rates:
+            object.__setattr__(self, "auxiliary_rates", rates_with_porosity_length)
+
     def check(self, scene: SceneView) -> None:
-        """Check that the stiffness ratio of the scene is defined.
+        """Check the porosity length, and that the stiffness ratio is defined.
 
         See ``Part.check``.
         """
+        check_porosity_length(self, scene)
         if lacks_critical_stiffness(scene):
             rule = f"gives no critical stiffness with dilatancy = {self.dilatancy:g}"
             raise self.field_error(
@@ -120,11 +205,18 @@ class DilatantFluid(Fluid):
         r"""Compute an upper bound of the future pore pressure.
 
         See ``Fluid.highest_pressure``. The upper bound follows from the drainage rate and from the
-        largest rate at which pores can close. The largest closing rate is :math:`V (\varphi -
-        \varphi_0 - \epsilon \ln(V/V_*))`.
+        largest rate at which pores can close. The closing rate is :math:`V (\varphi - \varphi_0 -
+        \epsilon \ln(V/V_*)) D_c/L_\varphi`. If the dilatancy is negative, the porosity may first
+        increase while slip is slow, and the closing rate is largest when the slip rate increases
+        again. The upper bound therefore includes the steady porosity at the lowest slip rate.
         """
-        closing = max(states[0] - self.dilatancy * log_slip_rate, self.dilatancy)
-        return max(states[1], math.exp(log_slip_rate) * closing / self.drainage)
+        closing = max(
+            states[0] - self.dilatancy * log_slip_rate,
+            self.dilatancy,
+            -self.dilatancy * (LARGEST_LOG_SLOWNESS + log_slip_rate),
+        )
+        closing_rate = math.exp(log_slip_rate) * closing / self.porosity_length
+        return max(states[1], closing_rate / self.drainage)
 
     @property
     def effects(self) -> tuple[str, ...]:
@@ -134,6 +226,10 @@ class DilatantFluid(Fluid):
     def parameter_values(self, scene: SceneView) -> Numbers:
         """Return the dilatancy and the drainage rate.
 
-        See ``Part.parameter_values``.
+        See ``Part.parameter_values``. If the porosity length is not 1, its inverse is the third
+        value.
         """
-        return self.dilatancy, self.drainage
+        plain = self.dilatancy, self.drainage
+        if self.auxiliary_rates is not rates_with_porosity_length:
+            return plain
+        return *plain, 1.0 / self.porosity_length

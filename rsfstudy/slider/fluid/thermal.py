@@ -16,10 +16,12 @@ from rsfstudy.slider.fluid import (
     Fluid,
     declare_dilatancy_field,
     declare_drainage_field,
+    declare_porosity_length_field,
 )
 from rsfstudy.slider.fluid.dilatant import (
     DilatantFluid,
-    porosity_and_pressure_rates,
+    check_porosity_length,
+    choose_porosity_rates,
     steady_porosity_and_pressure,
 )
 from rsfstudy.slider.laws import lacks_critical_stiffness
@@ -88,6 +90,9 @@ class ThermalFluid(Fluid):
     dilatancy : float, default: 0.0
         Dilatancy :math:`\epsilon/(\beta \sigma_*)` (see ``DilatantFluid``). Without dilatancy, the
         porosity is not an unknown.
+    porosity_length : float, default: 1.0
+        Slip distance :math:`L_\varphi/D_c` over which the porosity evolves (see ``DilatantFluid``).
+        Without dilatancy, the slip distance has no effect.
 
     Notes
     -----
@@ -118,6 +123,7 @@ class ThermalFluid(Fluid):
     )
     dilatancy: float = declare_dilatancy_field(0.0)
     drainage: float = declare_drainage_field()
+    porosity_length: float = declare_porosity_length_field()
 
     name = "thermal"
 
@@ -129,7 +135,7 @@ class ThermalFluid(Fluid):
     @property
     def auxiliary_rates(self) -> Function:  # type: ignore[override]
         """Function that computes the rates of the unknowns, except for heating."""
-        return porosity_and_pressure_rates if self.dilatancy else pressure_rate
+        return choose_porosity_rates(self.porosity_length) if self.dilatancy else pressure_rate
 
     @property
     def auxiliary_steady_states(self) -> Function:  # type: ignore[override]
@@ -156,15 +162,15 @@ class ThermalFluid(Fluid):
         return ("thermal_pressurisation", *("dilatancy",) * bool(self.dilatancy))
 
     def parameter_values(self, scene: SceneView) -> Numbers:
-        """Return the dilatancy and the drainage rate.
+        """Return the same parameters as for a dilatant fluid.
 
         See ``Part.parameter_values``. The pressurisation factor is a parameter of the part
         ``temperature``.
         """
-        return self.dilatancy, self.drainage
+        return DilatantFluid.parameter_values(self, scene)  # type: ignore[arg-type]
 
     def check(self, scene: SceneView) -> None:
-        """Check that the temperature changes and that the stiffness ratio is defined.
+        """Check the temperature, the porosity length and the stiffness ratio.
 
         See ``Part.check``.
         """
@@ -172,6 +178,8 @@ class ThermalFluid(Fluid):
             rule = f"has no meaning for temperature={scene.parts.temperature.name!r}"
             remedy = "Set temperature='shear_heating', or choose another fluid."
             raise InvalidValue("fluid", self.name, rule, remedy=remedy)
+        if self.dilatancy:
+            check_porosity_length(self, scene)
         if lacks_critical_stiffness(scene):
             rule = "gives no critical stiffness with thermal pressurisation"
             raise self.field_error(

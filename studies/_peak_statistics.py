@@ -1,0 +1,51 @@
+"""Statistics of the intervals between peaks of slip rate."""
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass
+from itertools import islice
+from typing import ClassVar
+
+from rsfstudy import Integrator, Scene
+from rsfstudy.limit_cycles.event_statistics import EventStatistics, _Event
+from rsfstudy.motion import maximum, minimum
+
+
+@dataclass(frozen=True)
+class PeakStatistics(EventStatistics):
+    """Statistics of the intervals between peaks of slip rate.
+
+    The fields are described in ``EventStatistics``. If the scene has noise, slip rates have many
+    peaks, and the events are those of ``EventStatistics``. Without noise, an event is a peak of the
+    slip rate. If long and short intervals alternate, the CV of the intervals between peaks differs
+    from the CV of the intervals between maxima of spring stress, which ``EventStatistics`` uses.
+    """
+
+    name: ClassVar[str] = "peak_statistics"
+
+    def _events(self, scene: Scene, integrator: Integrator, cycles: int) -> list[_Event]:
+        """Return the events that delimit the intervals.
+
+        See ``EventStatistics``.
+        """
+        if scene.parts.noise.is_active:
+            return super()._events(scene, integrator, cycles)
+        first = self.discarded_cycles
+        return list(islice(_iterate_peaks(scene, integrator), first, first + cycles + 1))
+
+
+def _iterate_peaks(scene: Scene, integrator: Integrator) -> Iterator[_Event]:
+    """Yield the peaks of slip rate with their stress drops."""
+    fastest, highest, lowest = (
+        maximum("log_slip_rate"),
+        maximum("spring_stress"),
+        minimum("spring_stress"),
+    )
+    time, stress = math.nan, math.nan
+    for event in integrator.follow(scene, (fastest, highest, lowest), with_time=True):
+        if event.specification == fastest:
+            time = event.time
+        elif event.specification == highest:
+            stress = event.point.spring_stress
+        elif event.specification == lowest and not math.isnan(time):
+            yield _Event(time, stress - event.point.spring_stress)
