@@ -1,0 +1,224 @@
+"""Computations of a view in a thread, with a progress bar and a cancel button."""
+
+from __future__ import annotations
+
+import ctypes
+import threading
+import warnings
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from functools import partial
+from typing import Any, NamedTuple
+
+import panel as pn
+
+from rsfstudy.errors import RsfStudyWarning
+
+#: Function with which a computation reports its progress: a fraction from 0 to 1, and a text.
+Report = Callable[[float, str], None]
+
+
+#: Time in s after which the progress bar of a computation becomes visible.
+DELAY = 0.4
+_COLLECTED = threading.local()
+
+
+def route_warnings_to_pages() -> None:
+    """Let ``collected_warnings`` receive the warnings of rsfstudy, instead of the terminal.
+
+    The server calls the function once. A notebook shows warnings in the usual way.
+    """
+    print_warning = warnings.showwarning
+
+    def show(message: Warning | str, *place: Any, **options: Any) -> None:
+        if isinstance(message, RsfStudyWarning) and hasattr(_COLLECTED, "messages"):
+            _COLLECTED.messages.append(str(message))
+        else:
+            print_warning(message, *place, **options)
+
+    warnings.filterwarnings("always", category=RsfStudyWarning)
+    warnings.showwarning = show
+
+
+@contextmanager
+def collected_warnings() -> Iterator[list[str]]:
+    """Collect the warnings that this thread issues in the body of a ``with`` statement.
+
+    Yields
+    ------
+    list of str
+        Messages, if the server has called ``route_warnings_to_pages``.
+    """
+    _COLLECTED.messages = []
+    try:
+        yield _COLLECTED.messages
+    finally:
+        del _COLLECTED.messages
+
+
+class Cancelled(BaseException):
+    """Raised in the thread of a computation when the user cancels the computation.
+
+    The class is not derived from ``Exception``, so that no handler of errors catches it. A
+    computation is therefore cancelled in the same way as Ctrl-C interrupts a command.
+    """
+
+
+class _Job(NamedTuple):
+    """Computation that waits for its thread, and the functions that receive its outcome."""
+
+    label: str
+    compute: Callable[[Report], Any]
+    deliver: Callable[[Any], None]
+    fail: Callable[[Exception], None]
+    document: Any
+
+
+class Jobs:
+    """Runner of the computations of one view, with at most one thread.
+
+    If a computation is started while another one is running, the new computation waits, and it
+    replaces a computation that is already waiting. Results of a computation are discarded if a new
+    computation is waiting. A slider that moves faster than the computation therefore causes no
+    queue.
+
+    Parameters
+    ----------
+    warn : callable
+        Function that receives the warnings of a computation, in the thread of the page. If there
+        are no warnings, the sequence is empty.
+
+    Attributes
+    ----------
+    indicator : panel.Row
+        Progress bar and cancel button. They become visible if a computation takes longer than
+        `DELAY` seconds.
+    """
+
+    def __init__(self, warn: Callable[[Sequence[str]], None]) -> None:
+        """Create the runner without a computation."""
+        self._warn = warn
+        self._bar = pn.indicators.Progress(
+            active=True, value=-1, max=1000, sizing_mode="stretch_width", margin=(12, 5)
+        )
+        self._label = pn.pane.Str("", margin=(5, 5))
+        self._button = pn.widgets.Button(label="Cancel", color="danger", width=90)
+        self._button.on_click(lambda _event: self.cancel())
+        self.indicator = pn.Row(self._label, self._bar, self._button, visible=False)
+        self._lock = threading.Lock()
+        self._running: tuple[_Job, threading.Thread] | None = None
+        self._waiting: _Job | None = None
+
+    @property
+    def is_running(self) -> bool:
+        """True while a computation is running or waiting."""
+        return self._running is not None
+
+    def start(
+        self,
+        compute: Callable[[Report], Any],
+        deliver: Callable[[Any], None],
+        fail: Callable[[Exception], None],
+        *,
+        label: str = "",
+    ) -> None:
+        """Run a computation in a thread, as soon as the browser has loaded the page.
+
+        Parameters
+        ----------
+        compute : callable
+            Function that takes a function ``report(fraction, text)`` and returns the result. The
+            function may call ``report`` to move the progress bar.
+        deliver : callable
+            Function that receives the result, in the thread of the page.
+        fail : callable
+            Function that receives an exception of the computation, in the thread of the page.
+        label : str, optional
+            Text next to the progress bar.
+        """
+        job = _Job(label, compute, deliver, fail, pn.state.curdoc)
+        pn.state.onload(partial(self._enqueue, job))
+
+    def _enqueue(self, job: _Job) -> None:
+        """Start a job, or let it wait if another job is running."""
+        with self._lock:
+            if self._running is not None:
+                self._waiting = job
+                return
+            self._launch(job)
+
+    def cancel(self) -> None:
+        """Cancel the running computation, and discard a waiting computation."""
+        with self._lock:
+            self._waiting = None
+            if self._running is None:
+                return
+            thread = self._running[1]
+            if thread.ident is not None:
+                ctypes.pythonapi.PyThreadState_SetAsyncExc(
+                    ctypes.c_ulong(thread.ident), ctypes.py_object(Cancelled)
+                )
+
+    def _launch(self, job: _Job) -> None:
+        """Start the thread of a job, and show the progress bar if the job takes long."""
+        thread = threading.Thread(target=self._work, args=(job,), daemon=True)
+        self._running = job, thread
+        timer = threading.Timer(DELAY, _call_in_document, (job, partial(self._show, job)))
+        timer.daemon = True
+        thread.start()
+        timer.start()
+
+    def _work(self, job: _Job) -> None:
+        """Compute the result of a job, and deliver the result to the page."""
+        outcome: Callable[[], None] | None = None
+        with collected_warnings() as messages:
+            try:
+                outcome = partial(job.deliver, job.compute(partial(self._report, job)))
+            except Exception as error:
+                outcome = partial(job.fail, error)
+            except Cancelled:
+                pass
+        with self._lock:
+            successor, self._waiting, self._running = self._waiting, None, None
+            if successor is not None:
+                self._launch(successor)
+        if successor is None:
+            _call_in_document(job, partial(self._finish, job, outcome, messages))
+
+    def _finish(
+        self, job: _Job, outcome: Callable[[], None] | None, messages: Sequence[str]
+    ) -> None:
+        """Hide the progress bar, and deliver the outcome of a job."""
+        if self._running is None:
+            self.indicator.visible = False
+        if outcome is not None:
+            self._warn(messages)
+            try:
+                outcome()
+            except Exception as error:
+                job.fail(error)
+
+    def _report(self, job: _Job, fraction: float, text: str = "") -> None:
+        """Move the progress bar."""
+
+        def move() -> None:
+            self._bar.value = max(0, min(1000, round(1000 * fraction)))
+            if text:
+                self._label.object = text
+
+        _call_in_document(job, move)
+
+    def _show(self, job: _Job) -> None:
+        """Show the progress bar if the job is still running."""
+        if self._running is not None and self._running[0] is job:
+            if not self.indicator.visible:
+                self._bar.value, self._label.object = -1, job.label
+            self.indicator.visible = True
+
+
+def _call_in_document(job: _Job, function: Callable[[], None]) -> None:
+    """Call a function in the thread of the page, or immediately if there is no page."""
+    if job.document is None or not job.document.session_context:
+        function()
+    else:
+        job.document.add_next_tick_callback(function)
