@@ -31,6 +31,7 @@ if TYPE_CHECKING:
     from rsfstudy.api.study_runs import run as run
     from rsfstudy.api.study_runs import studies as studies
     from rsfstudy.axes.axis import Axis as Axis
+    from rsfstudy.explorer.entry_points import explore as explore
     from rsfstudy.motion.accuracy import Accuracy as Accuracy
     from rsfstudy.motion.integrator import Integrator as Integrator
     from rsfstudy.plots._healing import plot_healing as plot_healing
@@ -82,6 +83,7 @@ _LAZY_EXPORTS = {
     "api.single_scene": ("critical_step", "limit_cycle", "to_si"),
     "api.event_catalogue": ("events",),
     "api.healing_tables": ("healing",),
+    "explorer.entry_points": ("explore",),
 }
 _MODULE_BY_EXPORTED_NAME = {
     name: module for module, names in _LAZY_EXPORTS.items() for name in names

@@ -31,6 +31,7 @@ MODULE_BY_COMMAND = {
     "fit": "fit",
     "events": "events",
     "healing": "healing",
+    "explore": "explore",
     "problems": "problems",
     "verify": "verify",
 }

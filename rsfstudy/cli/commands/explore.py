@@ -1,0 +1,51 @@
+"""Command ``rsfstudy explore``."""
+
+from __future__ import annotations
+
+import click
+
+from rsfstudy.cli import options
+from rsfstudy.cli.command_group import Command
+from rsfstudy.cli.printing import print_line
+from rsfstudy.cli.results import EXIT_STATUS_OK
+from rsfstudy.errors import SignalInterrupt
+
+
+@click.command(cls=Command)
+@click.argument("file", required=False, type=options.FilePath(exists=True))
+@click.option("--state", metavar="TEXT", help="Settings of a view, as its tab Code shows them.")
+@click.option(
+    "--port",
+    type=click.IntRange(1, 65535),
+    help="Port of the server.  [default: 8067, or a free port]",
+)
+@click.option("--no-browser", is_flag=True, help="Print the address, and do not open a browser.")
+def explore(given: options.CommandOptions) -> int:
+    """Show a scene, results or a record in the browser.
+
+    Without FILE, the page shows a spring-slider with sliders for its parameters. If FILE contains
+    the results of a study (.nc or .zarr), the page shows the results. Other files, such as CSV, are
+    read as laboratory records, which you can fit.
+
+    The server listens on this computer only. Press Ctrl-C to stop it.
+    """
+    from rsfstudy.explorer import serve
+
+    try:
+        serve(
+            given.file,
+            given.state,
+            port=given.port,
+            open_browser=not given.no_browser,
+            announce=_announce,
+        )
+    except SignalInterrupt:
+        raise
+    except KeyboardInterrupt:
+        print_line("stopped")
+    return EXIT_STATUS_OK
+
+
+def _announce(url: str) -> None:
+    """Print the first address of the page."""
+    print_line(f"{url}\nThe page is open until you press Ctrl-C.")

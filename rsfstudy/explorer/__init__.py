@@ -1,0 +1,30 @@
+"""Interactive views of scenes, results and records, in a browser or a notebook.
+
+A view consists of widgets and plots. It calls public functions of rsfstudy for every computation,
+so the package contains no physics, and it never writes a file on its own: the browser saves the
+files that you download. The modules are:
+
+- ``entry_points`` contains the functions ``explore`` and ``serve``.
+- ``views`` chooses the view of a scene, a dataset or a file.
+- ``view`` contains the base class ``View``, which adds code, downloads and messages to a view.
+- ``jobs`` runs computations in a thread, with a progress bar and a cancel button.
+- ``server`` serves the views to the browser of this computer only.
+- ``scene_view``, ``results_view`` and ``record_view`` contain one view each.
+
+The explorer needs Panel, which ``pip install 'rsfstudy[explore]'`` installs.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from rsfstudy._lazy_exports import build_lazy_export_functions
+
+if TYPE_CHECKING:
+    from rsfstudy.explorer.entry_points import explore, serve
+else:
+    __getattr__, __dir__ = build_lazy_export_functions(
+        __name__, {"explorer.entry_points": ("explore", "serve")}
+    )
+
+__all__ = ["explore", "serve"]

@@ -1,0 +1,72 @@
+"""Choice of the view of a scene, a dataset or a file.
+
+The main function is ``create_view``.
+"""
+
+from __future__ import annotations
+
+import importlib
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import xarray as xr
+
+from rsfstudy.errors import InvalidValue
+from rsfstudy.fitting import Record
+from rsfstudy.rig import Rig
+from rsfstudy.slider import Scene
+from rsfstudy.storage import StoredDataset, read_dataset
+
+if TYPE_CHECKING:
+    from rsfstudy.explorer.view import View
+
+#: Class of each view, as module and name. The modules import Panel.
+_VIEW_CLASSES = {
+    "scene": ("rsfstudy.explorer.scene_view", "SceneView"),
+    "results": ("rsfstudy.explorer.results_view", "ResultsView"),
+    "record": ("rsfstudy.explorer.record_view", "RecordView"),
+}
+#: Suffixes of results files.
+_RESULTS_SUFFIXES = (".nc", ".nc4", ".zarr")
+
+
+def create_view(source: Any = None, state: str | None = None) -> View:
+    """Create the view of a scene, a dataset or a file.
+
+    Parameters
+    ----------
+    source : Scene, Rig, Record, xarray.Dataset or path, optional
+        Object to show. The default is a scene with the default values.
+    state : str, optional
+        Settings of the widgets as JSON.
+
+    Returns
+    -------
+    View
+        View whose method ``panel`` returns the Panel object.
+    """
+    kind, loaded = _find_kind(source)
+    module, name = _VIEW_CLASSES[kind]
+    view_class: type[View] = getattr(importlib.import_module(module), name)
+    return view_class.restore(loaded, view_class.parse_state(state))
+
+
+def _find_kind(source: Any) -> tuple[str, Any]:
+    """Return the kind of a view and the object that the view shows.
+
+    A results file is opened. The record view reads the file of a record itself, because the user
+    can change the options of the reader.
+    """
+    if source is None or isinstance(source, Scene | Rig):
+        return "scene", source
+    if isinstance(source, Record):
+        return "record", source
+    if isinstance(source, xr.Dataset):
+        return ("scene" if StoredDataset(source).is_of_single_scene else "results"), source
+    if not isinstance(source, str | Path):
+        rule = "is not a scene, a rig, a record, a dataset or the path of a file"
+        remedy = "Pass a Scene, a Rig, a Record, a dataset of rsfstudy, or the path of a file."
+        raise InvalidValue("source", source, rule, remedy=remedy)
+    if Path(source).suffix.lower() in _RESULTS_SUFFIXES:
+        return _find_kind(read_dataset(Path(source)))
+    return "record", Path(source)
