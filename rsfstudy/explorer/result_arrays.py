@@ -9,6 +9,7 @@ import html
 import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -91,17 +92,16 @@ def error_name(dataset: xr.Dataset, variable: str) -> str:
     )
 
 
-def select_part(dataset: xr.Dataset, selection: Selection) -> xr.Dataset:
-    """Return the part of the results that a selection shows.
+def part_names(dataset: xr.Dataset, selection: Selection) -> list[str]:
+    """Return the names of the variables that a selection shows.
 
-    The part contains the variable, its error estimate, the variable along x, the statuses and the
-    messages, at the selected points.
+    The names are the variable, its error estimate, the variable along x, the status and the
+    message.
     """
     names = [selection.variable, error_name(dataset, selection.variable), selection.x]
     if shows_cells(dataset, selection.variable):
         names += ["status", "message"]
-    kept = [n for n in dict.fromkeys(names) if n in dataset.data_vars]
-    return dataset[kept].isel(dict(selection.points))
+    return [n for n in dict.fromkeys(names) if n in dataset.data_vars]
 
 
 def shows_cells(dataset: xr.Dataset, variable: str) -> bool:
@@ -191,7 +191,7 @@ def curves_of_panel(dataset: xr.Dataset, panel: Selection) -> list[Curve]:
     for number in thin_points(len(arrays[0]), MAX_CURVES):
         values, errors, status, cells = (a[number] for a in arrays)
         name = to_plain_text(describe_points(dataset, {second: int(number)})) if second else ""
-        kept = _thin_curve(values, status)
+        kept = thin_curve(values, status)
         rows = (x[number], values, errors, status, cells)
         found.append(Curve(name, int(number), *(row[kept] for row in rows)))
     return found
@@ -209,8 +209,23 @@ def _x_values(
     return np.broadcast_to(values.isel(at).transpose(*dims).values.astype(float), shape)
 
 
-def _thin_curve(values: np.ndarray, status: np.ndarray) -> np.ndarray:
-    """Return the indices of the points of a curve that are drawn."""
+def thin_curve(values: np.ndarray, status: np.ndarray | None = None) -> np.ndarray:
+    """Return the indices of the points of a curve that are drawn.
+
+    Parameters
+    ----------
+    values : ndarray, shape (n,)
+        Values of the curve.
+    status : ndarray of int, shape (n,), optional
+        Status codes of the points.
+
+    Returns
+    -------
+    ndarray of int
+        All indices if there are at most 4,000 points. Otherwise the first and the last index, and
+        the lowest point, the highest point and the first failed cell of each group of neighbouring
+        points.
+    """
     if values.size <= MAX_POINTS:
         return np.arange(values.size)
     starts = np.linspace(0, values.size, MAX_POINTS // 4, endpoint=False).astype(int)
@@ -218,7 +233,8 @@ def _thin_curve(values: np.ndarray, status: np.ndarray) -> np.ndarray:
     kept = [0, values.size - 1]
     for start, end in zip(starts, [*starts[1:], values.size], strict=True):
         kept += [start + int(low[start:end].argmin()), start + int(high[start:end].argmax())]
-        kept.append(start + int((status[start:end] != int(Status.OK)).argmax()))
+        if status is not None:
+            kept.append(start + int((status[start:end] != int(Status.OK)).argmax()))
     return np.unique(kept)
 
 
@@ -330,9 +346,15 @@ def to_plain_text(mathtext: str) -> str:
     """Convert a label in mathtext to Unicode characters, for legends and widgets."""
     text = mathtext.replace("\n", " ").replace(r"\,", " ").replace("$", "")
     text = re.sub(r"\\([A-Za-z]+) ?", lambda found: _unescape_symbol(found[1]), text)
-    powers = str.maketrans("0123456789-", "⁰¹²³⁴⁵⁶⁷⁸⁹⁻")
-    text = re.sub(r"\^\{?(-?\d+)\}?", lambda found: found[1].translate(powers), text)
+    for mark, digits in ((r"\^", "⁰¹²³⁴⁵⁶⁷⁸⁹⁻"), ("_", "₀₁₂₃₄₅₆₇₈₉₋")):
+        small = str.maketrans("0123456789-", digits)
+        text = re.sub(mark + r"\{?(-?\d+)\}?", partial(_translate_digits, small), text)
     return re.sub(r"[{}]", "", text).replace("\\ ", " ")
+
+
+def _translate_digits(digits: dict[int, int], found: re.Match[str]) -> str:
+    """Return the digits of a match as superscripts or subscripts."""
+    return found[1].translate(digits)
 
 
 def _unescape_symbol(name: str) -> str:

@@ -114,8 +114,9 @@ class Plot:
             toolbar_location="above",
             active_drag="box_zoom",
         )
-        self.figure.xaxis.axis_label = _to_bokeh_text(format_axis_label(dataset, panel.x, 200))
+        self.figure.xaxis.axis_label = to_plain_text(format_axis_label(dataset, panel.x, 200))
         self.figure.axis.axis_label_text_font_style = "normal"
+        self.figure.axis.axis_label_text_font_size = "12px"
         if not _is_numeric(dataset[panel.x]):
             _label_ticks(self.figure.xaxis, dict(enumerate(map(str, dataset[panel.x].values))))
         self.draw(dataset, panel)
@@ -144,8 +145,15 @@ class Plot:
         panel : Selection
             Selection that differs only in its points.
         """
-        title = _to_bokeh_text(describe_points(dataset, panel.points))
+        title = to_plain_text(describe_points(dataset, panel.points))
         self.figure.title.text = title[:1].upper() + title[1:]
+
+    def share_axes(self, other: Plot) -> None:
+        """Use the axis limits of another plot, so that panels can be compared."""
+        self.figure.x_range, self.figure.y_range = other.figure.x_range, other.figure.y_range
+        for limits in (other.figure.x_range, other.figure.y_range):
+            if isinstance(limits.renderers, list):
+                limits.renderers = [*limits.renderers, *self.figure.renderers[:2]]
 
     def draw_marks(self, **options: Any) -> Any:
         """Draw the symbols of the statuses, and return their renderer."""
@@ -188,7 +196,7 @@ class CurvesPlot(Plot):
         self.lines = ColumnDataSource({n: [] for n in ("xs", "ys", "color", "dash", "alpha")})
         self.points = ColumnDataSource(_point_columns([], []))
         label = format_axis_label(dataset, panel.variable, 200)
-        self.figure.yaxis.axis_label = _to_bokeh_text(label)
+        self.figure.yaxis.axis_label = to_plain_text(label)
         line = {"color": "color", "line_dash": "dash", "line_alpha": "alpha", "line_width": 1.6}
         self.figure.multi_line("xs", "ys", source=self.lines, **line)
         bars = Whisker(base="x", lower="low", upper="high", source=self.points)
@@ -308,7 +316,7 @@ class MapPlot(Plot):
 
     def draw(self, dataset: xr.Dataset, panel: Selection) -> None:
         """Add the image, its colour scale, the symbols of statuses and the tooltips."""
-        self.figure.yaxis.axis_label = _to_bokeh_text(format_axis_label(dataset, panel.second, 200))
+        self.figure.yaxis.axis_label = to_plain_text(format_axis_label(dataset, panel.second, 200))
         self.image = ColumnDataSource({n: [] for n in ("image", "x", "y", "dw", "dh")})
         self.chosen = ColumnDataSource({"x": [], "y": []})
         self.figure.grid.visible = False
@@ -434,8 +442,3 @@ def _label_ticks(axis: Any, names: dict[Any, str]) -> None:
 def _ticks(names: dict[Any, str]) -> tuple[FixedTicker, dict[Any, str]]:
     """Return the ticker and the tick labels of named values."""
     return FixedTicker(ticks=list(names)), {int(value): name for value, name in names.items()}
-
-
-def _to_bokeh_text(label: str) -> str:
-    """Convert the delimiters of formulas in a label from mathtext to Bokeh."""
-    return label.replace("$", "$$")
