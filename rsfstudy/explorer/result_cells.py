@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import warnings
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
@@ -14,7 +13,6 @@ import xarray as xr
 from bokeh.plotting import figure
 
 from rsfstudy.api import recompute_cell, simulate
-from rsfstudy.errors import RsfStudyWarning
 from rsfstudy.explorer.result_arrays import thin_curve, to_plain_text
 from rsfstudy.measures import Measure, Outcome
 from rsfstudy.plots import format_axis_label
@@ -45,8 +43,8 @@ class RecomputedCell:
         Results of the measure.
     motion : xarray.Dataset
         Motion of the cell.
-    notes : list of str
-        Explanation of the motion, and warnings of the computations.
+    note : str
+        Explanation of the motion.
     code : str
         Python statement that computes the motion.
     """
@@ -55,7 +53,7 @@ class RecomputedCell:
     scene: Scene
     outcome: Outcome
     motion: xr.Dataset
-    notes: list[str]
+    note: str
     code: str
 
 
@@ -108,27 +106,22 @@ def recompute(
         Scene, outcome and motion.
     """
     coordinates, study = cell_coordinates(results, number), StoredDataset(results).study
-    with warnings.catch_warnings(record=True, action="always") as caught:
-        report(0.1, "Computing the cell")
-        scene, outcome = recompute_cell(results, coordinates)
-        report(0.6, "Computing the motion")
-        motion, note, code = _recorded_motion(study.measure, scene, outcome)
-        if motion is None:
-            selected = StoredDataset(results.sel(coordinates))
-            changes = study.cell(selected.find_cell_number(study)).measure_changes
-            loading, note = _loading_of_motion(study.measure.with_(**changes), scene, outcome)
-            moving = scene.with_(**{name: value for name, (value, _text) in loading.items()})
-            options: dict[str, Any] = {"rtol": study.accuracy.rtol, "engine": study.accuracy.engine}
-            motion = simulate(moving, **options)
-            arguments = ", ".join(f"{name}={text}" for name, (_value, text) in loading.items())
-            with_loading = f"scene.with_({arguments})" if arguments else "scene"
-            texts = "".join(f", {name}={value!r}" for name, value in options.items())
-            code = f"motion = rsfstudy.simulate({with_loading}{texts})"
-    # Other threads may emit warnings at the same time.
-    messages = dict.fromkeys(
-        str(warning.message) for warning in caught if issubclass(warning.category, RsfStudyWarning)
-    )
-    return RecomputedCell(number, scene, outcome, motion, [note, *messages], code)
+    report(0.1, "Computing the cell")
+    scene, outcome = recompute_cell(results, coordinates)
+    report(0.6, "Computing the motion")
+    motion, note, code = _recorded_motion(study.measure, scene, outcome)
+    if motion is None:
+        selected = StoredDataset(results.sel(coordinates))
+        changes = study.cell(selected.find_cell_number(study)).measure_changes
+        loading, note = _loading_of_motion(study.measure.with_(**changes), scene, outcome)
+        moving = scene.with_(**{name: value for name, (value, _text) in loading.items()})
+        options: dict[str, Any] = {"rtol": study.accuracy.rtol, "engine": study.accuracy.engine}
+        motion = simulate(moving, **options)
+        arguments = ", ".join(f"{name}={text}" for name, (_value, text) in loading.items())
+        with_loading = f"scene.with_({arguments})" if arguments else "scene"
+        texts = "".join(f", {name}={value!r}" for name, value in options.items())
+        code = f"motion = rsfstudy.simulate({with_loading}{texts})"
+    return RecomputedCell(number, scene, outcome, motion, note, code)
 
 
 def _recorded_motion(

@@ -145,8 +145,8 @@ class Plot:
         panel : Selection
             Selection that differs only in its points.
         """
-        title = to_plain_text(describe_points(dataset, panel.points))
-        self.figure.title.text = title[:1].upper() + title[1:]
+        title = describe_points(dataset, panel.points)
+        self.figure.title.text = to_plain_text(title[:1].upper() + title[1:])
 
     def share_axes(self, other: Plot) -> None:
         """Use the axis limits of another plot, so that panels can be compared."""
@@ -263,9 +263,8 @@ def _curve_styles(
         colours = [_map_colour(mapper, points[c.number]) for c in curves]
         dashes = ["-"] * len(curves)
     is_recorded = panel.x in dataset.data_vars
-    has_line = _is_numeric(dataset[panel.x]) and (
-        is_recorded or all(_is_monotonic(c.x) for c in curves)
-    )
+    is_number = _is_numeric(dataset[panel.x]) and not _flag_names(dataset, panel.variable)
+    has_line = is_number and (is_recorded or all(_is_monotonic(c.x) for c in curves))
     return [
         {
             "color": colour,

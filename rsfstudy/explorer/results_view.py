@@ -47,8 +47,10 @@ from rsfstudy.rig import DatasetUnits
 from rsfstudy.status import Status
 from rsfstudy.storage import StoredDataset
 
-#: Height in pixels of a single panel and of one of several panels, and minimum width of a panel.
-_HEIGHT, _HEIGHT_OF_FACET, _MIN_WIDTH = 420, 330, 380
+#: Height in pixels of a single panel and of one of several panels.
+_HEIGHT, _HEIGHT_OF_FACET = 420, 330
+#: Style of a column that shows panels side by side if the page is wide enough.
+_GRID = {"display": "grid", "grid-template-columns": "repeat(auto-fit, minmax(380px, 1fr))"}
 #: Number of points of a dimension above which the cell is chosen by its index.
 _MAX_OPTIONS = 100
 _WIDE: dict[str, Any] = {"sizing_mode": "stretch_width"}
@@ -102,7 +104,7 @@ class ResultsView(View):
             widget.param.watch(partial(self._on_choice, key), "value")
         self._sliders: dict[str, Any] = {}
         self._slider_column = pn.Column(**_WIDE)
-        self._plot_area = pn.FlexBox(**_WIDE)
+        self._plot_area = pn.Column(styles=_GRID, **_WIDE)
         self._cell_area = pn.Column(**_WIDE)
         self._figure_area = pn.Column(**_WIDE, min_height=200)
         self._tabs = pn.Tabs(
@@ -190,8 +192,7 @@ class ResultsView(View):
         """Change one choice of the selection."""
         if self._is_updating or event.new == getattr(self.selection, key):
             return
-        names = _CHOICES if key != "variable" else ("variable",)
-        wishes = {name: getattr(self.selection, name) for name in names} | {key: event.new}
+        wishes = {name: getattr(self.selection, name) for name in _CHOICES} | {key: event.new}
         if key == "kind":
             wishes |= {"x": None, "second": None}
         with self.errors_shown():
@@ -231,8 +232,7 @@ class ResultsView(View):
         self._plots = [kind(self.shown, panel, self._on_cell, height) for panel in panels]
         for plot in self._plots[1:]:
             plot.share_axes(self._plots[0])
-        width = {"min_width": _MIN_WIDTH, "styles": {"flex": f"1 1 {_MIN_WIDTH}px"}}
-        self._plot_area[:] = [pn.pane.Bokeh(plot.figure, **_WIDE, **width) for plot in self._plots]
+        self._plot_area[:] = [pn.pane.Bokeh(plot.figure, **_WIDE) for plot in self._plots]
 
     def _on_tab(self, event: Any) -> None:
         """Draw the declared figure when its tab is opened for the first time."""
@@ -286,10 +286,7 @@ class ResultsView(View):
         table = pn.pane.DataFrame(
             tabulate_outcome(cell, self.results), index=False, float_format="{:.9g}".format
         )
-        figures = [
-            pn.pane.Bokeh(f, **_WIDE, styles={"flex": f"1 1 {_MIN_WIDTH}px"})
-            for f in motion_figures(cell.motion)
-        ]
+        figures = [pn.pane.Bokeh(figure, **_WIDE) for figure in motion_figures(cell.motion)]
         self._cell_area[:] = [
             *self._cell_area[:2],
             pn.Card(fields, title="Scene", collapsed=True, **_WIDE),
@@ -298,8 +295,8 @@ class ResultsView(View):
                 f"{cell.outcome.rhs_evaluations:,} right-hand-side evaluations"
             ),
             table,
-            pn.FlexBox(*figures, **_WIDE),
-            *map(_show_text, cell.notes),
+            pn.Column(*figures, styles=_GRID, **_WIDE),
+            _show_text(cell.note),
         ]
         self.refresh()
 
