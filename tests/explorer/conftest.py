@@ -19,7 +19,9 @@ from typing import Any, NamedTuple
 
 import pytest
 
-CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser")
+CHROMIUM = next(
+    filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None
+)
 #: Time in ms after which a page that does not show what a test waits for fails the test.
 PATIENCE = 60_000
 
@@ -109,7 +111,7 @@ def browser() -> Iterator[Any]:
         chromium.close()
 
 
-@pytest.fixture
+@pytest.fixture(scope="module")
 def open_page(browser: Any) -> Iterator[Callable[..., Any]]:
     """Yield a function that opens a page in a new browser profile.
 
