@@ -12,7 +12,6 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
 import pandas as pd
 import xarray as xr
 
@@ -727,18 +726,14 @@ def _find_cell_in_results_file(
     study : Study
         Study of the results.
     number : int
-        Number of the cell of the study in row-major order.
+        Number of the cell in row-major order.
     differences : mapping of str to (object, object)
         Stored value and current value of each dependency that has changed, such as the version of
         the code.
     """
     results = _open_dataset_if_name_or_path(source)
-    status = results["status"]
-    index = np.unravel_index(find_cell_number(results, cell_coordinates), status.shape)
+    number = find_cell_number(results, cell_coordinates)
     declared = StoredDataset(results).rebuild_study(study_file)
-    # The dataset may contain only some of the cells of the study.
-    selected = results.isel(dict(zip(status.dims, index, strict=True)))
-    number = StoredDataset(selected).find_cell_number(declared)
     now = run_fingerprint(declared, [declared.scene(number)])
     return (
         declared,

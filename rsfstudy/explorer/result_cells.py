@@ -111,9 +111,8 @@ def recompute(
     report(0.6, "Computing the motion")
     motion, note, code = _recorded_motion(study.measure, scene, outcome)
     if motion is None:
-        selected = StoredDataset(results.sel(coordinates))
-        changes = study.cell(selected.find_cell_number(study)).measure_changes
-        loading, note = _loading_of_motion(study.measure.with_(**changes), scene, outcome)
+        measure = study.measure.with_(**study.cell(number).measure_changes)
+        loading, note = _loading_of_motion(measure, scene, outcome)
         moving = scene.with_(**{name: value for name, (value, _text) in loading.items()})
         options: dict[str, Any] = {"rtol": study.accuracy.rtol, "engine": study.accuracy.engine}
         motion = simulate(moving, **options)

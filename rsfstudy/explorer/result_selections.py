@@ -172,12 +172,14 @@ def complete_selection(
     left = [d for d in others if d != second]
     facet = facet if _check_choice("facet", facet, ["", *known]) in left else ""
     given = points or {}
-    for name in given:
-        _check_choice("points", name, known)
-        if not -1 < int(given[name]) < dataset.sizes.get(name, 1):
-            rule = f"is not an index of {name}, which has {dataset.sizes.get(name, 1)} points"
-            raise InvalidValue("points", given[name], rule)
-    chosen = {d: int(given.get(d, 0)) for d in left if d != facet}
+    if not isinstance(given, Mapping):
+        raise InvalidValue("points", given, "must map names of dimensions to indices")
+    for name, index in given.items():
+        _check_choice("points", name, list(map(str, dataset.dims)))
+        if not isinstance(index, int) or not 0 <= index < dataset.sizes[name]:
+            rule = f"is not an index of {name}, which has {dataset.sizes[name]} points"
+            raise InvalidValue("points", index, rule)
+    chosen = {d: given.get(d, 0) for d in left if d != facet}
     return Selection(variable, str(kind), str(x), second or "", facet or "", chosen)
 
 

@@ -247,7 +247,9 @@ class ResultsView(View):
     def _show_figure(self, image: bytes) -> None:
         """Show the declared figure."""
         self._figure_area[:] = [
-            pn.pane.PNG(image, sizing_mode="scale_width", max_width=1000, alt_text="figure")
+            pn.pane.PNG(
+                image, sizing_mode="scale_width", max_width=1000, alt_text="figure of the study"
+            )
         ]
 
     # ---- cells ----------------------------------------------------------------------------------

@@ -90,21 +90,6 @@ class StoredDataset:
         """
         return dataset_scenes.scene_of_dataset(self.dataset, study)
 
-    def find_cell_number(self, study: Study) -> int:
-        """Return the number of the selected cell in its study.
-
-        Parameters
-        ----------
-        study : Study
-            Study of the results. The dataset may contain only some of its cells.
-
-        Returns
-        -------
-        int
-            Number of the cell in row-major order.
-        """
-        return dataset_scenes.find_selected_cell_number(self.dataset, study)
-
     def read_json(self, attribute_name: str) -> Any:
         """Decode an attribute that contains JSON.
 
