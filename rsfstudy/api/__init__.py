@@ -16,7 +16,11 @@ if TYPE_CHECKING:
     from rsfstudy.api.html_report import write_report
     from rsfstudy.api.result_paths import find_results
     from rsfstudy.api.simulation import BEYOND_INSTABILITY_NORM_ATTRIBUTE_NAME, simulate
-    from rsfstudy.api.study_runs import apply_overrides_to_study, prepare_run_with_progress
+    from rsfstudy.api.study_runs import (
+        apply_overrides_to_study,
+        prepare_run_with_progress,
+        recompute_cell,
+    )
 else:
     __getattr__, __dir__ = build_lazy_export_functions(
         __name__,
@@ -25,7 +29,11 @@ else:
             "api.html_report": ("write_report",),
             "api.result_paths": ("find_results",),
             "api.simulation": ("BEYOND_INSTABILITY_NORM_ATTRIBUTE_NAME", "simulate"),
-            "api.study_runs": ("apply_overrides_to_study", "prepare_run_with_progress"),
+            "api.study_runs": (
+                "apply_overrides_to_study",
+                "prepare_run_with_progress",
+                "recompute_cell",
+            ),
         },
     )
 
@@ -35,6 +43,7 @@ __all__ = [
     "apply_overrides_to_study",
     "find_results",
     "prepare_run_with_progress",
+    "recompute_cell",
     "simulate",
     "write_report",
 ]

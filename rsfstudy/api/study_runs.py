@@ -645,16 +645,16 @@ def compare(first: xr.Dataset | str | Path, second: xr.Dataset | str | Path) -> 
 
 @partial(error_boundary, unchanged_exceptions=(Exception,))
 def recompute_cell(
-    file: str | Path, place: Mapping[str, Any], *, study: str | Path | None = None
+    file: xr.Dataset | str | Path, place: Mapping[str, Any], *, study: str | Path | None = None
 ) -> tuple[Scene, Outcome]:
-    """Recompute one cell of a results file in the current process.
+    """Recompute one cell of the results of a study in the current process.
 
     Exceptions that the computation raises are not caught, so that a debugger can inspect them.
 
     Parameters
     ----------
-    file : str or Path
-        Path of a results file, or name of a study.
+    file : xarray.Dataset, str or Path
+        Results of a study, path of a results file, or name of a study.
     place : mapping of str to object
         Coordinates of the cell: the value or label on each axis. Numbers may be passed as strings.
     study : str or Path, optional
@@ -715,21 +715,23 @@ def recompute_cell(
 
 @partial(error_boundary, is_called_internally=True)
 def _find_cell_in_results_file(
-    results_file: str | Path, cell_coordinates: Mapping[str, Any], study_file: str | Path | None
+    source: xr.Dataset | str | Path,
+    cell_coordinates: Mapping[str, Any],
+    study_file: str | Path | None,
 ) -> tuple[Study, int, Mapping[str, tuple[Any, Any]]]:
-    """Find a cell of a results file.
+    """Find a cell of the results of a study.
 
     Returns
     -------
     study : Study
-        Study of the file.
+        Study of the results.
     number : int
         Number of the cell in row-major order.
     differences : mapping of str to (object, object)
         Stored value and current value of each dependency that has changed, such as the version of
         the code.
     """
-    results = open(results_file)
+    results = _open_dataset_if_name_or_path(source)
     number = find_cell_number(results, cell_coordinates)
     declared = StoredDataset(results).rebuild_study(study_file)
     now = run_fingerprint(declared, [declared.scene(number)])

@@ -13,7 +13,14 @@ from rsfstudy._lazy_exports import build_lazy_export_functions
 
 if TYPE_CHECKING:
     from rsfstudy.plots._agreement import draw_agreement
-    from rsfstudy.plots._axes import describe_point, label_rows
+    from rsfstudy.plots._axes import (
+        are_log_spaced,
+        are_positive_and_span_decades,
+        compute_cell_edges,
+        describe_point,
+        format_axis_label,
+        label_rows,
+    )
     from rsfstudy.plots._figures import (
         FIGURE_NAMES,
         Figure,
@@ -37,7 +44,14 @@ else:
         __name__,
         {
             "plots._agreement": ("draw_agreement",),
-            "plots._axes": ("describe_point", "label_rows"),
+            "plots._axes": (
+                "are_log_spaced",
+                "are_positive_and_span_decades",
+                "compute_cell_edges",
+                "describe_point",
+                "format_axis_label",
+                "label_rows",
+            ),
             "plots._figures": (
                 "FIGURE_NAMES",
                 "Figure",
@@ -64,11 +78,15 @@ __all__ = [
     "Figure",
     "NotebookFigure",
     "add_grey_legend_entry",
+    "are_log_spaced",
+    "are_positive_and_span_decades",
+    "compute_cell_edges",
     "cycle_marker",
     "cycle_style",
     "describe_point",
     "draw_agreement",
     "draw_figure",
+    "format_axis_label",
     "format_number",
     "format_slope",
     "label_rows",

@@ -171,6 +171,13 @@ def are_log_spaced(points: np.ndarray) -> bool:
         True if there are at least three points, if all points are positive and span at least a
         factor of ten, and if the ratios of neighbouring points vary less than the differences of
         neighbouring points.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from rsfstudy.plots import are_log_spaced
+    >>> are_log_spaced(np.array([1.0, 10.0, 100.0])), are_log_spaced(np.array([1.0, 2.0, 3.0]))
+    (True, False)
     """
     at = np.sort(points.astype(float))
     if at.size < 3 or at[0] <= 0.0 or at[-1] < 10.0 * at[0]:
@@ -192,11 +199,85 @@ def are_positive_and_span_decades(values: np.ndarray) -> bool:
     bool
         True if the smallest value is positive and the largest value is more than 100 times the
         smallest value.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from rsfstudy.plots import are_positive_and_span_decades
+    >>> are_positive_and_span_decades(np.array([0.1, 20.0]))
+    True
     """
     known = values[np.isfinite(values)]
     return bool(
         known.size and known.min() > 0.0 and known.max() > _MIN_RATIO_FOR_LOG_SCALE * known.min()
     )
+
+
+def compute_cell_edges(points: np.ndarray, is_log_scale: bool = False) -> np.ndarray:
+    """Compute the edges of lattice cells from their centres.
+
+    The edges are midpoints between neighbouring centres, on a linear or logarithmic scale.
+
+    Parameters
+    ----------
+    points : ndarray, shape (n,)
+        Centres of the cells along one axis, in increasing order.
+    is_log_scale : bool, default: False
+        If True, the midpoints are computed on a logarithmic scale.
+
+    Returns
+    -------
+    ndarray, shape (n + 1,)
+        Edges of the cells.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from rsfstudy.plots import compute_cell_edges
+    >>> compute_cell_edges(np.array([1.0, 2.0, 4.0]))
+    array([0.5, 1.5, 3. , 5. ])
+    """
+    if points.size < 2:
+        return np.asarray(
+            [0.9 * points[0], 1.1 * points[0]]
+            if is_log_scale
+            else [points[0] - 0.5, points[0] + 0.5]
+        )
+    at = np.log(points) if is_log_scale else points.astype(float)
+    halfway = 0.5 * (at[1:] + at[:-1])
+    ends = np.concatenate([[2.0 * at[0] - halfway[0]], halfway, [2.0 * at[-1] - halfway[-1]]])
+    return np.asarray(np.exp(ends) if is_log_scale else ends)
+
+
+def format_axis_label(
+    dataset: xr.Dataset, variable_name: str, max_line_characters: int = 45
+) -> str:
+    """Return an axis label with the name, symbol and units of a variable.
+
+    Parameters
+    ----------
+    dataset : xarray.Dataset
+        Results of a study. If the variable has the attributes ``long_name``, ``symbol`` and
+        ``units``, these attributes override the vocabulary of rsfstudy.
+    variable_name : str
+        Name of the variable.
+    max_line_characters : int, default: 45
+        Maximum number of visible characters per line.
+
+    Returns
+    -------
+    str
+        Label with formulas in mathtext.
+
+    Examples
+    --------
+    >>> import xarray as xr
+    >>> from rsfstudy.plots import format_axis_label
+    >>> format_axis_label(xr.Dataset(), "b_over_a", 80)
+    'Ratio of evolution effect to direct effect, $b/a$'
+    """
+    quantity = find_quantity(variable_name, read_quantities_not_in_vocabulary(dataset))
+    return format_quantity_axis_label(quantity, max_line_characters)
 
 
 def describe_point(cell: xr.Dataset | xr.DataArray, dimension: str) -> str:
@@ -397,11 +478,7 @@ def add_colour_bar(dataset: xr.Dataset, axes: Axes, dimension: str) -> None:
     """
     scale = _build_colour_scale(dataset, dimension)
     bar = cast(Figure, axes.figure).colorbar(scale, ax=axes, pad=0.02)
-    bar.set_label(
-        format_quantity_axis_label(
-            find_quantity(dimension, read_quantities_not_in_vocabulary(dataset)), 34
-        )
-    )
+    bar.set_label(format_axis_label(dataset, dimension, 34))
 
 
 def _build_colour_scale(dataset: xr.Dataset, dimension: str) -> ScalarMappable:

@@ -22,6 +22,7 @@ from rsfstudy.plots._axes import (
     are_log_spaced,
     are_positive_and_span_decades,
     describe_point,
+    format_axis_label,
     has_numeric_points,
     label_rows,
     point_colours,
@@ -35,7 +36,6 @@ from rsfstudy.plots._style import (
     cycle_style,
     estimate_text_capacity_in_characters,
 )
-from rsfstudy.plots._text import format_quantity_axis_label as labelled
 from rsfstudy.plots._text import format_slope, to_mathtext, wrap_text
 from rsfstudy.status import Status
 from rsfstudy.study import Panel, read_quantities_not_in_vocabulary
@@ -416,10 +416,7 @@ def _axis_label(
             _resolve_text_or_function(declared_label, panel_data, ""), max_line_characters
         )
     return (
-        labelled(
-            find_quantity(name_or_function, read_quantities_not_in_vocabulary(panel_data)),
-            max_line_characters,
-        )
+        format_axis_label(panel_data, name_or_function, max_line_characters)
         if isinstance(name_or_function, str) and name_or_function
         else ""
     )

@@ -18,6 +18,7 @@ from rsfstudy.plots._axes import (
     are_log_spaced,
     are_positive_and_span_decades,
     describe_point,
+    format_axis_label,
     has_numeric_points,
     is_numeric_variable,
     point_colours,
@@ -26,10 +27,9 @@ from rsfstudy.plots._axes import (
     varying_variables,
 )
 from rsfstudy.plots._style import add_grey_legend_entry, cycle_marker, cycle_style
-from rsfstudy.plots._text import format_quantity_axis_label, to_mathtext
+from rsfstudy.plots._text import to_mathtext
 from rsfstudy.storage import StoredDataset
-from rsfstudy.study import Panel, read_quantities_not_in_vocabulary
-from rsfstudy.vocabulary import find_quantity
+from rsfstudy.study import Panel
 
 #: Maximum number of panels, maximum number of lines with a legend entry, and number of points of a
 #: numeric axis above which a colour scale is used.
@@ -81,9 +81,7 @@ def _build_panel(dataset: xr.Dataset, variable_name: str, title: str) -> Panel:
     return Panel(
         x=along,
         overlays=[partial(_draw_lines, variable_name, along)],
-        y_label=format_quantity_axis_label(
-            find_quantity(variable_name, read_quantities_not_in_vocabulary(dataset)), 200
-        ),
+        y_label=format_axis_label(dataset, variable_name, 200),
         title=to_mathtext(title),
     )
 

@@ -26,15 +26,16 @@ from scipy.spatial import cKDTree
 from rsfstudy.plots._axes import (
     are_log_spaced,
     are_positive_and_span_decades,
+    compute_cell_edges,
+    format_axis_label,
     has_numeric_points,
     is_numeric_variable,
     measured_variables,
     read_flag_meanings_of_variable,
 )
-from rsfstudy.plots._text import format_quantity_axis_label, to_mathtext
+from rsfstudy.plots._text import to_mathtext
 from rsfstudy.status import Status
-from rsfstudy.study import Panel, read_quantities_not_in_vocabulary
-from rsfstudy.vocabulary import find_quantity
+from rsfstudy.study import Panel
 
 #: Minimum number of points of each axis of a map, and maximum number of maps.
 _MIN_POINTS_PER_MAP_AXIS, _MAX_MAPS = 3, 12
@@ -77,17 +78,14 @@ def panels(dataset: xr.Dataset, variable: str | None = None) -> Sequence[Panel]:
     if plane is None or not set(values.dims) <= set(cells):
         return []
     others = [str(d) for d in values.dims if d not in plane]
-    about = find_quantity(names[0], read_quantities_not_in_vocabulary(dataset))
     places = list(np.ndindex(*(values.sizes[d] for d in others)))[:_MAX_MAPS]
     panel = partial(
         Panel,
         x=plane[1],
         overlays=[partial(draw_map, names[0], plane, _colour_scale(values))],
-        y_label=format_quantity_axis_label(
-            find_quantity(plane[0], read_quantities_not_in_vocabulary(dataset)), 200
-        ),
+        y_label=format_axis_label(dataset, plane[0], 200),
         title=None if others else to_mathtext(dataset.attrs.get("title", "")),
-        legend_title=format_quantity_axis_label(about, 60)
+        legend_title=format_axis_label(dataset, names[0], 60)
         if read_flag_meanings_of_variable(values)
         else None,
     )
@@ -135,7 +133,7 @@ def draw_map(
     dataset = dataset.sortby(list(map_dimensions))
     values = dataset[variable_name].astype(float).transpose(*map_dimensions)
     y, x = (values[dimension].values.astype(float) for dimension in map_dimensions)
-    at = _cell_edges(x, are_log_spaced(x)), _cell_edges(y, are_log_spaced(y))
+    at = compute_cell_edges(x, are_log_spaced(x)), compute_cell_edges(y, are_log_spaced(y))
     axes.set(**{f"{w}scale": "log" for w, points in (("x", x), ("y", y)) if are_log_spaced(points)})
     axes.set(xlim=(at[0][0], at[0][-1]), ylim=(at[1][0], at[1][-1]))
     if found := colour_scale or _colour_scale(dataset[variable_name]):
@@ -148,11 +146,7 @@ def draw_map(
                 axes.add_collection(PolyCollection([], facecolor=colour, label=meanings[flag]))
         else:
             bar = cast(Figure, axes.figure).colorbar(drawn, ax=axes, pad=0.02)
-            bar.set_label(
-                format_quantity_axis_label(
-                    find_quantity(variable_name, read_quantities_not_in_vocabulary(dataset)), 34
-                )
-            )
+            bar.set_label(format_axis_label(dataset, variable_name, 34))
             draw_contours(axes, values, found[1])
     status = dataset["status"]
     status = status.squeeze(
@@ -176,7 +170,7 @@ def _colour_scale(map_values: xr.DataArray) -> tuple[Normalize, Sequence[float]]
         return None
     if read_flag_meanings_of_variable(map_values):
         flags = np.unique(values[np.isfinite(values)])
-        return BoundaryNorm(_cell_edges(flags), 256), flags.tolist()
+        return BoundaryNorm(compute_cell_edges(flags), 256), flags.tolist()
     low, high = float(np.nanmin(values)), float(np.nanmax(values))
     if are_positive_and_span_decades(values):
         subs = (1.0, 3.0) if high < 1e4 * low else (1.0,)
@@ -185,23 +179,6 @@ def _colour_scale(map_values: xr.DataArray) -> tuple[Normalize, Sequence[float]]
 
 
 # ---- contents of a map --------------------------------------------------------------------------
-
-
-def _cell_edges(cell_centres: np.ndarray, is_log_scale: bool = False) -> np.ndarray:
-    """Compute the edges of lattice cells from their centres.
-
-    The edges are midpoints between neighbouring centres, on a linear or logarithmic scale.
-    """
-    if cell_centres.size < 2:
-        return np.asarray(
-            [0.9 * cell_centres[0], 1.1 * cell_centres[0]]
-            if is_log_scale
-            else [cell_centres[0] - 0.5, cell_centres[0] + 0.5]
-        )
-    at = np.log(cell_centres) if is_log_scale else cell_centres.astype(float)
-    halfway = 0.5 * (at[1:] + at[:-1])
-    ends = np.concatenate([[2.0 * at[0] - halfway[0]], halfway, [2.0 * at[-1] - halfway[-1]]])
-    return np.asarray(np.exp(ends) if is_log_scale else ends)
 
 
 def draw_contours(axes: Axes, values: xr.DataArray, contour_levels: Sequence[float]) -> None:

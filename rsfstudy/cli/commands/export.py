@@ -36,6 +36,7 @@ def export(given: options.CommandOptions) -> int:
     The command writes a CSV table, a MATLAB file, or both. The CSV table of a study has one row per
     cell. The CSV table of a motion has one row per time.
     """
+    import rsfstudy.api  # noqa: F401  # The import registers the accessor ``dataset.rsf``.
     from rsfstudy.cli.export_files import to_csv, to_mat
     from rsfstudy.storage import read_dataset
 

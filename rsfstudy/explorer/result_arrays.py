@@ -1,0 +1,364 @@
+"""Numbers that a selection of results shows.
+
+The functions return arrays for the curves and the maps of a plot, and never draw.
+"""
+
+from __future__ import annotations
+
+import html
+import re
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from functools import partial
+from typing import Any, NamedTuple
+
+import numpy as np
+import xarray as xr
+
+from rsfstudy.explorer.result_selections import Selection, dimension_along_x
+from rsfstudy.plots import are_log_spaced, compute_cell_edges, describe_point
+from rsfstudy.status import Status
+
+#: Maximum number of panels, of curves in a panel, and of points of a curve.
+MAX_PANELS, MAX_CURVES, MAX_POINTS = 12, 40, 4000
+#: Number of blocks along each axis in which the statuses of many cells are shown.
+_BLOCKS = 50
+
+
+@dataclass(frozen=True)
+class Curve:
+    """Numbers of one curve.
+
+    Parameters
+    ----------
+    name : str
+        Point of the curve on the colour dimension. The string is empty for a single curve.
+    number : int
+        Index of this point.
+    x, y, error : ndarray
+        Coordinates, values and error estimates. If the variable has no error estimate, ``error``
+        contains NaN.
+    status : ndarray of int
+        Status codes of the cells. The code is ``Status.OK`` if a point belongs to no cell.
+    cells : ndarray of int
+        Numbers of the cells in row-major order, or -1 if a point belongs to no cell.
+    """
+
+    name: str
+    number: int
+    x: np.ndarray
+    y: np.ndarray
+    error: np.ndarray
+    status: np.ndarray
+    cells: np.ndarray
+
+
+@dataclass(frozen=True)
+class Map:
+    """Numbers of one map.
+
+    Parameters
+    ----------
+    x, y : ndarray
+        Coordinates of the cells along both axes, in increasing order.
+    values, status : ndarray, shape (y, x)
+        Values and status codes of the cells.
+    cells : ndarray of int, shape (y, x)
+        Numbers of the cells in row-major order, or -1 if a point belongs to no cell.
+    """
+
+    x: np.ndarray
+    y: np.ndarray
+    values: np.ndarray
+    status: np.ndarray
+    cells: np.ndarray
+
+    def cell_at(self, x: float, y: float) -> int:
+        """Return the number of the cell at a position, or -1 outside the map."""
+        at = []
+        for points, value in ((self.y, y), (self.x, x)):
+            edges = compute_cell_edges(points, are_log_spaced(points))
+            at.append(int(np.searchsorted(edges, value, side="right")) - 1)
+            if not edges[0] <= value <= edges[-1]:
+                return -1
+        return int(self.cells[min(at[0], self.y.size - 1), min(at[1], self.x.size - 1)])
+
+
+def error_name(dataset: xr.Dataset, variable: str) -> str:
+    """Return the name of the error estimate of a variable, or an empty string."""
+    names = (f"{variable}_stderr", f"{variable}_error")
+    return next(
+        (n for n in names if n in dataset and dataset[n].dims == dataset[variable].dims), ""
+    )
+
+
+def part_names(dataset: xr.Dataset, selection: Selection) -> list[str]:
+    """Return the names of the variables that a selection shows.
+
+    The names are the variable, its error estimate, the variable along x, the status and the
+    message.
+    """
+    names = [selection.variable, error_name(dataset, selection.variable), selection.x]
+    if shows_cells(dataset, selection.variable):
+        names += ["status", "message"]
+    return [n for n in dict.fromkeys(names) if n in dataset.data_vars]
+
+
+def shows_cells(dataset: xr.Dataset, variable: str) -> bool:
+    """Return True if each value of a variable belongs to one cell."""
+    return {*dataset["status"].dims} <= {*dataset[variable].dims}
+
+
+def iterate_panels(dataset: xr.Dataset, selection: Selection) -> Iterator[Selection]:
+    """Yield the selection of each panel, without a facet.
+
+    At most 12 points of the facet dimension are selected, at regular intervals.
+    """
+    if not selection.facet:
+        yield selection
+        return
+    for place in thin_points(dataset.sizes[selection.facet], MAX_PANELS):
+        points = {**selection.points, selection.facet: int(place)}
+        yield Selection(
+            selection.variable, selection.kind, selection.x, selection.second, "", points
+        )
+
+
+def thin_points(size: int, most: int) -> np.ndarray:
+    """Return indices at regular intervals, including the first and the last index."""
+    return np.unique(np.linspace(0, size - 1, min(size, most)).round().astype(int))
+
+
+def describe_points(dataset: xr.Dataset, points: Mapping[str, int]) -> str:
+    """Describe the selected points of several dimensions in mathtext."""
+    varied = [d for d in points if dataset.sizes[d] > 1]
+    return ", ".join(
+        describe_point(dataset.coords.to_dataset().isel({d: points[d]}), d) for d in varied
+    )
+
+
+def _arrays_of_panel(
+    dataset: xr.Dataset, panel: Selection, dimensions: Sequence[str]
+) -> tuple[np.ndarray, ...]:
+    """Return values, errors, statuses and cell numbers along the dimensions of a panel."""
+    lattice, error = dataset["status"], error_name(dataset, panel.variable)
+    status, cells = xr.DataArray(int(Status.OK)), xr.DataArray(-1)
+    if shows_cells(dataset, panel.variable):
+        status = lattice.isel({d: i for d, i in panel.points.items() if d in lattice.dims})
+        cells, stride = xr.DataArray(0), 1
+        for name in map(str, reversed(lattice.dims)):
+            place: Any = xr.DataArray(np.arange(lattice.sizes[name]), dims=name)
+            cells = cells + stride * (place if name in dimensions else panel.points[name])
+            stride *= lattice.sizes[name]
+    values = (
+        dataset[panel.variable]
+        .isel(panel.points)
+        .transpose(*dimensions)
+        .drop_vars(dimensions, errors="ignore")
+    )
+    errors = dataset[error].isel(panel.points) if error else xr.DataArray(np.nan)
+    rest = [
+        one.drop_vars(list(one.coords)).broadcast_like(values).transpose(*dimensions)
+        for one in (errors, status, cells)
+    ]
+    return values.values.astype(float), *(one.values for one in rest)
+
+
+def curves_of_panel(dataset: xr.Dataset, panel: Selection) -> list[Curve]:
+    """Return the curves of a panel without a facet.
+
+    If there are more than 40 curves, curves at regular intervals are returned. A curve with more
+    than 4,000 points is thinned: of each group of neighbouring points, the lowest point, the
+    highest point and the first failed cell are kept.
+
+    Parameters
+    ----------
+    dataset : xarray.Dataset
+        Results of a study.
+    panel : Selection
+        Selection with the kind ``"lines"``.
+
+    Returns
+    -------
+    list of Curve
+        One curve per selected point of the colour dimension.
+    """
+    along, second = dimension_along_x(dataset, panel.variable, panel.x), panel.second
+    dims = ([second] if second else []) + [along]
+    arrays = [a.reshape(-1, a.shape[-1]) for a in _arrays_of_panel(dataset, panel, dims)]
+    x = _x_values(dataset, panel, along, arrays[0].shape)
+    found = []
+    for number in thin_points(len(arrays[0]), MAX_CURVES):
+        values, errors, status, cells = (a[number] for a in arrays)
+        name = to_plain_text(describe_points(dataset, {second: int(number)})) if second else ""
+        kept = thin_curve(values, status)
+        rows = (x[number], values, errors, status, cells)
+        found.append(Curve(name, int(number), *(row[kept] for row in rows)))
+    return found
+
+
+def _x_values(
+    dataset: xr.Dataset, panel: Selection, along: str, shape: tuple[int, ...]
+) -> np.ndarray:
+    """Return the values along x of all curves. Names are numbered from 0."""
+    values = dataset[panel.x] if panel.x in dataset.variables else dataset[along]
+    if values.dtype.kind not in "iuf":
+        return np.broadcast_to(np.arange(shape[-1], dtype=float), shape)
+    at = {d: i for d, i in panel.points.items() if d in values.dims}
+    dims = [d for d in (panel.second, along) if d in values.dims]
+    return np.broadcast_to(values.isel(at).transpose(*dims).values.astype(float), shape)
+
+
+def thin_curve(values: np.ndarray, status: np.ndarray | None = None) -> np.ndarray:
+    """Return the indices of the points of a curve that are drawn.
+
+    Parameters
+    ----------
+    values : ndarray, shape (n,)
+        Values of the curve.
+    status : ndarray of int, shape (n,), optional
+        Status codes of the points.
+
+    Returns
+    -------
+    ndarray of int
+        All indices if there are at most 4,000 points. Otherwise the first and the last index, and
+        the lowest point, the highest point and the first failed cell of each group of neighbouring
+        points.
+    """
+    if values.size <= MAX_POINTS:
+        return np.arange(values.size)
+    starts = np.linspace(0, values.size, MAX_POINTS // 4, endpoint=False).astype(int)
+    low, high = np.nan_to_num(values, nan=np.inf), np.nan_to_num(values, nan=-np.inf)
+    kept = [0, values.size - 1]
+    for start, end in zip(starts, [*starts[1:], values.size], strict=True):
+        kept += [start + int(low[start:end].argmin()), start + int(high[start:end].argmax())]
+        if status is not None:
+            kept.append(start + int((status[start:end] != int(Status.OK)).argmax()))
+    return np.unique(kept)
+
+
+def map_of_panel(dataset: xr.Dataset, panel: Selection) -> Map:
+    """Return the map of a panel without a facet.
+
+    Parameters
+    ----------
+    dataset : xarray.Dataset
+        Results of a study.
+    panel : Selection
+        Selection with the kind ``"map"``.
+
+    Returns
+    -------
+    Map
+        Values and statuses, with increasing coordinates.
+    """
+    dims = (panel.second, panel.x)
+    y, x = (dataset[d].values.astype(float) for d in dims)
+    order = np.ix_(np.argsort(y), np.argsort(x))
+    values, _errors, status, cells = (a[order] for a in _arrays_of_panel(dataset, panel, dims))
+    return Map(np.sort(x), np.sort(y), values, status, cells)
+
+
+def sample_map(
+    found: Map, x_range: tuple[float, float], y_range: tuple[float, float], shape: tuple[int, int]
+) -> np.ndarray:
+    """Sample the values of a map at the pixels of an image.
+
+    Parameters
+    ----------
+    found : Map
+        Map to sample.
+    x_range, y_range : tuple of (float, float)
+        Limits of the image. If the points of an axis are spaced logarithmically, the pixels are
+        spaced logarithmically.
+    shape : tuple of (int, int)
+        Number of pixels along y and along x.
+
+    Returns
+    -------
+    ndarray
+        Values at the pixels.
+    """
+    places = []
+    limits = (y_range, x_range)
+    for points, (low, high), count in zip((found.y, found.x), limits, shape, strict=True):
+        edges, is_log = compute_cell_edges(points, log := are_log_spaced(points)), log
+        low, high = (np.log(low), np.log(high)) if is_log else (low, high)
+        pixels = low + (high - low) * (np.arange(count) + 0.5) / count
+        pixels = np.exp(pixels) if is_log else pixels
+        places.append(np.clip(np.searchsorted(edges, pixels, "right") - 1, 0, points.size - 1))
+    return found.values[np.ix_(*places)]
+
+
+class Marks(NamedTuple):
+    """Cells whose status is not "ok".
+
+    Parameters
+    ----------
+    rows, columns : ndarray of int
+        Index of the curve and index along the curve, or indices of a map along y and x.
+    status, cells : ndarray of int
+        Status codes and cell numbers.
+    """
+
+    rows: np.ndarray
+    columns: np.ndarray
+    status: np.ndarray
+    cells: np.ndarray
+
+
+def find_marks(status: np.ndarray, cells: np.ndarray) -> Marks:
+    """Find the cells whose status is not "ok".
+
+    If there are more than 2,500 such cells, the array is divided into 50 by 50 blocks, and one cell
+    of each status is kept in each block. A single failed cell among a million cells is therefore
+    always found.
+
+    Parameters
+    ----------
+    status, cells : ndarray of int, shape (rows, columns)
+        Status codes and cell numbers.
+
+    Returns
+    -------
+    Marks
+        Cells in row-major order.
+    """
+    rows, columns = np.nonzero(status != int(Status.OK))
+    codes = status[rows, columns]
+    if rows.size > _BLOCKS**2:
+        blocks = [
+            at * _BLOCKS // size for at, size in zip((rows, columns), status.shape, strict=True)
+        ]
+        keys = np.ravel_multi_index((*blocks, codes), (_BLOCKS, _BLOCKS, len(Status)))
+        kept = np.unique(keys, return_index=True)[1]
+        rows, columns, codes = rows[kept], columns[kept], codes[kept]
+    return Marks(rows, columns, codes, cells[rows, columns])
+
+
+def describe_status(code: int) -> str:
+    """Return the name of a status with spaces instead of underscores."""
+    return Status.labels_by_code()[code].replace("_", " ")
+
+
+def to_plain_text(mathtext: str) -> str:
+    """Convert a label in mathtext to Unicode characters, for legends and widgets."""
+    text = mathtext.replace("\n", " ").replace(r"\,", " ").replace("$", "")
+    text = re.sub(r"\\([A-Za-z]+) ?", lambda found: _unescape_symbol(found[1]), text)
+    for mark, digits in ((r"\^", "⁰¹²³⁴⁵⁶⁷⁸⁹⁻"), ("_", "₀₁₂₃₄₅₆₇₈₉₋")):
+        small = str.maketrans("0123456789-", digits)
+        text = re.sub(mark + r"\{?(-?\d+)\}?", partial(_translate_digits, small), text)
+    return re.sub(r"[{}]", "", text).replace("\\ ", " ")
+
+
+def _translate_digits(digits: dict[int, int], found: re.Match[str]) -> str:
+    """Return the digits of a match as superscripts or subscripts."""
+    return found[1].translate(digits)
+
+
+def _unescape_symbol(name: str) -> str:
+    """Return the character of a symbol, or the name of an operator such as ``ln``."""
+    entity = f"&{name};"
+    character = html.unescape(entity)
+    return name if character == entity else character

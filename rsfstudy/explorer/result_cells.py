@@ -1,0 +1,234 @@
+"""Cells of the results of a study: scene, outcome and motion, computed again."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import pandas as pd
+import xarray as xr
+from bokeh.plotting import figure
+
+from rsfstudy.api import recompute_cell, simulate
+from rsfstudy.explorer.result_arrays import thin_curve, to_plain_text
+from rsfstudy.measures import Measure, Outcome
+from rsfstudy.plots import format_axis_label
+from rsfstudy.slider import Scene
+from rsfstudy.storage import StoredDataset
+
+#: Variables that can be along x in the plot of a motion. The first available variable is used.
+_ABSCISSAE = ("time", "load_point_displacement", "slip")
+#: Load of the motion if a measure solves for this load and has found no value.
+_LOAD_WITHOUT_VALUE = {
+    "load_velocity_ratio": 2.0, "displacement_step": 1.0, "normal_stress_step": 0.1,
+}  # fmt: skip
+#: Load point velocity in V_* of the motion of a scene that has no step.
+_VELOCITY_WITHOUT_STEP = 1.01
+
+
+@dataclass(frozen=True)
+class RecomputedCell:
+    """Cell that was computed again.
+
+    Parameters
+    ----------
+    number : int
+        Number of the cell in row-major order.
+    scene : Scene
+        Scene of the cell.
+    outcome : Outcome
+        Results of the measure.
+    motion : xarray.Dataset
+        Motion of the cell.
+    note : str
+        Explanation of the motion.
+    code : str
+        Python statement that computes the motion.
+    """
+
+    number: int
+    scene: Scene
+    outcome: Outcome
+    motion: xr.Dataset
+    note: str
+    code: str
+
+
+def cell_coordinates(results: xr.Dataset, number: int) -> dict[str, Any]:
+    """Return the coordinates of a cell.
+
+    Parameters
+    ----------
+    results : xarray.Dataset
+        Results of a study.
+    number : int
+        Number of the cell in row-major order.
+
+    Returns
+    -------
+    dict of str to object
+        Value or label on each dimension of the lattice.
+    """
+    status = results["status"]
+    index = np.unravel_index(number, status.shape)
+    return {
+        str(d): results[d].values[i].item()
+        if results[d].dtype.kind != "O"
+        else results[d].values[i]
+        for d, i in zip(status.dims, index, strict=True)
+    }
+
+
+def recompute(
+    results: xr.Dataset, number: int, report: Callable[[float, str], None]
+) -> RecomputedCell:
+    """Compute the outcome and the motion of a cell again.
+
+    If the measure records the motion, for example a limit cycle, the result contains the recorded
+    motion. Otherwise, the motion of the scene is simulated. If the measure solves for the load, the
+    load is the value that the measure has verified as unstable.
+
+    Parameters
+    ----------
+    results : xarray.Dataset
+        Results of a study.
+    number : int
+        Number of the cell in row-major order.
+    report : callable
+        Function that receives the progress as a fraction and a text.
+
+    Returns
+    -------
+    RecomputedCell
+        Scene, outcome and motion.
+    """
+    coordinates, study = cell_coordinates(results, number), StoredDataset(results).study
+    report(0.1, "Computing the cell")
+    scene, outcome = recompute_cell(results, coordinates)
+    report(0.6, "Computing the motion")
+    motion, note, code = _recorded_motion(study.measure, scene, outcome)
+    if motion is None:
+        measure = study.measure.with_(**study.cell(number).measure_changes)
+        loading, note = _loading_of_motion(measure, scene, outcome)
+        moving = scene.with_(**{name: value for name, (value, _text) in loading.items()})
+        options: dict[str, Any] = {"rtol": study.accuracy.rtol, "engine": study.accuracy.engine}
+        motion = simulate(moving, **options)
+        arguments = ", ".join(f"{name}={text}" for name, (_value, text) in loading.items())
+        with_loading = f"scene.with_({arguments})" if arguments else "scene"
+        texts = "".join(f", {name}={value!r}" for name, value in options.items())
+        code = f"motion = rsfstudy.simulate({with_loading}{texts})"
+    return RecomputedCell(number, scene, outcome, motion, note, code)
+
+
+def _recorded_motion(
+    measure: Measure, scene: Scene, outcome: Outcome
+) -> tuple[xr.Dataset | None, str, str]:
+    """Return the motion that a measure has recorded, with an explanation and code."""
+    dims = measure.variables.get("log10_slip_rate", ())
+    names = [n for n in outcome.values if measure.variables[n] == dims]
+    if len(dims) != 1 or not {*_ABSCISSAE} & {*names}:
+        return None, "", ""
+    columns = {name: (dims, np.asarray(outcome.values[name])) for name in names}
+    attributes = {"scene": json.dumps(scene.describe()), "title": f"Motion of {measure.name}"}
+    note = f"The measure {measure.name} has recorded this motion."
+    code = f"motion = {{name: outcome.values[name] for name in {names!r}}}"
+    return xr.Dataset(columns, attrs=attributes), note, code
+
+
+def _loading_of_motion(
+    measure: Measure, scene: Scene, outcome: Outcome
+) -> tuple[dict[str, tuple[float, str]], str]:
+    """Return the fields of the loading with their code, and an explanation."""
+    loads = [name for name in measure.solved_fields if name in _LOAD_WITHOUT_VALUE]
+    if loads:
+        verified = f"{measure.primary_output}_unstable"
+        value = float(outcome.values.get(verified, np.nan))
+        if np.isfinite(value):
+            text = f'outcome.values["{verified}"]'
+            note = "Motion after the step that the measure has verified as unstable."
+        else:
+            value = _LOAD_WITHOUT_VALUE[loads[0]]
+            text = repr(value)
+            note = f"The measure found no critical step. Motion after {loads[0]} = {value:g}."
+        loading = {loads[0]: (value, text)}
+        if loads[0] != "load_velocity_ratio" and scene.load_velocity_ratio is None:
+            loading["load_velocity_ratio"] = (0.0, "0.0")
+        return loading, note
+    if scene.is_perturbed:
+        return {}, "Motion of the scene, simulated from its loading."
+    ratio = _VELOCITY_WITHOUT_STEP
+    note = f"The scene has no step. Motion after a step of the load point velocity to {ratio} V_*."
+    return {"load_velocity_ratio": (ratio, repr(ratio))}, note
+
+
+def tabulate_outcome(cell: RecomputedCell, results: xr.Dataset) -> pd.DataFrame:
+    """Return a table of the numbers of a cell, with errors and with the stored values.
+
+    Parameters
+    ----------
+    cell : RecomputedCell
+        Cell that was computed again.
+    results : xarray.Dataset
+        Results of the study.
+
+    Returns
+    -------
+    pandas.DataFrame
+        Table with one row per scalar result. The columns are ``result``, ``value``, ``error`` and
+        ``stored``.
+    """
+    stored = results.sel(cell_coordinates(results, cell.number))
+    values = {n: v for n, v in cell.outcome.values.items() if np.ndim(v) == 0}
+    rows = [
+        {
+            "result": name,
+            "value": float(value),
+            "error": float(values.get(f"{name}_error", np.nan)),
+            "stored": float(stored[name]),
+        }
+        for name, value in values.items()
+        if not name.endswith("_error")
+    ]
+    return pd.DataFrame(rows, columns=["result", "value", "error", "stored"])
+
+
+def motion_figures(motion: xr.Dataset, height: int = 240) -> list[Any]:
+    """Return Bokeh figures of stress and slip rate against displacement or time.
+
+    If a motion without inertia and damping passes the instability norm, the figures end there,
+    because the rest of the motion has no physical meaning.
+
+    Parameters
+    ----------
+    motion : xarray.Dataset
+        Simulated or recorded motion.
+    height : int, default: 240
+        Height of a figure in pixels.
+
+    Returns
+    -------
+    list of bokeh.plotting.figure
+        Two figures with a common x axis.
+    """
+    if "instability_time" in motion:
+        motion = motion.sel(time=slice(None, float(motion["instability_time"])))
+    x = next(name for name in _ABSCISSAE if name in motion)
+    stress = "friction_coefficient" if "friction_coefficient" in motion else "shear_stress"
+    drawn: list[Any] = []
+    for y in (stress, "log10_slip_rate"):
+        kept = thin_curve(motion[y].values)
+        shared = {"x_range": drawn[0].x_range} if drawn else {}
+        panel: Any = figure(
+            height=height, sizing_mode="stretch_width", toolbar_location="above",
+            tools="pan,wheel_zoom,box_zoom,reset,hover", active_drag="box_zoom", **shared,
+        )  # fmt: skip
+        panel.line(motion[x].values[kept], motion[y].values[kept], line_width=1.6, color="#0072B2")
+        for axis, name in ((panel.xaxis, x), (panel.yaxis, y)):
+            axis.axis_label_text_font_size = "12px"
+            axis.axis_label = to_plain_text(format_axis_label(motion, name, 200))
+        panel.axis.axis_label_text_font_style = "normal"
+        drawn.append(panel)
+    return drawn

@@ -1,0 +1,443 @@
+"""Bokeh figures of curves and maps of results.
+
+A figure keeps its data sources. A slider replaces only the data, so that the browser does not build
+the figure again.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import Any
+
+import numpy as np
+import xarray as xr
+from bokeh.events import Tap
+from bokeh.models import (
+    ColorBar,
+    ColumnDataSource,
+    FixedTicker,
+    HoverTool,
+    LinearColorMapper,
+    LinearScale,
+    LogColorMapper,
+    Range1d,
+    TapTool,
+    Whisker,
+)
+from bokeh.palettes import Viridis256
+from bokeh.plotting import figure
+
+from rsfstudy.explorer.result_arrays import (
+    Curve,
+    Map,
+    Marks,
+    curves_of_panel,
+    describe_points,
+    describe_status,
+    find_marks,
+    map_of_panel,
+    sample_map,
+    thin_points,
+    to_plain_text,
+)
+from rsfstudy.explorer.result_selections import Selection
+from rsfstudy.formatting import read_flag_meanings
+from rsfstudy.plots import (
+    are_log_spaced,
+    are_positive_and_span_decades,
+    compute_cell_edges,
+    cycle_marker,
+    cycle_style,
+    format_axis_label,
+    style_context,
+)
+from rsfstudy.status import Status
+
+#: Function that receives the number of the cell that the user clicks.
+OnCell = Callable[[int], None]
+
+#: Number of curves above which a numeric colour dimension has a colour scale.
+_MAX_CURVES_WITH_NAMES = 7
+#: Number of points of a curve above which its markers are small, and maximum number of points that
+#: the pointer can select.
+_MAX_POINTS_WITH_MARKERS, _MAX_SELECTABLE_POINTS = 60, 6000
+#: Maximum number of cells of which an image shows each one, and number of pixels of other images.
+_MAX_CELLS_OF_IMAGE, _PIXELS = 2**21, (1000, 1400)
+#: Number of rows of status symbols at the bottom of a figure.
+_STATUS_ROWS = 8
+_DASHES = {"-": [], "--": [6, 3], ":": [2, 3], "-.": [6, 3, 2, 3]}
+_MARKERS = {
+    "o": "circle", "s": "square", "^": "triangle", "D": "diamond", "v": "inverted_triangle",
+    "<": "hex", ">": "plus", "P": "cross", "*": "star", "X": "square_pin",
+}  # fmt: skip
+_STATUS_SYMBOLS = (
+    "x", "asterisk", "triangle_dot", "square_x", "circle_y", "diamond_cross", "y",
+)  # fmt: skip
+#: Colours of symbols of failures and of other statuses, and colour of cells without a value.
+_FAILURE_COLOUR, _ANSWER_COLOUR, _EMPTY_COLOUR = "#D55E00", "#444444", "#e4e4e4"
+#: Palette of Okabe and Ito for variables with flags.
+_FLAG_COLOURS = ("#0072B2", "#E69F00", "#009E73", "#CC79A7", "#56B4E9", "#F0E442", "#D55E00")
+
+
+class Plot:
+    """Base class of plots with symbols for the statuses of cells.
+
+    Parameters
+    ----------
+    dataset : xarray.Dataset
+        Results of a study, in the units of the plot.
+    panel : Selection
+        Selection without a facet.
+    on_cell : callable
+        Function that receives the number of the cell that the user clicks.
+    height : int
+        Height of the figure in pixels.
+
+    Attributes
+    ----------
+    figure : bokeh.plotting.figure
+        Figure.
+    """
+
+    def __init__(self, dataset: xr.Dataset, panel: Selection, on_cell: OnCell, height: int) -> None:
+        """Create the figure, and draw the panel."""
+        self.on_cell = on_cell
+        codes = np.unique(dataset["status"].values).tolist()
+        self._symbols = dict(zip(codes, _STATUS_SYMBOLS * 4, strict=False))
+        self.marks = ColumnDataSource(_mark_columns({}, Marks(*[np.array([], int)] * 4), [], []))
+        self.figure: Any = figure(
+            height=height,
+            sizing_mode="stretch_width",
+            x_axis_type="log" if _is_log_axis(dataset, panel.x) else "linear",
+            y_axis_type=self.choose_y_type(dataset, panel),
+            tools="pan,wheel_zoom,box_zoom,reset,tap",
+            toolbar_location="above",
+            active_drag="box_zoom",
+        )
+        self.figure.xaxis.axis_label = to_plain_text(format_axis_label(dataset, panel.x, 200))
+        self.figure.axis.axis_label_text_font_style = "normal"
+        self.figure.axis.axis_label_text_font_size = "12px"
+        if not _is_numeric(dataset[panel.x]):
+            _label_ticks(self.figure.xaxis, dict(enumerate(map(str, dataset[panel.x].values))))
+        self.draw(dataset, panel)
+        if self.figure.legend:
+            self.figure.add_layout(self.figure.legend[0], "below")
+            self.figure.legend.update(
+                ncols=3, border_line_color=None, label_text_font_size="11px", location="left"
+            )
+        self.update(dataset, panel)
+
+    def choose_y_type(self, dataset: xr.Dataset, panel: Selection) -> str:
+        """Return "log" or "linear"."""
+        raise NotImplementedError
+
+    def draw(self, dataset: xr.Dataset, panel: Selection) -> None:
+        """Add the glyphs and tools to the figure."""
+        raise NotImplementedError
+
+    def update(self, dataset: xr.Dataset, panel: Selection) -> None:
+        """Replace the data of the plot.
+
+        Parameters
+        ----------
+        dataset : xarray.Dataset
+            Results of a study, in the units of the plot.
+        panel : Selection
+            Selection that differs only in its points.
+        """
+        title = describe_points(dataset, panel.points)
+        self.figure.title.text = to_plain_text(title[:1].upper() + title[1:])
+
+    def share_axes(self, other: Plot) -> None:
+        """Use the axis limits of another plot, so that panels can be compared."""
+        self.figure.x_range, self.figure.y_range = other.figure.x_range, other.figure.y_range
+        for limits in (other.figure.x_range, other.figure.y_range):
+            if isinstance(limits.renderers, list):
+                limits.renderers = [*limits.renderers, *self.figure.renderers[:2]]
+
+    def draw_marks(self, **options: Any) -> Any:
+        """Draw the symbols of the statuses, and return their renderer."""
+        drawn = self.figure.scatter(
+            "x", "y", marker="marker", color="color", fill_alpha=0.0, size=9, line_width=1.5,
+            source=self.marks, legend_field="status", **options,
+        )  # fmt: skip
+        self.figure.add_tools(HoverTool(renderers=[drawn], tooltips=[("status", "@status")]))
+        return drawn
+
+    def set_marks(self, marks: Marks, x: Any, y: Any) -> None:
+        """Replace the symbols of the statuses."""
+        self.marks.data = _mark_columns(self._symbols, marks, x, y)
+
+
+def _mark_columns(symbols: dict[int, str], marks: Marks, x: Any, y: Any) -> dict[str, Any]:
+    """Return the columns of the source of the status symbols."""
+    failed = marks.status >= int(Status.WORK_BUDGET_SPENT)
+    codes = marks.status.tolist()
+    return {
+        "x": x,
+        "y": y,
+        "cell": marks.cells,
+        "status": [describe_status(code) for code in codes],
+        "marker": [symbols[code] for code in codes],
+        "color": np.where(failed, _FAILURE_COLOUR, _ANSWER_COLOUR).tolist(),
+    }
+
+
+class CurvesPlot(Plot):
+    """Curves with error bars. The symbols of the statuses are at the bottom of the figure."""
+
+    def choose_y_type(self, dataset: xr.Dataset, panel: Selection) -> str:
+        """Return "log" if all values of the variable are positive and span decades."""
+        is_log = are_positive_and_span_decades(dataset[panel.variable].values)
+        return "log" if is_log and not _flag_names(dataset, panel.variable) else "linear"
+
+    def draw(self, dataset: xr.Dataset, panel: Selection) -> None:
+        """Add curves, points, error bars, statuses, tooltips and a colour scale."""
+        self.lines = ColumnDataSource({n: [] for n in ("xs", "ys", "color", "dash", "alpha")})
+        self.points = ColumnDataSource(_point_columns([], []))
+        label = format_axis_label(dataset, panel.variable, 200)
+        self.figure.yaxis.axis_label = to_plain_text(label)
+        line = {"color": "color", "line_dash": "dash", "line_alpha": "alpha", "line_width": 1.6}
+        self.figure.multi_line("xs", "ys", source=self.lines, **line)
+        bars = Whisker(base="x", lower="low", upper="high", source=self.points)
+        bars.upper_head.size = bars.lower_head.size = 6
+        self.figure.add_layout(bars)
+        mapper = _colour_scale(dataset, panel.second)
+        named: Any = {"legend_field": "name"} if panel.second and not mapper else {}
+        points = self.figure.scatter(
+            "x", "y", marker="marker", color="color", size="size", source=self.points,
+            nonselection_alpha=0.5, **named,
+        )  # fmt: skip
+        self.figure.y_range.update(renderers=[points], range_padding=0.2)
+        self.figure.extra_y_ranges = {"status": Range1d(0.0, 1.0)}
+        self.figure.extra_y_scales = {"status": LinearScale()}
+        marks = self.draw_marks(y_range_name="status", nonselection_line_alpha=0.4)
+        tips = [("value", "@y{0.000000e+0} ± @error{0.0e+0}"), ("x", "@x{0.000000e+0}")]
+        tips += [("curve", "@name")] * bool(panel.second) + [("status", "@status")]
+        self.figure.add_tools(HoverTool(renderers=[points], tooltips=tips))
+        self.figure.select_one(TapTool).renderers = [points, marks]
+        for source in (self.points, self.marks):
+            source.selected.on_change("indices", self._select)
+        if mapper:
+            title = to_plain_text(format_axis_label(dataset, panel.second, 200))
+            bar = ColorBar(color_mapper=mapper, title=title, title_text_font_style="normal")
+            self.figure.add_layout(bar, "right")
+        _label_ticks(self.figure.yaxis, _flag_names(dataset, panel.variable))
+
+    def _select(self, _name: str, _old: Any, _new: Any) -> None:
+        """Call ``on_cell`` with the cell of the selected point or symbol."""
+        for source in (self.points, self.marks):
+            for index in source.selected.indices[:1]:
+                if (cell := int(source.data["cell"][index])) >= 0:
+                    self.on_cell(cell)
+                    return
+
+    def update(self, dataset: xr.Dataset, panel: Selection) -> None:
+        """Replace the data of the plot. See ``Plot.update``."""
+        super().update(dataset, panel)
+        curves = curves_of_panel(dataset, panel)
+        styles = _curve_styles(dataset, panel, curves)
+        self.points.selected.indices = self.marks.selected.indices = []
+        self.lines.data = {
+            "xs": [c.x for c in curves],
+            "ys": [c.y for c in curves],
+            **{name: [s[name] for s in styles] for name in ("color", "dash", "alpha")},
+        }
+        self.points.data = _point_columns(curves, styles)
+        pairs = [find_marks(c.status[None], c.cells[None]) for c in curves]
+        at = [c.x[m.columns] for c, m in zip(curves, pairs, strict=True)]
+        rows = [np.full(m.rows.size, 0.03 + 0.05 * (i % _STATUS_ROWS)) for i, m in enumerate(pairs)]
+        marks = Marks(*(np.concatenate(parts) for parts in zip(*pairs, strict=True)))
+        self.set_marks(marks, np.concatenate(at), np.concatenate(rows))
+
+
+def _curve_styles(
+    dataset: xr.Dataset, panel: Selection, curves: Sequence[Curve]
+) -> list[dict[str, Any]]:
+    """Return colour, dashes, opacity of the line, marker and marker size of each curve."""
+    with style_context():
+        cycled = [cycle_style(c.number) for c in curves]
+    colours, dashes = [s["color"] for s in cycled], [s["linestyle"] for s in cycled]
+    if mapper := _colour_scale(dataset, panel.second):
+        points = dataset[panel.second].values.astype(float)
+        colours = [_map_colour(mapper, points[c.number]) for c in curves]
+        dashes = ["-"] * len(curves)
+    is_recorded = panel.x in dataset.data_vars
+    is_number = _is_numeric(dataset[panel.x]) and not _flag_names(dataset, panel.variable)
+    has_line = is_number and (is_recorded or all(_is_monotonic(c.x) for c in curves))
+    return [
+        {
+            "color": colour,
+            "dash": _DASHES.get(dash) if isinstance(dash, str) else list(dash[1]),
+            "alpha": float(has_line),
+            "marker": _MARKERS[cycle_marker(curve.number)],
+            "size": 6 if curve.x.size <= _MAX_POINTS_WITH_MARKERS or not has_line else 2,
+        }
+        for curve, colour, dash in zip(curves, colours, dashes, strict=True)
+    ]
+
+
+def _is_monotonic(values: np.ndarray) -> bool:
+    """Return True if values increase or decrease strictly."""
+    steps = np.diff(values)
+    return bool((steps > 0.0).all() or (steps < 0.0).all())
+
+
+def _point_columns(curves: Sequence[Curve], styles: Sequence[dict[str, Any]]) -> dict[str, Any]:
+    """Return the columns of the source of the points and error bars."""
+    total = sum(c.x.size for c in curves)
+    each = total if total <= _MAX_SELECTABLE_POINTS else _MAX_SELECTABLE_POINTS // len(curves)
+    kept = [thin_points(c.x.size, each) for c in curves]
+    numbers = [
+        np.stack([c.x, c.y, c.error, c.cells])[:, k] for c, k in zip(curves, kept, strict=True)
+    ]
+    rows: dict[str, Any] = dict(
+        zip(("x", "y", "error", "cell"), np.hstack([np.empty((4, 0)), *numbers]), strict=True)
+    )
+    codes = [code for c, k in zip(curves, kept, strict=True) for code in c.status[k].tolist()]
+    rows["status"] = [describe_status(code) for code in codes]
+    rows["name"] = [c.name for c, k in zip(curves, kept, strict=True) for _ in k]
+    for name in ("color", "marker", "size"):
+        rows[name] = [s[name] for s, k in zip(styles, kept, strict=True) for _ in k]
+    low = rows["y"] - rows["error"]
+    positive = rows["y"][rows["y"] > 0.0]
+    # A logarithmic axis cannot show an error bar that includes zero.
+    least = 0.1 * positive.min() if positive.size == np.isfinite(rows["y"]).sum() > 0 else -np.inf
+    return rows | {"low": np.maximum(low, least), "high": rows["y"] + rows["error"]}
+
+
+class MapPlot(Plot):
+    """Map with colours. Cells without a value are grey, and symbols show the statuses."""
+
+    def choose_y_type(self, dataset: xr.Dataset, panel: Selection) -> str:
+        """Return "log" if the points along y are spaced logarithmically."""
+        return "log" if _is_log_axis(dataset, panel.second) else "linear"
+
+    def draw(self, dataset: xr.Dataset, panel: Selection) -> None:
+        """Add the image, its colour scale, the symbols of statuses and the tooltips."""
+        self.figure.yaxis.axis_label = to_plain_text(format_axis_label(dataset, panel.second, 200))
+        self.image = ColumnDataSource({n: [] for n in ("image", "x", "y", "dw", "dh")})
+        self.chosen = ColumnDataSource({"x": [], "y": []})
+        self.figure.grid.visible = False
+        self.figure.background_fill_color = _EMPTY_COLOUR
+        flags = _flag_names(dataset, panel.variable)
+        mapper = _value_mapper(dataset[panel.variable].values, flags)
+        drawn = self.figure.image(
+            image="image", x="x", y="y", dw="dw", dh="dh", source=self.image, color_mapper=mapper
+        )
+        self.draw_marks()
+        self.figure.scatter(
+            "x", "y", source=self.chosen, marker="square", size=14, fill_alpha=0.0,
+            line_color="black", line_width=2.5,
+        )  # fmt: skip
+        tips = [("value", "@image{0.000000e+0}"), ("x", "$x{0.0000e+0}"), ("y", "$y{0.0000e+0}")]
+        self.figure.add_tools(HoverTool(renderers=[drawn], tooltips=tips))
+        title = to_plain_text(format_axis_label(dataset, panel.variable, 200))
+        bar = ColorBar(color_mapper=mapper, title=title, title_text_font_style="normal")
+        if flags:
+            bar.ticker, bar.major_label_overrides = _ticks(dict(enumerate(flags.values())))
+        self.figure.add_layout(bar, "right")
+        self.figure.on_event(Tap, self._select)
+
+    def _select(self, event: Any) -> None:
+        """Call ``on_cell`` with the cell at the position of the pointer."""
+        if event.x is None or (cell := self.map.cell_at(event.x, event.y)) < 0:
+            return
+        row, column = np.argwhere(self.map.cells == cell)[0]
+        self.chosen.data = {"x": [self.map.x[column]], "y": [self.map.y[row]]}
+        self.on_cell(cell)
+
+    def update(self, dataset: xr.Dataset, panel: Selection) -> None:
+        """Replace the data of the plot. See ``Plot.update``."""
+        super().update(dataset, panel)
+        self.map = found = map_of_panel(dataset, panel)
+        values, (x, y) = _image_of_map(found)
+        if flags := _flag_names(dataset, panel.variable):
+            numbers = np.searchsorted(list(flags), values).astype(float)
+            values = np.where(np.isfinite(values), numbers, np.nan)
+        self.image.data = {
+            "image": [values.astype(np.float32)], "x": [x[0]], "y": [y[0]],
+            "dw": [x[1] - x[0]], "dh": [y[1] - y[0]],
+        }  # fmt: skip
+        marks = find_marks(found.status, found.cells)
+        self.set_marks(marks, found.x[marks.columns], found.y[marks.rows])
+        self.chosen.data = {"x": [], "y": []}
+
+
+def _image_of_map(found: Map) -> tuple[np.ndarray, list[tuple[float, float]]]:
+    """Return the image of a map, and its limits along x and y.
+
+    If all cells have the same size on the axes, each pixel of the image is one cell.
+    """
+    limits, is_even = [], found.values.size <= _MAX_CELLS_OF_IMAGE
+    for points in (found.x, found.y):
+        is_log = are_log_spaced(points)
+        edges = compute_cell_edges(points, is_log)
+        sizes = np.diff(np.log(edges) if is_log else edges)
+        is_even = is_even and bool(np.ptp(sizes) < 1e-6 * sizes[0])
+        limits.append((float(edges[0]), float(edges[-1])))
+    return (found.values if is_even else sample_map(found, limits[0], limits[1], _PIXELS)), limits
+
+
+# ---- scales and labels ---------------------------------------------------------------------------
+
+
+def _is_numeric(values: xr.DataArray) -> bool:
+    """Return True if values are numbers."""
+    return values.dtype.kind in "iuf"
+
+
+def _is_log_axis(dataset: xr.Dataset, name: str) -> bool:
+    """Return True if the values of a coordinate are spaced logarithmically."""
+    values = dataset[name]
+    return _is_numeric(values) and values.ndim == 1 and are_log_spaced(values.values)
+
+
+def _colour_scale(dataset: xr.Dataset, dimension: str) -> Any:
+    """Return the colour mapper of a numeric dimension with many points, or None."""
+    if not dimension or not _is_numeric(dataset[dimension]):
+        return None
+    points = dataset[dimension].values.astype(float)
+    if points.size <= _MAX_CURVES_WITH_NAMES:
+        return None
+    kind = LogColorMapper if are_log_spaced(points) else LinearColorMapper
+    return kind(palette=Viridis256, low=float(points.min()), high=float(points.max()))
+
+
+def _map_colour(mapper: Any, value: float) -> str:
+    """Return the colour of a value."""
+    low, high = mapper.low, mapper.high
+    if isinstance(mapper, LogColorMapper):
+        low, high, value = np.log(low), np.log(high), np.log(value)
+    return str(Viridis256[round(255 * (value - low) / (high - low))])
+
+
+def _value_mapper(values: np.ndarray, flags: dict[float, str]) -> Any:
+    """Return the colour mapper of the values of a map."""
+    clear: Any = {"nan_color": (0, 0, 0, 0)}
+    if flags:
+        palette = [_FLAG_COLOURS[i % len(_FLAG_COLOURS)] for i in range(len(flags))]
+        return LinearColorMapper(palette=palette, low=-0.5, high=len(flags) - 0.5, **clear)
+    finite = values[np.isfinite(values)]
+    low, high = (float(finite.min()), float(finite.max())) if finite.size else (0.0, 1.0)
+    high = high if high > low else low + (abs(low) or 1.0)
+    kind = LogColorMapper if are_positive_and_span_decades(values) else LinearColorMapper
+    return kind(palette=Viridis256, low=low, high=high, **clear)
+
+
+def _flag_names(dataset: xr.Dataset, variable: str) -> dict[float, str]:
+    """Return the meanings of the flags that occur in a variable."""
+    meanings = read_flag_meanings(dataset[variable].attrs)
+    present = {*np.unique(dataset[variable].values).tolist()} if meanings else set()
+    return {code: text.replace("_", " ") for code, text in meanings.items() if code in present}
+
+
+def _label_ticks(axis: Any, names: dict[Any, str]) -> None:
+    """Use names as tick labels, if there are any."""
+    if names:
+        axis.ticker, axis.major_label_overrides = _ticks(names)
+
+
+def _ticks(names: dict[Any, str]) -> tuple[FixedTicker, dict[Any, str]]:
+    """Return the ticker and the tick labels of named values."""
+    return FixedTicker(ticks=list(names)), {int(value): name for value, name in names.items()}
