@@ -30,7 +30,7 @@ _CLICK_REACH = 0.02
 #: Margin on both sides of the record, as a fraction of the visible range.
 _MARGIN = 0.02
 #: Panels from top to bottom: height in pixels, and height of the axis label.
-_HEIGHTS = {"steps": 45, "friction": 300, "displacement": 150, "normal_stress": 150, "fit": 170}
+_HEIGHTS = {"steps": 60, "friction": 300, "displacement": 150, "normal_stress": 150, "fit": 170}
 #: Axis labels, and the factor from the units of the record to the units of the label.
 _LABELS = {
     "time": ("Time (s)", 1.0),
@@ -41,7 +41,8 @@ _LABELS = {
 #: Markers and line dashes of the laws, which differ for readers who cannot tell the colours apart.
 _MARKERS = ("circle", "triangle", "square", "diamond", "cross")
 _DASHES = ("solid", "dashed", "dotdash", "dotted", "dashdot")
-_STEP_COLOR, _EXCLUDED_COLOR, _HOLD_COLOR = "#333333", "#999999", "#f0e442"
+_STEP_COLOR, _EXCLUDED_COLOR = "#333333", "#999999"
+_HOLD_STYLE = {"color": "#f0e442", "fill_alpha": 0.25, "line_alpha": 0.0}
 
 
 def find_holds(steps: Sequence[LoadingStep]) -> list[tuple[float, float]]:
@@ -95,6 +96,8 @@ class RecordPlot:
         self.layout = gridplot(
             [[each] for each in self.figures.values()], sizing_mode="stretch_width"
         )
+        for bar in (self.layout.toolbar, *(each.toolbar for each in self.figures.values())):
+            bar.active_drag = next(filter(_is_selection_tool, bar.tools), None)
 
     def show_record(self, record: Record, x_name: str) -> None:
         """Show a record against time or displacement.
@@ -145,7 +148,7 @@ class RecordPlot:
         numbers = range(1, len(steps) + 1)
         self._steps.data = {
             "x": [self._place(time) for time in self._step_times],
-            "y": [0.5 for _ in numbers],
+            "y": [0.72 if n % 2 else 0.28 for n in numbers],  # Steps of a hold may coincide.
             "number": [str(n) for n in numbers],
             "marker": ["square_x" if n in excluded else "square" for n in numbers],
             "color": [_EXCLUDED_COLOR if n in excluded else _STEP_COLOR for n in numbers],
@@ -167,6 +170,7 @@ class RecordPlot:
         """
         self._fitted = [] if dataset is None else [*_iterate_fitted_rows(dataset)]
         self.figures["fit"].visible = bool(self._fitted)
+        self.figures["friction"].legend.visible = bool(self._fitted)
         self._label_lowest_axis()
         self._thin_fits()
 
@@ -212,11 +216,11 @@ class RecordPlot:
         self.show_steps((), ())
         strip = self.figures["steps"]
         marks = {"source": self._steps, "color": "color"}
-        strip.scatter("x", "y", marker="marker", size=20, fill_alpha=0.15, **marks)
+        strip.scatter("x", "y", marker="marker", size=18, fill_alpha=0.15, **marks)
         strip.text("x", "y", text="number", text_align="center", text_baseline="middle",
                    text_font_size="11px", source=self._steps, text_color="color")  # fmt: skip
         for each in self.figures.values():
-            each.vstrip(x0="x0", x1="x1", source=self._holds, color=_HOLD_COLOR, alpha=0.35)
+            each.vstrip("x0", "x1", source=self._holds, level="underlay", **_HOLD_STYLE)
             if each is not strip:
                 each.vspan("x", line_dash="dash", line_width=1.5, **marks)
             for box in self._outside:
@@ -236,7 +240,7 @@ class RecordPlot:
         residuals.scatter("x", "y", marker="marker", source=self._fit_residuals, size=4, **fitted)
         for height in (-2.0, 2.0):
             residuals.add_layout(Span(dimension="width", location=height, line_dash="dotted"))
-        residuals.visible = False
+        self.show_fit(None)
 
     def _x(self) -> np.ndarray:
         """Return the column on the horizontal axis."""
@@ -306,9 +310,11 @@ class RecordPlot:
         if event.x is None or not len(self._step_times):
             return
         apart = np.abs(np.array(self._steps.data["x"], dtype=float) - event.x)
-        nearest = int(apart.argmin())
-        if apart[nearest] <= _CLICK_REACH * (self._limits[1] - self._limits[0]):
-            self._on_step(nearest)
+        near = np.flatnonzero(apart <= _CLICK_REACH * (self._limits[1] - self._limits[0]))
+        if event.model is self.figures["steps"]:
+            apart = np.abs(np.array(self._steps.data["y"]) - event.y)
+        if len(near):
+            self._on_step(int(near[apart[near].argmin()]))
 
     def _dragged(self, event: SelectionGeometry) -> None:
         """Report the times between which the user has dragged."""
@@ -317,6 +323,11 @@ class RecordPlot:
             begin, end = self._times_between((left, right))
             if begin < end:
                 self._on_window(begin, end)
+
+
+def _is_selection_tool(tool: Any) -> bool:
+    """Return True for the selection tool of a figure, and of the common toolbar."""
+    return isinstance(getattr(tool, "tools", [tool])[0], BoxSelectTool)
 
 
 def _iterate_fitted_rows(dataset: xr.Dataset) -> Iterator[Mapping[str, Any]]:

@@ -69,6 +69,8 @@ class RecordView(View):
         self._fit_button = pn.widgets.Button(name="Fit", button_type="primary")
         self._whole_button = pn.widgets.Button(name="Whole record")
         self._plot = RecordPlot(self._choose_window, self._toggle_step)
+        drawn = pn.pane.Bokeh(self._plot.layout, sizing_mode="stretch_width")
+        self._plots = pn.Column(drawn, sizing_mode="stretch_width")
         self._summary = pn.Column(sizing_mode="stretch_width")
         self._statuses = pn.pane.DataFrame(pd.DataFrame(), index=False)
         self._connect()
@@ -90,7 +92,7 @@ class RecordView(View):
             named["normal_stress"],
             pn.Row(named["begin"], named["end"]),
             self._whole_button,
-            pn.pane.Str("Steps to fit"),
+            pn.pane.Markdown("Steps to fit", margin=(5, 10, 0, 10)),
             pn.Column(self._steps, max_height=170, scroll=True),
             *(named[name] for name in ("laws", "stiffness", "trend_degree", "more_free")),
             pn.Card(*details, named["together"], title="More choices", collapsed=True),
@@ -99,7 +101,7 @@ class RecordView(View):
 
     def plots(self) -> list[Any]:
         """Return the plots and the tables in the right column."""
-        return [pn.pane.Bokeh(self._plot.layout, sizing_mode="stretch_width"), self._summary]
+        return [self._plots, self._summary]
 
     def status(self) -> list[Any]:
         """Return the table of the statuses of the fits."""
@@ -148,7 +150,9 @@ class RecordView(View):
         """Call the methods of the view when the user changes a widget."""
 
         def watch(widget: Any, method: Callable[[], None]) -> None:
-            widget.param.watch(lambda _event: None if self._is_updating else method(), "value")
+            widget.param.watch(
+                lambda _event: None if self._is_updating else _call_with_lock(method), "value"
+            )
 
         methods = dict.fromkeys(_READING_CHOICES, self._read)
         methods |= dict.fromkeys(("begin", "end"), self._show_window)
@@ -157,8 +161,10 @@ class RecordView(View):
             watch(widget, methods.get(name, self._change_choices))
         watch(self._x, self._show_record)
         watch(self._steps, self._change_steps)
-        self._fit_button.on_click(lambda _event: self._start_fit())
-        self._whole_button.on_click(lambda _event: self._choose_window(None, None))
+        self._fit_button.on_click(lambda _event: _call_with_lock(self._start_fit))
+        self._whole_button.on_click(
+            lambda _event: _call_with_lock(lambda: self._choose_window(None, None))
+        )
 
     # ---- record, window and steps ---------------------------------------------------------------
 
@@ -179,6 +185,7 @@ class RecordView(View):
 
     def _show_record(self) -> None:
         """Show the record against time or displacement."""
+        self._plots.visible = self._record is not None
         if self._record is not None:
             self._plot.show_record(self._record, self._x.value)
         self._show_window()
@@ -315,6 +322,15 @@ class RecordView(View):
     def dataset(self) -> xr.Dataset:
         """Return the dataset of the fit."""
         return self._finished_fit()
+
+
+def _call_with_lock(method: Callable[[], None]) -> None:
+    """Call a method that changes Bokeh models, which requires the lock of the document."""
+    document = pn.state.curdoc
+    if document is None or not document.session_context:
+        method()
+    else:
+        document.add_next_tick_callback(method)
 
 
 def _to_pane(piece: SummaryTableOrSentence) -> Any:

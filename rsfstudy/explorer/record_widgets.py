@@ -41,7 +41,7 @@ def create_choice_widgets() -> dict[str, Any]:
         Widgets by the name of the field of ``FitChoices``, with the default values.
     """
     default, kinds = FitChoices(), pn.widgets
-    half = {"width": 130, "format": "0.[000000]"}
+    half = {"width": 125, "format": "0.[000000]"}
     wide = {"sizing_mode": "stretch_width"}
     return {
         "columns": _text("Columns", "time=t (s), friction=mu"),
