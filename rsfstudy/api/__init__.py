@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from rsfstudy.api.fit_record import DEFAULT_FREE_PARAMETERS, STIFFNESS_FROM_RECORD, fit
     from rsfstudy.api.html_report import write_report
     from rsfstudy.api.result_paths import find_results
-    from rsfstudy.api.simulation import BEYOND_INSTABILITY_NORM_ATTRIBUTE_NAME
+    from rsfstudy.api.simulation import BEYOND_INSTABILITY_NORM_ATTRIBUTE_NAME, simulate
     from rsfstudy.api.study_runs import apply_overrides_to_study, prepare_run_with_progress
 else:
     __getattr__, __dir__ = build_lazy_export_functions(
@@ -24,7 +24,7 @@ else:
             "api.fit_record": ("DEFAULT_FREE_PARAMETERS", "STIFFNESS_FROM_RECORD", "fit"),
             "api.html_report": ("write_report",),
             "api.result_paths": ("find_results",),
-            "api.simulation": ("BEYOND_INSTABILITY_NORM_ATTRIBUTE_NAME",),
+            "api.simulation": ("BEYOND_INSTABILITY_NORM_ATTRIBUTE_NAME", "simulate"),
             "api.study_runs": ("apply_overrides_to_study", "prepare_run_with_progress"),
         },
     )
@@ -37,6 +37,7 @@ __all__ = [
     "find_results",
     "fit",
     "prepare_run_with_progress",
+    "simulate",
     "write_report",
 ]
 from rsfstudy.api import accessor as accessor  # The import registers the accessor.

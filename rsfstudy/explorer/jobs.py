@@ -4,14 +4,56 @@ from __future__ import annotations
 
 import ctypes
 import threading
-from collections.abc import Callable
+import warnings
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from functools import partial
 from typing import Any, NamedTuple
 
 import panel as pn
 
+from rsfstudy.errors import RsfStudyWarning
+
 #: Function with which a computation reports its progress: a fraction from 0 to 1, and a text.
 Report = Callable[[float, str], None]
+
+
+#: Time in s after which the progress bar of a computation becomes visible.
+DELAY = 0.4
+_COLLECTED = threading.local()
+
+
+def route_warnings_to_pages() -> None:
+    """Let ``collected_warnings`` receive the warnings of rsfstudy, instead of the terminal.
+
+    The server calls the function once. A notebook shows warnings in the usual way.
+    """
+    print_warning = warnings.showwarning
+
+    def show(message: Warning | str, *place: Any, **options: Any) -> None:
+        if isinstance(message, RsfStudyWarning) and hasattr(_COLLECTED, "messages"):
+            _COLLECTED.messages.append(str(message))
+        else:
+            print_warning(message, *place, **options)
+
+    warnings.filterwarnings("always", category=RsfStudyWarning)
+    warnings.showwarning = show
+
+
+@contextmanager
+def collected_warnings() -> Iterator[list[str]]:
+    """Collect the warnings that this thread issues in the body of a ``with`` statement.
+
+    Yields
+    ------
+    list of str
+        Messages, if the server has called ``route_warnings_to_pages``.
+    """
+    _COLLECTED.messages = []
+    try:
+        yield _COLLECTED.messages
+    finally:
+        del _COLLECTED.messages
 
 
 class Cancelled(BaseException):
@@ -40,14 +82,22 @@ class Jobs:
     computation is waiting. A slider that moves faster than the computation therefore causes no
     queue.
 
+    Parameters
+    ----------
+    warn : callable
+        Function that receives the warnings of a computation, in the thread of the page. If there
+        are no warnings, the sequence is empty.
+
     Attributes
     ----------
     indicator : panel.Row
-        Progress bar and cancel button, which are visible while a long computation is running.
+        Progress bar and cancel button. They become visible if a computation takes longer than
+        `DELAY` seconds.
     """
 
-    def __init__(self) -> None:
+    def __init__(self, warn: Callable[[Sequence[str]], None]) -> None:
         """Create the runner without a computation."""
+        self._warn = warn
         self._bar = pn.indicators.Progress(
             active=True, value=-1, max=1000, sizing_mode="stretch_width", margin=(12, 5)
         )
@@ -84,8 +134,7 @@ class Jobs:
         fail : callable
             Function that receives an exception of the computation, in the thread of the page.
         label : str, optional
-            Text next to the progress bar. Without a text, the progress bar is not shown, which
-            suits computations that take a fraction of a second.
+            Text next to the progress bar.
         """
         job = _Job(label, compute, deliver, fail, pn.state.curdoc)
         with self._lock:
@@ -93,7 +142,6 @@ class Jobs:
                 self._waiting = job
                 return
             self._launch(job)
-        self._show(label)
 
     def cancel(self) -> None:
         """Cancel the running computation, and discard a waiting computation."""
@@ -108,31 +156,37 @@ class Jobs:
                 )
 
     def _launch(self, job: _Job) -> None:
-        """Start the thread of a job."""
+        """Start the thread of a job, and show the progress bar if the job takes long."""
         thread = threading.Thread(target=self._work, args=(job,), daemon=True)
         self._running = job, thread
+        timer = threading.Timer(DELAY, _call_in_document, (job, partial(self._show, job)))
+        timer.daemon = True
         thread.start()
+        timer.start()
 
     def _work(self, job: _Job) -> None:
         """Compute the result of a job, and deliver the result to the page."""
         outcome: Callable[[], None] | None = None
-        try:
-            result = job.compute(partial(self._report, job))
-            outcome = partial(job.deliver, result)
-        except Exception as error:
-            outcome = partial(job.fail, error)
-        except Cancelled:
-            pass
+        with collected_warnings() as messages:
+            try:
+                outcome = partial(job.deliver, job.compute(partial(self._report, job)))
+            except Exception as error:
+                outcome = partial(job.fail, error)
+            except Cancelled:
+                pass
         with self._lock:
             successor, self._waiting, self._running = self._waiting, None, None
             if successor is not None:
                 self._launch(successor)
-        _call_in_document(job, lambda: self._finish(outcome, successor))
+        if successor is None:
+            _call_in_document(job, partial(self._finish, outcome, messages))
 
-    def _finish(self, outcome: Callable[[], None] | None, successor: _Job | None) -> None:
-        """Deliver the outcome of a job unless another job has replaced it."""
-        self._show(successor.label if successor else "")
-        if outcome is not None and successor is None:
+    def _finish(self, outcome: Callable[[], None] | None, messages: Sequence[str]) -> None:
+        """Hide the progress bar, and deliver the outcome of a job."""
+        if self._running is None:
+            self.indicator.visible = False
+        if outcome is not None:
+            self._warn(messages)
             outcome()
 
     def _report(self, job: _Job, fraction: float, text: str = "") -> None:
@@ -145,10 +199,12 @@ class Jobs:
 
         _call_in_document(job, move)
 
-    def _show(self, label: str) -> None:
-        """Show the progress bar if a label is given, and hide it otherwise."""
-        self._label.object, self._bar.value = label, -1
-        self.indicator.visible = bool(label)
+    def _show(self, job: _Job) -> None:
+        """Show the progress bar if the job is still running."""
+        if self._running is not None and self._running[0] is job:
+            if not self.indicator.visible:
+                self._bar.value, self._label.object = -1, job.label
+            self.indicator.visible = True
 
 
 def _call_in_document(job: _Job, function: Callable[[], None]) -> None:

@@ -22,8 +22,9 @@ from tornado.httputil import HTTPServerRequest
 from tornado.routing import Matcher, Rule
 from tornado.web import RequestHandler
 
-from rsfstudy.errors import InvalidValue, RsfStudyError
-from rsfstudy.explorer.view import STATE_ARGUMENT, load_panel
+from rsfstudy.errors import InvalidValue
+from rsfstudy.explorer.jobs import route_warnings_to_pages
+from rsfstudy.explorer.view import STATE_ARGUMENT, create_message, load_panel
 from rsfstudy.explorer.views import create_view
 
 #: Address of the loopback interface, and port that is used by default if it is free.
@@ -83,6 +84,7 @@ class ExplorerServer:
         announce : callable
             Function that receives the first address when the server is ready.
         """
+        route_warnings_to_pages()
         self._server.start()
         announce(self.url)
         if open_browser:
@@ -98,8 +100,8 @@ def _build_page(source: Any) -> Any:
     arguments = pn.state.session_args.get(STATE_ARGUMENT, [b""])
     try:
         return create_view(source, arguments[0].decode(errors="replace")).panel()
-    except RsfStudyError as error:
-        return pn.pane.Alert(pn.pane.Str(str(error)).object, alert_type="danger")
+    except Exception as error:
+        return create_message(error)
 
 
 def _find_free_port(port: int | None) -> int:

@@ -7,7 +7,7 @@ import json
 import logging
 import tempfile
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from functools import partial
 from pathlib import Path
@@ -28,6 +28,9 @@ from rsfstudy.storage import write_dataset
 STATE_ARGUMENT = "state"
 #: Width of the column with the widgets in pixels. The plots have the remaining width.
 CONTROLS_WIDTH = 290
+_CODE_STYLE = (
+    "textarea.bk-input.bk-input:disabled {font-family: monospace; color: #222; opacity: 1}"
+)
 _COPY_SCRIPT = """
 navigator.clipboard.writeText(source.value)
 button.label = "Copied"
@@ -61,12 +64,13 @@ class View(ABC):
     def __init__(self, source: Any) -> None:
         """Create the parts of the page that all views have."""
         self.source = source
-        self.jobs = Jobs()
+        self.jobs = Jobs(self.show_warnings)
         self._alert = pn.pane.Alert("", alert_type="danger", visible=False)
+        self._warnings = pn.pane.Alert("", alert_type="warning", visible=False)
         self._codes = {
             label: pn.widgets.TextAreaInput(
                 name=label, disabled=True, auto_grow=True, max_rows=40, rows=2,
-                sizing_mode="stretch_width", stylesheets=["textarea {font-family: monospace}"],
+                sizing_mode="stretch_width", stylesheets=[_CODE_STYLE],
             )
             for label in ("Python", "Command line", "State")
         }  # fmt: skip
@@ -238,11 +242,9 @@ class View(ABC):
     def refresh(self) -> None:
         """Update the code and the address of the page after a change of the view."""
         with self.errors_shown():
-            for label, make in zip(
-                self._codes, (self.python_code, self.command_line, lambda: self.state_text),
-                strict=True,
-            ):  # fmt: skip
-                self._codes[label].value = make()
+            texts = self.python_code(), self.command_line(), self.state_text
+            for box, text in zip(self._codes.values(), texts, strict=True):
+                box.value = text
         if pn.state.location is not None:
             pn.state.location.search = "?" + urlencode({STATE_ARGUMENT: self.state_text})
 
@@ -256,13 +258,19 @@ class View(ABC):
         error : Exception
             Error. An error that rsfstudy does not raise itself is also logged.
         """
-        if isinstance(error, RsfStudyError):
-            text = str(error)
-        else:
-            text = f"The view failed: {format_exception(error)}. Change a setting and try again."
-            logging.getLogger(__name__).error("the view failed", exc_info=error)
-        self._alert.object = _escape_markdown(text)
+        self._alert.object = _format_message(error)
         self._alert.visible = True
+
+    def show_warnings(self, messages: Sequence[str]) -> None:
+        """Show the warnings of a computation above the plots.
+
+        Parameters
+        ----------
+        messages : sequence of str
+            Messages. Without messages, the warnings of the last computation are hidden.
+        """
+        self._warnings.object = "\n\n".join(map(escape_markdown, dict.fromkeys(messages)))
+        self._warnings.visible = bool(messages)
 
     def hide_error(self) -> None:
         """Hide the message of the last error."""
@@ -285,7 +293,7 @@ class View(ABC):
     # ---- page -----------------------------------------------------------------------------------
 
     def panel(self) -> pn.viewable.Viewable:
-        """Return the page: widgets on the left, plots on the right, and tabs below.
+        """Return the page: widgets on the left, plots and tabs on the right.
 
         Returns
         -------
@@ -294,20 +302,24 @@ class View(ABC):
         """
         load_panel()
         controls = pn.Column(*self.controls(), width=CONTROLS_WIDTH, margin=(0, 10, 0, 0))
-        plots = pn.Column(
-            self._alert, self.jobs.indicator, *self.plots(), sizing_mode="stretch_width"
-        )
         tabs = pn.Tabs(
             ("Code", self._code_tab()),
             ("Download", self._download_tab()),
             ("Status", pn.Column(*self.status(), sizing_mode="stretch_width")),
             sizing_mode="stretch_width",
         )
+        plots = pn.Column(
+            self._alert,
+            self._warnings,
+            self.jobs.indicator,
+            *self.plots(),
+            tabs,
+            sizing_mode="stretch_width",
+        )
         self.refresh()
         return pn.Column(
-            pn.pane.Markdown(f"# {_escape_markdown(self.title)}", margin=(0, 5)),
+            pn.pane.Markdown(f"# {escape_markdown(self.title)}", margin=(0, 5)),
             pn.Row(controls, plots, sizing_mode="stretch_width"),
-            tabs,
             sizing_mode="stretch_width",
             margin=(0, 15),
         )
@@ -374,6 +386,42 @@ def load_panel() -> None:
         pn.extension(inline=True, notifications=False)
 
 
-def _escape_markdown(text: str) -> str:
-    """Escape the characters that have a meaning in Markdown or HTML."""
+def create_message(error: Exception) -> Any:
+    """Return a page with the message of an error that prevents a view.
+
+    Parameters
+    ----------
+    error : Exception
+        Error, which is logged unless rsfstudy has raised it.
+
+    Returns
+    -------
+    panel.pane.Alert
+        Page.
+    """
+    return pn.pane.Alert(_format_message(error), alert_type="danger")
+
+
+def _format_message(error: Exception) -> str:
+    """Return the message of an error as Markdown, and log an unexpected error."""
+    if isinstance(error, RsfStudyError):
+        return escape_markdown(str(error))
+    logging.getLogger(__name__).error("the view failed", exc_info=error)
+    text = f"The view failed: {format_exception(error)}. Change a setting and try again."
+    return escape_markdown(text)
+
+
+def escape_markdown(text: str) -> str:
+    """Escape the characters that have a meaning in Markdown or HTML.
+
+    Parameters
+    ----------
+    text : str
+        Plain text.
+
+    Returns
+    -------
+    str
+        Markdown that shows the text.
+    """
     return text.translate({ord(c): f"&#{ord(c)};" for c in "\\`*_{}[]<>#|~&"})

@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from rsfstudy.rig.column_reading import ColumnsOfSource, ReadingOptions, read_columns
     from rsfstudy.rig.columns import Column
     from rsfstudy.rig.dataset_units import DatasetUnits
+    from rsfstudy.rig.protocol_files import read_protocol
     from rsfstudy.rig.ranges import expand_range
     from rsfstudy.rig.record_files import read_record
     from rsfstudy.rig.rig import Rig
@@ -34,6 +35,7 @@ else:
     __getattr__, __dir__ = build_lazy_export_functions(
         __name__,
         {
+            "rig.protocol_files": ("read_protocol",),
             "rig.ranges": ("expand_range",),
             "rig.record_files": ("read_record",),
             "rig.rig": ("Rig",),
@@ -75,6 +77,7 @@ __all__ = [
     "has_time_column",
     "parse_number",
     "read_columns",
+    "read_protocol",
     "read_record",
     "read_table",
     "compute_conversion_factor",

@@ -1,0 +1,152 @@
+"""Widgets for numbers: a slider and a box for exact values."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from typing import Any, NamedTuple
+
+import panel as pn
+
+#: Rules with which parts declare fields that have no negative values.
+POSITIVE, NON_NEGATIVE = "must be greater than 0", "must be 0 or greater"
+#: Steps of a slider.
+_STEPS = 200
+#: Ratio of the largest value of a slider to the typical value, for fields without a scale, such as
+#: a, and for times and velocities.
+_RATIO_OF_PLAIN_FIELD, _RATIO_OF_SCALED_FIELD = 4.0, 100.0
+
+
+class SliderRange(NamedTuple):
+    """Range of a slider.
+
+    Parameters
+    ----------
+    low, high : float
+        Smallest and largest value.
+    is_logarithmic : bool
+        True if equal distances on the slider are equal ratios of the value.
+    is_whole : bool
+        True if all values are whole numbers.
+    """
+
+    low: float
+    high: float
+    is_logarithmic: bool = False
+    is_whole: bool = False
+
+    @classmethod
+    def of_field(cls, default: float, typical: float, rule: str, scale: str) -> SliderRange:
+        """Choose the range of a field from its declaration.
+
+        Parameters
+        ----------
+        default : float
+            Default value, which is 0 if the field is optional.
+        typical : float
+            Positive value in the middle of the range.
+        rule : str
+            Rule that the values satisfy, as the part declares it.
+        scale : str
+            Scale of the field, such as "D_c/V_*", or an empty string.
+
+        Returns
+        -------
+        SliderRange
+            Range. The box accepts values outside the range.
+        """
+        high = _RATIO_OF_PLAIN_FIELD * typical
+        if "whole number" in rule:
+            return cls(0.0, max(20.0, 2.0 * typical), is_whole=True)
+        if "between 0 and 1" in rule:
+            return cls(0.0, 1.0)
+        if rule == POSITIVE or (rule == NON_NEGATIVE and scale in ("V_*", "D_c/V_*")):
+            ratio = _RATIO_OF_SCALED_FIELD if scale else _RATIO_OF_PLAIN_FIELD
+            return cls(typical / ratio, typical * ratio, is_logarithmic=True)
+        return cls(0.0 if rule == NON_NEGATIVE or default else -high, high)
+
+    def value_at(self, position: float) -> float:
+        """Return the value at a position between 0 and 1, with 4 significant digits."""
+        if self.is_logarithmic:
+            value = self.low * (self.high / self.low) ** position
+        else:
+            value = self.low + (self.high - self.low) * position
+        return float(round(value) if self.is_whole else f"{value:.4g}")
+
+    def position_of(self, value: float) -> float:
+        """Return the position of a value, or the nearest end of the slider."""
+        if not self.is_logarithmic:
+            position = (value - self.low) / (self.high - self.low)
+        elif value > 0.0:
+            position = math.log(value / self.low) / math.log(self.high / self.low)
+        else:
+            position = 0.0
+        return min(1.0, max(0.0, position))
+
+
+class NumberWidget:
+    """Slider and box for one number.
+
+    Parameters
+    ----------
+    label : str
+        Description of the number.
+    unit : str
+        Unit, which is shown above the box.
+    value : float or None
+        Value. None leaves the box empty, and the field has its default value.
+    limits : SliderRange
+        Range of the slider.
+    changed : callable
+        Function that receives a new value, or None if the box is cleared.
+    meaning : str, default: ""
+        Description of the number, which a tooltip shows.
+
+    Attributes
+    ----------
+    row : panel.Row
+        Slider and box.
+    """
+
+    def __init__(
+        self,
+        label: str,
+        unit: str,
+        value: float | None,
+        limits: SliderRange,
+        changed: Callable[[float | None], None],
+        meaning: str = "",
+    ) -> None:
+        """Create the widgets."""
+        self._limits, self._changed, self._is_moved_by_code = limits, changed, False
+        self._slider = pn.widgets.FloatSlider(
+            name=label, start=0.0, end=1.0, step=1.0 / _STEPS, show_value=False, width=145,
+            value=limits.position_of(value or 0.0), tooltips=False,
+        )  # fmt: skip
+        step = 10.0 ** math.floor(math.log10(max(abs(limits.low), abs(limits.high)))) / 100.0
+        self._box = pn.widgets.FloatInput(
+            name=unit or " ", value=value, width=95, step=step, description=meaning or None
+        )
+        self._slider.param.watch(self._slider_moved, "value")
+        self._box.param.watch(self._box_changed, "value")
+        self.row = pn.Row(self._slider, self._box, margin=0)
+
+    def _slider_moved(self, event: Any) -> None:
+        """Write the value of the slider to the box."""
+        if not self._is_moved_by_code:
+            self._set(self._box, self._limits.value_at(event.new))
+            self._changed(self._box.value)
+
+    def _box_changed(self, event: Any) -> None:
+        """Move the slider to the value in the box."""
+        if not self._is_moved_by_code:
+            self._set(self._slider, self._limits.position_of(event.new or 0.0))
+            self._changed(event.new)
+
+    def _set(self, widget: Any, value: float) -> None:
+        """Set a widget without a call of the function ``changed``."""
+        self._is_moved_by_code = True
+        try:
+            widget.value = value
+        finally:
+            self._is_moved_by_code = False

@@ -1,0 +1,340 @@
+"""Settings of the scene view: the fields of a scene, as Python code and command line state them.
+
+The settings contain texts such as ``"5 MPa"``. The view builds the scene from these texts, so the
+code that the view shows reproduces the scene exactly.
+"""
+
+from __future__ import annotations
+
+import json
+import shlex
+import tempfile
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass, field, fields, replace
+from importlib.util import find_spec
+from pathlib import Path
+from typing import Any, Self
+
+import xarray as xr
+
+from rsfstudy.api import simulate
+from rsfstudy.errors import InvalidValue
+from rsfstudy.rig import DatasetUnits, Rig, read_protocol
+from rsfstudy.slider import Scene, SceneFields
+
+#: Name of the choice of loading whose segments are a table.
+PROTOCOL = "protocol"
+#: Units of rigs on the page, by the scale of a scene field.
+UNITS_BY_SCALE = {
+    "sigma_*": "MPa", "D_c": "um", "V_*": "um/s", "D_c/V_*": "s", "sigma_*/D_c": "MPa/um",
+    "V_*/D_c": "1/s",
+}  # fmt: skip
+#: SI value of each unit.
+_SI_VALUES = {"MPa": 1e6, "um": 1e-6, "um/s": 1e-6, "s": 1.0, "MPa/um": 1e12, "1/s": 1.0}
+#: Rig of the README, which is the default in units of a rig.
+README_RIG = {
+    "normal_stress": "5 MPa",
+    "slip_distance": "10 um",
+    "reference_velocity": "1 um/s",
+    "stiffness": "0.05 MPa/um",
+}
+#: Number of characters of the arguments above which a call is written on several lines.
+_LONG_CALL = 70
+QUANTITY_BY_FIELD = {quantity.name: quantity for quantity in SceneFields.QUANTITIES}
+
+
+@dataclass(frozen=True)
+class SceneSettings:
+    """Settings of a scene, its motion and its units.
+
+    Parameters
+    ----------
+    scene : dict of str to object
+        Fields of ``Scene``, or arguments of ``Rig.scene`` if there is a rig.
+    rig : dict of str to str
+        Quantities of the rig with units. Without a rig, the settings are dimensionless.
+    protocol : str
+        Table of the segments of the loading in the format of ``read_protocol``, or an empty string.
+    duration : str
+        Duration of the motion, or an empty string for the default.
+    """
+
+    scene: dict[str, Any] = field(default_factory=dict)
+    rig: dict[str, str] = field(default_factory=dict)
+    protocol: str = ""
+    duration: str = ""
+
+    @classmethod
+    def from_state(cls, state: Mapping[str, Any]) -> Self:
+        """Create settings from the state of a view.
+
+        Parameters
+        ----------
+        state : mapping of str to object
+            State that ``as_state`` returned.
+
+        Returns
+        -------
+        SceneSettings
+            Settings.
+
+        Raises
+        ------
+        InvalidValue
+            If a name is unknown, or if a value has the wrong type.
+        """
+        kinds = {each.name: type(getattr(cls(), each.name)) for each in fields(cls)}
+        for name, value in state.items():
+            if name not in kinds:
+                raise InvalidValue("state", name, "is unknown", choices=kinds)
+            if not isinstance(value, kinds[name]):
+                rule = f"must be {'an object' if kinds[name] is dict else 'a text'}"
+                raise InvalidValue(f"state: {name}", value, rule)
+        return cls(**state)
+
+    @classmethod
+    def from_scene(cls, scene: Scene, rig: Rig | None = None) -> Self:
+        """Create the settings of a scene.
+
+        Parameters
+        ----------
+        scene : Scene
+            Scene. Its values become dimensionless settings, or settings in units of the rig.
+        rig : Rig, optional
+            Rig of the scene.
+
+        Returns
+        -------
+        SceneSettings
+            Settings with the values that differ from the default values.
+        """
+        described, defaults = scene.describe(), SceneFields.defaults()
+        values = {
+            name: value
+            for name, value in described.items()
+            if name in defaults and value is not None and value != defaults[name]
+        }
+        protocol = ""
+        if values.pop("loading", None) is not None:
+            protocol = format_protocol(described.get("segments"))
+        values = {"law": scene.law, "normal_stress": scene.normal_stress} | values
+        if rig is None:
+            return cls(values, protocol=protocol)
+        derived = _fields_of_rig(rig)
+        quantities = {
+            name: f"{value:.12g} {unit}"
+            for name, (value, unit) in Rig.convert_quantities_for_display(rig.as_dict()).items()
+        }
+        converted = {
+            rig_name(name): with_rig_units(rig, name, value)
+            for name, value in values.items()
+            if name not in derived
+        }
+        return cls(converted, quantities, protocol=protocol)
+
+    def as_state(self) -> dict[str, Any]:
+        """Return the settings as plain values, without empty settings."""
+        return {name: value for name, value in asdict(self).items() if value}
+
+    def with_field(self, name: str, value: Any) -> Self:
+        """Return the settings with a field that is set, or removed if the value is None."""
+        changed = {n: v for n, v in self.scene.items() if n != name}
+        return replace(self, scene=changed if value is None else changed | {name: value})
+
+    # ---- computation ----------------------------------------------------------------------------
+
+    def build_rig(self) -> Rig | None:
+        """Return the rig, or None if the settings are dimensionless."""
+        return Rig(**self.rig) if self.rig else None
+
+    def build_scene(self, rig: Rig | None) -> Scene:
+        """Return the scene.
+
+        Parameters
+        ----------
+        rig : Rig or None
+            Rig that ``build_rig`` returned.
+
+        Returns
+        -------
+        Scene
+            Scene of the settings.
+        """
+        values = dict(self.scene)
+        if self.protocol:
+            with tempfile.TemporaryDirectory() as directory:
+                path = Path(directory, "protocol.csv")
+                path.write_text(self.protocol)
+                values["loading"] = read_protocol(path, rig)
+        return rig.scene(**values) if rig else Scene(**values)
+
+    def simulate(self, scene: Scene, rig: Rig | None) -> xr.Dataset:
+        """Return the motion of the scene.
+
+        Parameters
+        ----------
+        scene : Scene
+            Scene of the settings.
+        rig : Rig or None
+            Rig of the settings.
+
+        Returns
+        -------
+        xarray.Dataset
+            Dimensionless motion.
+        """
+        duration: float | None = None
+        if self.duration:
+            duration = rig.dimensionless(self.duration, name="duration") if rig else None
+            duration = _parse_number("duration", self.duration) if rig is None else duration
+        return simulate(scene, duration=duration, engine=fastest_engine())
+
+    # ---- reproduction ---------------------------------------------------------------------------
+
+    def python_code(self) -> str:
+        """Return Python code that computes and saves the motion."""
+        lines, values = ["import rsfstudy", ""], quote_values(self.scene)
+        rig_argument = ", rig" if self.rig else ""
+        if self.rig:
+            lines.append(f"rig = {format_call('rsfstudy.Rig', quote_values(self.rig))}")
+        if self.protocol:
+            lines.insert(0, "from pathlib import Path\n")
+            lines.append(f'Path("protocol.csv").write_text("""{self.protocol}""")')
+            lines.append(f'test = rsfstudy.read_protocol("protocol.csv"{rig_argument})')
+            values["loading"] = "test"
+        make = "rig.scene" if self.rig else "rsfstudy.Scene"
+        lines.append(f"scene = {format_call(make, values)}")
+        lines.append(f"motion = rsfstudy.simulate(scene{self._duration_argument()})")
+        lines.append(f'rsfstudy.plot_motion(motion{rig_argument}).savefig("motion.png", dpi=300)')
+        if self.rig:
+            units = quote_values(DatasetUnits.DISPLAY_UNITS)
+            lines.append(f"motion = {format_call('rig.in_units', units, 'motion')}")
+        lines.append('motion.to_netcdf("motion.nc")')
+        lines.append('print(f"k/k_cr = {scene.stiffness_ratio:.6g}")')
+        lines.append('print(f"peak friction {float(motion.friction_coefficient.max()):.6g}")')
+        return "\n".join(lines)
+
+    def _duration_argument(self) -> str:
+        """Return the arguments of ``rsfstudy.simulate`` after the scene."""
+        engine = f', engine="{fastest_engine()}"'
+        if not self.duration:
+            return engine
+        text = f"rig.dimensionless({json.dumps(self.duration)})" if self.rig else self.duration
+        return f", duration={text}{engine}"
+
+    def command_line(self) -> str:
+        """Return the command line that computes and saves the motion."""
+        options = [f"--{name.replace('_', '-')}={value}" for name, value in self.rig.items()]
+        options += [f"--set={name}={value}" for name, value in self.scene.items()]
+        options += ["--protocol=protocol.csv"] if self.protocol else []
+        options += [f"--duration={self.duration}"] if self.duration else []
+        options += [f"--engine={fastest_engine()}", "--output=motion.png"]
+        command = shlex.join(["rsfstudy", "simulate", *options])
+        if self.protocol:
+            return f"cat > protocol.csv << 'END'\n{self.protocol.strip()}\nEND\n{command}"
+        return command
+
+
+def fastest_engine() -> str:
+    """Return the compiled engine if Numba is installed, and SciPy otherwise."""
+    return "compiled" if find_spec("numba") else "scipy"
+
+
+def quote_values(values: Mapping[str, Any]) -> dict[str, str]:
+    """Return values as Python code, with double quotes."""
+    return {n: json.dumps(v) if isinstance(v, str) else repr(v) for n, v in values.items()}
+
+
+def format_call(function: str, keywords: Mapping[str, str], *arguments: str) -> str:
+    """Return a call as Python code, with one argument per line if the call is long."""
+    parts = [*arguments, *(f"{name}={value}" for name, value in keywords.items())]
+    if sum(map(len, parts)) < _LONG_CALL:
+        return f"{function}({', '.join(parts)})"
+    return f"{function}(\n" + "".join(f"    {part},\n" for part in parts) + ")"
+
+
+def format_protocol(segments: Any) -> str:
+    """Return the table of the segments of a protocol.
+
+    Parameters
+    ----------
+    segments : sequence of mapping, or None
+        Segments as ``Scene.describe`` returns them.
+
+    Returns
+    -------
+    str
+        Table in the format of ``read_protocol``, with dimensionless units.
+
+    Raises
+    ------
+    InvalidValue
+        If the loading has no segments, because it is a sampled history or a user-defined class.
+    """
+    if not segments:
+        remedy = "Pass a scene with a built-in loading or with a protocol."
+        raise InvalidValue("loading", "loading", "cannot be shown by widgets", remedy=remedy)
+    rows = [dict(row) for row in (json.loads(segments) if isinstance(segments, str) else segments)]
+    units = {
+        "velocity": "V_*", "duration": "D_c/V_*", "distance": "D_c", "step": "D_c",
+        "normal_stress": "sigma_*",
+    }  # fmt: skip
+    names = [name for name in units if any(row.get(name) is not None for row in rows)]
+    lines = [", ".join(f"{name} ({units[name]})" for name in names)]
+    for row in rows:
+        cells = ("" if row.get(name) is None else f"{row[name]:.17g}" for name in names)
+        lines.append(", ".join(cells))
+    return "\n".join(lines) + "\n"
+
+
+def rig_name(field_name: str) -> str:
+    """Return the name of a field in units of a rig, such as ``load_velocity``."""
+    quantity = QUANTITY_BY_FIELD.get(field_name)
+    is_velocity = quantity is not None and quantity.scale == "V_*" and "_ratio" in field_name
+    return field_name.removesuffix("_ratio") if is_velocity else field_name
+
+
+def with_rig_units(rig: Rig, field_name: str, value: Any) -> Any:
+    """Convert the value of a field to a text with units of a rig.
+
+    Parameters
+    ----------
+    rig : Rig
+        Rig with the scales.
+    field_name : str
+        Name of the field.
+    value : object
+        Dimensionless value.
+
+    Returns
+    -------
+    object
+        Text with units. A value without a scale is returned unchanged.
+    """
+    quantity = QUANTITY_BY_FIELD.get(field_name)
+    if quantity is None or not quantity.scale or isinstance(value, bool | str):
+        return value
+    unit = UNITS_BY_SCALE[quantity.scale]
+    return f"{value * scale_in_units(rig, quantity.scale):.12g} {unit}"
+
+
+def scale_in_units(rig: Rig, scale: str) -> float:
+    """Return a scale of a rig in the units that the page shows."""
+    return float(rig.scales[scale].factor) / _SI_VALUES[UNITS_BY_SCALE[scale]]
+
+
+def _fields_of_rig(rig: Rig) -> set[str]:
+    """Return the names of the fields that follow from the quantities of a rig."""
+    plain = Scene().as_dict()
+    of_rig = rig.scene(normal_stress=plain["normal_stress"]).as_dict()
+    derived = {name for name, value in of_rig.items() if value not in (None, plain.get(name))}
+    return derived | ({"stiffness_ratio"} if "stiffness" in derived else set())
+
+
+def _parse_number(name: str, text: str) -> float:
+    """Convert a text to a number."""
+    try:
+        return float(text)
+    except ValueError as error:
+        remedy = "Give a number in D_c/V_*, or choose the units of a rig."
+        raise InvalidValue(name, text, "is not a number", remedy=remedy) from error
