@@ -252,7 +252,7 @@ class RecordView(View):
             return
         self.hide_error()
         with self.errors_shown():
-            record, arguments = self._window, self._fit_arguments()
+            record, choices, arguments = self._window, self.choices, self._fit_arguments()
 
             def compute(report: Callable[[float, str], None]) -> xr.Dataset:
                 def progress(done: int, total: int) -> None:
@@ -260,7 +260,11 @@ class RecordView(View):
 
                 return fit(record, progress=progress, **arguments)
 
-            self.jobs.start(compute, self._show_fit, self.show_error, label="Fitting")
+            def deliver(dataset: xr.Dataset) -> None:
+                if self.choices == choices:
+                    self._show_fit(dataset)
+
+            self.jobs.start(compute, deliver, self.show_error, label="Fitting")
 
     def _show_fit(self, dataset: xr.Dataset | None) -> None:
         """Show the fitted curves, the residuals and the tables."""
