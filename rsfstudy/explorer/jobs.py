@@ -124,7 +124,7 @@ class Jobs:
         *,
         label: str = "",
     ) -> None:
-        """Run a computation in a thread.
+        """Run a computation in a thread, as soon as the browser has loaded the page.
 
         Parameters
         ----------
@@ -139,6 +139,10 @@ class Jobs:
             Text next to the progress bar.
         """
         job = _Job(label, compute, deliver, fail, pn.state.curdoc)
+        pn.state.onload(partial(self._enqueue, job))
+
+    def _enqueue(self, job: _Job) -> None:
+        """Start a job, or let it wait if another job is running."""
         with self._lock:
             if self._running is not None:
                 self._waiting = job
@@ -183,15 +187,20 @@ class Jobs:
             if successor is not None:
                 self._launch(successor)
         if successor is None:
-            _call_in_document(job, partial(self._finish, outcome, messages))
+            _call_in_document(job, partial(self._finish, job, outcome, messages))
 
-    def _finish(self, outcome: Callable[[], None] | None, messages: Sequence[str]) -> None:
+    def _finish(
+        self, job: _Job, outcome: Callable[[], None] | None, messages: Sequence[str]
+    ) -> None:
         """Hide the progress bar, and deliver the outcome of a job."""
         if self._running is None:
             self.indicator.visible = False
         if outcome is not None:
             self._warn(messages)
-            outcome()
+            try:
+                outcome()
+            except Exception as error:
+                job.fail(error)
 
     def _report(self, job: _Job, fraction: float, text: str = "") -> None:
         """Move the progress bar."""

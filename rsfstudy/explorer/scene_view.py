@@ -249,15 +249,18 @@ class SceneView(View):
     def _show_settings(self, settings: SceneSettings) -> None:
         """Show settings in the widgets, and compute the motion."""
         settings.build_scene(settings.build_rig())  # raises an error before the widgets change
-        self._controls.show(replace(settings, duration=""))
-        with pn.param.parameterized.discard_events(self._duration):
-            self._duration.value = settings.duration
-        self._settings_changed()
+        self._controls.show(settings)
+        if self._duration.value == settings.duration:
+            self._compute()
+        else:
+            self._duration.value = settings.duration  # which computes the motion
 
     def _settings_changed(self) -> None:
         """Compute the motion again after a change of a setting."""
         duration = self._duration.value.strip()
         self._controls.settings = replace(self._controls.settings, duration=duration)
+        if self._controls.settings != PRESETS.get(self._preset.value):
+            self._preset.value = _NO_PRESET
         self._compute()
 
     def _compute(self) -> None:

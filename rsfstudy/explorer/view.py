@@ -316,7 +316,10 @@ class View(ABC):
             tabs,
             sizing_mode="stretch_width",
         )
-        self.refresh()
+        pn.state.onload(self.refresh)
+        if pn.state.curdoc is not None and pn.state.curdoc.session_context is not None:
+            pn.config.exception_handler = self.show_error  # of this browser tab only
+            pn.state.curdoc.on_session_destroyed(lambda _context: self.jobs.cancel())
         return pn.Column(
             pn.pane.Markdown(f"# {escape_markdown(self.title)}", margin=(0, 5)),
             pn.Row(controls, plots, sizing_mode="stretch_width"),
@@ -345,21 +348,13 @@ class View(ABC):
                 pn.widgets.FileDownload(
                     label=labels.get(suffix, f"Figure ({suffix.upper()})"),
                     filename=f"{self.file_stem}.{suffix}",
-                    callback=partial(self._write_download, writer),
+                    callback=partial(_write_to_memory, writer),
                     button_type="primary",
                     width=150,
                 )
                 for suffix, writer in writers.items()
             )
         )
-
-    def _write_download(self, write: Callable[[], bytes]) -> io.BytesIO:
-        """Return the contents of a file, or show the error that prevents the download."""
-        try:
-            return io.BytesIO(write())
-        except Exception as error:
-            self.show_error(error)
-            raise
 
     def _render_figure(self, suffix: str) -> bytes:
         """Return the figure as an image."""
@@ -375,6 +370,11 @@ class View(ABC):
         with tempfile.TemporaryDirectory() as directory:
             write_dataset(self.dataset(), path := Path(directory, "data.nc"))
             return path.read_bytes()
+
+
+def _write_to_memory(write: Callable[[], bytes]) -> io.BytesIO:
+    """Return the contents of a file that the user downloads."""
+    return io.BytesIO(write())
 
 
 def load_panel() -> None:
