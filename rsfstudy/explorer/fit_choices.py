@@ -7,7 +7,6 @@ same arguments.
 
 from __future__ import annotations
 
-import json
 import shlex
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields
@@ -24,8 +23,6 @@ from rsfstudy.slider import Scene
 #: An excluded time belongs to the nearest step of the window if the distance in time is at most
 #: this fraction of the shortest interval between two steps.
 _MAX_STEP_SHIFT_OVER_INTERVAL = 0.25
-#: Maximum length of a line of Python code.
-_MAX_CODE_LINE_LENGTH = 88
 #: Options of the command ``fit`` whose names differ from the keywords of the functions.
 _OPTION_BY_KEYWORD = {"laws": "--law", "steps": "--step"}
 
@@ -290,51 +287,6 @@ def parse_columns(text: str) -> dict[str, str]:
             raise InvalidValue("columns", part.strip(), rule)
         found[name] = heading
     return found
-
-
-def format_call(
-    function_name: str, positional: Sequence[str], keywords: Mapping[str, Any], target: str = ""
-) -> str:
-    """Format a call of a function as Python code.
-
-    Parameters
-    ----------
-    function_name : str
-        Name of the function.
-    positional : sequence of str
-        Code of the positional arguments.
-    keywords : mapping of str to object
-        Values of the keyword arguments, which consist of texts, numbers, lists and dictionaries.
-    target : str, default: ""
-        Name of the variable to which the result is assigned.
-
-    Returns
-    -------
-    str
-        Code in one line, or in one line per argument if one line is too long.
-    """
-    parts = [*positional, *(f"{name}={format_value(value)}" for name, value in keywords.items())]
-    begins = f"{target} = {function_name}(" if target else f"{function_name}("
-    line = f"{begins}{', '.join(parts)})"
-    if len(line) <= _MAX_CODE_LINE_LENGTH:
-        return line
-    return "\n".join([begins, *(f"    {part}," for part in parts), ")"])
-
-
-def format_value(value: Any) -> str:
-    """Format a value as Python code.
-
-    Parameters
-    ----------
-    value : object
-        Text, number, Boolean, list or dictionary.
-
-    Returns
-    -------
-    str
-        Code with double quotes around texts.
-    """
-    return repr(value) if isinstance(value, bool) else json.dumps(value, ensure_ascii=False)
 
 
 def format_fit_command(path: str, arguments: Mapping[str, Any]) -> str:

@@ -7,7 +7,7 @@ and the maximum in each pixel. When the user zooms, the visible rows are reduced
 from __future__ import annotations
 
 import itertools
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from typing import Any
 
 import numpy as np
@@ -29,7 +29,8 @@ _ASSUMED_WIDTH = 900
 _CLICK_REACH = 0.02
 #: Margin on both sides of the record, as a fraction of the visible range.
 _MARGIN = 0.02
-#: Panels from top to bottom: height in pixels, and height of the axis label.
+#: Columns of the record in the second to the fourth figure, and heights of all figures in pixels.
+_COLUMNS = ("friction", "displacement", "normal_stress")
 _HEIGHTS = {"steps": 60, "friction": 300, "displacement": 150, "normal_stress": 150, "fit": 170}
 #: Axis labels, and the factor from the units of the record to the units of the label.
 _LABELS = {
@@ -83,11 +84,11 @@ class RecordPlot:
         self._record: Record | None = None
         self._x_name = "time"
         self._step_times: np.ndarray = np.zeros(0)
-        self._fitted: list[Mapping[str, Any]] = []
+        self._fitted: list[dict[str, Any]] = []
         self._limits = (0.0, 0.0)
         self._x_range = Range1d(0.0, 1.0)
         self.figures = {name: self._create_figure(name) for name in _HEIGHTS}
-        self._curves = {name: self._add_curve(name) for name in (*_HEIGHTS,)[1:4]}
+        self._curves = {name: self._add_curve(name) for name in _COLUMNS}
         self._steps, self._holds = ColumnDataSource(), ColumnDataSource()
         self._fit_curves, self._fit_residuals = ColumnDataSource(), ColumnDataSource()
         self._outside = [BoxAnnotation(visible=False, level="overlay") for _side in range(2)]
@@ -232,8 +233,7 @@ class RecordPlot:
         """Add the fitted curves and the figure of the whitened residuals."""
         friction, residuals = self.figures["friction"], self.figures["fit"]
         fitted = {"color": "color", "legend_field": "law"}
-        self._fit_curves.data = {"xs": [], "ys": [], "color": [], "law": [], "dash": []}
-        self._fit_residuals.data = {"x": [], "y": [], "color": [], "law": [], "marker": []}
+        self._thin_fits()
         friction.multi_line(
             "xs", "ys", source=self._fit_curves, line_width=2.5, line_dash="dash", **fitted
         )
@@ -257,8 +257,8 @@ class RecordPlot:
         """Return the times in s between two horizontal coordinates."""
         assert self._record is not None
         time, ordered = self._record.time, np.maximum.accumulate(self._x())
-        first = np.searchsorted(ordered, limits[0])
-        last = np.searchsorted(ordered, limits[1], "right") - 1
+        first = int(np.searchsorted(ordered, limits[0]))
+        last = int(np.searchsorted(ordered, limits[1], "right")) - 1
         return float(time[min(first, len(time) - 1)]), float(time[max(last, 0)])
 
     def _thin_again(self) -> None:
@@ -276,20 +276,23 @@ class RecordPlot:
 
     def _thin_fits(self) -> None:
         """Reduce the fitted curves and the whitened residuals."""
-        curves: dict[str, list[Any]] = {name: [] for name in self._fit_curves.data}
-        residuals: dict[str, list[Any]] = {name: [] for name in self._fit_residuals.data}
+        curves: dict[str, list[Any]] = {n: [] for n in ("xs", "ys", "color", "law", "dash")}
+        points: dict[str, list[Any]] = {n: [] for n in ("x", "y", "color", "law", "marker")}
         for rows in self._fitted:
-            for name, target in (("fitted_friction", curves), ("innovation", residuals)):
-                known = np.isfinite(rows[name])
-                x = rows[f"record_{self._x_name}"][known]
-                x, y = thin_to_pixels(x, rows[name][known], self._limits, self._pixel_count())
-                count = 1 if target is curves else len(x)
-                target["xs" if target is curves else "x"] += [x] if target is curves else [*x]
-                target["ys" if target is curves else "y"] += [y] if target is curves else [*y]
-                for key in ("color", "law", "marker", "dash"):
-                    if key in target:
-                        target[key] += [rows[key]] * count
-        self._fit_curves.data, self._fit_residuals.data = curves, residuals
+            x, y = self._thin_rows(rows, "fitted_friction")
+            for name, value in (rows | {"xs": x, "ys": y}).items():
+                curves.get(name, []).append(value)
+            x, y = self._thin_rows(rows, "innovation")
+            looks = {name: [rows[name]] * len(x) for name in ("color", "law", "marker")}
+            for name, values in (looks | {"x": x, "y": y}).items():
+                points[name].extend(values)
+        self._fit_curves.data, self._fit_residuals.data = curves, points
+
+    def _thin_rows(self, rows: dict[str, Any], name: str) -> tuple[np.ndarray, np.ndarray]:
+        """Reduce the rows of a fit in which a variable is not NaN."""
+        known = np.isfinite(rows[name])
+        x = rows[f"record_{self._x_name}"][known]
+        return thin_to_pixels(x, rows[name][known], self._limits, self._pixel_count())
 
     def _pixel_count(self) -> int:
         """Return the number of pixels between the ends of the horizontal axis."""
@@ -330,7 +333,7 @@ def _is_selection_tool(tool: Any) -> bool:
     return isinstance(getattr(tool, "tools", [tool])[0], BoxSelectTool)
 
 
-def _iterate_fitted_rows(dataset: xr.Dataset) -> Iterator[Mapping[str, Any]]:
+def _iterate_fitted_rows(dataset: xr.Dataset) -> Iterator[dict[str, Any]]:
     """Yield the curves of each fit of a dataset, with the style of its law."""
     laws = dataset["law"].values.tolist()
     with style_context():

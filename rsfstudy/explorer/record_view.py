@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import asdict
@@ -14,14 +15,10 @@ import xarray as xr
 
 from rsfstudy.api import fit
 from rsfstudy.errors import DataError, InvalidValue
-from rsfstudy.explorer.fit_choices import (
-    FitChoices,
-    format_call,
-    format_fit_command,
-    format_value,
-)
+from rsfstudy.explorer.fit_choices import FitChoices, format_fit_command
 from rsfstudy.explorer.record_plot import RecordPlot
 from rsfstudy.explorer.record_widgets import create_choice_widgets, format_step
+from rsfstudy.explorer.scene_settings import format_call, quote_values
 from rsfstudy.explorer.view import View
 from rsfstudy.fitting import Record
 from rsfstudy.plots import Figure
@@ -288,13 +285,15 @@ class RecordView(View):
     def python_code(self) -> str:
         """Return Python code that reads the record, fits it and prints the table of the fit."""
         path, lines = self._path, ["import rsfstudy", ""]
-        source = format_value(path) if path else "record"
+        source = json.dumps(path) if path else "record"
         if not path:
             lines.append("# `record` is the object that was passed to rsfstudy.explore.")
         reading, fitting = self._reading | self.choices.window_arguments(), self._fit_arguments()
         if path or reading:
-            lines.append(format_call("rsfstudy.read_record", [source], reading, "record"))
-        lines.append(format_call("rsfstudy.fit", ["record"], fitting, "fit"))
+            lines.append(
+                f"record = {format_call('rsfstudy.read_record', quote_values(reading), source)}"
+            )
+        lines.append(f"fit = {format_call('rsfstudy.fit', quote_values(fitting), 'record')}")
         return "\n".join([*lines, "print(fit.rsf.fit_table().T)"])
 
     def command_line(self) -> str:
