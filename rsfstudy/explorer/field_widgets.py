@@ -120,12 +120,12 @@ class NumberWidget:
         """Create the widgets."""
         self._limits, self._changed, self._is_moved_by_code = limits, changed, False
         self._slider = pn.widgets.FloatSlider(
-            name=label, start=0.0, end=1.0, step=1.0 / _STEPS, show_value=False, width=145,
+            label=label, start=0.0, end=1.0, step=1.0 / _STEPS, show_value=False, width=145,
             value=limits.position_of(value or 0.0), tooltips=False,
         )  # fmt: skip
         step = 10.0 ** math.floor(math.log10(max(abs(limits.low), abs(limits.high)))) / 100.0
         self._box = pn.widgets.FloatInput(
-            name=unit or " ", value=value, width=95, step=step, description=meaning or None
+            label=unit or " ", value=value, width=95, step=step, description=meaning or None
         )
         self._slider.param.watch(self._slider_moved, "value")
         self._box.param.watch(self._box_changed, "value")

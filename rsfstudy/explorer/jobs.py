@@ -103,7 +103,7 @@ class Jobs:
             active=True, value=-1, max=1000, sizing_mode="stretch_width", margin=(12, 5)
         )
         self._label = pn.pane.Str("", margin=(5, 5))
-        self._button = pn.widgets.Button(name="Cancel", button_type="danger", width=90)
+        self._button = pn.widgets.Button(label="Cancel", color="danger", width=90)
         self._button.on_click(lambda _event: self.cancel())
         self.indicator = pn.Row(self._label, self._bar, self._button, visible=False)
         self._lock = threading.Lock()

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
 
@@ -19,7 +19,7 @@ from rsfstudy.explorer.scene_settings import (
     scale_in_units,
 )
 from rsfstudy.rig import Rig
-from rsfstudy.slider import Scene, SceneFields, SliderParameters
+from rsfstudy.slider import SceneFields, SliderParameters
 
 #: Values of fields whose default is 0 or None, when the user selects the part of the field.
 _TYPICAL_VALUES = {
@@ -39,6 +39,12 @@ _RIG_QUANTITIES_OF_PART = {
         "thermal_diffusivity", "heat_capacity", "shear_zone_width", "reference_temperature",
     ),
     "thermal": ("pressurisation_factor",),
+}  # fmt: skip
+_STIFFNESS = {*SceneFields.ALTERNATIVE_STIFFNESS}
+#: Fields that follow from the quantities of a rig.
+_FIELDS_OF_RIG = {
+    "inertia", "stiffness_ratio", "stiffness", "reference_rate", "period", "radiation_damping",
+    "heating", "cooling", "direct_activation", "evolution_activation", "pressurisation",
 }  # fmt: skip
 _TYPICAL_RIG_QUANTITIES = README_RIG | {
     "period": "0.01 s", "shear_modulus": "30 GPa", "density": "2700 kg/m^3",
@@ -87,7 +93,7 @@ class SceneControls:
         self.settings = settings
         self._rig = settings.build_rig()
         units = pn.widgets.RadioButtonGroup(
-            name="Units", options=["dimensionless", "rig"], value="rig" if self._rig else
+            label="Units", options=["dimensionless", "rig"], value="rig" if self._rig else
             "dimensionless", width=270,
         )  # fmt: skip
         units.param.watch(lambda event: self._choose_units(event.new), "value")
@@ -135,7 +141,7 @@ class SceneControls:
         fields = {n: v for n, v in self.settings.scene.items() if n not in dropped}
         if not slot.part_class_by_selecting_field:
             fields[slot.name] = name
-        elif new is not None and new.selected_by and new.selected_by not in self._fields_of_rig():
+        elif new is not None and new.selected_by and (self._rig is None or slot.name == "loading"):
             fields[new.selected_by] = self._typical(new.selected_by)
         rig = dict(self.settings.rig)
         for quantity in _RIG_QUANTITIES_OF_PART.get(old.name, ()) if old else ():
@@ -180,7 +186,7 @@ class SceneControls:
         name = self.part_of_slot(slot)
         options = [*slot.built_in_parts, *slot.user_parts]
         options += [PROTOCOL] if slot.name == "loading" and PROTOCOL not in options else []
-        selector = pn.widgets.Select(name=slot.name, options=options, value=name, width=265)
+        selector = pn.widgets.Select(label=slot.name, options=options, value=name, width=265)
         selector.param.watch(lambda event: self._choose_part(slot, event.new), "value")
         widgets = [selector]
         if name == PROTOCOL:
@@ -199,14 +205,10 @@ class SceneControls:
         ]
 
     def _fields_of_rig(self) -> set[str]:
-        """Return the fields that follow from the quantities of the rig."""
+        """Return the fields without a widget, because the rig or a menu determines them."""
         if self._rig is None:
             return {"inertia"}
-        derived = set(SceneSettings.from_scene(Scene()).scene) - {"law", "normal_stress"}
-        return derived | {
-            "inertia", "stiffness", "reference_rate", "period", "radiation_damping", "heating",
-            "cooling", "direct_activation", "evolution_activation", "pressurisation",
-        }  # fmt: skip
+        return _FIELDS_OF_RIG - (set() if "stiffness" in self.settings.rig else _STIFFNESS)
 
     def _field_widget(self, part: Any, field: str) -> Any:
         """Return the widget of a field."""
@@ -215,7 +217,7 @@ class SceneControls:
         name = rig_name(field) if self._rig else field
         stated = self.settings.scene.get(name, self.settings.scene.get(field))
         if isinstance(default, bool):
-            box = pn.widgets.Checkbox(name=field, value=bool(stated))
+            box = pn.widgets.Checkbox(label=field, value=bool(stated))
             box.param.watch(lambda event: self._set_field(field, event.new or None), "value")
             return box
         scale = scale_in_units(self._rig, quantity.scale) if self._rig and quantity.scale else 1.0
@@ -257,7 +259,7 @@ class SceneControls:
     def _protocol_box(self) -> Any:
         """Return the text box with the segments of the loading."""
         box = pn.widgets.TextAreaInput(
-            name="Segments (CSV)", value=self.settings.protocol, rows=7, width=265
+            label="Segments (CSV)", value=self.settings.protocol, rows=7, width=265
         )
 
         def change(event: Any) -> None:
@@ -271,15 +273,3 @@ class SceneControls:
         """Store the value of a field."""
         self.settings = self.settings.with_field(name, value)
         self._changed()
-
-    def find_fields(self) -> Iterator[str]:
-        """Iterate over the names of the fields that the widgets show.
-
-        Yields
-        ------
-        str
-            Name of a field.
-        """
-        for card in self.column.objects[1:]:
-            for row in card.objects:
-                yield row.objects[0].name if isinstance(row, pn.Row) else row.name

@@ -165,11 +165,11 @@ class SceneView(View):
         """Create the widgets and the plots."""
         super().__init__(source)
         self._result: Result | None = None
-        self._preset = pn.widgets.Select(name="Preset", options=[_NO_PRESET, *PRESETS], width=275)
+        self._preset = pn.widgets.Select(label="Preset", options=[_NO_PRESET, *PRESETS], width=275)
         self._preset.value = next(iter(PRESETS)) if source is None else _NO_PRESET
         self._preset.param.watch(lambda event: self._choose_preset(event.new), "value")
         self._duration = pn.widgets.TextInput(
-            name="Duration (empty: whole loading)", width=270, placeholder="such as 60 s, or 50"
+            label="Duration (empty: whole loading)", width=270, placeholder="such as 60 s, or 50"
         )
         self._controls = SceneControls(_read_settings(source), self._settings_changed)
         self._duration.value = self._controls.settings.duration

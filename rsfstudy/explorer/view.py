@@ -69,7 +69,7 @@ class View(ABC):
         self._warnings = pn.pane.Alert("", alert_type="warning", visible=False)
         self._codes = {
             label: pn.widgets.TextAreaInput(
-                name=label, disabled=True, auto_grow=True, max_rows=40, rows=2,
+                label=label, disabled=True, auto_grow=True, max_rows=40, rows=2,
                 sizing_mode="stretch_width", stylesheets=[_CODE_STYLE],
             )
             for label in ("Python", "Command line", "State")
@@ -331,7 +331,7 @@ class View(ABC):
         """Return the code that reproduces the view, with copy buttons."""
         rows = []
         for text in self._codes.values():
-            button = pn.widgets.Button(name="Copy", width=80, margin=(25, 5, 5, 5))
+            button = pn.widgets.Button(label="Copy", width=80, margin=(25, 5, 5, 5))
             button.js_on_click(args={"source": text, "button": button}, code=_COPY_SCRIPT)
             rows.append(pn.Row(text, button, sizing_mode="stretch_width"))
         return pn.Column(*rows, sizing_mode="stretch_width")
@@ -349,7 +349,7 @@ class View(ABC):
                     label=labels.get(suffix, f"Figure ({suffix.upper()})"),
                     filename=f"{self.file_stem}.{suffix}",
                     callback=partial(_write_to_memory, writer),
-                    button_type="primary",
+                    color="primary",
                     width=150,
                 )
                 for suffix, writer in writers.items()

@@ -19,7 +19,9 @@ from typing import Any, NamedTuple
 
 import pytest
 
-CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser")
+CHROMIUM = next(
+    filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None
+)
 #: Time in ms after which a page that does not show what a test waits for fails the test.
 PATIENCE = 60_000
 

@@ -1,0 +1,155 @@
+"""Tests of the widgets of a scene and of the runner of computations, without a browser."""
+
+import threading
+import time
+
+import pytest
+
+import rsfstudy
+from rsfstudy.explorer.field_widgets import SliderRange
+from rsfstudy.explorer.jobs import Jobs
+from rsfstudy.explorer.scene_controls import SceneControls
+from rsfstudy.explorer.scene_presets import PRESETS
+from rsfstudy.explorer.scene_settings import README_RIG, SceneSettings
+from rsfstudy.slider import SceneFields
+
+#: Settings with which every part can be combined.
+SETTINGS = SceneSettings({"law": "slip", "normal_stress": "imposed"})
+RIG_SETTINGS = SceneSettings({"law": "slip", "normal_stress": "imposed"}, README_RIG)
+SLOTS = {slot.name: slot for slot in SceneFields.SLOTS}
+
+
+def choose(controls, slot, name):
+    """Select a part in the menu of a slot."""
+    cards = {card.title: card for card in controls.column.objects[1:]}
+    cards[slot.replace("_", " ").capitalize()].objects[0].value = name
+
+
+def scene_of(controls):
+    settings = controls.settings
+    return settings.build_scene(settings.build_rig())
+
+
+@pytest.mark.parametrize("settings", [SETTINGS, RIG_SETTINGS], ids=["dimensionless", "rig"])
+@pytest.mark.parametrize(
+    ("slot", "part"), [(s.name, part) for s in SLOTS.values() for part in s.built_in_parts]
+)
+def test_every_part_can_be_chosen_and_left(slot, part, settings):
+    calls = []
+    controls = SceneControls(settings, lambda: calls.append(controls.settings))
+    if part == "thermal":
+        choose(controls, "temperature", "shear_heating")
+    choose(controls, slot, part)
+    scene = scene_of(controls)
+    assert getattr(scene.parts, slot).name == part
+    choose(controls, slot, settings.scene.get(slot, SLOTS[slot].default_part_name))
+    assert getattr(scene_of(controls).parts, slot).name == settings.scene.get(
+        slot, SLOTS[slot].default_part_name
+    )
+    assert len(calls) >= (part != settings.scene.get(slot, SLOTS[slot].default_part_name))
+
+
+@pytest.mark.parametrize("label", PRESETS)
+def test_presets_survive_state_and_units(label):
+    preset = PRESETS[label]
+    assert SceneSettings.from_state(preset.as_state()) == preset
+    scene = preset.build_scene(preset.build_rig())
+    assert SceneSettings.from_scene(scene).build_scene(None) == scene
+    if preset.rig:
+        again = SceneSettings.from_scene(scene, preset.build_rig())
+        values = again.build_scene(again.build_rig()).as_dict()
+        known = scene.as_dict()
+        assert values.keys() == known.keys()
+        for name, value in known.items():
+            expected = pytest.approx(value, rel=1e-11) if isinstance(value, float) else value
+            assert values[name] == expected, name
+
+
+@pytest.mark.parametrize(
+    ("state", "message"),
+    [
+        ({"scenes": {}}, "scenes.*is unknown"),
+        ({"scene": 3}, "must be an object"),
+        ({"protocol": ["a"]}, "must be a text"),
+    ],
+)
+def test_a_wrong_state_is_refused(state, message):
+    with pytest.raises(rsfstudy.errors.InvalidValue, match=message):
+        SceneSettings.from_state(state)
+
+
+def test_a_notebook_gets_a_panel_object():
+    page = rsfstudy.explore(rsfstudy.Scene(law="slowness", load_velocity_ratio=3.0))
+    assert "panel" in type(page).__module__
+    with pytest.raises(rsfstudy.errors.InvalidValue, match="neither|is not a scene"):
+        rsfstudy.explore(3.0)
+    with pytest.raises(rsfstudy.errors.InvalidValue, match="is not JSON"):
+        rsfstudy.explore(state="{")
+
+
+@pytest.mark.parametrize(
+    ("limits", "value"),
+    [
+        (SliderRange.of_field(0.01, 0.01, "must be greater than 0", ""), 0.0123),
+        (SliderRange.of_field(0.0, 100.0, "must be 0 or greater", "D_c/V_*"), 7.0),
+        (SliderRange.of_field(0.0, 1.0, "", "D_c"), -0.5),
+        (SliderRange.of_field(2.0, 2.0, "", ""), 1.4),
+        (SliderRange.of_field(0.5, 0.5, "must lie between 0 and 1", ""), 0.25),
+    ],
+)
+def test_a_slider_covers_its_range(limits, value):
+    assert limits.low < value < limits.high
+    assert limits.value_at(limits.position_of(value)) == pytest.approx(value, rel=1e-3)
+    assert limits.value_at(0.0) == pytest.approx(limits.low, rel=1e-3)
+    assert limits.value_at(1.0) == pytest.approx(limits.high, rel=1e-3)
+    assert (limits.position_of(-1e9), limits.position_of(1e9)) == (0.0, 1.0)
+
+
+def wait_until(condition):
+    """Wait until a condition holds."""
+    for _ in range(3000):
+        if condition():
+            return
+        time.sleep(0.01)
+    raise AssertionError("the computation has not ended")
+
+
+def test_the_last_of_several_jobs_delivers():
+    """A job that waits is replaced, and the result of an outdated job is discarded."""
+    jobs, results, may_end = Jobs(lambda messages: None), [], threading.Event()
+
+    def compute(number):
+        may_end.wait(30)
+        return number
+
+    for number in range(3):
+        jobs.start(lambda _report, n=number: compute(n), results.append, results.append)
+    may_end.set()
+    wait_until(lambda: not jobs.is_running)
+    assert results == [2]
+
+
+def test_a_cancelled_job_ends_and_delivers_nothing():
+    jobs, results, started = Jobs(lambda messages: None), [], threading.Event()
+
+    def compute(report):
+        started.set()
+        while True:
+            report(0.5, "half")
+
+    jobs.start(compute, results.append, results.append, label="long")
+    started.wait(30)
+    jobs.cancel()
+    wait_until(lambda: not jobs.is_running)
+    assert (results, jobs.indicator.visible) == ([], False)
+
+
+def test_errors_of_a_job_reach_the_page():
+    jobs, failures, error = Jobs(lambda messages: None), [], ValueError("wrong")
+
+    def compute(_report):
+        raise error
+
+    jobs.start(compute, failures.append, failures.append)
+    wait_until(lambda: not jobs.is_running and failures)
+    assert failures == [error]
