@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 from rsfstudy._lazy_exports import build_lazy_export_functions
 
 if TYPE_CHECKING:
-    from rsfstudy.api.fit_record import STIFFNESS_FROM_RECORD
+    from rsfstudy.api.fit_record import DEFAULT_FREE_PARAMETERS, STIFFNESS_FROM_RECORD, fit
     from rsfstudy.api.html_report import write_report
     from rsfstudy.api.result_paths import find_results
     from rsfstudy.api.simulation import BEYOND_INSTABILITY_NORM_ATTRIBUTE_NAME, simulate
@@ -25,7 +25,7 @@ else:
     __getattr__, __dir__ = build_lazy_export_functions(
         __name__,
         {
-            "api.fit_record": ("STIFFNESS_FROM_RECORD",),
+            "api.fit_record": ("DEFAULT_FREE_PARAMETERS", "STIFFNESS_FROM_RECORD", "fit"),
             "api.html_report": ("write_report",),
             "api.result_paths": ("find_results",),
             "api.simulation": ("BEYOND_INSTABILITY_NORM_ATTRIBUTE_NAME", "simulate"),
@@ -39,9 +39,11 @@ else:
 
 __all__ = [
     "BEYOND_INSTABILITY_NORM_ATTRIBUTE_NAME",
+    "DEFAULT_FREE_PARAMETERS",
     "STIFFNESS_FROM_RECORD",
     "apply_overrides_to_study",
     "find_results",
+    "fit",
     "prepare_run_with_progress",
     "recompute_cell",
     "simulate",

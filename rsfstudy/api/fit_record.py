@@ -25,6 +25,7 @@ from rsfstudy.axes import Axis
 from rsfstudy.defaults import Defaults
 from rsfstudy.error_boundary import error_boundary
 from rsfstudy.errors import InvalidValue
+from rsfstudy.execution import ProgressCallback
 from rsfstudy.fitting import (
     LOW_PASS_ORDERS,
     MEAN,
@@ -99,6 +100,7 @@ def fit(
     rtol: float = Accuracy.DEFAULT_RTOL,
     budget: int = Defaults.FIT_EVALUATION_BUDGET,
     workers: int = 0,
+    progress: bool | ProgressCallback = False,
     command: str = "rsfstudy.fit",
     **scene: Any,
 ) -> xr.Dataset:
@@ -188,6 +190,9 @@ def fit(
         Largest number of right-hand side evaluations of a fit.
     workers : int, default: 0
         Number of worker processes. With 0, the fits are computed in the current process.
+    progress : bool or callable, default: False
+        If True, show a progress bar. A function is called with the number of finished fits and the
+        number of all fits.
     command : str, default: "rsfstudy.fit"
         Command line to record in the history of the dataset.
     **scene : object
@@ -334,7 +339,7 @@ def fit(
         accuracy=Accuracy(rtol, budget, engine=chosen),
     )
     fits = study_runs.run(
-        study, workers=workers, output=None, progress=False, keep_going=True, command=command
+        study, workers=workers, output=None, progress=progress, keep_going=True, command=command
     )
     processing = [f"{one.name}: {text}" for one in records for text in one.processing]
     return fits.assign_attrs({"processing": "; ".join(processing)} if processing else {})

@@ -20,15 +20,15 @@ _MAX_PROGRESS_LINES, _MIN_PROGRESS_LINE_INTERVAL = 10, 10.0
 
 
 @contextlib.contextmanager
-def show_progress(study_name: str, is_shown: bool) -> Iterator[ProgressCallback]:
-    """Show the progress of a run on standard error.
+def show_progress(study_name: str, is_shown: bool | ProgressCallback) -> Iterator[ProgressCallback]:
+    """Show the progress of a run on standard error, or report it to a function.
 
     Parameters
     ----------
     study_name : str
         Name of the study, which is displayed next to the bar.
-    is_shown : bool
-        If False, nothing is displayed.
+    is_shown : bool or callable
+        If False, nothing is displayed. If a function, the function receives the progress instead.
 
     Yields
     ------
@@ -36,7 +36,9 @@ def show_progress(study_name: str, is_shown: bool) -> Iterator[ProgressCallback]
         Function ``update(done, total)`` that displays the number of completed cells.
     """
     console = Console(stderr=True)
-    if not is_shown:
+    if callable(is_shown):
+        yield is_shown
+    elif not is_shown:
         yield lambda _done, _all: None
     elif not (console.is_terminal or console.is_jupyter):
         yield _print_progress_lines(study_name, console)

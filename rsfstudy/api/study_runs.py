@@ -22,7 +22,13 @@ from rsfstudy.api.result_paths import find_results, output_directory
 from rsfstudy.defaults import Defaults
 from rsfstudy.error_boundary import error_boundary, find_stacklevel_of_user_code
 from rsfstudy.errors import IncompleteWarning, InvalidValue, RsfStudyWarning, shorten_text
-from rsfstudy.execution import OutputOptions, WorkerPool, prepare_study_run, run_fingerprint
+from rsfstudy.execution import (
+    OutputOptions,
+    ProgressCallback,
+    WorkerPool,
+    prepare_study_run,
+    run_fingerprint,
+)
 from rsfstudy.measures import Outcome
 from rsfstudy.motion import Engine
 from rsfstudy.netcdf_encoding import copy_with_cf_encoding
@@ -82,7 +88,7 @@ def run(
     workers: int = 2,
     client: Any = None,
     output: str | Path | None = Defaults.OUTPUT_DIRECTORY,
-    progress: bool = True,
+    progress: bool | ProgressCallback = True,
     fresh: bool = False,
     rtol: float | None = None,
     engine: str | None = None,
@@ -110,9 +116,9 @@ def run(
         Client of an existing Dask cluster, which replaces the local cluster.
     output : str, Path or None, default: "outputs"
         Directory for the results ``NAME.nc`` and the journal. If None, nothing is written.
-    progress : bool, default: True
+    progress : bool or callable, default: True
         If True, show a progress bar. If standard error is not a terminal, lines of text replace the
-        bar.
+        bar. A function is called with the number of finished cells and the number of all cells.
     fresh : bool, default: False
         If True, discard the finished cells of previous runs, and compute all cells.
     rtol : float, optional
@@ -254,7 +260,7 @@ def prepare_run_with_progress(
     study: Study,
     output_options: OutputOptions,
     worker_pool: WorkerPool,
-    show_progress_bar: bool = True,
+    show_progress_bar: bool | ProgressCallback = True,
 ) -> Callable[[], xr.Dataset]:
     """Check a study, and return a function that runs the study.
 
@@ -266,8 +272,9 @@ def prepare_run_with_progress(
         Options for the output of the run.
     worker_pool : WorkerPool
         Workers that compute the cells.
-    show_progress_bar : bool, default: True
-        If True, show the progress of the run.
+    show_progress_bar : bool or callable, default: True
+        If True, show the progress of the run. A function is called with the number of finished
+        cells and the number of all cells.
 
     Returns
     -------
@@ -286,7 +293,7 @@ def prepare_run_with_progress(
         """Compile the equations if necessary, and run the study."""
         if study.accuracy.engine == Engine.COMPILED:
             compile_scenes_with_notice(
-                ready.plan.example_scenes, study.measure.needs_time, show_progress_bar
+                ready.plan.example_scenes, study.measure.needs_time, show_progress_bar is True
             )
         with show_progress(study.name, show_progress_bar) as show:
             return ready(worker_pool.make_cell_batch_mapper(ready.worker_log_path), show)

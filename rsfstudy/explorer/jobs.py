@@ -56,11 +56,12 @@ def collected_warnings() -> Iterator[list[str]]:
         del _COLLECTED.messages
 
 
-class Cancelled(BaseException):
+class Cancelled(KeyboardInterrupt):
     """Raised in the thread of a computation when the user cancels the computation.
 
-    The class is not derived from ``Exception``, so that no handler of errors catches it. A
-    computation is therefore cancelled in the same way as Ctrl-C interrupts a command.
+    The class is derived from ``KeyboardInterrupt``, because runs of studies and fits record any
+    other exception as the outcome of a cell. A computation is therefore cancelled in the same way
+    as Ctrl-C interrupts a command.
     """
 
 
@@ -108,6 +109,7 @@ class Jobs:
         self._lock = threading.Lock()
         self._running: tuple[_Job, threading.Thread] | None = None
         self._waiting: _Job | None = None
+        self._cancelled: _Job | None = None
 
     @property
     def is_running(self) -> bool:
@@ -153,7 +155,7 @@ class Jobs:
             self._waiting = None
             if self._running is None:
                 return
-            thread = self._running[1]
+            self._cancelled, thread = self._running
             if thread.ident is not None:
                 ctypes.pythonapi.PyThreadState_SetAsyncExc(
                     ctypes.c_ulong(thread.ident), ctypes.py_object(Cancelled)
@@ -179,6 +181,8 @@ class Jobs:
             except Cancelled:
                 pass
         with self._lock:
+            if job is self._cancelled:  # A run converts the exception to another exception.
+                outcome = None
             successor, self._waiting, self._running = self._waiting, None, None
             if successor is not None:
                 self._launch(successor)

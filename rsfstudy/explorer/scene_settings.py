@@ -242,7 +242,12 @@ def fastest_engine() -> str:
 
 def quote_values(values: Mapping[str, Any]) -> dict[str, str]:
     """Return values as Python code, with double quotes."""
-    return {n: json.dumps(v) if isinstance(v, str) else repr(v) for n, v in values.items()}
+    return {
+        name: json.dumps(value, ensure_ascii=False)
+        if isinstance(value, str | list | dict)
+        else repr(value)
+        for name, value in values.items()
+    }
 
 
 def format_call(function: str, keywords: Mapping[str, str], *arguments: str) -> str:
