@@ -275,9 +275,9 @@ class DatasetAccessor:
             study are plotted with ``rsfstudy.plot``. Motions and limit cycles are plotted with
             ``rsfstudy.plot_motion``.
         **plot_options : object
-            Keyword arguments for ``rsfstudy.plot`` or ``rsfstudy.plot_motion``, such as
-            ``variable`` and ``style`` for the results of a study, or ``rig`` and ``against`` for a
-            motion.
+            Keyword arguments for ``rsfstudy.plot`` or ``rsfstudy.plot_motion``. The arguments
+            ``style``, ``width`` and ``header`` apply to all figures. In addition, ``variable``
+            applies to the results of a study, and ``rig`` and ``against`` apply to a motion.
 
         Returns
         -------

@@ -384,6 +384,8 @@ def plot(
     variable: str | None = None,
     *,
     style: Any = None,
+    width: Any = None,
+    header: bool = True,
     user_figure: Any = None,
 ) -> Figure:
     """Plot the results of a study.
@@ -398,9 +400,15 @@ def plot(
     style : path, str, dict or list, optional
         Style that overrides the style of rsfstudy: the path of a style sheet with the suffix
         ``.mplstyle``, the name of a style in ``matplotlib.style.available``, a dictionary of
-        matplotlib settings, or a list of styles. For example, ``{"font.size": 9, "figure.figsize":
-        (3.5, 2.6)}`` selects a width of 3.5 inches, which is one column of a journal. Colours and
-        line styles follow ``axes.prop_cycle``.
+        matplotlib settings, or a list of styles. For example, ``{"font.size": 9}`` selects larger
+        letters. Colours and line styles follow ``axes.prop_cycle``.
+    width : quantity, optional
+        Width of the figure, from "60 mm" to "600 mm". If the panels of a row would be narrower than
+        55 mm, the row has fewer panels. By default, the figure is as wide as a column (84 mm) or
+        the text (174 mm) of a journal page.
+    header : bool, default: True
+        If False, the figure has no header. The header lists overrides of the study, and missing and
+        failed cells.
     user_figure : callable, module or Figure, optional
         User-defined figure: a function ``draw(dataset, axes)``, a module with a function ``draw``,
         or an ``rsfstudy.Figure``. The argument is required if the study was declared with a
@@ -416,8 +424,8 @@ def plot(
     Raises
     ------
     InvalidValue
-        If the variable does not exist, if the style is invalid or contains an unknown setting, or
-        if the figure cannot be drawn from the dataset.
+        If the variable does not exist, if the width is invalid, if the style is invalid or contains
+        an unknown setting, or if the figure cannot be drawn from the dataset.
 
     See Also
     --------
@@ -440,8 +448,9 @@ def plot(
     """
     from rsfstudy.plots import draw_figure
 
+    dataset = _open_dataset_if_name_or_path(dataset)
     return draw_figure(
-        _open_dataset_if_name_or_path(dataset), user_figure, variable=variable, style=style
+        dataset, user_figure, variable=variable, style=style, width=width, header=header
     )
 
 

@@ -200,6 +200,8 @@ def _make_comma_list_option(
     Path("fit.png"),
     "Path of the figure. The data are written to a NetCDF file next to the figure.",
 )
+@options.style_options
+@options.header_option
 @options.json_option
 def fit(given: options.CommandOptions) -> int:
     """Fit friction parameters to velocity steps in RECORDS.
@@ -246,7 +248,8 @@ def _fit_and_write_files(
         **parse_scene_field_assignments(given.settings),
     )
     dataset = write_dataset(dataset, data_path)
-    save_figure(dataset, given.output)
+    appearance = given.collect_option_values("style", "width", "header")
+    save_figure(dataset, given.output, **appearance)
     return dataset
 
 
