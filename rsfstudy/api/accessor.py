@@ -432,6 +432,39 @@ class DatasetAccessor:
         return modes.where(~(modes >= slow), slow + fast).assign_attrs(modes.attrs)
 
     @error_boundary
+    def simplify(self) -> xr.Dataset:
+        """Return a copy that is suitable for plots and tables of plain xarray.
+
+        Returns
+        -------
+        xarray.Dataset
+            Dataset without constant coordinates. The attribute ``constants`` contains the values of
+            these coordinates as JSON. The attribute ``units`` of a dimensionless variable is its
+            scale, such as "D_c/V_*", or is omitted if the variable is a pure number. The other
+            methods of the accessor need the original dataset.
+
+        Raises
+        ------
+        DataError
+            If rsfstudy has not created the dataset.
+
+        See Also
+        --------
+        to_dataframe : Convert the dataset to a table without constant columns.
+
+        Examples
+        --------
+        >>> from rsfstudy import Scene, simulate
+        >>> motion = simulate(Scene(load_velocity_ratio=2.0), duration=1.0).rsf.simplify()
+        >>> list(motion.coords), motion["slip"].attrs["units"]
+        (['time', 'slip'], 'D_c')
+        """
+        from rsfstudy.api.simple_datasets import simplify_dataset
+
+        self._require_rsfstudy_dataset()
+        return simplify_dataset(self._dataset)
+
+    @error_boundary
     def to_dataframe(self) -> pd.DataFrame:
         """Convert the dataset to a table, and omit constant columns.
 
