@@ -98,6 +98,7 @@ def fit(
     rtol: float = Accuracy.DEFAULT_RTOL,
     budget: int = Defaults.FIT_EVALUATION_BUDGET,
     workers: int = 0,
+    progress: bool = True,
     command: str = "rsfstudy.fit",
     **scene: Any,
 ) -> xr.Dataset:
@@ -187,6 +188,9 @@ def fit(
         Largest number of right-hand side evaluations of a fit.
     workers : int, default: 0
         Number of worker processes. With 0, the fits are computed in the current process.
+    progress : bool, default: True
+        If True, show the number of finished fits on standard error if the fits take longer than
+        20 s.
     command : str, default: "rsfstudy.fit"
         Command line to record in the history of the dataset.
     **scene : object
@@ -326,7 +330,7 @@ def fit(
         accuracy=Accuracy(rtol, budget, engine=chosen),
     )
     fits = study_runs.run(
-        study, workers=workers, output=None, progress=False, keep_going=True, command=command
+        study, workers=workers, output=None, progress=progress, keep_going=True, command=command
     )
     processing = [f"{one.name}: {text}" for one in records for text in one.processing]
     return fits.assign_attrs({"processing": "; ".join(processing)} if processing else {})

@@ -74,6 +74,10 @@ def studies() -> dict[str, Study]:
     return StudiesByName({name: load_study(name) for name in study_names()})
 
 
+#: Time in s after which the progress of fits is shown.
+_PROGRESS_DELAY_OF_FITS = 20.0
+
+
 @error_boundary
 @SceneFields.add_to_signature()
 def run(
@@ -281,6 +285,9 @@ def prepare_run_with_progress(
     """
     Engine.check_is_usable(study.accuracy.engine)
     ready = prepare_study_run(study, output_options, worker_pool)
+    # Fits of a record usually take a few seconds, and then need no progress report.
+    is_fit = study.plot == "fits"
+    appearance: Any = {"items": "fits", "delay": _PROGRESS_DELAY_OF_FITS} if is_fit else {}
 
     def run() -> xr.Dataset:
         """Compile the equations if necessary, and run the study."""
@@ -288,7 +295,7 @@ def prepare_run_with_progress(
             compile_scenes_with_notice(
                 ready.plan.example_scenes, study.measure.needs_time, show_progress_bar
             )
-        with show_progress(study.name, show_progress_bar) as show:
+        with show_progress(study.name, show_progress_bar, **appearance) as show:
             return ready(worker_pool.make_cell_batch_mapper(ready.worker_log_path), show)
 
     return run

@@ -215,6 +215,7 @@ budget_option = make_count_option(
     "Maximum number of right-hand-side evaluations per cell. If you increase it, cells with an "
     "answer are not recomputed.  [default: value of the study, 500000]",
 )
+quiet_option = click.option("--quiet", is_flag=True, help="Do not show progress.")
 #: Options of the worker pool that computes the cells.
 worker_options = combine_option_decorators(
     make_count_option("--workers", 2, "Number of worker processes on this machine."),
@@ -227,7 +228,7 @@ worker_options = combine_option_decorators(
         default=Defaults.CELL_TIME_LIMIT,
         help="CPU time limit for each cell on a worker.",
     ),
-    click.option("--quiet", is_flag=True, help="Do not show progress."),
+    quiet_option,
 )
 study_file_option = click.option(
     "--study",

@@ -202,6 +202,7 @@ def _make_comma_list_option(
 )
 @options.style_options
 @options.header_option
+@options.quiet_option
 @options.json_option
 def fit(given: options.CommandOptions) -> int:
     """Fit friction parameters to velocity steps in RECORDS.
@@ -243,6 +244,7 @@ def _fit_and_write_files(
     dataset = rsfstudy.fit(
         records,
         steps=[_parse_step_number(text) for text in given.steps],
+        progress=not given.quiet,
         command=given.command_line,
         **given.collect_option_values(*_OPTIONS_PASSED_TO_FIT),
         **parse_scene_field_assignments(given.settings),
