@@ -537,7 +537,7 @@ NEW_NAME_BY_OWNER_AND_FORMER_NAME: Mapping[str, Mapping[str, str]] = {
     "rsfstudy.plots._figures:save_figure()": {
         "own": "user_figure",
     },
-    "rsfstudy.plots._figures:render_figure()": {
+    "rsfstudy.plots._image_files:render_figure()": {
         "drawn": "figure",
         "form": "image_format",
     },

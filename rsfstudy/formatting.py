@@ -144,3 +144,28 @@ def format_nonempty_fields(fields: Mapping[str, Any]) -> str:
     return ", ".join(
         f"{n} = {format_value(value)}" for n, value in fields.items() if value is not None
     )
+
+
+def format_duration(seconds: float) -> str:
+    """Format a duration with a suitable unit.
+
+    Parameters
+    ----------
+    seconds : float
+        Duration in s.
+
+    Returns
+    -------
+    str
+        Duration such as "2.5 s", "3 min 20 s" or "1 h 5 min".
+    """
+    if seconds < 0.05:
+        return "less than 0.1 s"
+    if seconds < 9.95:
+        return f"{seconds:.1f} s"
+    whole = round(seconds)
+    if whole < 60:
+        return f"{whole} s"
+    if whole < 3600:
+        return f"{whole // 60} min {whole % 60} s"
+    return f"{whole // 3600} h {whole % 3600 // 60} min"

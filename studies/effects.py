@@ -212,7 +212,7 @@ def draw_bars(variable: str, digits: int) -> DrawFunction:
             for y, value in zip(at, of_law, strict=True):
                 text = f" {value:.{digits}g}" if np.isfinite(value) else " no cycle"
                 axes.text(
-                    value if value > 0.0 else 0.0, y, text, va="center", fontsize=5.5, clip_on=True
+                    value if value > 0.0 else 0.0, y, text, va="center", fontsize=6, clip_on=True
                 )
         label_rows(axes, [", ".join(row) for row in values["row"].values], 20)
         axes.tick_params(axis="y", labelsize=6)

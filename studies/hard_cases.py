@@ -397,7 +397,7 @@ def name_cases(dataset: xr.Dataset, axes: Axes) -> None:
     from rsfstudy.plots import label_rows
 
     label_rows(axes, [str(name) for name in dataset["hard_case"].values])
-    axes.tick_params(axis="y", labelsize=5.5)
+    axes.tick_params(axis="y", labelsize=6)
     if math.isfinite(axes.dataLim.minposx):
         axes.set_xscale("log")
 

@@ -50,6 +50,9 @@ def cycle_place(law: str, normal_stress: str) -> dict[str, str]:
 #: Values of log10(V/V_*) at which the lines of constant state intersect the line of steady sliding.
 #: The state of a line is -b ln(V/V_*).
 CONSTANT_STATE_LOG_RATES = (-8.0, -4.0, 0.0, 4.0, 8.0)
+#: Largest number of couplings of normal stress and shear stress for each of which a panel shows the
+#: lines of constant state.
+MAX_COUPLINGS_WITH_STATE_LINES = 2
 
 
 def distinct_orbits(dataset: xr.Dataset) -> list[tuple[xr.Dataset, str]]:
@@ -85,7 +88,9 @@ def distinct_orbits(dataset: xr.Dataset) -> list[tuple[xr.Dataset, str]]:
 def plot_orbits(dataset: xr.Dataset, axes: Axes) -> None:
     """Draw stress against slip rate, with lines of steady and constant state.
 
-    The lines are drawn once for each coupling of normal stress and shear stress.
+    The steady lines are drawn once for each coupling of normal stress and shear stress. If there
+    are more than two couplings, the lines of constant state are drawn only for the first coupling,
+    because the lines of all couplings would cover each other.
 
     Parameters
     ----------
@@ -107,6 +112,7 @@ def plot_orbits(dataset: xr.Dataset, axes: Axes) -> None:
         _axes_fractions(axes, cell["log10_slip_rate"], cell["frictional_stress"]) for cell in cells
     ]
     drawn: set[tuple[str | float, ...]] = set()
+    coupling_count = len({steady_line_key(cell) for cell in cells})
     for number, cell in enumerate(cells):
         if steady_line_key(cell) in drawn:
             continue
@@ -114,6 +120,8 @@ def plot_orbits(dataset: xr.Dataset, axes: Axes) -> None:
         colour, steady = cycle_style(number)["color"], steady_line(cell, rates)
         axes.plot(rates, steady, "--", color=colour, linewidth=0.8, label="steady state")
         taken.append(_axes_fractions(axes, rates, steady))
+        if number and coupling_count > MAX_COUPLINGS_WITH_STATE_LINES:
+            continue
         for state in CONSTANT_STATE_LOG_RATES:
             theta = -state * LN10 * scene_from_coordinates(cell).b
             line, text = (

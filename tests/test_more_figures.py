@@ -141,7 +141,7 @@ def test_labels_of_errors_of_samples_are_short(tmp_path_factory):
     dataset, _path = named_results("uncertain_recurrence", tmp_path_factory)
     drawn = plots.draw_figure(dataset, variable="recurrence_interval_error")
     checks.assert_printable(drawn)
-    assert drawn.axes[1].get_ylabel().startswith("error of\nrecurrence")
+    assert drawn.axes[6].get_ylabel().startswith("error of\nrecurrence")
 
 
 def test_errors_too_small_to_show_are_left_out():

@@ -20,7 +20,7 @@ def told(stream: io.StringIO, monkeypatch, done: list[int], show: bool = True) -
     monkeypatch.setattr("sys.stderr", stream)
     with progress.show_progress("holds", show) as update:
         for count in done:
-            update(count, done[-1])
+            update(count, done[-1], None)
     return stream.getvalue()
 
 

@@ -276,9 +276,9 @@ class DatasetAccessor:
             study are plotted with ``rsfstudy.plot``. Motions and limit cycles are plotted with
             ``rsfstudy.plot_motion``.
         **plot_options : object
-            Keyword arguments for ``rsfstudy.plot`` or ``rsfstudy.plot_motion``, such as
-            ``variable`` and ``style`` for the results of a study, or ``rig`` and ``against`` for a
-            motion.
+            Keyword arguments for ``rsfstudy.plot`` or ``rsfstudy.plot_motion``. The arguments
+            ``style``, ``width`` and ``header`` apply to all figures. In addition, ``variable``
+            applies to the results of a study, and ``rig`` and ``against`` apply to a motion.
 
         Returns
         -------
@@ -437,6 +437,39 @@ class DatasetAccessor:
         )
         modes, slow = self._dataset["slip_mode"], LimitCycle.SLIP_MODES.index("slow_slip")
         return modes.where(~(modes >= slow), slow + fast).assign_attrs(modes.attrs)
+
+    @error_boundary
+    def simplify(self) -> xr.Dataset:
+        """Return a copy that is suitable for plots and tables of plain xarray.
+
+        Returns
+        -------
+        xarray.Dataset
+            Dataset without constant coordinates. The attribute ``constants`` contains the values of
+            these coordinates as JSON. The attribute ``units`` of a dimensionless variable is its
+            scale, such as "D_c/V_*", or is omitted if the variable is a pure number. The other
+            methods of the accessor need the original dataset.
+
+        Raises
+        ------
+        DataError
+            If rsfstudy has not created the dataset.
+
+        See Also
+        --------
+        to_dataframe : Convert the dataset to a table without constant columns.
+
+        Examples
+        --------
+        >>> from rsfstudy import Scene, simulate
+        >>> motion = simulate(Scene(load_velocity_ratio=2.0), duration=1.0).rsf.simplify()
+        >>> list(motion.coords), motion["slip"].attrs["units"]
+        (['time', 'slip'], 'D_c')
+        """
+        from rsfstudy.api.simple_datasets import simplify_dataset
+
+        self._require_rsfstudy_dataset()
+        return simplify_dataset(self._dataset)
 
     @error_boundary
     def to_dataframe(self) -> pd.DataFrame:

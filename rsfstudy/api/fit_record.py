@@ -100,7 +100,7 @@ def fit(
     rtol: float = Accuracy.DEFAULT_RTOL,
     budget: int = Defaults.FIT_EVALUATION_BUDGET,
     workers: int = 0,
-    progress: bool | ProgressCallback = False,
+    progress: bool | ProgressCallback = True,
     command: str = "rsfstudy.fit",
     **scene: Any,
 ) -> xr.Dataset:
@@ -190,9 +190,10 @@ def fit(
         Largest number of right-hand side evaluations of a fit.
     workers : int, default: 0
         Number of worker processes. With 0, the fits are computed in the current process.
-    progress : bool or callable, default: False
-        If True, show a progress bar. A function is called with the number of finished fits and the
-        number of all fits.
+    progress : bool or callable, default: True
+        If True, show the number of finished fits on standard error if the fits take longer than
+        20 s. A function is called with the number of finished fits, the number of all fits,
+        and the estimated remaining time in s, or None.
     command : str, default: "rsfstudy.fit"
         Command line to record in the history of the dataset.
     **scene : object

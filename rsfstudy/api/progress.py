@@ -12,15 +12,20 @@ from rich import progress as bars
 from rich.console import Console
 
 from rsfstudy.execution import ProgressCallback
+from rsfstudy.formatting import format_duration
 from rsfstudy.motion import Engine
 from rsfstudy.slider import Scene
 
 #: Maximum number of progress lines of a run, and minimum time in s between two lines.
 _MAX_PROGRESS_LINES, _MIN_PROGRESS_LINE_INTERVAL = 10, 10.0
+#: Minimum estimated time in s of a run whose estimated time is printed.
+_MIN_PRINTED_ESTIMATE = 20.0
 
 
 @contextlib.contextmanager
-def show_progress(study_name: str, is_shown: bool | ProgressCallback) -> Iterator[ProgressCallback]:
+def show_progress(
+    study_name: str, is_shown: bool | ProgressCallback, items: str = "cells", delay: float = 0.0
+) -> Iterator[ProgressCallback]:
     """Show the progress of a run on standard error, or report it to a function.
 
     Parameters
@@ -28,31 +33,39 @@ def show_progress(study_name: str, is_shown: bool | ProgressCallback) -> Iterato
     study_name : str
         Name of the study, which is displayed next to the bar.
     is_shown : bool or callable
-        If False, nothing is displayed. If a function, the function receives the progress instead.
+        If False, nothing is displayed. If a function, the function receives the number of
+        completed items, the number of all items and the remaining time in s instead.
+    items : str, default: "cells"
+        Name of the counted objects.
+    delay : float, default: 0.0
+        Time in s before the first output. Nothing is displayed if the run ends earlier.
 
     Yields
     ------
     callable
-        Function ``update(done, total)`` that displays the number of completed cells.
+        Function ``update(done, total, remaining_seconds)`` that displays the number of completed
+        cells and the remaining time.
     """
     console = Console(stderr=True)
     if callable(is_shown):
         yield is_shown
     elif not is_shown:
-        yield lambda _done, _all: None
+        yield lambda _done, _all, _remaining: None
     elif not (console.is_terminal or console.is_jupyter):
-        yield _print_progress_lines(study_name, console)
+        yield _print_progress_lines(study_name, console, items, delay)
     else:
-        cells = (bars.MofNCompleteColumn(), bars.TextColumn("cells"))
+        counts = (bars.MofNCompleteColumn(), bars.TextColumn(items))
         times = (bars.TimeElapsedColumn(), bars.TimeRemainingColumn())
-        told = (bars.TextColumn("{task.description}"), bars.BarColumn(), *cells, *times)
+        told = (bars.TextColumn("{task.description}"), bars.BarColumn(), *counts, *times)
         bar = bars.Progress(*told, console=console)
         task = bar.add_task(study_name, total=None)
+        began = time.monotonic()
 
-        def update(done: int, total: int) -> None:
+        def update(done: int, total: int, _remaining: float | None = None) -> None:
             """Update the progress bar."""
-            bar.start()  # The bar starts late because a run may fail before its first report.
-            bar.update(task, completed=done, total=total)
+            if time.monotonic() - began >= delay:
+                bar.start()  # The bar starts late because a run may fail before its first report.
+                bar.update(task, completed=done, total=total)
 
         try:
             yield update
@@ -60,26 +73,39 @@ def show_progress(study_name: str, is_shown: bool | ProgressCallback) -> Iterato
             bar.stop()
 
 
-def _print_progress_lines(study_name: str, console: Console) -> ProgressCallback:
+def _print_progress_lines(
+    study_name: str, console: Console, items: str, delay: float
+) -> ProgressCallback:
     """Return a function that prints progress lines for log files and pipes.
 
-    The function prints at most one line per tenth of the cells. The time between two lines is at
-    least ten seconds, except that the last line is always printed. A short run therefore prints a
-    single line.
+    The function prints the estimated time of a long run once, as soon as the first cells determine
+    it. In addition, the function prints at most one line per tenth of the cells. The time between
+    two lines is at least ten seconds, except that the last line is always printed. A short run
+    therefore prints a single line.
     """
     began = said = time.monotonic()
-    told = 0
+    told, is_estimated = 0, False
 
-    def update(done: int, total: int) -> None:
+    def print_line(text: str) -> None:
+        console.print(f"{study_name}: {text}", highlight=False, markup=False, soft_wrap=True)
+
+    def update(done: int, total: int, remaining: float | None = None) -> None:
         """Print a progress line if enough cells have been completed."""
-        nonlocal said, told
+        nonlocal said, told, is_estimated
         now, part = time.monotonic(), _MAX_PROGRESS_LINES * done // total
+        left = "" if remaining is None else f", about {format_duration(remaining)} left"
+        if now - began < delay:
+            return
+        if not is_estimated and (remaining or 0.0) > _MIN_PRINTED_ESTIMATE:
+            is_estimated = True
+            print_line(f"{done:,} of {total:,} {items} are finished{left}")
         if part > told and (
             part == _MAX_PROGRESS_LINES or now - said >= _MIN_PROGRESS_LINE_INTERVAL
         ):
             said, told = now, part
-            text = f"{study_name}: {done:,} of {total:,} cells after {now - began:.0f} s"
-            console.print(text, highlight=False, markup=False, soft_wrap=True)
+            print_line(
+                f"{done:,} of {total:,} {items} after {now - began:.0f} s{left * (done < total)}"
+            )
 
     return update
 

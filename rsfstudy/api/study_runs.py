@@ -80,6 +80,10 @@ def studies() -> dict[str, Study]:
     return StudiesByName({name: load_study(name) for name in study_names()})
 
 
+#: Time in s after which the progress of fits is shown.
+_PROGRESS_DELAY_OF_FITS = 20.0
+
+
 @error_boundary
 @SceneFields.add_to_signature()
 def run(
@@ -274,7 +278,7 @@ def prepare_run_with_progress(
         Workers that compute the cells.
     show_progress_bar : bool or callable, default: True
         If True, show the progress of the run. A function is called with the number of finished
-        cells and the number of all cells.
+        cells, the number of all cells, and the estimated remaining time in s, or None.
 
     Returns
     -------
@@ -288,6 +292,9 @@ def prepare_run_with_progress(
     """
     Engine.check_is_usable(study.accuracy.engine)
     ready = prepare_study_run(study, output_options, worker_pool)
+    # Fits of a record usually take a few seconds, and then need no progress report.
+    is_fit = study.plot == "fits"
+    appearance: Any = {"items": "fits", "delay": _PROGRESS_DELAY_OF_FITS} if is_fit else {}
 
     def run() -> xr.Dataset:
         """Compile the equations if necessary, and run the study."""
@@ -295,7 +302,7 @@ def prepare_run_with_progress(
             compile_scenes_with_notice(
                 ready.plan.example_scenes, study.measure.needs_time, show_progress_bar is True
             )
-        with show_progress(study.name, show_progress_bar) as show:
+        with show_progress(study.name, show_progress_bar, **appearance) as show:
             return ready(worker_pool.make_cell_batch_mapper(ready.worker_log_path), show)
 
     return run
@@ -391,6 +398,8 @@ def plot(
     variable: str | None = None,
     *,
     style: Any = None,
+    width: Any = None,
+    header: bool = True,
     user_figure: Any = None,
 ) -> Figure:
     """Plot the results of a study.
@@ -405,9 +414,15 @@ def plot(
     style : path, str, dict or list, optional
         Style that overrides the style of rsfstudy: the path of a style sheet with the suffix
         ``.mplstyle``, the name of a style in ``matplotlib.style.available``, a dictionary of
-        matplotlib settings, or a list of styles. For example, ``{"font.size": 9, "figure.figsize":
-        (3.5, 2.6)}`` selects a width of 3.5 inches, which is one column of a journal. Colours and
-        line styles follow ``axes.prop_cycle``.
+        matplotlib settings, or a list of styles. For example, ``{"font.size": 9}`` selects larger
+        letters. Colours and line styles follow ``axes.prop_cycle``.
+    width : quantity, optional
+        Width of the figure, from "60 mm" to "600 mm". If the panels of a row would be narrower than
+        55 mm, the row has fewer panels. By default, the figure is as wide as a column (84 mm) or
+        the text (174 mm) of a journal page.
+    header : bool, default: True
+        If False, the figure has no header. The header lists overrides of the study, and missing and
+        failed cells.
     user_figure : callable, module or Figure, optional
         User-defined figure: a function ``draw(dataset, axes)``, a module with a function ``draw``,
         or an ``rsfstudy.Figure``. The argument is required if the study was declared with a
@@ -423,8 +438,8 @@ def plot(
     Raises
     ------
     InvalidValue
-        If the variable does not exist, if the style is invalid or contains an unknown setting, or
-        if the figure cannot be drawn from the dataset.
+        If the variable does not exist, if the width is invalid, if the style is invalid or contains
+        an unknown setting, or if the figure cannot be drawn from the dataset.
 
     See Also
     --------
@@ -447,8 +462,9 @@ def plot(
     """
     from rsfstudy.plots import draw_figure
 
+    dataset = _open_dataset_if_name_or_path(dataset)
     return draw_figure(
-        _open_dataset_if_name_or_path(dataset), user_figure, variable=variable, style=style
+        dataset, user_figure, variable=variable, style=style, width=width, header=header
     )
 
 

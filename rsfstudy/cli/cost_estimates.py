@@ -15,6 +15,7 @@ import numpy as np
 
 from rsfstudy.errors import InvalidValue
 from rsfstudy.execution import CellPlan
+from rsfstudy.formatting import format_duration
 from rsfstudy.motion import Engine
 from rsfstudy.storage import CellTimings
 
@@ -174,31 +175,6 @@ def compiled_engine_hint(cell_plan: CellPlan, output_directory: Path) -> str:
         f"{times} times with {name}" for name, times in _COMPILED_SPEEDUP_BY_MEASURE.items()
     )
     return f"--engine compiled is usually faster: about {each}"
-
-
-def format_duration(seconds: float) -> str:
-    """Format a duration with a suitable unit.
-
-    Parameters
-    ----------
-    seconds : float
-        Duration in s.
-
-    Returns
-    -------
-    str
-        Duration such as "2.5 s", "3 min 20 s" or "1 h 5 min".
-    """
-    if seconds < 0.05:
-        return "less than 0.1 s"
-    if seconds < 9.95:
-        return f"{seconds:.1f} s"
-    whole = round(seconds)
-    if whole < 60:
-        return f"{whole} s"
-    if whole < 3600:
-        return f"{whole // 60} min {whole % 60} s"
-    return f"{whole // 3600} h {whole % 3600 // 60} min"
 
 
 def _timings_match_accuracy_and_engine(cell_plan: CellPlan, cell_timings: CellTimings) -> bool:

@@ -122,9 +122,8 @@ def draw_and_save_figure(
         an empty list, because the results have already been written.
     """
     try:
-        save_figure(
-            dataset, figure_path, user_figure, variable=options.variable, style=options.style
-        )
+        appearance = options.collect_option_values("style", "width", "header")
+        save_figure(dataset, figure_path, user_figure, variable=options.variable, **appearance)
     except (OSError, RsfStudyError) as error:
         print_note(f"no figure: {error}")
         return []

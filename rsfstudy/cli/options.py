@@ -215,6 +215,7 @@ budget_option = make_count_option(
     "Maximum number of right-hand-side evaluations per cell. If you increase it, cells with an "
     "answer are not recomputed.  [default: value of the study, 500000]",
 )
+quiet_option = click.option("--quiet", is_flag=True, help="Do not show progress.")
 #: Options of the worker pool that computes the cells.
 worker_options = combine_option_decorators(
     make_count_option("--workers", 2, "Number of worker processes on this machine."),
@@ -231,7 +232,7 @@ worker_options = combine_option_decorators(
         default=Defaults.CELL_TIME_LIMIT,
         help="CPU time limit for each cell on a worker.",
     ),
-    click.option("--quiet", is_flag=True, help="Do not show progress."),
+    quiet_option,
 )
 study_file_option = click.option(
     "--study",
@@ -270,14 +271,26 @@ def _check_style_option(
     return value
 
 
-#: Options for the format and the style of figures.
-figure_options = combine_option_decorators(
-    click.option(
-        "--figure",
-        "form",
-        type=click.Choice(Defaults.FIGURE_FORMATS),
-        help="File format of figures.  [default: png]",
-    ),
+def _check_width_option(
+    _context: click.Context, _option: click.Parameter, value: str | None
+) -> str | None:
+    """Check the width of a figure, and return the width.
+
+    Raises
+    ------
+    InvalidValue
+        If the width is not a length, or if the width is out of range.
+    """
+    if value is not None:
+        from rsfstudy.plots import style_context
+
+        with style_context(width=value):
+            pass
+    return value
+
+
+#: Options for the style and the width of figures.
+style_options = combine_option_decorators(
     click.option(
         "--style",
         metavar="STYLE",
@@ -285,6 +298,31 @@ figure_options = combine_option_decorators(
         help="Matplotlib style sheet (FILE.mplstyle) or name of a style, applied after the default "
         "style.",
     ),
+    click.option(
+        "--width",
+        metavar="WIDTH",
+        callback=_check_width_option,
+        help="Width of the figure, for example '85 mm'.  [default: 84 mm or 174 mm]",
+    ),
+)
+header_option = click.option(
+    "--no-header",
+    "header",
+    is_flag=True,
+    default=True,
+    flag_value=False,
+    help="Omit the header of the figure, for example the list of overrides.",
+)
+#: Options for the format and the appearance of figures.
+figure_options = combine_option_decorators(
+    click.option(
+        "--figure",
+        "form",
+        type=click.Choice(Defaults.FIGURE_FORMATS),
+        help="File format of figures.  [default: png]",
+    ),
+    style_options,
+    header_option,
 )
 
 

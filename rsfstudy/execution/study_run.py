@@ -20,6 +20,7 @@ from rsfstudy.errors import DataError, Interrupted, InvalidValue, RsfStudyError,
 from rsfstudy.execution import provenance
 from rsfstudy.execution.cell_computation import CellBatchMapper, CellTask, StoredCellRows
 from rsfstudy.execution.cell_plan import CellBatchIterator, CellPlan, order_cells_by_golden_section
+from rsfstudy.execution.time_estimate import TimeEstimate
 from rsfstudy.reductions import apply_reductions
 from rsfstudy.status import Status
 from rsfstudy.storage import (
@@ -39,7 +40,9 @@ _NAMES_OF_ANSWER_STATUSES = frozenset(status.name for status in Status if status
 #: succeeded.
 _MAX_FAILURES_WITHOUT_SUCCESS = 10
 
-ProgressCallback = Callable[[int, int], None]
+#: Function of the number of finished cells, the number of all cells, and the estimated remaining
+#: time in s. The time is None if it is unknown.
+ProgressCallback = Callable[[int, int, float | None], None]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -179,7 +182,8 @@ class StudyRun:
             Function that computes the cells: ``cell_computation.compute_serially``, or the result
             of ``worker_pool.make_dask_batch_mapper``.
         progress_callback : callable
-            Function that is called with the number of finished cells and the number of all cells.
+            Function that is called with the number of finished cells, the number of all cells, and
+            the estimated remaining time.
 
         Returns
         -------
@@ -224,21 +228,23 @@ class StudyRun:
         answered = journal.statuses(self.plan.keys[cells]) < int(Status.WORK_BUDGET_SPENT)
         missing = order_cells_by_golden_section(cells[~answered])
         done, failed, total = int(answered.sum()), 0, len(cells)
-        progress_callback(done, total)
+        progress_callback(done, total, None)
         if self.worker_log_path is not None:
             self.worker_log_path.unlink(missing_ok=True)  # An earlier run may have left it.
         if not len(missing):
             return
         batches = CellBatchIterator(self.plan, missing, self.workers)
+        estimate = TimeEstimate(self.workers)
         with contextlib.closing(cell_batch_mapper(self.task, batches)) as arriving:
             for finished in arriving:
                 journal.add_cells(finished)
                 self._warn_of_lost_cells(finished)
                 for row in finished:
                     batches.record_cell_time(row[4])
+                    estimate.record_cell_time(row[4])
                     failed += row[1] not in _NAMES_OF_ANSWER_STATUSES
                 done += len(finished)
-                progress_callback(done, total)
+                progress_callback(done, total, estimate.remaining_seconds(total - done))
                 if (
                     failed == done >= _MAX_FAILURES_WITHOUT_SUCCESS
                     and done < total

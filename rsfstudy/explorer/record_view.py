@@ -252,7 +252,7 @@ class RecordView(View):
             record, choices, arguments = self._window, self.choices, self._fit_arguments()
 
             def compute(report: Callable[[float, str], None]) -> xr.Dataset:
-                def progress(done: int, total: int) -> None:
+                def progress(done: int, total: int, _remaining: float | None = None) -> None:
                     report(done / total, f"{done} of {total} fits")
 
                 return fit(record, progress=progress, **arguments)

@@ -21,16 +21,10 @@ if TYPE_CHECKING:
         format_axis_label,
         label_rows,
     )
-    from rsfstudy.plots._figures import (
-        FIGURE_NAMES,
-        Figure,
-        NotebookFigure,
-        draw_figure,
-        render_figure,
-        save_figure,
-        write_image,
-    )
+    from rsfstudy.plots._figure_choice import FIGURE_NAMES
+    from rsfstudy.plots._figures import draw_figure, save_figure
     from rsfstudy.plots._healing import plot_healing
+    from rsfstudy.plots._image_files import Figure, NotebookFigure, render_figure, write_image
     from rsfstudy.plots._motion import plot_motion
     from rsfstudy.plots._style import (
         add_grey_legend_entry,
@@ -52,16 +46,10 @@ else:
                 "format_axis_label",
                 "label_rows",
             ),
-            "plots._figures": (
-                "FIGURE_NAMES",
-                "Figure",
-                "NotebookFigure",
-                "draw_figure",
-                "render_figure",
-                "save_figure",
-                "write_image",
-            ),
+            "plots._figure_choice": ("FIGURE_NAMES",),
+            "plots._figures": ("draw_figure", "save_figure"),
             "plots._healing": ("plot_healing",),
+            "plots._image_files": ("Figure", "NotebookFigure", "render_figure", "write_image"),
             "plots._motion": ("plot_motion",),
             "plots._style": (
                 "add_grey_legend_entry",

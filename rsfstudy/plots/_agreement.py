@@ -7,13 +7,13 @@ from collections.abc import Mapping, Sequence
 from matplotlib.figure import Figure
 
 from rsfstudy._deprecation import accept_former_keyword_names
-from rsfstudy.plots._figures import NotebookFigure
+from rsfstudy.plots._image_files import NotebookFigure
+from rsfstudy.plots._size import figure_size
 from rsfstudy.plots._style import (
     add_legend,
     cycle_marker,
     cycle_style,
     enlarge_for_legends,
-    figure_size,
     finalize_layout,
 )
 

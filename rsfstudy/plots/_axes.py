@@ -20,6 +20,7 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter, LogLocator, MaxNLocator, NullFormatter
 
 from rsfstudy.formatting import read_flag_meanings
+from rsfstudy.plots._style import estimate_text_capacity_in_characters
 from rsfstudy.plots._text import (
     format_number,
     format_quantity_axis_label,
@@ -45,11 +46,23 @@ _MAX_POINT_NAMES_ALONG_Y, _MAX_POINT_NAMES_ALONG_X = 45, 30
 #: Maximum number of horizontal tick labels with names along x. If there are more names, the tick
 #: labels are vertical.
 _MAX_HORIZONTAL_NAMES_ALONG_X = 12
+#: Height of the title and the labels below a panel, in characters.
+_HEIGHT_BELOW_PANEL_IN_CHARACTERS = 6
+#: Smallest font size of figures in points.
+MIN_FONT_SIZE = 6.0
 #: Templates of phrases that describe the points of some axes, for example in titles.
 _POINT_PHRASE_TEMPLATE_BY_AXIS = {
     "law": "{} law",
     "normal_stress": "{} normal stress",
     "load": "load point {}",
+}
+#: Phrases that describe state evolution laws, if the name of the law is not part of the phrase.
+_PHRASE_BY_LAW = {
+    "cut_off": "slowness law with cut-off",
+    "flash_heating": "slip law with flash heating",
+    "perrin_rice_zheng": "Perrin-Rice-Zheng law",
+    "two_slip_states": "slip law with two states",
+    "two_slowness_states": "slowness law with two states",
 }
 
 
@@ -310,6 +323,8 @@ def describe_point(cell: xr.Dataset | xr.DataArray, dimension: str) -> str:
     value = cell[dimension].item()
     about = find_quantity(dimension, read_quantities_not_in_vocabulary(cell.coords.to_dataset()))
     if isinstance(value, str):
+        if dimension == "law" and value in _PHRASE_BY_LAW:
+            return _PHRASE_BY_LAW[value]
         return _POINT_PHRASE_TEMPLATE_BY_AXIS.get(dimension, "{}").format(to_mathtext(value))
     if dimension == "stiffness_ratio":
         return format_stiffness_ratio(value)
@@ -353,7 +368,7 @@ def set_x_axis_of_dimension(axes: Axes, dataset: xr.Dataset, dimension: str) -> 
         axes.xaxis, names, 40 if upright else width, _MAX_POINT_NAMES_ALONG_X
     )
     if upright:
-        axes.tick_params(axis="x", labelrotation=90.0, labelsize=5.0)
+        axes.tick_params(axis="x", labelrotation=90.0, labelsize=MIN_FONT_SIZE)
     axes.set_xlim(-0.5, points.size - 0.5)
     return np.arange(points.size, dtype=float)
 
@@ -476,9 +491,28 @@ def add_colour_bar(dataset: xr.Dataset, axes: Axes, dimension: str) -> None:
     dimension : str
         Name of the dimension.
     """
-    scale = _build_colour_scale(dataset, dimension)
+    add_labelled_colour_bar(_build_colour_scale(dataset, dimension), dataset, axes, dimension)
+
+
+def add_labelled_colour_bar(
+    scale: ScalarMappable, dataset: xr.Dataset, axes: Axes, variable_name: str
+) -> None:
+    """Add a colour bar with the label of a variable.
+
+    Parameters
+    ----------
+    scale : matplotlib.cm.ScalarMappable
+        Colour scale.
+    dataset : xarray.Dataset
+        Dataset with the variable.
+    axes : matplotlib.axes.Axes
+        Axes of the panel. The colour bar is placed to the right of the axes.
+    variable_name : str
+        Name of the variable.
+    """
     bar = cast(Figure, axes.figure).colorbar(scale, ax=axes, pad=0.02)
-    bar.set_label(format_axis_label(dataset, dimension, 34))
+    longest = estimate_text_capacity_in_characters(axes)[1] - _HEIGHT_BELOW_PANEL_IN_CHARACTERS
+    bar.set_label(format_axis_label(dataset, variable_name, min(34, longest)))
 
 
 def _build_colour_scale(dataset: xr.Dataset, dimension: str) -> ScalarMappable:

@@ -7,108 +7,52 @@ study to a file. The style sheet ``rsfstudy.mplstyle`` defines the appearance of
 
 from __future__ import annotations
 
-import importlib
-import io
-import math
-import os
-from collections.abc import Sequence
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 import xarray as xr
-from matplotlib.backends.backend_agg import FigureCanvasAgg
-from matplotlib.figure import Figure as Figure
+from matplotlib.axes import Axes
 
 from rsfstudy._deprecation import accept_former_keyword_names
 from rsfstudy.defaults import Defaults
 from rsfstudy.errors import InvalidValue, RsfStudyError
 from rsfstudy.formatting import format_overrides, pluralize
 from rsfstudy.plots import _panel
-from rsfstudy.plots._axes import describe_point as describe_point
-from rsfstudy.plots._axes import label_rows as label_rows
-from rsfstudy.plots._style import add_grey_legend_entry as add_grey_legend_entry
+from rsfstudy.plots._figure_choice import choose_figure
+from rsfstudy.plots._image_files import Figure, NotebookFigure, render_figure, write_image
+from rsfstudy.plots._size import figure_size, fit_panel_columns, header_line_length
 from rsfstudy.plots._style import (
     add_panel_letters,
     enlarge_for_legends,
-    figure_size,
     finalize_layout,
     freeze_tick_label_size,
     merge_common_legends,
+    style_context,
 )
-from rsfstudy.plots._style import cycle_marker as cycle_marker
-from rsfstudy.plots._style import cycle_style as cycle_style
-from rsfstudy.plots._style import style_context as style_context
-from rsfstudy.plots._text import format_number as format_number
-from rsfstudy.plots._text import format_slope as format_slope
 from rsfstudy.plots._text import quantity_symbol, to_mathtext, wrap_text
+from rsfstudy.plots.samples import CornerFigure
 from rsfstudy.rig import DatasetUnits
 from rsfstudy.status import Status
 from rsfstudy.storage import StoredDataset
 from rsfstudy.study import Figure as Declared
-from rsfstudy.study import Panel, Study, load_study, read_quantities_not_in_vocabulary, study_names
-from rsfstudy.study import failed_cell_mask as failed_cell_mask
-from rsfstudy.vocabulary import FORMULAS_OF_DERIVED_COORDINATES, find_quantity
+from rsfstudy.study import failed_cell_mask, read_quantities_not_in_vocabulary
+from rsfstudy.vocabulary import find_quantity
 
-#: Names of the generic figures that can display any study.
-_NAMES_OF_FIGURES_FOR_ANY_LATTICE = ("lines", "maps")
-#: Name of the figure that shows fits of records.
-_NAME_OF_FITS_FIGURE = "fits"
-#: Names of all figures, including the figures of the named studies.
-FIGURE_NAMES = (*_NAMES_OF_FIGURES_FOR_ANY_LATTICE, _NAME_OF_FITS_FIGURE, *study_names())
-
-#: Resolution of figures in notebooks, in dots per inch.
-_SCREEN_DPI = 150
-#: Metadata that remove the creation date from an image file, so that two files of the same figure
-#: are identical.
-_IMAGE_METADATA_WITHOUT_DATES: dict[str, dict[str, Any]] = {
-    "pdf": {"CreationDate": None},
-    "svg": {"Date": None},
-}
-#: The panels of a figure are repeated for each point of additional axes. The first value is the
-#: maximum number of such points, and the second value is the maximum number of panels after the
-#: repetition.
-_MAX_POINTS_OF_REPEATED_AXES, _MAX_PANELS_AFTER_REPEATING = 4, 12
-#: Height of a panel of a scatter matrix in mm.
-_SCATTER_PANEL_HEIGHT = 44.0
-
-
-class NotebookFigure(Figure):
-    """Figure that notebooks display without pyplot.
-
-    Parameters
-    ----------
-    *args : object
-        Positional arguments of ``matplotlib.figure.Figure``.
-    **options : object
-        Keyword arguments of ``matplotlib.figure.Figure``.
-
-    Examples
-    --------
-    >>> from rsfstudy.plots import NotebookFigure
-    >>> figure = NotebookFigure(figsize=(3.0, 2.0))
-    >>> axes = figure.add_subplot()
-    >>> len(figure.axes)
-    1
-    """
-
-    def __init__(self, *args: Any, **options: Any) -> None:
-        """Create the figure with a canvas that can render images."""
-        super().__init__(*args, **options)
-        # The canvas keeps its renderer, which is used to measure the size of text.
-        FigureCanvasAgg(self)
-
-    def _repr_png_(self) -> bytes:
-        """Return the figure as a PNG image for notebooks."""
-        image = io.BytesIO()
-        self.savefig(image, format="png", dpi=_SCREEN_DPI)
-        return image.getvalue()
+#: Colours of the header. The header is red if cells are missing, or if the fraction of failed cells
+#: exceeds the limit.
+_HEADER_COLOUR, _WARNING_COLOUR = "0.4", "tab:red"
+_MAX_FAILED_FRACTION_WITHOUT_WARNING = 0.01
 
 
 @accept_former_keyword_names
 def draw_figure(
-    dataset: xr.Dataset, user_figure: Any = None, *, variable: str | None = None, style: Any = None
+    dataset: xr.Dataset,
+    user_figure: Any = None,
+    *,
+    variable: str | None = None,
+    style: Any = None,
+    width: Any = None,
+    header: bool = True,
 ) -> Figure:
     """Draw the figure of a study.
 
@@ -128,6 +72,13 @@ def draw_figure(
     style : path, str, dict or list, optional
         Styles that override the style of rsfstudy: style sheets with the suffix ``.mplstyle``,
         names of matplotlib styles, or dictionaries of matplotlib settings.
+    width : quantity, optional
+        Width of the figure, from "60 mm" to "600 mm". If the panels of a row would be narrower than
+        55 mm, the row has fewer panels. By default, the figure is as wide as a column (84 mm) or
+        the text (174 mm) of a journal page.
+    header : bool, default: True
+        If False, the figure has no header. The header lists overrides of the study, and missing and
+        failed cells.
 
     Returns
     -------
@@ -139,7 +90,7 @@ def draw_figure(
     ------
     InvalidValue
         If the declaration of the study contains an unknown figure, if ``user_figure`` cannot draw,
-        if the variable is missing or not numeric, or if a style is invalid.
+        if the variable is missing or not numeric, or if a style or the width is invalid.
     DataError
         If the dataset has no attribute with a declaration, or if x and y of a curve have different
         sizes.
@@ -181,48 +132,73 @@ def draw_figure(
             "own", user_figure, rule, remedy="Define, for example, def name(dataset, axes): ..."
         )
     dataset = DatasetUnits(dataset).convert_for_display()
-    with style_context(style):
-        drawing, dataset = _choose_figure(dataset, user_figure, variable)
-        panels = drawing.panels
-        columns = min(drawing.columns, len(panels))
-        rows = -(-len(panels) // columns)
-        height = drawing.height(dataset) if callable(drawing.height) else drawing.height
-        figure = NotebookFigure(figsize=figure_size(columns, rows, height), layout="constrained")
-        drawn = [figure.add_subplot(rows, columns, number + 1) for number in range(len(panels))]
-        for axes, panel in zip(drawn, panels, strict=True):
+    with style_context(style, width):
+        drawing, dataset = choose_figure(dataset, user_figure, variable)
+        is_corner = isinstance(drawing, CornerFigure)
+        columns = min(drawing.columns, len(drawing.panels))
+        columns = columns if is_corner else fit_panel_columns(columns)
+        figure, drawn = _create_panels(drawing, dataset, columns)
+        for axes, panel in zip(drawn, drawing.panels, strict=True):
             freeze_tick_label_size(axes)
             _panel.draw_panel(panel, dataset, axes)
-        _panel.finalize_scales_and_legends(panels, drawn)
+        _panel.finalize_scales_and_legends(drawing.panels, drawn)
         for scale in figure.axes:
             if scale not in drawn:
                 freeze_tick_label_size(scale)
-        add_panel_letters(drawn)
+        if isinstance(drawing, CornerFigure):
+            drawing.finish(drawn)
+        else:
+            add_panel_letters(drawn)
         merge_common_legends(figure, drawn)
-        lacking, overrides = (
-            _missing_cells_note(dataset),
-            StoredDataset(dataset).declaration.overrides,
-        )
-        said = [_format_note_on_overrides(dataset, columns)] if overrides else []
-        if said or lacking:
-            color = "tab:red" if lacking else "0.4"
-            figure.suptitle("\n".join(filter(None, (*said, lacking))), color=color)
-        enlarge_for_legends(figure, [drawn[i : i + columns] for i in range(0, len(drawn), columns)])
+        if header:
+            _add_header(figure, dataset)
+        rows = [[a for a in drawn if _row_of_panel(a) == n] for n in range(len(drawn))]
+        enlarge_for_legends(figure, list(filter(None, rows)))
         finalize_layout(figure)
     return figure
 
 
-def _missing_cells_note(dataset: xr.Dataset) -> str:
-    """Return a note in brackets about missing and failed lattice cells.
+def _create_panels(
+    drawing: Declared, dataset: xr.Dataset, columns: int
+) -> tuple[NotebookFigure, list[Axes]]:
+    """Create a figure with empty panels."""
+    rows, places = -(-len(drawing.panels) // columns), list(range(len(drawing.panels)))
+    height = drawing.height(dataset) if callable(drawing.height) else drawing.height
+    size = figure_size(columns, rows, height)
+    if isinstance(drawing, CornerFigure):
+        rows, places, size = columns, drawing.places, drawing.size()
+    figure = NotebookFigure(figsize=size, layout="constrained")
+    return figure, [figure.add_subplot(rows, columns, place + 1) for place in places]
+
+
+def _row_of_panel(axes: Axes) -> int:
+    """Return the index of the row that contains a panel."""
+    place = axes.get_subplotspec()
+    return 0 if place is None else place.rowspan.start
+
+
+def _add_header(figure: Figure, dataset: xr.Dataset) -> None:
+    """Add a header that lists overrides of the study, and missing and failed cells."""
+    overrides = StoredDataset(dataset).declaration.overrides
+    missing, is_warning = _missing_cells_note(dataset)
+    lines = [_format_note_on_overrides(dataset, header_line_length(figure))] if overrides else []
+    if lines or missing:
+        color = _WARNING_COLOUR if is_warning else _HEADER_COLOUR
+        figure.suptitle("\n".join(filter(None, (*lines, missing))), color=color)
+
+
+def _missing_cells_note(dataset: xr.Dataset) -> tuple[str, bool]:
+    """Return a note in brackets about missing and failed cells, and if the note is a warning.
 
     The note is empty if the results are complete.
     """
     completeness = dataset.attrs.get("completeness", "complete")
-    failed = int(
-        (failed_cell_mask(dataset["status"]) & (dataset["status"] != Status.PENDING)).sum()
-    )
+    failed = failed_cell_mask(dataset["status"]) & (dataset["status"] != Status.PENDING)
+    count = int(failed.sum())
     parts = [completeness] * (completeness != "complete")
-    parts += [f"{pluralize(failed, 'cell')} failed"] * (failed > 0)
-    return f"[{', '.join(parts)}]" * bool(parts)
+    parts += [f"{pluralize(count, 'cell')} failed"] * (count > 0)
+    many = count > _MAX_FAILED_FRACTION_WITHOUT_WARNING * failed.size
+    return f"[{', '.join(parts)}]" * bool(parts), many or completeness != "complete"
 
 
 def _format_note_on_overrides(dataset: xr.Dataset, max_line_characters: int) -> str:
@@ -238,127 +214,7 @@ def _format_note_on_overrides(dataset: xr.Dataset, max_line_characters: int) -> 
     text = to_mathtext(
         format_overrides(values).replace("=", " = ").replace(",", ", ").replace(",  ", ", ")
     )
-    return wrap_text(f"overrides: {text}", 55 if max_line_characters == 1 else 120)
-
-
-# ---- choice of the figure -----------------------------------------------------------------------
-
-
-def _choose_figure(
-    dataset: xr.Dataset, user_figure: Any = None, variable: str | None = None
-) -> tuple[Declared, xr.Dataset]:
-    """Choose the figure of a dataset and create all its panels.
-
-    The function also returns the dataset with the axes that the figure expects. If the dataset has
-    more axes than the declared figure can display, the function chooses a generic figure of maps or
-    lines.
-    """
-    name, sizes = StoredDataset(dataset).declaration.plot, dataset["status"].sizes
-    study = load_study(name) if name in study_names() else None
-    if name == _NAME_OF_FITS_FIGURE and user_figure is variable is None:
-        return Declared(
-            importlib.import_module(f"{__package__}.{_NAME_OF_FITS_FIGURE}").panels(dataset)
-        ), dataset
-    if (
-        user_figure is None
-        and study is None
-        and name not in (*_NAMES_OF_FIGURES_FOR_ANY_LATTICE, _NAME_OF_FITS_FIGURE)
-    ):
-        raise InvalidValue("plot", name, "is unknown", choices=FIGURE_NAMES)
-    known = {str(dimension) for dimension in sizes}
-    if study is not None and user_figure in (None, study.plot):
-        user_figure, dataset = study.plot, _restore_dimensions_of_selected_axes(dataset, study)
-        if isinstance(user_figure, Declared) and not user_figure.allow_extra_dims:
-            known = set(study.dimensions)
-    elif isinstance(user_figure, Declared):
-        known -= set(StoredDataset(dataset).declaration.overrides) - user_figure.dimensions
-    varied = {str(dimension) for dimension, points in sizes.items() if points > 1}
-    further = sorted(varied - known)
-    many = math.prod(sizes[dimension] for dimension in further) > _MAX_POINTS_OF_REPEATED_AXES
-    plain = variable is not None or user_figure is None or isinstance(user_figure, str)
-    if plain or many or DatasetUnits(dataset).are_unexpected_by_figures:
-        return _generic_figure(dataset, variable), dataset
-    drawing = (
-        user_figure
-        if isinstance(user_figure, Declared)
-        else Declared([getattr(user_figure, "draw", user_figure)])
-    )
-    dataset = dataset.squeeze(sorted(set(map(str, sizes)) - known - varied), drop=False)
-    panels = _expand_panels_of_figure(drawing, dataset, further)
-    few = panels and (len(panels) <= _MAX_PANELS_AFTER_REPEATING or not further)
-    return (replace(drawing, panels=panels) if few else _generic_figure(dataset)), dataset
-
-
-def _expand_panels_of_figure(
-    figure_declaration: Declared, dataset: xr.Dataset, extra_dimensions: Sequence[str]
-) -> list[Panel]:
-    """Create the panels of a figure for all facets and additional axes.
-
-    Additional axes are axes that the declaration of the figure does not mention. The panels are
-    repeated for each point of the additional axes, and the titles describe the points.
-    """
-    found: list[Panel] = []
-    for at in np.ndindex(*(dataset.sizes[dimension] for dimension in extra_dimensions)):
-        where = dict(zip(extra_dimensions, at, strict=True))
-        part = dataset.isel(where)
-        said = ", ".join(describe_point(part, dimension) for dimension in extra_dimensions)
-        each = [
-            one for panel in figure_declaration.panels for one in _panel.expand_facets(panel, part)
-        ]
-        found += (
-            [_panel.restrict_panel_to_point_of_extra_dims(panel, where, said) for panel in each]
-            if extra_dimensions
-            else each
-        )
-    named = [panel.y for panel in figure_declaration.panels if isinstance(panel.y, str) and panel.y]
-    if not found and named and not any(name in dataset for name in named):
-        rule = "does not fit these results, because the results do not contain its variables"
-        raise InvalidValue("plot", StoredDataset(dataset).declaration.plot, rule)
-    return found
-
-
-def _restore_dimensions_of_selected_axes(dataset: xr.Dataset, study: Study) -> xr.Dataset:
-    """Restore the dimensions of axes that were reduced to a single point."""
-    gone = [d for d in study.dimensions if d not in dataset.dims and d in dataset.coords]
-    if not gone:
-        return dataset
-    reduced = tuple(reduction.name for reduction in study.reductions)
-    cells = [name for name in dataset.data_vars if not str(name).startswith(reduced)]
-    derived = {
-        name: (axis, np.atleast_1d(dataset[name]), dataset[name].attrs)
-        for name, (axis, _formula) in FORMULAS_OF_DERIVED_COORDINATES.items()
-        if axis in gone and name in dataset.coords
-    }
-    measured = dataset[cells].drop_vars(derived).expand_dims(gone)
-    return dataset.drop_vars([*cells, *derived, *gone]).merge(measured).assign_coords(derived)
-
-
-def _generic_figure(dataset: xr.Dataset, variable: str | None = None) -> Declared:
-    """Return a generic figure that can display any study.
-
-    The figure is a scatter matrix for studies with samples, a set of maps if there are two numeric
-    axes, and a line plot otherwise.
-    """
-    from rsfstudy.plots import _axes, lines, maps, samples
-
-    logarithms = [n for n in map(str, dataset.data_vars) if "log10_" in n]
-    dataset = dataset.drop_vars([n for n in logarithms if n.replace("log10_", "") in dataset])
-    if square := samples.panels(dataset, variable):
-        return Declared(
-            square, samples.count_panels_per_side_of_scatter_matrix(square), _SCATTER_PANEL_HEIGHT
-        )
-    for module in (maps, lines):
-        if found := module.panels(dataset, variable):
-            return Declared(found)
-    choices = [
-        str(name) for name, values in dataset.data_vars.items() if _axes.is_numeric_variable(values)
-    ]
-    raise InvalidValue(
-        "variable", variable, "is not a numeric variable of these results", choices=choices
-    )
-
-
-# ---- files --------------------------------------------------------------------------------------
+    return wrap_text(f"overrides: {text}", max_line_characters)
 
 
 @accept_former_keyword_names
@@ -369,6 +225,8 @@ def save_figure(
     *,
     variable: str | None = None,
     style: Any = None,
+    width: Any = None,
+    header: bool = True,
 ) -> None:
     """Write the figure of a study to a file.
 
@@ -386,6 +244,10 @@ def save_figure(
         Name of a variable to draw instead of the declared figure, as for ``draw_figure``.
     style : path, str, dict or list, optional
         Styles that override the style of rsfstudy, as for ``draw_figure``.
+    width : quantity, optional
+        Width of the figure, as for ``draw_figure``.
+    header : bool, default: True
+        If False, the figure has no header, as for ``draw_figure``.
 
     Raises
     ------
@@ -424,7 +286,9 @@ def save_figure(
             "figure", path.name, "has an unsupported suffix", choices=Defaults.FIGURE_FORMATS
         )
     try:
-        drawn = draw_figure(dataset, user_figure, variable=variable, style=style)
+        drawn = draw_figure(
+            dataset, user_figure, variable=variable, style=style, width=width, header=header
+        )
         # The layout is final, so it must not be computed again when the figure is saved.
         drawn.set_layout_engine(None)
         with style_context(style):
@@ -435,74 +299,3 @@ def save_figure(
         rule = f"does not fit these results ({type(error).__name__}: {error})"
         raise InvalidValue("plot", StoredDataset(dataset).declaration.plot, rule) from error
     write_image(image, path)
-
-
-@accept_former_keyword_names
-def render_figure(figure: Figure, image_format: str) -> bytes:
-    r"""Render a figure as an image.
-
-    Parameters
-    ----------
-    figure : matplotlib.figure.Figure
-        Figure to render.
-    image_format : {"png", "pdf", "svg"}
-        Format of the image.
-
-    Returns
-    -------
-    bytes
-        Contents of an image file without a creation date.
-
-    Examples
-    --------
-    >>> from rsfstudy.plots import NotebookFigure, render_figure
-    >>> image = render_figure(NotebookFigure(figsize=(1.0, 1.0)), "png")
-    >>> image[:4]
-    b'\x89PNG'
-    """
-    image = io.BytesIO()
-    figure.savefig(
-        image, format=image_format, metadata=_IMAGE_METADATA_WITHOUT_DATES.get(image_format)
-    )
-    return image.getvalue()
-
-
-def write_image(image: bytes, path: Path) -> None:
-    """Write an image to a file atomically.
-
-    The function writes the image to a temporary file in the same directory, and renames the
-    temporary file. Missing parent directories are created.
-
-    Parameters
-    ----------
-    image : bytes
-        Encoded image.
-    path : Path
-        Path of the file.
-
-    Raises
-    ------
-    OSError
-        If the file cannot be written.
-
-    Examples
-    --------
-    >>> import tempfile
-    >>> from pathlib import Path
-    >>> from rsfstudy.plots import NotebookFigure, render_figure, write_image
-    >>> image = render_figure(NotebookFigure(figsize=(1.0, 1.0)), "svg")
-    >>> with tempfile.TemporaryDirectory() as directory:
-    ...     path = Path(directory, "figures", "empty.svg")
-    ...     write_image(image, path)
-    ...     path.read_bytes() == image
-    True
-    """
-    path.parent.mkdir(parents=True, exist_ok=True)
-    beside = path.with_name(f".{path.name}.new")
-    try:
-        # If the temporary file were a link or a pipe, the image would be written to another place.
-        beside.unlink(missing_ok=True)
-        beside.write_bytes(image)
-        os.replace(beside, path)
-    finally:
-        beside.unlink(missing_ok=True)

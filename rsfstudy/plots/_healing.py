@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from functools import partial
+from typing import Any
 
 import numpy as np
 import xarray as xr
@@ -14,13 +15,13 @@ from rsfstudy.error_boundary import error_boundary
 from rsfstudy.errors import DataError
 from rsfstudy.fitting import Record
 from rsfstudy.plots._axes import set_log_scale
-from rsfstudy.plots._figures import NotebookFigure
+from rsfstudy.plots._image_files import NotebookFigure
+from rsfstudy.plots._size import figure_size, fit_panel_columns
 from rsfstudy.plots._style import (
     add_legend,
     add_panel_letters,
     cycle_style,
     enlarge_for_legends,
-    figure_size,
     finalize_layout,
     style_context,
 )
@@ -32,7 +33,9 @@ _ERROR_BAR_STDERRS = 2.0
 
 
 @partial(error_boundary, is_called_internally=True)
-def plot_healing(table: xr.Dataset, record: Record | None = None) -> Figure:
+def plot_healing(
+    table: xr.Dataset, record: Record | None = None, *, style: Any = None, width: Any = None
+) -> Figure:
     """Plot healing and relaxation against the duration of holds.
 
     Parameters
@@ -46,6 +49,11 @@ def plot_healing(table: xr.Dataset, record: Record | None = None) -> Figure:
         Record that contains the holds. If you pass a record, the first panel shows the recorded
         friction, the friction before each hold, and the peak friction after each hold. By default,
         the figure does not have this panel.
+    style : path, str, dict or list, optional
+        Styles that override the style of rsfstudy, as for ``rsfstudy.plot``.
+    width : quantity, optional
+        Width of the figure, from "60 mm" to "600 mm". If the figure is narrower than 110 mm, the
+        panels are one below the other.
 
     Returns
     -------
@@ -56,6 +64,8 @@ def plot_healing(table: xr.Dataset, record: Record | None = None) -> Figure:
     ------
     DataError
         If the dataset is not a table of holds, or if it contains no holds.
+    InvalidValue
+        If the style or the width is invalid.
 
     Examples
     --------
@@ -70,17 +80,19 @@ def plot_healing(table: xr.Dataset, record: Record | None = None) -> Figure:
     if not table.sizes["hold"]:
         raise DataError("the table contains no holds, so there is nothing to draw.")
     count = 1 if record is None else 2
-    with style_context():
+    with style_context(style, width):
+        columns = fit_panel_columns(count)
+        rows = count // columns
         figure = NotebookFigure(
-            figsize=figure_size(count, 1, _PANEL_HEIGHT_MM), layout="constrained"
+            figsize=figure_size(columns, rows, _PANEL_HEIGHT_MM), layout="constrained"
         )
-        panels = figure.subplots(1, count, squeeze=False)[0].tolist()
+        panels = figure.subplots(rows, columns, squeeze=False).ravel().tolist()
         if record is not None:
             _draw_record(table, record, panels[0])
         _draw_healing(table, panels[-1])
         if count > 1:
             add_panel_letters(panels)
-        enlarge_for_legends(figure, [panels])
+        enlarge_for_legends(figure, [panels] if rows == 1 else [[panel] for panel in panels])
         finalize_layout(figure)
     return figure
 

@@ -20,13 +20,13 @@ from rsfstudy._deprecation import accept_former_keyword_names
 from rsfstudy.error_boundary import error_boundary
 from rsfstudy.errors import DataError, InvalidValue
 from rsfstudy.plots._axes import set_log_scale
-from rsfstudy.plots._figures import NotebookFigure
+from rsfstudy.plots._image_files import NotebookFigure
+from rsfstudy.plots._size import figure_size, fit_panel_columns, header_line_length
 from rsfstudy.plots._style import (
     add_legend,
     add_panel_letters,
     cycle_style,
     enlarge_for_legends,
-    figure_size,
     finalize_layout,
     freeze_tick_label_size,
     style_context,
@@ -50,7 +50,13 @@ _FRICTION_LABEL = r"Friction coefficient, $\mu$"
 @accept_former_keyword_names
 @partial(error_boundary, is_called_internally=True)
 def plot_motion(
-    motion: xr.Dataset, rig: Rig | None = None, *, against: str | None = None
+    motion: xr.Dataset,
+    rig: Rig | None = None,
+    *,
+    against: str | None = None,
+    style: Any = None,
+    width: Any = None,
+    header: bool = True,
 ) -> Figure:
     """Draw a motion or a limit cycle.
 
@@ -69,6 +75,13 @@ def plot_motion(
         Variable along x. The default is the load point displacement, or the slip if the load point
         is stationary. For a limit cycle, the default is the time, because the load point
         displacement is unknown.
+    style : path, str, dict or list, optional
+        Styles that override the style of rsfstudy, as for ``rsfstudy.plot``.
+    width : quantity, optional
+        Width of the figure, from "60 mm" to "600 mm". The default is 174 mm. If the figure is
+        narrower than 110 mm, it has a single column of panels.
+    header : bool, default: True
+        If False, the figure has no title.
 
     Returns
     -------
@@ -82,7 +95,8 @@ def plot_motion(
     DataError
         If the dataset is not a motion or a limit cycle, or if the motion contains no values.
     InvalidValue
-        If ``against`` is unknown, or if the dataset cannot be converted to the units of the rig.
+        If ``against`` is unknown, if the style or the width is invalid, or if the dataset cannot be
+        converted to the units of the rig.
 
     Examples
     --------
@@ -100,12 +114,8 @@ def plot_motion(
         raise DataError(f"the dataset contains no motion, so there is nothing to draw. {text}")
     against = against or _choose_abscissa(motion)
     shown = motion if rig is None else rig.in_units(motion, **DatasetUnits.DISPLAY_UNITS)
-    with style_context():
-        figure = NotebookFigure(figsize=figure_size(2, 2, PANEL_HEIGHT_MM), layout="constrained")
-        grid = figure.add_gridspec(2, 2)
-        upper = figure.add_subplot(grid[0, 0])
-        lower = figure.add_subplot(grid[1, 0], sharex=upper)
-        plane = figure.add_subplot(grid[:, 1])
+    with style_context(style, width):
+        figure, upper, lower, plane = _create_motion_panels(fit_panel_columns(2))
         for axes in figure.axes:
             freeze_tick_label_size(axes)
         if "friction_coefficient" in shown:
@@ -120,10 +130,27 @@ def plot_motion(
         lower.set_xlabel(_axis_label(shown[against]))
         _draw_phase_plane(motion, shown, plane)
         add_panel_letters(figure.axes)
-        figure.suptitle(wrap_text(to_mathtext(_motion_title(motion)), 120))
-        enlarge_for_legends(figure, [[upper], [lower, plane]])
+        if header:
+            title = to_mathtext(_motion_title(motion))
+            figure.suptitle(wrap_text(title, header_line_length(figure)))
+        enlarge_for_legends(figure, [[upper], [lower], [plane]])
         finalize_layout(figure)
     return figure
+
+
+def _create_motion_panels(columns: int) -> tuple[NotebookFigure, Axes, Axes, Axes]:
+    """Create a figure with empty panels for friction, slip rate and the phase plane.
+
+    The phase plane is right of the other panels if there are two columns, and below them otherwise.
+    """
+    rows = 2 if columns == 2 else 3
+    size = figure_size(columns, rows, PANEL_HEIGHT_MM)
+    figure = NotebookFigure(figsize=size, layout="constrained")
+    grid = figure.add_gridspec(rows, columns)
+    upper = figure.add_subplot(grid[0, 0])
+    lower = figure.add_subplot(grid[1, 0], sharex=upper)
+    plane = figure.add_subplot(grid[:, 1] if columns == 2 else grid[2, 0])
+    return figure, upper, lower, plane
 
 
 def _check_motion(motion: xr.Dataset, abscissa: str | None) -> None:

@@ -29,15 +29,13 @@ from matplotlib.transforms import blended_transform_factory, offset_copy
 from rsfstudy._deprecation import accept_former_keyword_names
 from rsfstudy.error_boundary import check_regular_file
 from rsfstudy.errors import InvalidValue, RsfStudyError, shorten_text
+from rsfstudy.plots._size import width_context
 from rsfstudy.plots._text import visible_length, wrap_text
 
 #: Default style sheet of rsfstudy.
 STYLE_SHEET = Path(__file__).with_name("rsfstudy.mplstyle")
 #: File name suffix of style sheets.
 _STYLE_SHEET_SUFFIX = ".mplstyle"
-INCHES_PER_MM = 1.0 / 25.4
-#: Gap between the two columns of a journal page, in inches.
-_JOURNAL_COLUMN_GAP_INCHES = 6.0 * INCHES_PER_MM
 _MARKER_CYCLE = "os^Dv<>P*X"
 #: Fraction of the panel width that a colour bar and its label occupy.
 _COLOUR_BAR_FRACTION_OF_PANEL = 0.24
@@ -45,8 +43,8 @@ _COLOUR_BAR_FRACTION_OF_PANEL = 0.24
 
 @accept_former_keyword_names
 @contextlib.contextmanager
-def style_context(user_styles: Any = None) -> Iterator[None]:
-    """Apply the style sheet of rsfstudy and any additional styles.
+def style_context(user_styles: Any = None, width: Any = None) -> Iterator[None]:
+    """Apply the style sheet of rsfstudy, any additional styles and the width of figures.
 
     Parameters
     ----------
@@ -55,6 +53,9 @@ def style_context(user_styles: Any = None) -> Iterator[None]:
         ``matplotlib.style.available``, a dictionary of matplotlib settings, or a list of such
         styles. Later styles override earlier styles. By default, only the style sheet of rsfstudy
         is applied.
+    width : quantity, optional
+        Width of the figures that rsfstudy creates inside the ``with`` block, for example "85 mm".
+        By default, the figure determines its width.
 
     Yields
     ------
@@ -64,9 +65,9 @@ def style_context(user_styles: Any = None) -> Iterator[None]:
     Raises
     ------
     InvalidValue
-        If an argument is not a valid style, if a style contains an unknown setting, or if a figure
-        cannot be drawn in the style, for example because the style needs LaTeX and LaTeX is not
-        installed.
+        If an argument is not a valid style, if a style contains an unknown setting, if the width is
+        invalid, or if a figure cannot be drawn in the style, for example because the style needs
+        LaTeX and LaTeX is not installed.
 
     Examples
     --------
@@ -78,7 +79,7 @@ def style_context(user_styles: Any = None) -> Iterator[None]:
     """
     others = user_styles if isinstance(user_styles, list | tuple) else [user_styles]
     settings = [_to_matplotlib_style(other) for other in others if other is not None]
-    with style.context([STYLE_SHEET, *settings]):
+    with style.context([STYLE_SHEET, *settings]), width_context(width):
         try:
             yield
         except (RsfStudyError, OSError):
@@ -179,35 +180,6 @@ def _strip_comment(line: str) -> str:
 def _strip_quotes(value: str) -> str:
     """Remove the double quotes around a value."""
     return value[1:-1] if len(value) > 1 and value[0] == value[-1] == '"' else value
-
-
-def figure_size(
-    panel_columns: int, panel_rows: int, panel_height_mm: float | None = None
-) -> tuple[float, float]:
-    """Compute the size of a figure in inches.
-
-    Parameters
-    ----------
-    panel_columns : int
-        Number of columns of panels. A figure with one column of panels is as wide as a column of a
-        journal page. All other figures are as wide as the page.
-    panel_rows : int
-        Number of rows of panels.
-    panel_height_mm : float, optional
-        Height of a panel in mm. The default is the figure height of the current style.
-
-    Returns
-    -------
-    width : float
-        Width of the figure in inches.
-    panel_height_mm : float
-        Height of the figure in inches.
-    """
-    width, usual = rcParams["figure.figsize"]
-    each = usual if panel_height_mm is None else panel_height_mm * INCHES_PER_MM
-    return (
-        width if panel_columns == 1 else 2.0 * width + _JOURNAL_COLUMN_GAP_INCHES
-    ), panel_rows * each
 
 
 def cycle_style(number: int) -> dict[str, Any]:
@@ -352,9 +324,11 @@ def _estimate_tick_label_line_count(axes: Axes) -> float:
 def _legend_entries(axes: Axes) -> dict[str, Any]:
     """Return a dictionary of the visible artists, keyed by their labels."""
     named: dict[str, Any] = {}
+    # The handle of an entry is as wide as about six characters.
+    longest = min(48, estimate_text_capacity_in_characters(axes)[0] - 6)
     for handle, label in zip(*axes.get_legend_handles_labels(), strict=True):
         if _is_visible(handle):
-            named.setdefault(wrap_text(label, 48), handle)
+            named.setdefault(wrap_text(label, longest), handle)
     return named
 
 
@@ -470,10 +444,10 @@ def merge_common_legends(figure: Figure, panel_axes: Sequence[Axes]) -> None:
 
 
 def enlarge_for_legends(figure: Figure, panel_rows: Sequence[Sequence[Axes]]) -> None:
-    """Increase the figure height by the height of legends and tick labels.
+    """Increase the figure height by the height of its legends, header and long labels.
 
-    Because of the additional height, legends and long tick labels do not reduce the height of the
-    panels.
+    Because of the additional height, legends, the header, and titles and tick labels with several
+    lines do not reduce the height of the panels.
 
     Parameters
     ----------
@@ -487,8 +461,11 @@ def enlarge_for_legends(figure: Figure, panel_rows: Sequence[Sequence[Axes]]) ->
         max(map(_legend_height, legends), default=0.0) for legends in (*beside, figure.legends)
     ]
     line = 1.3 * float(rcParams["font.size"]) / 72.0
-    heights += [line * (max(map(_estimate_tick_label_line_count, row)) - 1.0) for row in panel_rows]
-    figure.set_figheight(figure.get_figheight() + sum(heights))
+    lines = [max(map(_estimate_tick_label_line_count, row)) - 1.0 for row in panel_rows]
+    lines += [float(max(panel.get_title().count("\n") for panel in row)) for row in panel_rows]
+    if header := figure.get_suptitle():
+        lines.append(header.count("\n") + 1.5)
+    figure.set_figheight(figure.get_figheight() + sum(heights) + line * sum(lines))
 
 
 def _legend_height(legend: Legend) -> float:

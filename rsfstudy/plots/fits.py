@@ -6,19 +6,20 @@ the residuals, the autocorrelation of the residuals, and the correlations of the
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from functools import partial
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 import xarray as xr
-from matplotlib import colormaps
+from matplotlib import colormaps, rcParams
 from matplotlib.axes import Axes
-from matplotlib.text import Text
+from matplotlib.figure import Figure
 
 from rsfstudy.fitting import PARAMETERS, split_window_number
-from rsfstudy.plots._axes import describe_point
+from rsfstudy.plots._axes import MIN_FONT_SIZE, describe_point
 from rsfstudy.plots._style import add_grey_legend_entry, cycle_style
 from rsfstudy.study import Panel
 
@@ -28,6 +29,11 @@ _MAX_AUTOCORRELATION_LAGS, _MAX_DRAWN_RECORD_ROWS, _MAX_RECORD_PANELS = 40, 20_0
 #: Margin on both sides of the fitted windows as a fraction of the total extent of the windows, and
 #: width of the moving average of residuals as a fraction of a window.
 _MARGIN_FRACTION_BESIDE_WINDOWS, _RESIDUAL_AVERAGING_FRACTION_OF_WINDOW = 0.15, 0.02
+#: Maximum number of parameters of a correlation matrix whose cells contain numbers. A colour bar
+#: replaces the numbers in larger matrices.
+_MAX_PARAMETERS_WITH_NUMBERS = 8
+#: Margin above and below the visible curves as a fraction of their range.
+_Y_MARGIN_FRACTION = 0.05
 #: Half width of the confidence band of the fitted curve, in standard errors.
 _CONFIDENCE_BAND_HALF_WIDTH_IN_STDERRS = 2.0
 _LINE_STYLE_OF_RECORD_ROWS: dict[str, Any] = {
@@ -167,6 +173,19 @@ def _draw_record_with_fits(dataset: xr.Dataset, axes: Axes) -> None:
     if windows:
         beside = _MARGIN_FRACTION_BESIDE_WINDOWS * (max(windows) - min(windows))
         axes.set_xlim(min(windows) - beside, max(windows) + beside)
+        _fit_y_limits_to_visible_lines(axes)
+
+
+def _fit_y_limits_to_visible_lines(axes: Axes) -> None:
+    """Set the y limits to the range of the curves and records inside the x limits."""
+    left, right = axes.get_xlim()
+    visible = []
+    for line in axes.lines:
+        x, y = np.asarray(line.get_data(), dtype=float)
+        visible.append(y[(x >= left) & (x <= right) & np.isfinite(y)])
+    values = np.concatenate(visible)
+    margin = _Y_MARGIN_FRACTION * (float(np.ptp(values)) or 1.0)
+    axes.set_ylim(values.min() - margin, values.max() + margin)
 
 
 def _draw_residuals(dataset: xr.Dataset, axes: Axes) -> None:
@@ -209,10 +228,11 @@ def _compute_autocorrelation(values: np.ndarray) -> np.ndarray:
 
 def _correlation_title(dataset: xr.Dataset) -> str:
     """Return the title of the correlation panel with friction law names."""
-    laws = [str(law) for law in dataset["law"].values]
+    laws = [describe_point(dataset.isel(law=n), "law") for n in range(dataset.sizes["law"])][:2]
     if len(laws) == 1:
-        return f"Correlation: {describe_point(dataset.isel(law=0), 'law')}"
-    return f"Correlation: {laws[0]} (lower), {laws[1]} (upper)".replace("_", " ")
+        return f"Correlation: {laws[0]}"
+    first, second = (law.removesuffix(" law") for law in laws)
+    return f"Correlation: {first} below, {second} above"
 
 
 def _parameter_symbol(parameter_name: str) -> str:
@@ -233,14 +253,41 @@ def _draw_correlation(dataset: xr.Dataset, axes: Axes) -> None:
     values = np.tril(lower) + np.triu(upper, 1)
     names = [_parameter_symbol(str(name)) for name in dataset["parameter"].values]
     colours = colormaps["RdBu_r"].with_extremes(bad="0.85")
-    axes.imshow(values, vmin=-1.0, vmax=1.0, cmap=colours, aspect="auto")
+    image = axes.imshow(values, vmin=-1.0, vmax=1.0, cmap=colours, aspect="auto")
     axes.grid(visible=False)
-    axes.set_xticks(range(len(names)), names)
-    axes.set_yticks(range(len(names)), names)
+    _label_parameters(axes, names)
+    if len(names) <= _MAX_PARAMETERS_WITH_NUMBERS:
+        _write_correlations(axes, values)
+    else:
+        bar = cast(Figure, axes.figure).colorbar(image, ax=axes, pad=0.02)
+        bar.set_label("Correlation coefficient")
+
+
+def _label_parameters(axes: Axes, names: Sequence[str]) -> None:
+    """Label the rows and columns of a correlation matrix without overlapping labels."""
+    # A line of text is about 1.6 times as high as its letters.
+    line = 1.6 * rcParams["xtick.labelsize"] / 72.0
+    width, height = (
+        side * length
+        for side, length in zip(
+            cast(Figure, axes.figure).get_size_inches(),
+            (axes.get_position().width, axes.get_position().height),
+            strict=True,
+        )
+    )
+    for axis, length in ((axes.xaxis, width), (axes.yaxis, height)):
+        some = slice(None, None, max(1, math.ceil(len(names) * line / length)))
+        axis.set_ticks(range(len(names))[some], names[some])
+    if len(names) > _MAX_PARAMETERS_WITH_NUMBERS:
+        axes.tick_params(axis="x", labelrotation=90.0)
     axes.tick_params(length=0)
+
+
+def _write_correlations(axes: Axes, values: np.ndarray) -> None:
+    """Write the correlation coefficients into the cells of the matrix."""
     for (row, column), value in np.ndenumerate(values):
         shade = "white" if abs(value) > 0.6 else "black"
         text = f"{value:.2f}".replace("0.", ".") if row != column else ""
         if np.isfinite(value):
-            drawn: Text = axes.text(column, row, text, ha="center", va="center", color=shade)
-            drawn.set_fontsize(min(7.0, 50.0 / len(names)))
+            size = max(MIN_FONT_SIZE, min(7.0, 50.0 / len(values)))
+            axes.text(column, row, text, ha="center", va="center", color=shade, fontsize=size)

@@ -10,7 +10,7 @@ from __future__ import annotations
 import warnings
 from collections.abc import Sequence
 from functools import partial
-from typing import Any, cast
+from typing import Any
 
 import numpy as np
 import xarray as xr
@@ -18,12 +18,13 @@ from matplotlib.axes import Axes
 from matplotlib.collections import PolyCollection
 from matplotlib.colors import BoundaryNorm, LogNorm, Normalize
 from matplotlib.contour import QuadContourSet
-from matplotlib.figure import Figure
 from matplotlib.patheffects import withStroke
 from matplotlib.ticker import LogLocator, MaxNLocator
 from scipy.spatial import cKDTree
 
 from rsfstudy.plots._axes import (
+    MIN_FONT_SIZE,
+    add_labelled_colour_bar,
     are_log_spaced,
     are_positive_and_span_decades,
     compute_cell_edges,
@@ -145,8 +146,7 @@ def draw_map(
                 colour = drawn.to_rgba(np.array(flag))
                 axes.add_collection(PolyCollection([], facecolor=colour, label=meanings[flag]))
         else:
-            bar = cast(Figure, axes.figure).colorbar(drawn, ax=axes, pad=0.02)
-            bar.set_label(format_axis_label(dataset, variable_name, 34))
+            add_labelled_colour_bar(drawn, dataset, axes, variable_name)
             draw_contours(axes, values, found[1])
     status = dataset["status"]
     status = status.squeeze(
@@ -203,7 +203,9 @@ def draw_contours(axes: Axes, values: xr.DataArray, contour_levels: Sequence[flo
         found = axes.contour(
             x, y, values, contour_levels, colors="white", linewidths=0.6, linestyles="-"
         )
-    for text in axes.clabel(found, fontsize=6, fmt="%.3g", manual=_label_positions(axes, found)):
+    for text in axes.clabel(
+        found, fontsize=MIN_FONT_SIZE, fmt="%.3g", manual=_label_positions(axes, found)
+    ):
         text.set_path_effects([withStroke(linewidth=1.0, foreground="0.2")])
 
 

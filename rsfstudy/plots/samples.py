@@ -1,13 +1,12 @@
-"""Histograms and scatter plots of samples and cases.
+"""Corner plots of samples and cases.
 
-The function ``panels`` builds a scatter matrix of the primary output and the sampled fields. The
-diagonal of the matrix shows histograms. Colours distinguish the points of the other axes of the
-study.
+The function ``corner_figure`` builds a corner plot of the primary output and the sampled fields: a
+triangle of scatter plots with histograms on its diagonal. Colours distinguish the points of the
+other axes of the study.
 """
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from functools import partial
 
@@ -22,29 +21,77 @@ from rsfstudy.plots._axes import (
     is_numeric_variable,
     varying_variables,
 )
+from rsfstudy.plots._size import figure_size
 from rsfstudy.plots._style import cycle_style
 from rsfstudy.plots._text import format_units, quantity_symbol, wrap_text
 from rsfstudy.storage import StoredDataset
-from rsfstudy.study import DrawFunction, Panel, read_quantities_not_in_vocabulary
+from rsfstudy.study import DrawFunction, Figure, Panel, read_quantities_not_in_vocabulary
 from rsfstudy.vocabulary import find_quantity
 
-#: Maximum number of quantities in the scatter matrix, including the measured variable, and maximum
+#: Maximum number of quantities in the corner plot, including the measured variable, and maximum
 #: number of ticks per axis.
 _MAX_SCATTERED_QUANTITIES, _MAX_TICKS = 4, 3
+#: Maximum number of columns of a figure that is as wide as one column of a journal page.
+_MAX_COLUMNS_IN_NARROW_FIGURE = 2
 #: Style of the points in scatter plots. The points are rasterised in vector graphics, because there
 #: may be 10^5 points.
-_SCATTER_POINT_STYLE = {
-    "marker": ".",
-    "markersize": 2.0,
-    "markeredgewidth": 0.0,
-    "rasterized": True,
-}
+_SCATTER_POINT_STYLE = {"marker": ".", "markeredgewidth": 0.0, "rasterized": True}
+#: Diameters of the points in points (1/72 inch), and number of samples above which the smaller
+#: diameter is used.
+_LARGE_POINT, _SMALL_POINT, _MIN_SAMPLES_WITH_SMALL_POINTS = 4.5, 2.0, 500
 #: Maximum number of bins of a histogram, and maximum number of characters per line of a label.
 _MAX_BINS, _MAX_LABEL_LINE_CHARACTERS = 30, 17
 
 
-def panels(dataset: xr.Dataset, variable: str | None = None) -> Sequence[Panel]:
-    """Build the panels of a scatter matrix.
+class CornerFigure(Figure):
+    """Figure with panels in the lower triangle of a square.
+
+    Parameters
+    ----------
+    panels : sequence of Panel
+        Panels of the lower triangle and the diagonal, row by row.
+    columns : int
+        Number of rows and columns of the square.
+    """
+
+    @property
+    def places(self) -> list[int]:
+        """Positions of the panels, counted row by row from 0."""
+        return [row * self.columns + x for row in range(self.columns) for x in range(row + 1)]
+
+    def size(self) -> tuple[float, float]:
+        """Return the width and the height of the figure in inches."""
+        width, height = figure_size(1 if self.columns <= _MAX_COLUMNS_IN_NARROW_FIGURE else 2, 1)
+        return width, width if self.columns > 1 else height
+
+    def finish(self, axes_of_panels: Sequence[Axes]) -> None:
+        """Align the x axes of each column, and remove inner labels.
+
+        Parameters
+        ----------
+        axes_of_panels : sequence of matplotlib.axes.Axes
+            Axes of the panels, in the order of ``panels``.
+        """
+        for axes, place in zip(axes_of_panels, self.places, strict=True):
+            row, column = divmod(place, self.columns)
+            if row < self.columns - 1:
+                axes.set_xlabel("")
+                axes.tick_params(labelbottom=False)
+                axes.xaxis.get_offset_text().set_visible(False)
+            if row == column and self.columns > 1:
+                axes.set_ylabel("")
+                axes.tick_params(left=False, labelleft=False)
+                axes.grid(visible=False)
+            elif column:
+                axes.set_ylabel("")
+                axes.tick_params(labelleft=False)
+                axes.yaxis.get_offset_text().set_visible(False)
+            bottom = axes_of_panels[self.places.index((self.columns - 1) * self.columns + column)]
+            axes.set_xlim(bottom.get_xlim())
+
+
+def corner_figure(dataset: xr.Dataset, variable: str | None = None) -> CornerFigure | None:
+    """Build the corner plot of samples or cases.
 
     Parameters
     ----------
@@ -56,38 +103,27 @@ def panels(dataset: xr.Dataset, variable: str | None = None) -> Sequence[Panel]:
 
     Returns
     -------
-    list of Panel
-        Panels of the matrix, row by row. The list is empty if the study has no axis with numbered
-        points, such as samples or cases. The list is also empty if the variable is not numeric, or
-        does not vary along an axis with numbered points.
+    CornerFigure or None
+        Corner plot. The result is None if the study has no axis with numbered points, such as
+        samples or cases. The result is also None if the variable is not numeric, or does not vary
+        along an axis with numbered points.
     """
     fields = _sampled_fields(dataset)
     if variable is not None and variable not in dataset:
-        return []
+        return None
     along = next((d for d in fields if variable is None or d in dataset[variable].dims), None)
     if along is None or (variable is not None and not is_numeric_variable(dataset[variable])):
-        return []
-    names = [variable] if variable else varying_variables(dataset)[:1]
-    names += [name for name in fields[along] if has_numeric_points(dataset, name)][
-        : _MAX_SCATTERED_QUANTITIES - len(names)
+        return None
+    measured = [variable] if variable else varying_variables(dataset)[:1]
+    sampled = [name for name in fields[along] if has_numeric_points(dataset, name)]
+    # The last row shows the measured variable against each sampled field.
+    names = sampled[: _MAX_SCATTERED_QUANTITIES - len(measured)] + measured
+    panels = [
+        _build_panel(dataset, along, x, y)
+        for number, y in enumerate(names, start=1)
+        for x in names[:number]
     ]
-    return [_build_panel(dataset, along, x, y) for y in names for x in names]
-
-
-def count_panels_per_side_of_scatter_matrix(panels: Sequence[Panel]) -> int:
-    """Return the number of rows and columns of a scatter matrix.
-
-    Parameters
-    ----------
-    panels : sequence of Panel
-        All panels of the matrix.
-
-    Returns
-    -------
-    int
-        Number of panels in each row, which equals the number of rows.
-    """
-    return math.isqrt(len(panels))
+    return CornerFigure(panels, len(names)) if panels else None
 
 
 def _sampled_fields(dataset: xr.Dataset) -> dict[str, list[str]]:
@@ -121,12 +157,13 @@ def _build_panel(
             y_label="Number",
             title="",
         )
+    many = dataset.sizes[sample_dimension] >= _MIN_SAMPLES_WITH_SMALL_POINTS
     return Panel(
         x=x_variable,
         y=y_variable,
         hue=list(by),
         markers_only=True,
-        style=_SCATTER_POINT_STYLE,
+        style=_SCATTER_POINT_STYLE | {"markersize": _SMALL_POINT if many else _LARGE_POINT},
         overlays=[few_ticks],
         title="",
         x_label=_format_short_axis_label(dataset, x_variable),

@@ -29,7 +29,7 @@ from rsfstudy.reporting.tables import (
     format_number_or_dash,
     format_units,
 )
-from rsfstudy.slider import Scene
+from rsfstudy.slider import Scene, SceneFields
 from rsfstudy.storage import StoredDataset
 
 SummaryTableOrSentence = TextTable | Mapping[str, str] | str
@@ -63,6 +63,7 @@ def build_summary_tables_and_sentences(dataset: xr.Dataset) -> Iterator[SummaryT
         yield summarise_motion(dataset)
         try:
             yield describe_stability(dataset.rsf.scene)
+            yield from note_on_default_friction(dataset.rsf.scene)
             yield build_events_table(dataset.rsf.events())
         except InvalidValue as error:  # The scene has a user-defined part.
             yield f"stability and events are unavailable: {error}"
@@ -87,9 +88,11 @@ def build_motion_tables_and_sentences(
     Returns
     -------
     list of (mapping of str to str, str, or TextTable)
-        Peak values of the motion, stability of the scene, and table of the events.
+        Peak values of the motion, stability of the scene, a note if the reference friction has its
+        default value, and table of the events.
     """
-    return [summarise_motion(motion), describe_stability(scene), build_events_table(catalogue)]
+    notes = [describe_stability(scene), *note_on_default_friction(scene)]
+    return [summarise_motion(motion), *notes, build_events_table(catalogue)]
 
 
 def is_motion(dataset: xr.Dataset) -> bool:
@@ -210,6 +213,25 @@ def describe_stability(scene: Scene) -> str:
     sliding = "stable" if scene.stiffness_ratio > 1.0 else "unstable"
     ratio = f"{scene.stiffness_ratio:.4g} times the critical stiffness"
     return f"stiffness is {ratio}: steady sliding at V_* is {sliding}"
+
+
+def note_on_default_friction(scene: Scene) -> list[str]:
+    """Return a note if the friction coefficient at V_* has its default value.
+
+    Parameters
+    ----------
+    scene : Scene
+        Scene to describe.
+
+    Returns
+    -------
+    list of str
+        Note, or an empty list if the friction coefficient differs from the default.
+    """
+    default = SceneFields.defaults()["mu_star"]
+    if scene.mu_star != default:
+        return []
+    return [f"mu_star, the friction coefficient at V_*, has its default value {default:g}"]
 
 
 def build_events_table(event_catalogue: xr.Dataset) -> TextTable | str:

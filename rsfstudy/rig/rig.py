@@ -27,6 +27,7 @@ from rsfstudy.rig.dataset_scales import (
     convert_dataset_units,
     read_si_scales,
 )
+from rsfstudy.rig.fault_parameters import replace_b_by_ratio
 from rsfstudy.rig.rig_quantities import (
     AXIS_NAME_BY_RIG_NAME,
     RATIO_FIELD_BY_DIMENSIONAL_NAME,
@@ -228,7 +229,13 @@ class Rig(HtmlTableMixin):
             / self.scales[scale].factor
         )
 
-    @SceneFields.add_to_signature(*RATIO_FIELD_BY_DIMENSIONAL_NAME)
+    def __repr__(self) -> str:
+        """Return the quantities of the rig with units, without omitted quantities."""
+        shown = in_display_units(self.as_dict())
+        parts = [f"{name}='{value:.12g} {units}'" for name, (value, units) in shown.items()]
+        return f"Rig({', '.join(parts)})"
+
+    @SceneFields.add_to_signature("b", *RATIO_FIELD_BY_DIMENSIONAL_NAME)
     def scene(self, **fields: Any) -> Scene:
         """Create a scene of this rig.
 
@@ -238,7 +245,9 @@ class Rig(HtmlTableMixin):
             Fields of `Scene`. Pass dimensionless fields such as ``hold_time`` or
             ``displacement_step`` as quantities with physical units. A velocity may be a ratio, as
             in ``load_velocity_ratio=10``, or a quantity, as in ``load_velocity="10 um/s"``. The
-            field ``instability_norm`` may be a slip rate, for example ``"10 mm/s"``. Pass
+            field ``instability_norm`` may be a slip rate, for example ``"10 mm/s"``. The parameter
+            ``b`` can be passed together with ``a`` instead of ``b_over_a``. The friction
+            coefficient at :math:`V_*` is ``mu_star``, which is 0.76 if you do not pass it. Pass
             ``inertia=False`` to ignore the mass or the period of the rig, and
             ``temperature="isothermal"`` to ignore heat.
 
@@ -251,9 +260,12 @@ class Rig(HtmlTableMixin):
         Raises
         ------
         InvalidValue
-            If a field is unknown or invalid, or if a velocity is given both as a ratio and as a
-            quantity.
+            If a field is unknown or invalid, if a velocity is given both as a ratio and as a
+            quantity, if ``b`` is given together with ``b_over_a``, or if ``b`` is given without
+            ``a``.
         """
+        if "b" in fields:
+            fields = replace_b_by_ratio(fields)
         if find_si_units_of_field("instability_norm", norm := fields.get("instability_norm")):
             scene = self.scene(**{n: v for n, v in fields.items() if n != "instability_norm"})
             return scene.with_(instability_norm=convert_to_instability_norm(self, norm, scene))

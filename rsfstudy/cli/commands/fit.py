@@ -200,6 +200,9 @@ def _make_comma_list_option(
     Path("fit.png"),
     "Path of the figure. The data are written to a NetCDF file next to the figure.",
 )
+@options.style_options
+@options.header_option
+@options.quiet_option
 @options.json_option
 def fit(given: options.CommandOptions) -> int:
     """Fit friction parameters to velocity steps in RECORDS.
@@ -241,12 +244,14 @@ def _fit_and_write_files(
     dataset = rsfstudy.fit(
         records,
         steps=[_parse_step_number(text) for text in given.steps],
+        progress=not given.quiet,
         command=given.command_line,
         **given.collect_option_values(*_OPTIONS_PASSED_TO_FIT),
         **parse_scene_field_assignments(given.settings),
     )
     dataset = write_dataset(dataset, data_path)
-    save_figure(dataset, given.output)
+    appearance = given.collect_option_values("style", "width", "header")
+    save_figure(dataset, given.output, **appearance)
     return dataset
 
 

@@ -79,6 +79,7 @@ class HealingResult(CommandResult):
     Path("healing.png"),
     "Path of the figure. The data are written to a NetCDF file next to the figure.",
 )
+@options.style_options
 @options.json_option
 def healing(given: options.CommandOptions) -> int:
     """Measure frictional healing in the holds of RECORD.
@@ -103,7 +104,8 @@ def healing(given: options.CommandOptions) -> int:
     record = rsfstudy.read_record(given.record, **about)
     table = rsfstudy.healing(record).assign_attrs(provenance_attributes(given.command_line))
     write_dataset(table, data)
-    write_figure(rsfstudy.plot_healing(table, record), given.output)
+    appearance = given.collect_option_values("style", "width")
+    write_figure(rsfstudy.plot_healing(table, record, **appearance), given.output, given.style)
     result = HealingResult(record, table, record.stiffness(), [given.output, data])
     return output_result(result, _print_healing, given.as_json)
 

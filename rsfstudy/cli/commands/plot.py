@@ -55,9 +55,15 @@ def _draw_figure(results: Path, figure_path: Path, given: options.CommandOptions
 
     dataset = read_results_file(results, given.study)
     if StoredDataset(dataset).is_of_single_scene:
-        drawing = dataset.rsf.plot(against=given.against)
-        figure_files.write_figure(drawing, figure_path, given.style)
+        if given.variable is not None:
+            rule = "applies to results of a study only, and the file contains a motion"
+            raise InvalidValue("--variable", given.variable, rule, remedy="Use --against.")
+        appearance = given.collect_option_values("against", "style", "width", "header")
+        figure_files.write_figure(dataset.rsf.plot(**appearance), figure_path, given.style)
         return [figure_path]
+    if given.against is not None:
+        rule = "applies to a motion only, and the file contains results of a study"
+        raise InvalidValue("--against", given.against, rule, remedy="Use --variable.")
     own = None if given.variable else figure_files.load_user_figure_or_default(dataset, given.study)
     return figure_files.draw_and_save_figure(dataset, figure_path, given, own)
 

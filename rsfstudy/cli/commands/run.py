@@ -279,9 +279,8 @@ def _print_short_report(done: StudyRun) -> None:
     The report has one line for each table of the full report. Failed cells and verdicts that differ
     from the expected verdicts are listed individually.
     """
-    from rsfstudy.cli.cost_estimates import format_duration
     from rsfstudy.cli.study_results import print_failures, print_unexpected_verdicts
-    from rsfstudy.formatting import format_overrides
+    from rsfstudy.formatting import format_duration, format_overrides
     from rsfstudy.reporting import count_verdicts, summarise_study_as_text_lines
 
     assert done.results is not None
@@ -302,7 +301,7 @@ def _print_short_report(done: StudyRun) -> None:
 
 def _print_runs(runs: Runs) -> None:
     """Print a table with one row per study."""
-    from rsfstudy.cli.cost_estimates import format_duration
+    from rsfstudy.formatting import format_duration
     from rsfstudy.reporting import TextTable, count_verdicts
 
     colours = {"ok": "green", "skipped": "yellow"}

@@ -57,6 +57,8 @@ _EXIT_STATUS_UNPHYSICAL_MOTION = 3
     Path("motion.png"),
     "Path of the figure. The data are written to a NetCDF file next to the figure.",
 )
+@options.style_options
+@options.header_option
 @click.option("--quiet", is_flag=True, help="Print only the status, without peaks and events.")
 def simulate(given: options.CommandOptions) -> int:
     """Compute a single motion, and write its figure and its data.
@@ -135,7 +137,8 @@ def _write_motion_and_figure(
         return
     data = given.output.with_suffix(".nc")
     write_dataset(rig.in_units(motion, **DatasetUnits.DISPLAY_UNITS) if rig else motion, data)
-    write_figure(rsfstudy.plot_motion(motion, rig, against=given.against), given.output)
+    appearance = given.collect_option_values("against", "style", "width", "header")
+    write_figure(rsfstudy.plot_motion(motion, rig, **appearance), given.output, given.style)
     if not given.quiet:
         found = [motion, motion.rsf.events()]
         if rig:

@@ -96,6 +96,7 @@ def _comparison_to_json(file: Path, comparison: AnswerComparison) -> dict[str, A
 @options.make_image_option(
     "--figure", None, "Path of a figure of the agreement (.png, .pdf or .svg)."
 )
+@options.style_options
 @options.json_option
 def verify(given: options.CommandOptions) -> int:
     """Compare the solutions of a different code with reference solutions.
@@ -107,6 +108,8 @@ def verify(given: options.CommandOptions) -> int:
     from rsfstudy.cli import assignment_parsing
     from rsfstudy.referee import compare_file_with_known_answer
 
+    if given.figure is None and (given.style, given.width) != (None, None):
+        raise click.UsageError("--style and --width apply to a figure. Add --figure FILE.")
     if math.isnan(given.digits):  # click accepts NaN for any range
         raise InvalidValue("--digits", given.digits, "must be a number, from 1 to 12")
     columns = assignment_parsing.parse_column_assignments(given.columns)
@@ -116,7 +119,7 @@ def verify(given: options.CommandOptions) -> int:
     ]
     status = output_result(Verification(given.files, found), _print_verification, given.as_json)
     if given.figure is not None:
-        _write_agreement_figure(found, given.figure)
+        _write_agreement_figure(found, given)
     return status
 
 
@@ -138,7 +141,9 @@ def _print_verification(result: Verification) -> None:
     print_line(summarise_comparisons(result.comparisons), style="bold")
 
 
-def _write_agreement_figure(comparisons: Sequence[AnswerComparison], figure_path: Path) -> None:
+def _write_agreement_figure(
+    comparisons: Sequence[AnswerComparison], given: options.CommandOptions
+) -> None:
     """Draw the number of agreeing digits of each quantity.
 
     If the function compares a single file and the problem has an index column, such as time, the
@@ -162,6 +167,6 @@ def _write_agreement_figure(comparisons: Sequence[AnswerComparison], figure_path
             at = comparison.problem.number or number
             for one in comparison.quantity_agreements:
                 digits.setdefault(one.quantity_name, []).append((at, one.agreeing_digits))
-    with style_context(None):
+    with style_context(given.style, given.width):
         drawn = draw_agreement(digits, label, comparisons[0].required_digits)
-    write_figure(drawn, figure_path)
+    write_figure(drawn, given.figure, given.style)

@@ -1,0 +1,60 @@
+"""Copies of datasets for plots and tables of plain xarray."""
+
+from __future__ import annotations
+
+import json
+from typing import Any
+
+import numpy as np
+import xarray as xr
+
+#: Attribute of a simplified dataset with the values of the omitted coordinates as JSON.
+CONSTANTS_ATTRIBUTE = "constants"
+
+
+def simplify_dataset(dataset: xr.Dataset) -> xr.Dataset:
+    """Omit constant coordinates, and replace unit attributes by readable units.
+
+    Parameters
+    ----------
+    dataset : xarray.Dataset
+        Results of a study, or a dataset of one scene.
+
+    Returns
+    -------
+    xarray.Dataset
+        Dataset as returned by ``DatasetAccessor.simplify``.
+    """
+    constants: dict[str, Any] = {}
+    for name, values in dataset.coords.items():
+        # A coordinate of a dimension with several points is needed to select the points.
+        if (values.ndim == 0 or name not in dataset.dims) and _is_constant(values):
+            constants[str(name)] = _to_plain_value(values)
+    # The copy has variables of its own, so that their attributes can be replaced.
+    simple = dataset.drop_vars(list(constants)).copy()
+    for name in simple.variables:
+        simple[name].attrs = _replace_units(dataset[name].attrs)
+    return simple.assign_attrs({CONSTANTS_ATTRIBUTE: json.dumps(constants)})
+
+
+def _is_constant(values: xr.DataArray) -> bool:
+    """Return True if all values of a coordinate are equal, or if all values are missing."""
+    return bool(values.size) and len(np.unique(values.values.astype(str))) == 1
+
+
+def _to_plain_value(values: xr.DataArray) -> Any:
+    """Return the value of a constant coordinate as a number, a string or a boolean."""
+    value = values.values.flat[0]
+    plain = value.item() if hasattr(value, "item") else value
+    missing = isinstance(plain, float) and not np.isfinite(plain)
+    return None if missing else plain if isinstance(plain, int | float | str) else str(plain)
+
+
+def _replace_units(attributes: dict[Any, Any]) -> dict[Any, Any]:
+    """Return attributes whose units are the scale of a variable, or no units for a pure number."""
+    replaced = {name: value for name, value in attributes.items() if name != "scale"}
+    if replaced.get("units") == "1":
+        del replaced["units"]
+        if scale := attributes.get("scale"):
+            replaced["units"] = scale
+    return replaced

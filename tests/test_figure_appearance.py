@@ -1,0 +1,245 @@
+"""Tests of the width, style, header and text sizes of figures."""
+
+import itertools
+
+import numpy as np
+import pytest
+import test_figures as checks
+import xarray as xr
+from matplotlib.colors import to_hex
+from matplotlib.image import imread
+from matplotlib.text import Text
+from rsfstudy.named_studies.accuracy_cost import INTEGRATORS
+from study_runs import call_main, run
+
+import rsfstudy
+from rsfstudy import Axis, Scene, Study, plots
+from rsfstudy.errors import InvalidValue
+from rsfstudy.measures import LinearStability
+from rsfstudy.plots import fits, samples
+from rsfstudy.status import Status
+from rsfstudy.storage import write_dataset
+
+MM = 25.4
+RATES = Axis("load_velocity_ratio", np.geomspace(1e-4, 1e4, 9))
+ANGLES = Axis("phi", [45.0, 60.0, 75.0])
+
+
+def lattice(*axes, **fields):
+    """Return critical stiffness over the given axes."""
+    study = {"name": "mine", "title": "Critical stiffness", "base": Scene(alpha=0.56)}
+    return run(Study(**study, axes=list(axes), measure=LinearStability(), **fields))
+
+
+@pytest.fixture(scope="module")
+def motion():
+    return rsfstudy.simulate(Scene(hold_time=1.0), duration=1.0, rtol=1e-3)
+
+
+@pytest.fixture(scope="module")
+def holds():
+    scene = Scene(normal_stress="constant", hold_time=1000, stiffness_ratio=10)
+    motion = rsfstudy.simulate(scene, duration=1100.0)
+    return motion.rsf.holds()
+
+
+@pytest.fixture(scope="module")
+def results():
+    """Return results whose figure has two panels next to each other."""
+    return lattice(RATES)
+
+
+@pytest.fixture
+def draw(request, motion, holds, results):
+    """Return a function that draws the figure with the given appearance."""
+    return {
+        "motion": motion.rsf.plot,
+        "study": results.rsf.plot,
+        "map": lambda **about: lattice(ANGLES, RATES).rsf.plot(**about),
+        "healing": lambda **about: rsfstudy.plot_healing(holds, **about),
+    }[request.param]
+
+
+@pytest.mark.parametrize("draw", ["motion", "study", "map", "healing"], indirect=True)
+@pytest.mark.parametrize("width", ["85 mm", "18 cm", 0.12])
+def test_figures_have_the_requested_width_and_style(draw, width):
+    drawn = draw(width=width, style={"axes.facecolor": "#123456"})
+    expected = {"85 mm": 85.0, "18 cm": 180.0, 0.12: 120.0}[width]
+    assert drawn.get_figwidth() * MM == pytest.approx(expected)
+    assert {to_hex(axes.get_facecolor()) for axes in drawn.axes} == {"#123456"}
+    checks.assert_printable(drawn)
+    for axes in drawn.axes:
+        assert axes.get_window_extent().width / drawn.dpi * MM > 30.0 or not axes.get_xlabel()
+
+
+def test_panels_are_below_each_other_in_a_narrow_figure(results):
+    lefts = [
+        {round(axes.get_position().x0, 2) for axes in results.rsf.plot(width=width).axes}
+        for width in ("85 mm", "170 mm")
+    ]
+    assert [len(positions) for positions in lefts] == [1, 2]
+
+
+@pytest.mark.parametrize(
+    ("width", "message"),
+    [
+        ("20 mm", "width = '20 mm': must be from 60 mm to 600 mm. For example, pass '85 mm'"),
+        (85, "must be from 60 mm to 600 mm"),
+        ("3 s", "has units of another kind than m"),
+        ("wide", "is no quantity"),
+    ],
+)
+def test_widths_are_checked(motion, width, message):
+    with pytest.raises(InvalidValue, match=message):
+        motion.rsf.plot(width=width)
+    assert rsfstudy.plot_motion(motion).get_figwidth() * MM == pytest.approx(174.0, abs=0.1)
+
+
+def test_commands_draw_figures_with_a_width_and_a_style(motion, results, tmp_path):
+    (tmp_path / "mine.mplstyle").write_text("savefig.dpi: 50\n")
+    for name, dataset in (("motion", motion), ("study", results)):
+        write_dataset(dataset, tmp_path / f"{name}.nc")
+        options = ["--width", "85 mm", "--style", tmp_path / "mine.mplstyle", "--no-header"]
+        ran = call_main("plot", tmp_path / f"{name}.nc", *options)
+        assert ran.returncode == 0, ran.stderr
+        assert imread(tmp_path / f"{name}.png").shape[1] == int(85.0 / MM * 50)
+
+
+@pytest.mark.parametrize(
+    ("name", "option", "message"),
+    [
+        ("motion", ["--variable", "slip"], "applies to results of a study only"),
+        ("study", ["--against", "time"], "applies to a motion only"),
+        ("study", ["--width", "5 mm"], "must be from 60 mm to 600 mm"),
+    ],
+)
+def test_options_without_effect_are_rejected(motion, results, name, option, message, tmp_path):
+    write_dataset({"motion": motion, "study": results}[name], tmp_path / "file.nc")
+    ran = call_main("plot", tmp_path / "file.nc", *option)
+    assert ran.returncode == 2
+    assert message in " ".join(ran.stderr.split())
+    assert not list(tmp_path.glob("*.png"))
+
+
+def test_the_style_of_verify_requires_a_figure():
+    ran = call_main("verify", "missing.csv", "--width", "85 mm")
+    assert (ran.returncode, "Add --figure FILE" in ran.stderr) == (2, True)
+
+
+# ---- header -------------------------------------------------------------------------------------
+
+
+def with_failures(dataset, count):
+    """Return a copy of a dataset with failed cells."""
+    status = dataset["status"].copy()
+    status.values.flat[:count] = int(Status.INTEGRATION_FAILED)
+    return dataset.assign(status=status)
+
+
+def test_the_header_is_red_only_if_many_cells_failed():
+    dataset = lattice(Axis("phi", np.linspace(40.0, 80.0, 20)), RATES)
+    colours = {}
+    for count in (1, 9):
+        drawn = plots.draw_figure(with_failures(dataset, count))
+        assert f"{count} cell" in drawn.get_suptitle()
+        colours[count] = drawn.texts[0].get_color()
+    assert colours == {1: "0.4", 9: "tab:red"}
+
+
+def test_the_header_can_be_omitted(motion):
+    dataset = with_failures(lattice(ANGLES, RATES), 3)
+    assert plots.draw_figure(dataset).get_suptitle() != ""
+    assert plots.draw_figure(dataset, header=False).get_suptitle() == ""
+    assert motion.rsf.plot().get_suptitle() != ""
+    assert motion.rsf.plot(header=False).get_suptitle() == ""
+
+
+def test_a_long_header_does_not_flatten_the_panels():
+    dataset = lattice(ANGLES, RATES)
+    plain, long = (plots.draw_figure(with_failures(dataset, count)) for count in (0, 9))
+    sizes = [drawn.axes[0].get_window_extent().height / drawn.dpi for drawn in (plain, long)]
+    assert sizes[1] > 0.95 * sizes[0]
+
+
+# ---- fits and samples ---------------------------------------------------------------------------
+
+
+def fit_of_steps(steps):
+    """Return the variables of a joint fit that the panels of records and correlations need."""
+    names = ["a", "b", "slip_distance"]
+    names += [f"{name}_{step}" for step in range(1, steps + 1) for name in ("mu_star", "trend1")]
+    moved = np.linspace(0.0, 1000.0, 201)
+    friction = np.where(moved < 400.0, 0.1, 0.6 + 1e-3 * np.sin(moved / 30.0))
+    fitted = np.where((moved > 600.0) & (moved < 900.0), friction, np.nan)
+    return xr.Dataset(
+        {
+            "record_displacement": ("row", moved),
+            "record_friction": ("row", friction),
+            "record_time": ("row", moved),
+            "fitted_friction": (("law", "row"), fitted[None]),
+            "fitted_friction_stderr": (("law", "row"), np.full((1, moved.size), 1e-4)),
+            "correlation": (
+                ("law", "parameter", "parameter2"),
+                np.full((1, len(names), len(names)), -0.555),
+            ),
+        },
+        coords={"law": ["perrin_rice_zheng"], "parameter": names},
+    )
+
+
+@pytest.mark.parametrize("steps", [1, 2, 5, 12])
+def test_the_labels_of_correlations_do_not_collide(steps):
+    with plots.style_context():
+        drawn = plots.NotebookFigure(figsize=(3.4, 2.4), layout="constrained")
+        axes = drawn.add_subplot()
+        fits._draw_correlation(fit_of_steps(steps), axes)
+        drawn.draw_without_rendering()
+        labels = [*axes.get_xticklabels()], [*axes.get_yticklabels()], list(axes.texts)
+    for group in labels:
+        found = checks.boxes(drawn, group)
+        assert found or group is labels[2]
+        for (one, first), (other, second) in itertools.combinations(found, 2):
+            assert not checks.overlap(first, second, 0.0), f"{one} touches {other}"
+    assert all(text.get_fontsize() >= 6.0 for text in axes.texts)
+
+
+def test_the_y_range_of_a_record_is_the_range_in_the_windows():
+    """Friction of 0.1 outside the windows does not stretch the y axis."""
+    axes = plots.NotebookFigure().add_subplot()
+    fits._draw_record_with_fits(fit_of_steps(1), axes)
+    low, high = axes.get_ylim()
+    assert 0.598 < low < 0.599
+    assert 0.601 < high < 0.602
+    assert "Perrin-Rice-Zheng law" in axes.get_legend_handles_labels()[1]
+
+
+def test_samples_are_a_corner_plot():
+    normal = np.random.default_rng(1).normal
+    table = {"a": 0.01 + 1e-3 * normal(size=40), "b_over_a": 2.0 + 0.1 * normal(size=40)}
+    dataset = lattice(Axis.cases(table, dimension="sample"))
+    drawn = plots.draw_figure(dataset)
+    places = [axes.get_subplotspec() for axes in drawn.axes]
+    rows = [(place.rowspan.start, place.colspan.start) for place in places]
+    assert rows == [(0, 0), (1, 0), (1, 1), (2, 0), (2, 1), (2, 2)]
+    assert drawn.get_figwidth() == drawn.get_figheight()
+    for axes, (row, column) in zip(drawn.axes, rows, strict=True):
+        assert bool(axes.get_xlabel()) is (row == 2)
+        assert bool(axes.get_ylabel()) is (column == 0 and row > 0)
+        same_column = [other for other, at in zip(drawn.axes, rows, strict=True) if at[1] == column]
+        assert {other.get_xlim() for other in same_column} == {axes.get_xlim()}
+    checks.assert_printable(drawn)
+    assert isinstance(samples.corner_figure(dataset), samples.CornerFigure)
+
+
+def test_integrators_have_distinct_colours():
+    with plots.style_context():
+        colours = [plots.cycle_style(number)["color"] for number in range(len(INTEGRATORS))]
+    assert len(set(colours)) == len(INTEGRATORS)
+
+
+def test_no_text_is_smaller_than_six_points(motion):
+    many = Axis("case", {f"a long name of case {n}": {"phi": 45.0 + n} for n in range(30)})
+    for drawn in (plots.draw_figure(lattice(many)), motion.rsf.plot(width="85 mm")):
+        drawn.draw_without_rendering()
+        sizes = [text.get_fontsize() for text in drawn.findobj(Text) if text.get_text()]
+        assert min(sizes) >= 6.0
