@@ -228,7 +228,7 @@ study = Study(
             tolerance=0.01,
             reason="reading error of 0.3 %, and sampling error of 0.3 % of both values",
             expected="differs",
-            reason="noise of the paper acts on the state variable and on normal stress",
+            difference_reason="noise of the paper acts on the state variable and on normal stress",
         ),
     ],
     plot=figure,
