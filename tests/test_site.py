@@ -6,6 +6,8 @@ network, and lists all public names.
 
 from __future__ import annotations
 
+import importlib
+import inspect
 import os
 import re
 import runpy
@@ -17,6 +19,7 @@ from pathlib import Path
 from urllib.parse import unquote, urlsplit
 
 import pytest
+from site_pages import FILES, find_page
 
 import rsfstudy
 from rsfstudy import measures, reductions
@@ -31,6 +34,11 @@ from rsfstudy.vocabulary import QUANTITY_BY_NAME
 
 ROOT = Path(__file__).parent.parent
 SLIDER = ROOT / "rsfstudy" / "slider"
+#: Public namespaces.
+NAMESPACES = (
+    "rsfstudy",
+    *(f"rsfstudy.{name}" for name in ("measures", "reductions", "parts", "fitting", "plots")),
+)
 SLOTS = ("laws", "normal_stress", "fluid", "dynamics", "loading", "temperature")
 
 
@@ -80,18 +88,19 @@ def pages(site) -> dict[Path, Page]:
     return {file: Page(file) for file in sorted(site.rglob("*.html"))}
 
 
-def text_of(pages: dict[Path, Page], name: str) -> str:
-    return next(page.text for file, page in pages.items() if file.name == f"{name}.html")
+def text_of(pages: dict[Path, Page], folder: str) -> str:
+    return "\n".join(page.text for file, page in pages.items() if file.parent.name == folder)
 
 
 def words_in(text: str) -> set[str]:
     return set(re.findall(r"--[\w-]+|\w+", text))
 
 
-def test_every_page_and_every_notebook_is_there(pages):
-    kept = [file for end in ("*.ipynb", "pages/*.md") for file in (ROOT / "studies").glob(end)]
-    needed = {"index", "README", *(file.stem for file in kept)}
-    assert needed <= {file.stem for file in pages}
+def test_every_page_and_every_notebook_is_there(pages, site):
+    kept = [*(ROOT / "studies").glob("*.ipynb"), *FILES[1:]]
+    needed = {site / "index.html"}
+    needed |= {site / file.relative_to(ROOT).with_suffix(".html") for file in kept}
+    assert needed <= set(pages)
 
 
 def test_links_lead_somewhere(pages):
@@ -143,7 +152,7 @@ def test_no_symbol_is_taken_for_emphasis(pages):
 
 
 def names() -> Iterator[tuple[str, list[str]]]:
-    """Yield the names that the page of names must contain.
+    """Yield the names that the reference must contain.
 
     The names come from the signature of a scene, the folders of parts, and declarations in
     the code.
@@ -178,20 +187,48 @@ def test_every_name_is_there(pages, kind):
     assert set(NAMES[kind]) <= words_in(text_of(pages, "reference"))
 
 
-def test_every_public_name_has_an_entry(pages):
-    page = next(page for file, page in pages.items() if file.name == "python.html")
-    assert {f"rsfstudy.{name}" for name in rsfstudy.__all__} <= page.anchors
+def test_every_public_object_has_a_page_with_an_example(pages):
+    """Functions and classes of the public namespaces have pages with examples.
+
+    Constants and types are listed on the page of the Python interface.
+    """
+    objects = {file.stem: page for file, page in pages.items() if file.parent.name == "objects"}
+    listed = text_of(pages, "reference")
+    for namespace in NAMESPACES:
+        module = importlib.import_module(namespace)
+        for name in module.__all__:
+            value = getattr(module, name)
+            known = [space for space in NAMESPACES if f"{space}.{name}" in objects]
+            if not known:
+                assert not inspect.isfunction(value), name
+                assert name in words_in(listed), name
+                continue
+            path = f"{known[0]}.{name}"
+            assert path in objects[path].anchors, path
+            assert ">>>" in objects[path].text or getattr(value, "_is_protocol", False), path
     members = {name for name in vars(DatasetAccessor) if not name.startswith("_")}
-    assert {
-        f"{DatasetAccessor.__module__}.DatasetAccessor.{name}" for name in members
-    } <= page.anchors
-    assert {"Law", "Measure", "Loading", "Reduction", "Stepper"} <= words_in(page.text)
+    accessor = f"{DatasetAccessor.__module__}.DatasetAccessor"
+    assert {f"{accessor}.{name}" for name in members} <= objects[accessor].anchors
+    assert "rsfstudy.motion.steppers.Stepper" in objects
+
+
+def test_every_study_has_a_thumbnail_and_a_page(pages):
+    """Thumbnails are small, and no thumbnail belongs to a study that does not exist."""
+    thumbnails = {file.stem: file for file in (ROOT / ".github" / "gallery").glob("*.png")}
+    assert set(thumbnails) == set(rsfstudy.studies())
+    assert all(file.stat().st_size <= 15_000 for file in thumbnails.values())
+    shown = next(page for file, page in pages.items() if file.name == "gallery.html")
+    code = {file.stem: page.text for file, page in pages.items() if file.parent.name == "gallery"}
+    for name in thumbnails:
+        assert any(link.endswith(f"/{name}.png") for link in shown.loaded), name
+        assert f"gallery/{name}.html" in shown.links
+        assert "study = Study(" in code[name], name
 
 
 def test_starting_points_of_changes_exist():
-    """The files and functions that the page on extensions names exist."""
-    text = (ROOT / "studies" / "pages" / "own_studies.md").read_text()
-    table = text.partition("<!-- starting points -->")[2].partition("To add a command")[0]
+    """The files and functions that the page for contributors names exist."""
+    text = find_page("<!-- starting points -->")
+    table = text.partition("<!-- starting points -->")[2].partition("## Add a command")[0]
     found = re.findall(r"`([a-z_/]+\.(?:py|csv))(?:: (\w+))?`", table)
     assert len(found) >= 15
     for path, function in found:
