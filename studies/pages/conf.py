@@ -78,13 +78,26 @@ def _table_of_contents(folder: Path, text: str) -> str:
     return f"```{{toctree}}\n:hidden:\n{pages}```"
 
 
+def _index_entries(found: re.Match[str]) -> str:
+    """Return the main index entries of a page, which the search ranks first.
+
+    Parameters
+    ----------
+    found : re.Match
+        Comment of the page with terms that are separated by commas.
+    """
+    return "```{index} " + ", ".join(f"! {term}" for term in found[1].split(", ")) + "\n```"
+
+
 def _fill_source(app: Any, page: str, text: list[str]) -> None:
     """Insert generated content into a page.
 
-    Notebooks are converted to Markdown, and the tables of the gallery become cards.
+    Notebooks are converted to Markdown, the tables of the gallery become cards, and comments with
+    terms become index entries.
     """
     if str(app.env.doc2path(page)).endswith(".ipynb"):
         text[0] = _notebook_to_markdown(text[0])
+    text[0] = re.sub(r"<!-- search: (.*) -->", _index_entries, text[0])
     if "<!-- contents -->" in text[0]:
         folder = Path(app.env.doc2path(page)).parent
         text[0] = text[0].replace("<!-- contents -->", _table_of_contents(folder, text[0]))
