@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import importlib
 import inspect
+import json
 import os
 import re
 import runpy
@@ -225,10 +226,68 @@ def test_every_study_has_a_thumbnail_and_a_page(pages):
         assert "study = Study(" in code[name], name
 
 
+#: Terms that users search for, with the page that the search should show first.
+SEARCHES = {
+    "AIC": "how_to/fit_many_steps",
+    "stick-slip": "tutorials/your_rig",
+    "ageing law": "explanation/scene",
+    "slip law": "explanation/scene",
+    "radiation damping": "explanation/scene",
+    "critical stiffness": "explanation/scene",
+    "healing": "how_to/measure_healing",
+    "slide-hold-slide": "how_to/measure_healing",
+    "xlook": "how_to/read_a_file",
+    "Excel": "how_to/read_a_file",
+    "MPa": "reference/units",
+    "cluster": "how_to/run_on_a_cluster",
+    "SLURM": "how_to/run_on_a_cluster",
+    "resume": "how_to/resume_a_run",
+    "stress drop": "how_to/find_events",
+    "limit cycle": "explanation/limit_cycles",
+    "standard error": "explanation/noise_and_intervals",
+    "effective sample size": "explanation/noise_and_intervals",
+    "p-value": "explanation/noise_and_intervals",
+    "Sobol indices": "how_to/sample_uncertainty",
+    "NetCDF": "reference/files",
+    "JSON": "reference/json",
+    "MATLAB": "how_to/export_results",
+    "PowerShell": "how_to/install",
+    "critical step": "how_to/compute_one_scene",
+}
+
+
+def test_the_search_shows_the_page_that_answers_first(site):
+    """Each term is a main index entry of a single page.
+
+    The search of Sphinx gives a main index entry that equals the query 100 points. All other
+    matches have fewer points.
+    """
+    text = (site / "searchindex.js").read_text()
+    index = json.loads(text[text.index("(") + 1 : text.rindex(")")])
+    for term, page in SEARCHES.items():
+        entries = index["indexentries"][term.lower()]
+        found = {index["docnames"][number] for number, _anchor, is_main in entries if is_main}
+        assert found == {f"studies/pages/{page}"}, term
+
+
+def test_quick_tests_exist():
+    files = (ROOT / "tests" / "quick.txt").read_text().split()
+    assert len(files) >= 10
+    assert all((ROOT / file).is_file() for file in files)
+    assert "@tests/quick.txt" in find_page("## Run the tests")
+
+
+def test_files_to_copy_exist():
+    table = find_page("<!-- files to copy -->").partition("<!-- files to copy -->")[2]
+    named = re.findall(r"`(\w+/[\w/.]+\.(?:py|csv|md))`", table.partition("\n## ")[0])
+    assert len(named) >= 14
+    assert all((ROOT / file).is_file() for file in named), named
+
+
 def test_starting_points_of_changes_exist():
     """The files and functions that the page for contributors names exist."""
     text = find_page("<!-- starting points -->")
-    table = text.partition("<!-- starting points -->")[2].partition("## Add a command")[0]
+    table = text.partition("<!-- starting points -->")[2].partition("\n## ")[0]
     found = re.findall(r"`([a-z_/]+\.(?:py|csv))(?:: (\w+))?`", table)
     assert len(found) >= 15
     for path, function in found:

@@ -22,16 +22,22 @@ import rsfstudy
 HERE = Path(__file__).parent
 #: Width and height of a thumbnail in pixels.
 SIZE = (360, 225)
+#: Resolution of the figure before it is scaled down.
+DPI = 200
 #: Limit of the size of a file in bytes.
 MOST_BYTES = 15_000
 
 
 def draw_figure(results: Path) -> Image.Image:
-    """Return the figure of a results file as an image with a white background."""
+    """Return the first panel of the figure of a results file, with a white background."""
     figure = rsfstudy.plot(rsfstudy.open(results))
     buffer = io.BytesIO()
-    figure.savefig(buffer, dpi=150, facecolor="white")
-    return Image.open(buffer).convert("RGB")
+    figure.savefig(buffer, dpi=DPI, facecolor="white")
+    image = Image.open(buffer).convert("RGB")
+    panel = figure.axes[0].get_tightbbox().transformed(figure.dpi_scale_trans.inverted())
+    left, bottom, right, top = (round(DPI * edge) for edge in panel.padded(0.03).extents)
+    edges = (max(left, 0), max(image.height - top, 0), right, image.height - bottom)
+    return image.crop((*edges[:2], min(right, image.width), min(edges[3], image.height)))
 
 
 def write_thumbnail(image: Image.Image, file: Path) -> None:
@@ -40,7 +46,8 @@ def write_thumbnail(image: Image.Image, file: Path) -> None:
     canvas = Image.new("RGB", SIZE, "white")
     canvas.paste(image, ((SIZE[0] - image.width) // 2, (SIZE[1] - image.height) // 2))
     for colours in (64, 32, 16, 8, 4):
-        canvas.quantize(colours, dither=Image.Dither.NONE).save(file, optimize=True)
+        reduced = canvas.quantize(colours, Image.Quantize.MAXCOVERAGE, dither=Image.Dither.NONE)
+        reduced.save(file, optimize=True)
         if file.stat().st_size <= MOST_BYTES:
             return
     raise SystemExit(f"{file.name} has more than {MOST_BYTES} bytes with four colours.")

@@ -177,10 +177,11 @@ def _card(name: str, cells: list[str]) -> str:
     """Format the card of a study with the first sentence of its description."""
     sentence = re.split(r"(?<=\.) (?=[A-Z])|: ", cells[-1])[0]
     figure = f" ({cells[0]})" if len(cells) > 1 else ""
+    sentence = sentence[0].upper() + sentence[1:].rstrip(".")
     return (
         f":::{{grid-item-card}} {name}{figure}\n:img-top: ../../.github/gallery/{name}.png\n"
         f":img-alt: Figure of the study {name}\n:link: gallery/{name}\n:link-type: doc\n\n"
-        f"{sentence}\n:::"
+        f"{sentence}.\n:::"
     )
 
 

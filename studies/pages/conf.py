@@ -54,6 +54,9 @@ html_show_sphinx = False
 #: Style of tables. Seven columns fit into a window with a width of 1200 pixels.
 TABLES = "table.docutils { font-size: .78rem } table.docutils :is(td, th) { padding: .2rem .35rem }"
 
+#: Name of a function in MathML that is not followed by a parenthesis.
+FUNCTION_BEFORE_NAME = re.compile(r"<mo>&ApplyFunction;</mo>(?!\s*(?:<mrow>\s*)?<mo[^>]*>[(\[{])")
+
 
 def _table_of_contents(folder: Path, text: str) -> str:
     """Return the table of contents of an index page.
@@ -145,7 +148,7 @@ def _write_math(writer: Any, node: nodes.math | nodes.math_block) -> None:
         except MathError as error:
             logging.getLogger(__name__).warning("%s: %s", error, source, location=node)
             markup = writer.encode(source)
-        writer.body.append(markup)
+        writer.body.append(FUNCTION_BEFORE_NAME.sub(r"\g<0><mspace width='0.17em'/>", markup))
     raise nodes.SkipNode
 
 
