@@ -76,6 +76,7 @@ def _table_of_contents(folder: Path, text: str) -> str:
     """
     linked = re.findall(r"\]\(([\w/]+)\.md\)|^:link: (\S+)", text, flags=re.MULTILINE)
     named = [one or other for one, other in linked]
+    named = [page for page in named if "/" not in page or page.endswith("/index")]
     others = sorted(file.stem for file in folder.glob("*.md") if file.stem != "index")
     pages = "".join(f"{page}\n" for page in dict.fromkeys((*named, *others)))
     return f"```{{toctree}}\n:hidden:\n{pages}```"
@@ -115,6 +116,8 @@ def _notebook_to_markdown(notebook: str) -> str:
     for cell in json.loads(notebook)["cells"]:
         text = "".join(cell["source"])
         if cell["cell_type"] == "markdown":
+            if parts:  # A page has a single title.
+                text = re.sub(r"^# ", "## ", text, flags=re.MULTILINE)
             parts.append(
                 re.sub(
                     r"\$[^$]+\$", lambda formula: _generated_content.html_symbol(formula[0]), text
