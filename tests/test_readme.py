@@ -26,8 +26,14 @@ from rsfstudy.slider.parts import field_names
 TEXT = "\n".join(file.read_text() for file in FILES)
 #: Tutorials, whose code blocks depend on the previous blocks of the page.
 TUTORIALS = sorted(file for file in FILES if file.parent.name == "tutorials")
+#: Python blocks of the other pages, each with the text that it prints, or an empty string.
 BLOCKS = [
-    block for file in FILES if file not in TUTORIALS for block in code_blocks(file.read_text())
+    block
+    for file in FILES
+    if file not in TUTORIALS
+    for block in re.findall(
+        r"```python\n(.*?)```(?:\n\n```text\n(.*?)```)?", file.read_text(), re.DOTALL
+    )
 ]
 
 
@@ -74,13 +80,13 @@ def lay_record(folder: Path) -> None:
 
 
 @pytest.mark.parametrize("number", range(len(BLOCKS)))
-def test_python_runs_as_it_stands(number, tmp_path, tmp_path_factory, cluster, monkeypatch):
-    """Each example runs in an empty directory.
+def test_python_runs_as_it_stands(number, tmp_path, tmp_path_factory, cluster, monkeypatch, capsys):
+    """Each example runs in an empty directory, and prints the text that the page shows.
 
     The examples share workers, and results of named studies are copied.
     """
     monkeypatch.chdir(tmp_path)
-    code = BLOCKS[number]
+    code, told = BLOCKS[number]
     if "outputs/rate_step_boundary.nc" in code:
         _dataset, file = named_results("rate_step_boundary", tmp_path_factory)
         (tmp_path / "outputs").mkdir()
@@ -90,6 +96,8 @@ def test_python_runs_as_it_stands(number, tmp_path, tmp_path_factory, cluster, m
     monkeypatch.setattr(rsfstudy, "run", functools.partial(rsfstudy.run, client=cluster))
     names = {"__name__": "block"}
     exec(compile(code, f"block {number}", "exec"), names)
+    if told:
+        assert_same_output(capsys.readouterr().out, told)
     for name, test in list(names.items()):
         if name.startswith("test_"):
             test()
