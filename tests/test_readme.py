@@ -13,6 +13,7 @@ import shutil
 from pathlib import Path
 
 import pytest
+import xarray as xr
 from site_pages import FILES, PAGES, ROOT, code_blocks, find_page
 from study_runs import call_main, named_results
 
@@ -244,6 +245,22 @@ def test_the_table_of_promises_names_tests_that_exist():
     assert all((here / name).is_file() for name in named)
     about = ("runner", "resume", "faults", "clusters", "scale", "files", "bad_input", "study")
     assert {f"test_{name}.py" for name in about} <= named
+
+
+def test_the_contents_of_results_files_are_as_described(tmp_path_factory):
+    """The variables and attributes in the table exist in the file of a named study."""
+    _dataset, path = named_results("rate_step_boundary", tmp_path_factory)
+    table = find_page("<!-- file contents -->").partition("<!-- file contents -->")[2]
+    rows = re.findall(r"^\| (.*?) \| (coordinate|variable|attribute) \|", table, re.MULTILINE)
+    named = {
+        kind: {name for row, of in rows if of == kind for name in re.findall(r"`(\w+)`", row)}
+        for kind in ("coordinate", "variable", "attribute")
+    }
+    assert all(named.values())
+    with xr.open_dataset(path) as dataset:
+        assert named["coordinate"] <= set(dataset.coords)
+        assert named["variable"] - {"NAME_error"} <= set(dataset.data_vars)
+        assert named["attribute"] <= set(dataset.attrs)
 
 
 def test_every_study_is_listed():
