@@ -116,9 +116,11 @@ def test_links_lead_somewhere(pages):
                 assert unquote(parts.fragment) in pages[target].anchors, (file.name, link)
 
 
-def test_nothing_is_loaded_from_the_net(pages):
+def test_nothing_is_loaded_from_the_net(pages, site):
     for file, page in pages.items():
         assert not [link for link in page.loaded if urlsplit(link).netloc], file.name
+    for style in site.rglob("*.css"):
+        assert not re.findall(r"(?:url\(|@import )[\"' ]*(?:https?:)?//", style.read_text()), style
 
 
 def test_nothing_is_left_to_be_made(pages):
