@@ -19,6 +19,14 @@ class Status(IntEnum):
     ----------
     meaning : str
         Explanation of the status for users.
+
+    Examples
+    --------
+    >>> from rsfstudy.measures import Status
+    >>> Status(3).label, Status(3).is_answer
+    ('no_limit_cycle', True)
+    >>> Status.WORK_BUDGET_SPENT.is_answer
+    False
     """
 
     meaning: str

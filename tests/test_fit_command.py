@@ -4,12 +4,12 @@ import math
 import re
 import shlex
 import shutil
-from pathlib import Path
 
 import numpy as np
 import pytest
 import synthetic_records as synthetic
 import xarray as xr
+from site_pages import PAGES, find_page
 from study_runs import call_main
 
 import rsfstudy
@@ -17,7 +17,6 @@ from rsfstudy.reporting import fit_tables
 from rsfstudy.reporting.fit_summaries import format_with_stderr
 from rsfstudy.status import Status
 
-PAGES = Path(__file__).parent.parent / "studies" / "pages"
 #: True parameters of the records below, for the slowness law and 1 -> 10 -> 1 um/s.
 TRUE = {"a": 0.010, "b": 0.013, "slip_distance": 12.0, "mu_star": 0.6, "trend1": -5e-6}
 STIFFNESS = 2e-3
@@ -192,8 +191,7 @@ def test_the_page_prints_what_the_command_does(tmp_path, monkeypatch):
     machines may round the last digit differently, and other versions of rich choose other
     widths.
     """
-    text = (PAGES / "fits.md").read_text()
-    block = text.split("<!-- fit command -->")[1]
+    block = find_page("<!-- fit command -->").split("<!-- fit command -->")[1]
     command, told = re.findall(r"```(?:sh|text)\n(.*?)```", block, re.DOTALL)[:2]
     shutil.copy(PAGES / "step.csv", tmp_path)
     monkeypatch.chdir(tmp_path)
@@ -213,7 +211,7 @@ def test_the_page_prints_what_the_command_does(tmp_path, monkeypatch):
 
 
 def test_the_page_shows_the_healing_of_its_record(tmp_path, monkeypatch):
-    block = (PAGES / "fits.md").read_text().split("<!-- healing command -->")[1]
+    block = find_page("<!-- healing command -->").split("<!-- healing command -->")[1]
     command, told = re.findall(r"```(?:sh|text)\n(.*?)```", block, re.DOTALL)[:2]
     shutil.copy(PAGES / "holds.csv", tmp_path)
     monkeypatch.chdir(tmp_path)

@@ -21,6 +21,7 @@ import numpy as np
 import pytest
 import xarray as xr
 from faulty_study import faulty_study
+from site_pages import PAGES, find_page
 from study_runs import call_main, run_with_failures
 
 import rsfstudy
@@ -31,8 +32,7 @@ from rsfstudy.cli.command_line import cli
 from rsfstudy.referee.problem_files import shipped_problem_files
 from rsfstudy.storage import dataset_files
 
-PAGES = Path(__file__).parent.parent / "studies" / "pages"
-TEXT = (PAGES / "running.md").read_text()
+TEXT = (PAGES / "reference" / "json.md").read_text()
 #: Study whose critical stiffness is proportional to b - a.
 STUDY_FILE = """
 from rsfstudy import Axis, Claim, Scene, Study
@@ -85,7 +85,7 @@ def place(tmp_path_factory) -> Path:
 # ---- keys ----------------------------------------------------------------------------------------
 def documented_keys(heading: str) -> dict[str, str]:
     """Return the meanings of the keys in the table below a heading of the page."""
-    section = TEXT.split(f"### {heading}\n")[1].split("\n### ")[0].split("\n## ")[0]
+    section = TEXT.split(f"## {heading}\n")[1].split("\n## ")[0]
     found = {}
     for line in re.findall(r"^\| (.*) \|$", section, re.MULTILINE)[1:]:
         names, *_others, meaning = line.split(" | ")
@@ -130,7 +130,7 @@ def assert_documented(found: dict[str, Any]) -> None:
 
 
 def test_every_command_with_json_has_a_table():
-    headings = re.findall(r"^### rsfstudy (\w+) --json$", TEXT, re.MULTILINE)
+    headings = re.findall(r"^## rsfstudy (\w+) --json$", TEXT, re.MULTILINE)
     with_json = [n for n, c in cli.commands.items() if "as_json" in {p.name for p in c.params}]
     assert sorted(headings) == sorted(with_json)
     assert {"list", "show", "run", "check", "compare", "fit", "verify"} <= set(with_json)
@@ -452,7 +452,7 @@ def test_every_module_of_a_command_is_in_the_table():
 
 def test_a_new_command_is_one_module_and_one_line(place, tmp_path, monkeypatch):
     """The command in the page on extensions counts cells."""
-    text = (PAGES / "own_studies.md").read_text()
+    text = find_page("<!-- file count.py -->")
     code = re.search(r"<!-- file count.py -->\n```python\n(.*?)```", text, re.DOTALL)[1]
     (tmp_path / "count.py").write_text(code)
     monkeypatch.setattr(commands, "__path__", [*commands.__path__, str(tmp_path)])

@@ -1,15 +1,15 @@
-"""Tests of the misprints in ``studies/MISPRINTS.md``.
+"""Tests of the misprints in the page of misprints.
 
 The corrected formulas hold, and the printed formulas do not.
 """
 
 import math
 import re
-from pathlib import Path
 
 import numpy as np
 import pytest
 from conftest import cot_phi
+from site_pages import PAGES
 
 import rsfstudy
 from rsfstudy import Scene
@@ -18,7 +18,7 @@ from rsfstudy.critical_steps.monotone_approach_to_load_rate import (
 )
 from rsfstudy.slider.friction import build_friction_relation
 
-PAGE = (Path(__file__).parent.parent / "studies" / "MISPRINTS.md").read_text()
+PAGE = (PAGES / "explanation" / "misprints.md").read_text()
 
 
 def test_eq_3():

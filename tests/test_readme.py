@@ -13,6 +13,8 @@ import shutil
 from pathlib import Path
 
 import pytest
+import xarray as xr
+from site_pages import FILES, PAGES, ROOT, code_blocks, find_page
 from study_runs import call_main, named_results
 
 import rsfstudy
@@ -22,40 +24,47 @@ from rsfstudy.critical_steps.critical_step import CriticalStep
 from rsfstudy.slider import laws
 from rsfstudy.slider.parts import field_names
 
-ROOT = Path(__file__).parent.parent
-#: The README, and the pages to which it links.
-FILES = [ROOT / "README.md", *sorted((ROOT / "studies" / "pages").glob("*.md"))]
 TEXT = "\n".join(file.read_text() for file in FILES)
-BLOCKS = re.findall(r"```python\n(.*?)```", TEXT, re.DOTALL)
-#: Index of the code block that is a study file.
-FILE = next(i for i, block in enumerate(BLOCKS) if "study = Study(" in block)
+#: Tutorials, whose code blocks depend on the previous blocks of the page.
+TUTORIALS = sorted(file for file in FILES if file.parent.name == "tutorials")
+#: Python blocks of the other pages, each with the text that it prints, or an empty string.
+BLOCKS = [
+    block
+    for file in FILES
+    if file not in TUTORIALS
+    for block in re.findall(
+        r"```python\n(.*?)```(?:\n\n```text\n(.*?)```)?", file.read_text(), re.DOTALL
+    )
+]
 
 
 def test_the_readme_is_read_in_a_few_minutes():
-    """The README has at most 150 lines, and sentences of at most 25 words.
+    """The README has at most 120 lines and one table, and sentences of at most 25 words.
 
     Code, tables and links are excluded.
     """
     text = FILES[0].read_text()
-    assert len(text.splitlines()) <= 150
+    assert len(text.splitlines()) <= 120
+    assert len(re.findall(r"^\|[-| ]+\|$", text, re.MULTILINE)) <= 1
     prose = re.sub(r"(?ms)^```.*?^```$|^\|.*?$|^#.*?$|<!--.*?-->", "\n\n", text)
     prose = re.sub(r"\]\([^)]*\)", "]", prose)
     said = re.split(r"(?<=[.?:])\*{0,2}\s+(?=[A-Z`])|\n\n|^- ", prose, flags=re.MULTILINE)
     assert [sentence for sentence in said if len(sentence.split()) > 25] == []
 
 
-def test_the_readme_leads_to_each_of_its_pages():
-    """The README links to each page.
-
-    The tests of the site check that links have valid targets.
-    """
-    named = re.findall(r"\]\((studies/pages/[^)#]+)", FILES[0].read_text())
-    assert {ROOT / name for name in named} == set(FILES[1:])
+def test_the_readme_leads_to_each_kind_of_page():
+    """The README links to the index page of each folder, and all its links have targets."""
+    links = re.findall(r"\]\(([^)#]+)", FILES[0].read_text())
+    local = {ROOT / link for link in links if "://" not in link}
+    assert all(target.is_file() for target in local)
+    assert {file for file in FILES if file.name == "index.md"} <= local
 
 
 def test_the_study_of_your_own_fits_in_thirty_lines():
-    assert "<!-- file angle.py -->\n```python\n" + BLOCKS[FILE] in TEXT
-    assert len(BLOCKS[FILE].splitlines()) <= 30
+    page = find_page("<!-- file angle.py -->")
+    block = code_blocks(page.split("<!-- file angle.py -->")[1])[0]
+    assert "study = Study(" in block
+    assert len(block.splitlines()) <= 30
 
 
 def test_there_are_examples():
@@ -67,23 +76,18 @@ def lay_record(folder: Path) -> None:
     pages = folder / "studies" / "pages"
     pages.mkdir(parents=True)
     for place in (folder, pages):
-        for name in ("step.csv", "holds.csv"):
-            shutil.copy(ROOT / "studies" / "pages" / name, place)
+        for name in ("step.csv", "holds.csv", "protocol.csv"):
+            shutil.copy(PAGES / name, place)
 
 
 @pytest.mark.parametrize("number", range(len(BLOCKS)))
-def test_python_runs_as_it_stands(number, tmp_path, tmp_path_factory, cluster, monkeypatch):
-    """Each example runs in an empty directory.
+def test_python_runs_as_it_stands(number, tmp_path, tmp_path_factory, cluster, monkeypatch, capsys):
+    """Each example runs in an empty directory, and prints the text that the page shows.
 
     The examples share workers, and results of named studies are copied.
     """
     monkeypatch.chdir(tmp_path)
-    code = BLOCKS[number]
-    if number == FILE:
-        (tmp_path / "angle.py").write_text(code)
-        ran = call_main("run", "angle.py", "--serial")
-        assert ran.returncode == 0, ran.stdout + ran.stderr
-        return
+    code, told = BLOCKS[number]
     if "outputs/rate_step_boundary.nc" in code:
         _dataset, file = named_results("rate_step_boundary", tmp_path_factory)
         (tmp_path / "outputs").mkdir()
@@ -93,9 +97,56 @@ def test_python_runs_as_it_stands(number, tmp_path, tmp_path_factory, cluster, m
     monkeypatch.setattr(rsfstudy, "run", functools.partial(rsfstudy.run, client=cluster))
     names = {"__name__": "block"}
     exec(compile(code, f"block {number}", "exec"), names)
+    if told:
+        assert_same_output(capsys.readouterr().out, told)
     for name, test in list(names.items()):
         if name.startswith("test_"):
             test()
+
+
+@pytest.mark.parametrize("page", TUTORIALS, ids=lambda page: page.stem)
+def test_a_tutorial_runs_from_top_to_bottom(page, tmp_path, cluster, monkeypatch, capsys):
+    """All blocks of a tutorial run in order in one directory.
+
+    Python blocks share their variables. A block below a comment ``file NAME`` is written to this
+    file. Commands run in this process. If a block of text follows a Python block, the block prints
+    this text.
+    """
+    if page.name == "index.md":
+        return
+    lay_record(tmp_path)
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(rsfstudy, "run", functools.partial(rsfstudy.run, client=cluster))
+    names: dict = {"__name__": "block"}
+    blocks = re.findall(
+        r"(?:<!-- file (\S+) -->\n)?```(python|sh)\n(.*?)```(?:\n\n```text\n(.*?)```)?",
+        page.read_text(),
+        re.DOTALL,
+    )
+    assert blocks
+    for file, language, code, told in blocks:
+        if file:
+            (tmp_path / file).write_text(code)
+        elif language == "sh":
+            for command in re.findall(r"^rsfstudy (.*)$", code.replace("\\\n", " "), re.MULTILINE):
+                serial = ["--serial"] if command.startswith("run ") else []
+                ran = call_main(*shlex.split(command.partition(" #")[0]), *serial)
+                assert ran.returncode == 0, ran.stdout + ran.stderr
+        else:
+            capsys.readouterr()
+            exec(compile(code, page.name, "exec"), names)
+            if told:
+                assert_same_output(capsys.readouterr().out, told)
+
+
+def assert_same_output(ours: str, theirs: str) -> None:
+    """Assert that two texts are equal except for the last digits of their numbers."""
+    number = r"-?\d+(?:\.\d+)?(?:e[+-]?\d+)?"
+    assert re.sub(number, "#", ours).split() == re.sub(number, "#", theirs).split()
+    for one, other in zip(re.findall(number, ours), re.findall(number, theirs), strict=True):
+        digits = len(other.partition("e")[0].partition(".")[2])
+        last = 1.001 * 10.0**-digits * 10.0 ** int(other.partition("e")[2] or 0)
+        assert abs(float(one) - float(other)) <= (last if digits else 0), (one, other)
 
 
 PRINTS = re.findall(r"```python\n([^`]*)```\n\n```text\n(.*?)```", FILES[0].read_text(), re.DOTALL)
@@ -143,7 +194,7 @@ def test_the_command_of_the_readme_fits_the_record(tmp_path, monkeypatch):
 
     Only the path of the record differs. The output of that command is tested elsewhere.
     """
-    texts = (FILES[0].read_text(), (ROOT / "studies" / "pages" / "fits.md").read_text())
+    texts = (FILES[0].read_text(), find_page("<!-- fit command -->"))
     here, there = (re.search(r"^rsfstudy fit .*$", text, re.MULTILINE)[0] for text in texts)
     assert here == there.replace("step.csv", "studies/pages/step.csv")
     lay_record(tmp_path)
@@ -167,24 +218,49 @@ def test_help_states_the_signatures_of_what_one_writes(base, example, written):
         assert f"    {name}({takes}) -> " in base.__doc__
 
 
+#: Options of ``dask worker`` and ``dask scheduler`` on the page about clusters.
+OPTIONS_OF_DASK = {"--nthreads", "--host", "--interface", "--dashboard-address", "--no-dashboard"}
+
+
 def test_commands_and_options_exist():
-    for command in re.findall(r"^rsfstudy (\w+)", TEXT, re.MULTILINE):
+    shell = "\n".join(re.findall(r"```sh\n(.*?)```", TEXT, re.DOTALL))
+    commands = set(re.findall(r"^rsfstudy (\w+)", shell, re.MULTILINE))
+    assert len(commands) > 10
+    for command in commands:
         assert command in cli.commands
     options = {
         option for command in cli.commands.values() for o in command.params for option in o.opts
     }
-    for option in re.findall(r"`(--[a-z-]+)", TEXT):
-        assert option in options
+    named = set(re.findall(r"`(--[a-z-]+)", TEXT))
+    assert named - options <= OPTIONS_OF_DASK
 
 
 def test_the_table_of_promises_names_tests_that_exist():
     """The table names existing test modules, and no module is missing."""
-    table = TEXT[TEXT.index("| promise | tests |") : TEXT.index("## Scale")]
+    table = (
+        find_page("| promise | tests |").partition("| promise | tests |")[2].partition("\n\n")[0]
+    )
     named = set(re.findall(r"`(test_\w+\.py)`", table))
     here = Path(__file__).parent
     assert all((here / name).is_file() for name in named)
     about = ("runner", "resume", "faults", "clusters", "scale", "files", "bad_input", "study")
     assert {f"test_{name}.py" for name in about} <= named
+
+
+def test_the_contents_of_results_files_are_as_described(tmp_path_factory):
+    """The variables and attributes in the table exist in the file of a named study."""
+    _dataset, path = named_results("rate_step_boundary", tmp_path_factory)
+    table = find_page("<!-- file contents -->").partition("<!-- file contents -->")[2]
+    rows = re.findall(r"^\| (.*?) \| (coordinate|variable|attribute) \|", table, re.MULTILINE)
+    named = {
+        kind: {name for row, of in rows if of == kind for name in re.findall(r"`(\w+)`", row)}
+        for kind in ("coordinate", "variable", "attribute")
+    }
+    assert all(named.values())
+    with xr.open_dataset(path) as dataset:
+        assert named["coordinate"] <= set(dataset.coords)
+        assert named["variable"] - {"NAME_error"} <= set(dataset.data_vars)
+        assert named["attribute"] <= set(dataset.attrs)
 
 
 def test_every_study_is_listed():

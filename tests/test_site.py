@@ -6,6 +6,9 @@ network, and lists all public names.
 
 from __future__ import annotations
 
+import importlib
+import inspect
+import json
 import os
 import re
 import runpy
@@ -17,6 +20,7 @@ from pathlib import Path
 from urllib.parse import unquote, urlsplit
 
 import pytest
+from site_pages import FILES, find_page
 
 import rsfstudy
 from rsfstudy import measures, reductions
@@ -31,6 +35,11 @@ from rsfstudy.vocabulary import QUANTITY_BY_NAME
 
 ROOT = Path(__file__).parent.parent
 SLIDER = ROOT / "rsfstudy" / "slider"
+#: Public namespaces.
+NAMESPACES = (
+    "rsfstudy",
+    *(f"rsfstudy.{name}" for name in ("measures", "reductions", "parts", "fitting", "plots")),
+)
 SLOTS = ("laws", "normal_stress", "fluid", "dynamics", "loading", "temperature")
 
 
@@ -80,18 +89,19 @@ def pages(site) -> dict[Path, Page]:
     return {file: Page(file) for file in sorted(site.rglob("*.html"))}
 
 
-def text_of(pages: dict[Path, Page], name: str) -> str:
-    return next(page.text for file, page in pages.items() if file.name == f"{name}.html")
+def text_of(pages: dict[Path, Page], folder: str) -> str:
+    return "\n".join(page.text for file, page in pages.items() if file.parent.name == folder)
 
 
 def words_in(text: str) -> set[str]:
     return set(re.findall(r"--[\w-]+|\w+", text))
 
 
-def test_every_page_and_every_notebook_is_there(pages):
-    kept = [file for end in ("*.ipynb", "pages/*.md") for file in (ROOT / "studies").glob(end)]
-    needed = {"index", "README", *(file.stem for file in kept)}
-    assert needed <= {file.stem for file in pages}
+def test_every_page_and_every_notebook_is_there(pages, site):
+    kept = [*(ROOT / "studies").glob("*.ipynb"), *FILES[1:]]
+    needed = {site / "index.html"}
+    needed |= {site / file.relative_to(ROOT).with_suffix(".html") for file in kept}
+    assert needed <= set(pages)
 
 
 def test_links_lead_somewhere(pages):
@@ -106,9 +116,11 @@ def test_links_lead_somewhere(pages):
                 assert unquote(parts.fragment) in pages[target].anchors, (file.name, link)
 
 
-def test_nothing_is_loaded_from_the_net(pages):
+def test_nothing_is_loaded_from_the_net(pages, site):
     for file, page in pages.items():
         assert not [link for link in page.loaded if urlsplit(link).netloc], file.name
+    for style in site.rglob("*.css"):
+        assert not re.findall(r"(?:url\(|@import )[\"' ]*(?:https?:)?//", style.read_text()), style
 
 
 def test_nothing_is_left_to_be_made(pages):
@@ -143,7 +155,7 @@ def test_no_symbol_is_taken_for_emphasis(pages):
 
 
 def names() -> Iterator[tuple[str, list[str]]]:
-    """Yield the names that the page of names must contain.
+    """Yield the names that the reference must contain.
 
     The names come from the signature of a scene, the folders of parts, and declarations in
     the code.
@@ -178,20 +190,106 @@ def test_every_name_is_there(pages, kind):
     assert set(NAMES[kind]) <= words_in(text_of(pages, "reference"))
 
 
-def test_every_public_name_has_an_entry(pages):
-    page = next(page for file, page in pages.items() if file.name == "python.html")
-    assert {f"rsfstudy.{name}" for name in rsfstudy.__all__} <= page.anchors
+def test_every_public_object_has_a_page_with_an_example(pages):
+    """Functions and classes of the public namespaces have pages with examples.
+
+    Constants and types are listed on the page of the Python interface.
+    """
+    objects = {file.stem: page for file, page in pages.items() if file.parent.name == "objects"}
+    listed = text_of(pages, "reference")
+    for namespace in NAMESPACES:
+        module = importlib.import_module(namespace)
+        for name in module.__all__:
+            value = getattr(module, name)
+            known = [space for space in NAMESPACES if f"{space}.{name}" in objects]
+            if not known:
+                assert not inspect.isfunction(value), name
+                assert name in words_in(listed), name
+                continue
+            path = f"{known[0]}.{name}"
+            assert path in objects[path].anchors, path
+            assert ">>>" in objects[path].text or getattr(value, "_is_protocol", False), path
     members = {name for name in vars(DatasetAccessor) if not name.startswith("_")}
-    assert {
-        f"{DatasetAccessor.__module__}.DatasetAccessor.{name}" for name in members
-    } <= page.anchors
-    assert {"Law", "Measure", "Loading", "Reduction", "Stepper"} <= words_in(page.text)
+    accessor = f"{DatasetAccessor.__module__}.DatasetAccessor"
+    assert {f"{accessor}.{name}" for name in members} <= objects[accessor].anchors
+    assert "rsfstudy.motion.steppers.Stepper" in objects
+
+
+def test_every_study_has_a_thumbnail_and_a_page(pages):
+    """Thumbnails are small, and no thumbnail belongs to a study that does not exist."""
+    thumbnails = {file.stem: file for file in (ROOT / ".github" / "gallery").glob("*.png")}
+    assert set(thumbnails) == set(rsfstudy.studies())
+    assert all(file.stat().st_size <= 15_000 for file in thumbnails.values())
+    shown = next(page for file, page in pages.items() if file.name == "gallery.html")
+    code = {file.stem: page.text for file, page in pages.items() if file.parent.name == "gallery"}
+    for name in thumbnails:
+        assert any(link.endswith(f"/{name}.png") for link in shown.loaded), name
+        assert f"gallery/{name}.html" in shown.links
+        assert "study = Study(" in code[name], name
+
+
+#: Terms that users search for, with the page that the search should show first.
+SEARCHES = {
+    "AIC": "how_to/fit_many_steps",
+    "stick-slip": "tutorials/your_rig",
+    "ageing law": "explanation/scene",
+    "slip law": "explanation/scene",
+    "radiation damping": "explanation/scene",
+    "critical stiffness": "explanation/scene",
+    "healing": "how_to/measure_healing",
+    "slide-hold-slide": "how_to/measure_healing",
+    "xlook": "how_to/read_a_file",
+    "Excel": "how_to/read_a_file",
+    "MPa": "reference/units",
+    "cluster": "how_to/run_on_a_cluster",
+    "SLURM": "how_to/run_on_a_cluster",
+    "resume": "how_to/resume_a_run",
+    "stress drop": "how_to/find_events",
+    "limit cycle": "explanation/limit_cycles",
+    "standard error": "explanation/noise_and_intervals",
+    "effective sample size": "explanation/noise_and_intervals",
+    "p-value": "explanation/noise_and_intervals",
+    "Sobol indices": "how_to/sample_uncertainty",
+    "NetCDF": "reference/files",
+    "JSON": "reference/json",
+    "MATLAB": "how_to/export_results",
+    "PowerShell": "how_to/install",
+    "critical step": "how_to/compute_one_scene",
+}
+
+
+def test_the_search_shows_the_page_that_answers_first(site):
+    """Each term is a main index entry of a single page.
+
+    The search of Sphinx gives a main index entry that equals the query 100 points. All other
+    matches have fewer points.
+    """
+    text = (site / "searchindex.js").read_text()
+    index = json.loads(text[text.index("(") + 1 : text.rindex(")")])
+    for term, page in SEARCHES.items():
+        entries = index["indexentries"][term.lower()]
+        found = {index["docnames"][number] for number, _anchor, is_main in entries if is_main}
+        assert found == {f"studies/pages/{page}"}, term
+
+
+def test_quick_tests_exist():
+    files = (ROOT / "tests" / "quick.txt").read_text().split()
+    assert len(files) >= 10
+    assert all((ROOT / file).is_file() for file in files)
+    assert "@tests/quick.txt" in find_page("## Run the tests")
+
+
+def test_files_to_copy_exist():
+    table = find_page("<!-- files to copy -->").partition("<!-- files to copy -->")[2]
+    named = re.findall(r"`(\w+/[\w/.]+\.(?:py|csv|md))`", table.partition("\n## ")[0])
+    assert len(named) >= 14
+    assert all((ROOT / file).is_file() for file in named), named
 
 
 def test_starting_points_of_changes_exist():
-    """The files and functions that the page on extensions names exist."""
-    text = (ROOT / "studies" / "pages" / "own_studies.md").read_text()
-    table = text.partition("<!-- starting points -->")[2].partition("To add a command")[0]
+    """The files and functions that the page for contributors names exist."""
+    text = find_page("<!-- starting points -->")
+    table = text.partition("<!-- starting points -->")[2].partition("\n## ")[0]
     found = re.findall(r"`([a-z_/]+\.(?:py|csv))(?:: (\w+))?`", table)
     assert len(found) >= 15
     for path, function in found:

@@ -187,7 +187,7 @@ def list_fit_values(dataset: xr.Dataset) -> list[dict[str, Any]]:
     Returns
     -------
     list of dict
-        One dictionary per fit. The documentation page "Running studies" describes the keys of the
+        One dictionary per fit. The documentation page "JSON output" describes the keys of the
         dictionaries. The fitted parameters have the same names, values and units as in the dataset.
 
     Raises

@@ -1,7 +1,7 @@
 """Base class and field declarations of the parts of a slider.
 
-A scene has six slots: the state evolution law, the normal stress condition, the pore fluid, the
-dynamics, the loading and the temperature. Each choice for a slot is a frozen dataclass derived from
+A scene has seven slots: the state evolution law, the normal stress condition, the pore fluid, the
+dynamics, the loading, the temperature and the noise. Each choice for a slot is a frozen dataclass derived from
 ``Part``, usually in its own module. The class declares the fields of the part with ``number`` and
 ``flag``.
 

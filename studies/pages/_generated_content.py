@@ -15,8 +15,14 @@ from typing import Any
 
 import click
 from _examples import CALLS, SCENES  # type: ignore[import-not-found]
+from _object_pages import (  # type: ignore[import-not-found]
+    NAMESPACES,
+    PublicObject,
+    constants,
+    further_objects,
+    public_objects,
+)
 
-import rsfstudy
 from rsfstudy import Study, measures
 from rsfstudy import reductions as reduce
 from rsfstudy.cli.command_line import cli
@@ -31,21 +37,8 @@ from rsfstudy.study import study_index, study_loader
 from rsfstudy.study.verdict_table import format_published_value
 from rsfstudy.vocabulary import QUANTITY_BY_NAME, find_quantity
 
-#: Modules that define the base classes for user-defined parts, measures and reductions. The keys
-#: are the names of the classes.
-CLASSES = {
-    "Law": "rsfstudy.parts",
-    "LawBase": "rsfstudy.parts",
-    "NormalStress": "rsfstudy.parts",
-    "Fluid": "rsfstudy.parts",
-    "Dynamics": "rsfstudy.parts",
-    "Loading": "rsfstudy.parts",
-    "Measure": "rsfstudy.measures",
-    "Outcome": "rsfstudy.measures",
-    "Output": "rsfstudy.measures",
-    "Reduction": "rsfstudy.reductions",
-    "Stepper": "rsfstudy.motion.steppers",
-}
+#: Headings of the tables of claims.
+CLAIM_HEADINGS = ("id", "claim", "source", "published", "tolerance", "differs because")
 
 
 def fill_page(text: str) -> str:
@@ -74,7 +67,7 @@ def escape_asterisks(text: str) -> str:
 
     Unescaped asterisks would start emphasised text.
 
-    Code is not changed.
+    Code and formulas are not changed.
 
     Parameters
     ----------
@@ -87,7 +80,7 @@ def escape_asterisks(text: str) -> str:
         Page with escaped asterisks.
     """
     parts = re.split(
-        r"((?:^    [^\n]*\n)+|^```.*?^```|`[^`\n]+(?:\n[^`\n]+)*`)",
+        r"((?:^    [^\n]*\n)+|^```.*?^```|`[^`\n]+(?:\n[^`\n]+)*`|\$\$.*?\$\$|\$[^$\n]+\$)",
         text,
         flags=re.MULTILINE | re.DOTALL,
     )
@@ -287,7 +280,7 @@ def _slot(slot: part_registry.Slot) -> str:
         if not slot.part_class_by_selecting_field
         else " A choice is selected if you pass one of its fields."
     )
-    return f"### {slot.name}\n\n{slot.long_name.capitalize()}.{called}\n\n{made}"
+    return f"## {slot.name}\n\n{slot.long_name.capitalize()}.{called}\n\n{made}"
 
 
 def equation(part: type[Part]) -> str:
@@ -406,7 +399,7 @@ def _measure(kind: type[Measure], example: Measure | None) -> str:
     home = f"`from {source.__name__} import {kind.__name__}`"
     stated = (study.measure for study in _studies().values())
     words = f"{first_paragraph(kind)} {headline} {home}{_format_call(kind, stated)}"
-    return "\n\n".join(filter(None, (f"### {kind.__name__}", words, taken, given)))
+    return "\n\n".join(filter(None, (f"## {kind.__name__}", words, taken, given)))
 
 
 @cache
@@ -496,7 +489,7 @@ def reductions() -> str:
     )
     stated = [one for study in _studies().values() for one in study.reductions]
     return "\n\n".join(
-        f"### {kind.__name__}\n\n{first_paragraph(kind)}{_format_call(kind, stated)}\n\n"
+        f"## {kind.__name__}\n\n{first_paragraph(kind)}{_format_call(kind, stated)}\n\n"
         + markdown_table(("field", "default", "meaning"), _describe_fields(kind))
         for kind in own
     )
@@ -511,14 +504,33 @@ def claims() -> str:
         Table in Markdown.
     """
     rows = (
-        (f"`{name}`", claim.id, strip_markup(claim.statement), strip_markup(claim.source),
-         format_published_value(claim.describe()), claim.tolerance,
-         strip_markup(claim.difference_reason))
-        for name, study in _studies().items()
-        for claim in study.claims
-    )  # fmt: skip
-    headings = ("study", "id", "claim", "source", "published", "tolerance", "differs because")
-    return markdown_table(headings, rows)
+        (f"[`{name}`](../gallery/{name}.md)", *row) for name in _studies() for row in _claims(name)
+    )
+    return markdown_table(("study", *CLAIM_HEADINGS), rows)
+
+
+def claims_of(name: str) -> str:
+    """Format a table of the claims of a study.
+
+    Parameters
+    ----------
+    name : str
+        Name of the study.
+
+    Returns
+    -------
+    str
+        Table in Markdown. The string is empty if the study has no claims.
+    """
+    return markdown_table(CLAIM_HEADINGS, _claims(name))
+
+
+def _claims(name: str) -> Iterator[tuple[object, ...]]:
+    """Yield the table row of each claim of a study."""
+    for claim in _studies()[name].claims:
+        yield (claim.id, strip_markup(claim.statement), strip_markup(claim.source),
+               format_published_value(claim.describe()), claim.tolerance,
+               strip_markup(claim.difference_reason))  # fmt: skip
 
 
 def statuses() -> str:
@@ -537,24 +549,20 @@ def statuses() -> str:
 
 
 def vocabulary() -> str:
-    """Format a table of the common vocabulary, without fields of scenes.
+    """Format a table of all symbols and variables, with their units and names.
 
     Returns
     -------
     str
-        Table in Markdown.
+        Table in Markdown, in the order of the names.
     """
+    abouts = {about.name: about for about in part_registry.SCENE_FIELD_QUANTITIES}
     rows = (
-        (
-            f"`{about.name}`",
-            html_symbol(about.symbol),
-            html_unit(about),
-            strip_markup(about.long_name),
-        )
-        for about in QUANTITY_BY_NAME.values()
-        if about.name not in part_registry.SCENE_FIELD_NAMES
-    )
-    return markdown_table(("name", "symbol", "unit", "meaning"), rows)
+        (f"`{name}`", html_symbol(about.symbol), html_unit(about), strip_markup(about.long_name),
+         "field" if name in abouts else "result")
+        for name, about in sorted((abouts | QUANTITY_BY_NAME).items())
+    )  # fmt: skip
+    return markdown_table(("name", "symbol", "unit", "meaning", "kind"), rows)
 
 
 # ---- the command line, and Python ----------------------------------------------------------------
@@ -586,7 +594,7 @@ def _command(name: str, command: click.Command) -> str:
     )
     words = strip_markup(inspect.cleandoc((command.help or "").split("\f")[0]).replace("\b\n", ""))
     made = markdown_table(("option", "default", "meaning"), rows)
-    return f"### rsfstudy {name}\n\n`rsfstudy {name} {taken}`\n\n{words}\n\n{made}"
+    return f"## rsfstudy {name}\n\n`rsfstudy {name} {taken}`\n\n{words}\n\n{made}"
 
 
 def _describe_option(option: click.Option) -> str:
@@ -597,58 +605,42 @@ def _describe_option(option: click.Option) -> str:
 
 
 def python() -> str:
-    """Format the autodoc entries of the public names.
+    """Format tables of the public functions and classes, with links to their pages.
 
     Returns
     -------
     str
         Sections in Markdown.
     """
-    return "\n\n".join(map(_entry, rsfstudy.__all__))
+    sections = [
+        f"## {heading}\n\n{_intro(namespace)}{_object_table(public_objects(namespace))}"
+        for namespace, heading in NAMESPACES.items()
+    ]
+    further = f"## Further classes\n\n{_object_table(further_objects())}"
+    pages = [one.path for name in NAMESPACES for one in public_objects(name)]
+    pages += [one.path for one in further_objects()]
+    contents = "".join(f"objects/{page}\n" for page in pages)
+    return "\n\n".join((*sections, further, f"```{{toctree}}\n:hidden:\n{contents}```"))
 
 
-def accessor() -> str:
-    """Format the autodoc entry of ``dataset.rsf``.
-
-    Returns
-    -------
-    str
-        Directive in Markdown.
-    """
-    return _rst("autoclass:: rsfstudy.api.accessor.DatasetAccessor", "members:")
+def _intro(namespace: str) -> str:
+    """Format the sentence that names a namespace and the constants in it."""
+    others = ", ".join(f"`{name}`" for name in constants(namespace))
+    words = f"Import these names from `{namespace}`."
+    return f"{words} Constants and types: {others}.\n\n" if others else f"{words}\n\n"
 
 
-def classes() -> str:
-    """Format the autodoc entries of the base classes for user-defined studies.
-
-    Returns
-    -------
-    str
-        Sections in Markdown.
-    """
-    return "\n\n".join(
-        f"### {name}\n\n" + _rst(f"autoclass:: {home}.{name}", "members:", "show-inheritance:")
-        for name, home in CLASSES.items()
+def _object_table(objects: Iterable[PublicObject]) -> str:
+    """Format a table of objects with links to their pages."""
+    rows = (
+        (f"[`{one.title}`](objects/{one.path}.md)", strip_markup(one.summary)) for one in objects
     )
-
-
-def _entry(name: str) -> str:
-    """Format the autodoc entry of a public name."""
-    kind = "class" if isinstance(getattr(rsfstudy, name), type) else "function"
-    return f"### {name}\n\n" + _rst(
-        f"auto{kind}:: rsfstudy.{name}", *["members:"] * (kind == "class")
-    )
-
-
-def _rst(directive: str, *options: str) -> str:
-    """Format a reStructuredText directive in Markdown."""
-    lines = "".join(f"   :{option}\n" for option in options)
-    return f"```{{eval-rst}}\n.. {directive}\n{lines}```"
+    return markdown_table(("object", "summary"), rows)
 
 
 #: Functions that generate the content, by name.
 MADE: dict[str, Callable[[], str]] = {
     one.__name__: one
     for one in (scene_fields, parts, rig, every_measure, reductions, claims, statuses, vocabulary,
-                commands, python, accessor, classes)
+                commands, python)
 }  # fmt: skip

@@ -10,7 +10,7 @@ from typing import Any
 
 from second_referee_way import PROBLEMS, read_stated_problem
 
-PAGE = Path(__file__).parents[2] / "studies" / "pages" / "referee.md"
+PAGE = Path(__file__).parents[2] / "studies" / "pages" / "reference" / "referee.md"
 PROBLEMS_MARKER = "<!-- problems: written by tests/benchmarks/referee_page.py -->\n"
 #: Wording of the conventions on the page, by their wording in the problem files. Problem files
 #: never change, so the page rephrases their sentences.

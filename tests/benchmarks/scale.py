@@ -173,7 +173,7 @@ COLUMNS = {
 
 
 def main(largest: int) -> None:
-    """Print the table of ``studies/pages/running.md``."""
+    """Print the table of ``studies/pages/explanation/accuracy_and_cost.md``."""
     print(f"| cells | engine | workers | {' | '.join(COLUMNS.values())} |")
     print("|---" * (3 + len(COLUMNS)) + "|")
     sizes = [size for size in (10**3, 10**4, 10**5, 10**6) if size <= largest]

@@ -51,7 +51,7 @@ class SobolIndices(Reduction):
     References
     ----------
     .. [1] Saltelli et al. (2010), Variance based sensitivity analysis of model output. Computer
-    Physics Communications 181, 259-270.
+       Physics Communications 181, 259-270.
 
     Examples
     --------

@@ -239,7 +239,7 @@ class StandardDeviation(_SampleStatistic):
     References
     ----------
     .. [1] Efron and Stein (1981), The jackknife estimate of variance. Annals of Statistics 9,
-    586-596.
+       586-596.
 
     Examples
     --------
@@ -279,7 +279,7 @@ class StandardDeviation(_SampleStatistic):
         References
         ----------
         .. [1] Efron and Stein (1981), The jackknife estimate of variance. Annals of Statistics 9,
-        586-596.
+           586-596.
         """
         count, apart = of.notnull().sum(self.over), of - of.mean(self.over)
         rest = (apart**2).sum(self.over) - apart**2 * count / (count - 1.0)
