@@ -16,14 +16,15 @@ coefficient of variation of the recurrence interval is :math:`\epsilon \sqrt{D}/
 
 import math
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import ClassVar, NamedTuple
 
 import numpy as np
 from scipy.integrate import solve_ivp
 
-from rsfstudy import Integrator, Scene
+from rsfstudy import Accuracy, Integrator, Scene
 from rsfstudy.errors import InvalidValue
-from rsfstudy.measures import LimitCycle, Measure, Outcome, Output, Status
+from rsfstudy.measures import EventStatistics, LimitCycle, Measure, Outcome, Output, Status
 from rsfstudy.motion import EventKind, rise
 
 #: Number of cycles after which the motion is on the limit cycle, and number of cycles after which
@@ -31,6 +32,8 @@ from rsfstudy.motion import EventKind, rise
 CYCLES_TO_CYCLE, CYCLES_TO_ADJOINT = 12, 8
 #: Tolerance of the adjoint solution, and step of its difference quotients, relative to a.
 ADJOINT_TOLERANCE, RELATIVE_STEP = 1e-9, 1e-5
+#: Requested accuracy of the phase response.
+THEORY_ACCURACY = Accuracy(rtol=1e-9, engine="compiled")
 
 
 class _CycleStart(NamedTuple):
@@ -193,3 +196,53 @@ class _AdjointSolution:
             )
             z = result.y[: len(z), -1]
         return -float(result.y[-2, -1]), -float(result.y[-1, -1])
+
+
+@lru_cache(maxsize=8)
+def compute_phase_response(scene: Scene) -> Outcome:
+    """Compute the phase response of a scene without its noise.
+
+    Parameters
+    ----------
+    scene : Scene
+        Scene without noise.
+
+    Returns
+    -------
+    Outcome
+        Outcome of ``PhaseResponse``.
+    """
+    return PhaseResponse()(scene, THEORY_ACCURACY)
+
+
+@dataclass(frozen=True)
+class NoisyRecurrence(EventStatistics):
+    """Statistics of the events, and the theory for weak noise of the shear stress.
+
+    The fields are described in ``EventStatistics``.
+    """
+
+    name: ClassVar[str] = "noisy_recurrence"
+    outputs = (
+        *EventStatistics.outputs,
+        Output(
+            "interval_cv_theory",
+            "$CV$",
+            "1",
+            "coefficient of variation of the recurrence interval by the phase response",
+        ),
+        *PhaseResponse.outputs,
+    )
+
+    def compute(self, scene: Scene, integrator: Integrator) -> Outcome:
+        """Compute the statistics and the theory.
+
+        See ``EventStatistics.compute``.
+        """
+        outcome = super().compute(scene, integrator)
+        theory = compute_phase_response(scene.with_(noise="none"))
+        if Status.OK not in (outcome.status, theory.status) or not theory.values:
+            return outcome
+        expected = scene.stress_noise * theory.values["stress_noise_sensitivity"]
+        values = {**outcome.values, **theory.values, "interval_cv_theory": expected}
+        return Outcome(outcome.status, values, outcome.message)

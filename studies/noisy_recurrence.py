@@ -11,18 +11,16 @@ events, the CV would be 14 % lower.
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from functools import lru_cache
 from typing import ClassVar
 
 import numpy as np
 import xarray as xr
 
-from rsfstudy import Accuracy, Axis, Claim, Figure, Integrator, Panel, Scene, Study
-from rsfstudy.measures import EventStatistics, Outcome, Output, Status
+from rsfstudy import Accuracy, Axis, Claim, Figure, Panel, Scene, Study
 from rsfstudy.reductions import Mean, Reduction
 from rsfstudy.study.figure_declarations import Axes
 
-from ._phase_response import PhaseResponse
+from ._phase_response import NoisyRecurrence
 
 #: Amplitudes of the noise. The theory is linear in the amplitude, and valid for all but the last.
 AMPLITUDES = (1e-5, 3e-5, 1e-4, 3e-4, 1e-3)
@@ -33,62 +31,10 @@ LARGEST_WEAK_AMPLITUDE = 3e-4
 LONG_RUN_DEVIATION = 0.015
 #: Number of seeds, and number of recurrence intervals per seed.
 SEEDS, CYCLES = 4, 5000
-#: Requested accuracy of the phase response.
-THEORY_ACCURACY = Accuracy(rtol=1e-9, engine="compiled")
 INDEPENDENT = "independent integration of the equations, with stochastic Runge-Kutta steps (SRA1)"
 #: Result of the adjoint equations and of the limit cycle in an independent program.
 STRESS_SENSITIVITY, JOINT_SENSITIVITY = 220.448392, 187.549556
 LIMIT_CYCLE_INTERVAL = 27.9378083295
-
-
-@lru_cache(maxsize=8)
-def compute_phase_response(scene: Scene) -> Outcome:
-    """Compute the phase response of a scene without its noise.
-
-    Parameters
-    ----------
-    scene : Scene
-        Scene without noise.
-
-    Returns
-    -------
-    Outcome
-        Outcome of ``PhaseResponse``.
-    """
-    return PhaseResponse()(scene, THEORY_ACCURACY)
-
-
-@dataclass(frozen=True)
-class NoisyRecurrence(EventStatistics):
-    """Statistics of the events, and the theory for weak noise of the shear stress.
-
-    The fields are described in ``EventStatistics``.
-    """
-
-    name: ClassVar[str] = "noisy_recurrence"
-    outputs = (
-        *EventStatistics.outputs,
-        Output(
-            "interval_cv_theory",
-            "$CV$",
-            "1",
-            "coefficient of variation of the recurrence interval by the phase response",
-        ),
-        *PhaseResponse.outputs,
-    )
-
-    def compute(self, scene: Scene, integrator: Integrator) -> Outcome:
-        """Compute the statistics and the theory.
-
-        See ``EventStatistics.compute``.
-        """
-        outcome = super().compute(scene, integrator)
-        theory = compute_phase_response(scene.with_(noise="none"))
-        if Status.OK not in (outcome.status, theory.status) or not theory.values:
-            return outcome
-        expected = scene.stress_noise * theory.values["stress_noise_sensitivity"]
-        values = {**outcome.values, **theory.values, "interval_cv_theory": expected}
-        return Outcome(outcome.status, values, outcome.message)
 
 
 @dataclass(frozen=True)

@@ -15,7 +15,7 @@ from rsfstudy.errors import InvalidValue
 from rsfstudy.measures import CriticalStep, EventStatistics, LimitCycle
 from rsfstudy.motion import rise
 from rsfstudy.motion.events import EventKind
-from rsfstudy.slider.noise._paths import Path
+from rsfstudy.slider.noise_paths import Path
 from rsfstudy.status import Status
 
 BASE = Scene(

@@ -77,6 +77,9 @@ class Scene(SceneFunctions, SceneQuantities):
     temperature : str or type, default: "isothermal"
         Temperature. With "isothermal", temperature is constant. With "shear_heating", the work of
         the shear stress heats the fault. A user-defined class is also accepted.
+    noise : str or type, default: "none"
+        Noise that is added to the loading. With "white", the noise of the stresses is a Wiener
+        process. With "correlated", the noise is bounded and has a correlation time.
     a : float, default: 0.0145
         Direct effect parameter.
     mu_star : float, default: 0.76
@@ -210,9 +213,6 @@ class Scene(SceneFunctions, SceneQuantities):
         Cooling rate :math:`c_{th} D_c/V_*`, for scenes with shear heating.
     direct_activation, evolution_activation : float, default: 0.0
         Activation terms :math:`Q/(R T_*)` of the direct effect and of the evolution effect.
-    noise : str or type, default: "none"
-        Noise that is added to the loading. With "white", the noise of the stresses is a Wiener
-        process. With "correlated", the noise is bounded and has a correlation time.
     stress_noise, normal_stress_noise : float, default: 0.0
         Amplitudes of the noise of shear stress and normal stress, in :math:`\sigma_*` per
         :math:`\sqrt{D_c/V_*}`.

@@ -5,17 +5,14 @@ modules automatically. Noise is a sampled path, not a term of the equations. Bet
 the stress changes at a constant rate, and the integrators follow the resulting motion to their
 tolerance. For noise that is independent of the motion, the motion converges to the solution of the
 stochastic differential equation as the sampling interval decreases (Wong-Zakai theorem). The module
-``_paths`` computes the paths from the seed. The base class is ``Noise``.
+``noise_paths`` computes the paths from the seed. The base class is ``Noise``.
 """
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import ClassVar
-
-import numpy as np
+from typing import Any, ClassVar
 
 from rsfstudy.quantities import Quantity
 from rsfstudy.slider.loading import ramp
@@ -81,7 +78,7 @@ class Noise(Part):
         """
         return (0.0,) * len(self.unknowns)
 
-    def iterate_segments(self, start: float, end: float, velocity: float) -> Iterator[np.ndarray]:
+    def iterate_segments(self, start: float, end: float, velocity: float) -> Iterator[Any]:
         """Yield the segment table of the noise in blocks.
 
         Parameters
@@ -91,23 +88,22 @@ class Noise(Part):
         velocity : float
             Load point velocity :math:`V_0/V_*` during the loading segment.
 
-        Yields
-        ------
-        ndarray of shape (rows, 7)
+        Returns
+        -------
+        iterator of ndarray of shape (rows, 7)
             Successive rows of the segment table, whose columns ``parameter_layout`` defines.
+
+        Raises
+        ------
+        TypeError
+            If the noise is not active.
         """
-        nothing = math.nan, math.nan, 0.0
-        yield np.array([[start, end, velocity, _log_magnitude(velocity), *nothing]])
+        raise TypeError(f"{self.name} has no path")
 
 
 _NORMAL_STRESS_UNKNOWNS = (
     Quantity("noise_fall", "$P$", "1", "fall of normal stress by noise", "sigma_*"),
 )
-
-
-def _log_magnitude(velocity: float) -> float:
-    """Return the logarithm of the magnitude of a velocity."""
-    return math.log(abs(velocity)) if velocity else -math.inf
 
 
 BUILT_IN_PARTS = discover_parts(__name__, __path__)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from rsfstudy.slider.noise._paths import Path
+from rsfstudy.slider import noise_paths
 from rsfstudy.slider.noise.white import WhiteNoise
 from rsfstudy.slider.parts import POSITIVE, Numbers, number
 from rsfstudy.slider.scene_view import SceneView
@@ -53,9 +53,9 @@ class CorrelatedNoise(WhiteNoise):
         """
         return super().parameter_values(scene)
 
-    def path(self, stream: int) -> Path:
+    def path(self, stream: int) -> noise_paths.Path:
         """Return the path of unit noise.
 
         See ``WhiteNoise.path``.
         """
-        return Path(int(self.noise_seed), stream, self.noise_correlation_time)
+        return noise_paths.Path(int(self.noise_seed), stream, self.noise_correlation_time)

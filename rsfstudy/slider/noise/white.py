@@ -2,15 +2,13 @@ r"""White noise, whose path is a Wiener process."""
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterator
 from dataclasses import dataclass
-
-import numpy as np
+from typing import Any
 
 from rsfstudy.errors import InvalidValue
-from rsfstudy.slider.noise import Noise, _log_magnitude
-from rsfstudy.slider.noise._paths import Path
+from rsfstudy.slider import noise_paths
+from rsfstudy.slider.noise import Noise
 from rsfstudy.slider.parts import (
     NON_NEGATIVE,
     NON_NEGATIVE_INTEGER,
@@ -19,14 +17,6 @@ from rsfstudy.slider.parts import (
     number,
 )
 from rsfstudy.slider.scene_view import SceneView
-
-#: Number of samples that are computed at once.
-_SAMPLES_PER_BLOCK = 4096
-#: Smallest distance between the start or end of a loading segment and a sample, relative to the
-#: sampling interval. Closer samples are left out, because rounding errors dominate the distance.
-_MIN_DISTANCE_OVER_INTERVAL = 1e-9
-#: Numbers of the independent paths of shear stress and normal stress.
-_SHEAR_STREAM, _NORMAL_STREAM = 0, 1
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -139,7 +129,7 @@ class WhiteNoise(Noise):
         """
         return (0.0,) * len(self.unknowns)
 
-    def path(self, stream: int) -> Path:
+    def path(self, stream: int) -> noise_paths.Path:
         """Return the path of unit noise.
 
         Parameters
@@ -152,38 +142,15 @@ class WhiteNoise(Noise):
         Path
             Path whose samples are multiplied by the amplitude.
         """
-        return Path(int(self.noise_seed), stream)
+        return noise_paths.Path(int(self.noise_seed), stream)
 
-    def iterate_segments(self, start: float, end: float, velocity: float) -> Iterator[np.ndarray]:
+    def iterate_segments(self, start: float, end: float, velocity: float) -> Iterator[Any]:
         """Yield the segment table of the noise in blocks.
 
         See ``Noise.iterate_segments``.
         """
-        interval = self.noise_interval
-        first = math.floor(start / interval + _MIN_DISTANCE_OVER_INTERVAL)
-        stop, late = end / interval - _MIN_DISTANCE_OVER_INTERVAL, start - first * interval
-        while first < stop:
-            count = math.ceil(min(stop - first, _SAMPLES_PER_BLOCK))
-            times = interval * np.arange(first, first + count + 1)
-            times[0] += late
-            if first + count >= stop:
-                times[-1] = end
-            shear = self._values_and_rates(self.stress_noise, _SHEAR_STREAM, first, count)[1]
-            fall = rate = np.full(count, math.nan)
-            if self.unknowns:
-                amplitude = self.normal_stress_noise
-                values, rate = self._values_and_rates(amplitude, _NORMAL_STREAM, first, count)
-                fall = -values
-                fall[0] -= late * rate[0]
-            steady = np.full(count, velocity), np.full(count, _log_magnitude(velocity))
-            yield np.column_stack((times[:-1], times[1:], *steady, rate, fall, shear))
-            first, late = first + count, 0.0
-
-    def _values_and_rates(
-        self, amplitude: float, stream: int, first: int, count: int
-    ) -> tuple[np.ndarray, np.ndarray]:
-        """Return the noise at the samples, and its rates after the samples."""
-        if not amplitude:
-            return np.zeros(count), np.zeros(count)
-        values = amplitude * self.path(stream).sample(self.noise_interval, first, count + 1)
-        return values[:-1], np.diff(values) / self.noise_interval
+        shear = self.path(0), self.stress_noise
+        normal = (self.path(1), self.normal_stress_noise) if self.unknowns else None
+        return noise_paths.iterate_segments(
+            start, end, velocity, self.noise_interval, shear, normal
+        )

@@ -14,6 +14,7 @@ computed without the preceding sections.
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 from typing import NamedTuple
 
 import numpy as np
@@ -21,6 +22,11 @@ from scipy.special import ndtri
 
 #: Binary exponent of the base interval: it is at least 2**31 and less than 2**32.
 _BASE_EXPONENT = 32
+#: Number of samples that are computed at once.
+_SAMPLES_PER_BLOCK = 4096
+#: Smallest distance between the start or end of a loading segment and a sample, relative to the
+#: sampling interval. Closer samples are left out, because rounding errors dominate the distance.
+_MIN_DISTANCE_OVER_INTERVAL = 1e-9
 #: Number of words that the generator returns for each value of its counter.
 _WORDS_PER_COUNT = 4
 
@@ -123,3 +129,61 @@ class Path(NamedTuple):
         words = np.atleast_1d(generator.random_raw(skipped + count))[skipped:]
         uniform = ((words >> np.uint64(11)).astype(float) + 0.5) * 2.0**-53
         return np.asarray(ndtri(uniform))
+
+
+def iterate_segments(
+    start: float,
+    end: float,
+    velocity: float,
+    interval: float,
+    shear: tuple[Path, float],
+    normal: tuple[Path, float] | None,
+) -> Iterator[np.ndarray]:
+    r"""Yield the segment table of noise in blocks.
+
+    Parameters
+    ----------
+    start, end : float
+        Start and end of a loading segment in :math:`D_c/V_*`. The end may be infinite.
+    velocity : float
+        Load point velocity :math:`V_0/V_*` during the loading segment.
+    interval : float
+        Sampling interval of the noise.
+    shear : tuple of (Path, float)
+        Path and amplitude of the noise of shear stress.
+    normal : tuple of (Path, float) or None
+        Path and amplitude of the noise of normal stress.
+
+    Yields
+    ------
+    ndarray of shape (rows, 7)
+        Successive rows of the segment table, whose columns ``parameter_layout`` defines.
+    """
+    first = math.floor(start / interval + _MIN_DISTANCE_OVER_INTERVAL)
+    stop, late = end / interval - _MIN_DISTANCE_OVER_INTERVAL, start - first * interval
+    log_velocity = math.log(abs(velocity)) if velocity else -math.inf
+    while first < stop:
+        count = math.ceil(min(stop - first, _SAMPLES_PER_BLOCK))
+        times = interval * np.arange(first, first + count + 1)
+        times[0] += late
+        if first + count >= stop:
+            times[-1] = end
+        fall = rate = np.full(count, math.nan)
+        if normal is not None:
+            values, rate = _values_and_rates(*normal, interval, first, count)
+            fall = -values
+            fall[0] -= late * rate[0]
+        noise_rate = _values_and_rates(*shear, interval, first, count)[1]
+        steady = np.full(count, velocity), np.full(count, log_velocity)
+        yield np.column_stack((times[:-1], times[1:], *steady, rate, fall, noise_rate))
+        first, late = first + count, 0.0
+
+
+def _values_and_rates(
+    path: Path, amplitude: float, interval: float, first: int, count: int
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return the noise at the samples, and its rates after the samples."""
+    if not amplitude:
+        return np.zeros(count), np.zeros(count)
+    values = amplitude * path.sample(interval, first, count + 1)
+    return values[:-1], np.diff(values) / interval
