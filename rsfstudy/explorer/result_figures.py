@@ -15,16 +15,12 @@ from bokeh.events import Tap
 from bokeh.models import (
     ColorBar,
     ColumnDataSource,
-    FixedTicker,
     HoverTool,
-    LinearColorMapper,
     LinearScale,
-    LogColorMapper,
     Range1d,
     TapTool,
     Whisker,
 )
-from bokeh.palettes import Viridis256
 from bokeh.plotting import figure
 
 from rsfstudy.explorer.result_arrays import (
@@ -40,8 +36,17 @@ from rsfstudy.explorer.result_arrays import (
     thin_points,
     to_plain_text,
 )
+from rsfstudy.explorer.result_scales import (
+    colour_scale,
+    flag_names,
+    is_log_axis,
+    is_numeric,
+    label_ticks,
+    map_colour,
+    ticks,
+    value_mapper,
+)
 from rsfstudy.explorer.result_selections import Selection
-from rsfstudy.formatting import read_flag_meanings
 from rsfstudy.plots import (
     are_log_spaced,
     are_positive_and_span_decades,
@@ -56,8 +61,6 @@ from rsfstudy.status import Status
 #: Function that receives the number of the cell that the user clicks.
 OnCell = Callable[[int], None]
 
-#: Number of curves above which a numeric colour dimension has a colour scale.
-_MAX_CURVES_WITH_NAMES = 7
 #: Number of points of a curve above which its markers are small, and maximum number of points that
 #: the pointer can select.
 _MAX_POINTS_WITH_MARKERS, _MAX_SELECTABLE_POINTS = 60, 6000
@@ -75,8 +78,6 @@ _STATUS_SYMBOLS = (
 )  # fmt: skip
 #: Colours of symbols of failures and of other statuses, and colour of cells without a value.
 _FAILURE_COLOUR, _ANSWER_COLOUR, _EMPTY_COLOUR = "#D55E00", "#444444", "#e4e4e4"
-#: Palette of Okabe and Ito for variables with flags.
-_FLAG_COLOURS = ("#0072B2", "#E69F00", "#009E73", "#CC79A7", "#56B4E9", "#F0E442", "#D55E00")
 
 
 class Plot:
@@ -108,7 +109,7 @@ class Plot:
         self.figure: Any = figure(
             height=height,
             sizing_mode="stretch_width",
-            x_axis_type="log" if _is_log_axis(dataset, panel.x) else "linear",
+            x_axis_type="log" if is_log_axis(dataset, panel.x) else "linear",
             y_axis_type=self.choose_y_type(dataset, panel),
             tools="pan,wheel_zoom,box_zoom,reset,tap",
             toolbar_location="above",
@@ -117,8 +118,8 @@ class Plot:
         self.figure.xaxis.axis_label = to_plain_text(format_axis_label(dataset, panel.x, 200))
         self.figure.axis.axis_label_text_font_style = "normal"
         self.figure.axis.axis_label_text_font_size = "12px"
-        if not _is_numeric(dataset[panel.x]):
-            _label_ticks(self.figure.xaxis, dict(enumerate(map(str, dataset[panel.x].values))))
+        if not is_numeric(dataset[panel.x]):
+            label_ticks(self.figure.xaxis, dict(enumerate(map(str, dataset[panel.x].values))))
         self.draw(dataset, panel)
         if self.figure.legend:
             self.figure.add_layout(self.figure.legend[0], "below")
@@ -189,7 +190,7 @@ class CurvesPlot(Plot):
     def choose_y_type(self, dataset: xr.Dataset, panel: Selection) -> str:
         """Return "log" if all values of the variable are positive and span decades."""
         is_log = are_positive_and_span_decades(dataset[panel.variable].values)
-        return "log" if is_log and not _flag_names(dataset, panel.variable) else "linear"
+        return "log" if is_log and not flag_names(dataset, panel.variable) else "linear"
 
     def draw(self, dataset: xr.Dataset, panel: Selection) -> None:
         """Add curves, points, error bars, statuses, tooltips and a colour scale."""
@@ -202,7 +203,7 @@ class CurvesPlot(Plot):
         bars = Whisker(base="x", lower="low", upper="high", source=self.points)
         bars.upper_head.size = bars.lower_head.size = 6
         self.figure.add_layout(bars)
-        mapper = _colour_scale(dataset, panel.second)
+        mapper = colour_scale(dataset, panel.second)
         named: Any = {"legend_field": "name"} if panel.second and not mapper else {}
         points = self.figure.scatter(
             "x", "y", marker="marker", color="color", size="size", source=self.points,
@@ -222,7 +223,7 @@ class CurvesPlot(Plot):
             title = to_plain_text(format_axis_label(dataset, panel.second, 200))
             bar = ColorBar(color_mapper=mapper, title=title, title_text_font_style="normal")
             self.figure.add_layout(bar, "right")
-        _label_ticks(self.figure.yaxis, _flag_names(dataset, panel.variable))
+        label_ticks(self.figure.yaxis, flag_names(dataset, panel.variable))
 
     def _select(self, _name: str, _old: Any, _new: Any) -> None:
         """Call ``on_cell`` with the cell of the selected point or symbol."""
@@ -258,12 +259,12 @@ def _curve_styles(
     with style_context():
         cycled = [cycle_style(c.number) for c in curves]
     colours, dashes = [s["color"] for s in cycled], [s["linestyle"] for s in cycled]
-    if mapper := _colour_scale(dataset, panel.second):
+    if mapper := colour_scale(dataset, panel.second):
         points = dataset[panel.second].values.astype(float)
-        colours = [_map_colour(mapper, points[c.number]) for c in curves]
+        colours = [map_colour(mapper, points[c.number]) for c in curves]
         dashes = ["-"] * len(curves)
     is_recorded = panel.x in dataset.data_vars
-    is_number = _is_numeric(dataset[panel.x]) and not _flag_names(dataset, panel.variable)
+    is_number = is_numeric(dataset[panel.x]) and not flag_names(dataset, panel.variable)
     has_line = is_number and (is_recorded or all(_is_monotonic(c.x) for c in curves))
     return [
         {
@@ -311,7 +312,7 @@ class MapPlot(Plot):
 
     def choose_y_type(self, dataset: xr.Dataset, panel: Selection) -> str:
         """Return "log" if the points along y are spaced logarithmically."""
-        return "log" if _is_log_axis(dataset, panel.second) else "linear"
+        return "log" if is_log_axis(dataset, panel.second) else "linear"
 
     def draw(self, dataset: xr.Dataset, panel: Selection) -> None:
         """Add the image, its colour scale, the symbols of statuses and the tooltips."""
@@ -320,8 +321,8 @@ class MapPlot(Plot):
         self.chosen = ColumnDataSource({"x": [], "y": []})
         self.figure.grid.visible = False
         self.figure.background_fill_color = _EMPTY_COLOUR
-        flags = _flag_names(dataset, panel.variable)
-        mapper = _value_mapper(dataset[panel.variable].values, flags)
+        flags = flag_names(dataset, panel.variable)
+        mapper = value_mapper(dataset[panel.variable].values, flags)
         drawn = self.figure.image(
             image="image", x="x", y="y", dw="dw", dh="dh", source=self.image, color_mapper=mapper
         )
@@ -335,7 +336,7 @@ class MapPlot(Plot):
         title = to_plain_text(format_axis_label(dataset, panel.variable, 200))
         bar = ColorBar(color_mapper=mapper, title=title, title_text_font_style="normal")
         if flags:
-            bar.ticker, bar.major_label_overrides = _ticks(dict(enumerate(flags.values())))
+            bar.ticker, bar.major_label_overrides = ticks(dict(enumerate(flags.values())))
         self.figure.add_layout(bar, "right")
         self.figure.on_event(Tap, self._select)
 
@@ -352,7 +353,7 @@ class MapPlot(Plot):
         super().update(dataset, panel)
         self.map = found = map_of_panel(dataset, panel)
         values, (x, y) = _image_of_map(found)
-        if flags := _flag_names(dataset, panel.variable):
+        if flags := flag_names(dataset, panel.variable):
             numbers = np.searchsorted(list(flags), values).astype(float)
             values = np.where(np.isfinite(values), numbers, np.nan)
         self.image.data = {
@@ -377,67 +378,3 @@ def _image_of_map(found: Map) -> tuple[np.ndarray, list[tuple[float, float]]]:
         is_even = is_even and bool(np.ptp(sizes) < 1e-6 * sizes[0])
         limits.append((float(edges[0]), float(edges[-1])))
     return (found.values if is_even else sample_map(found, limits[0], limits[1], _PIXELS)), limits
-
-
-# ---- scales and labels ---------------------------------------------------------------------------
-
-
-def _is_numeric(values: xr.DataArray) -> bool:
-    """Return True if values are numbers."""
-    return values.dtype.kind in "iuf"
-
-
-def _is_log_axis(dataset: xr.Dataset, name: str) -> bool:
-    """Return True if the values of a coordinate are spaced logarithmically."""
-    values = dataset[name]
-    return _is_numeric(values) and values.ndim == 1 and are_log_spaced(values.values)
-
-
-def _colour_scale(dataset: xr.Dataset, dimension: str) -> Any:
-    """Return the colour mapper of a numeric dimension with many points, or None."""
-    if not dimension or not _is_numeric(dataset[dimension]):
-        return None
-    points = dataset[dimension].values.astype(float)
-    if points.size <= _MAX_CURVES_WITH_NAMES:
-        return None
-    kind = LogColorMapper if are_log_spaced(points) else LinearColorMapper
-    return kind(palette=Viridis256, low=float(points.min()), high=float(points.max()))
-
-
-def _map_colour(mapper: Any, value: float) -> str:
-    """Return the colour of a value."""
-    low, high = mapper.low, mapper.high
-    if isinstance(mapper, LogColorMapper):
-        low, high, value = np.log(low), np.log(high), np.log(value)
-    return str(Viridis256[round(255 * (value - low) / (high - low))])
-
-
-def _value_mapper(values: np.ndarray, flags: dict[float, str]) -> Any:
-    """Return the colour mapper of the values of a map."""
-    clear: Any = {"nan_color": (0, 0, 0, 0)}
-    if flags:
-        palette = [_FLAG_COLOURS[i % len(_FLAG_COLOURS)] for i in range(len(flags))]
-        return LinearColorMapper(palette=palette, low=-0.5, high=len(flags) - 0.5, **clear)
-    finite = values[np.isfinite(values)]
-    low, high = (float(finite.min()), float(finite.max())) if finite.size else (0.0, 1.0)
-    high = high if high > low else low + (abs(low) or 1.0)
-    kind = LogColorMapper if are_positive_and_span_decades(values) else LinearColorMapper
-    return kind(palette=Viridis256, low=low, high=high, **clear)
-
-
-def _flag_names(dataset: xr.Dataset, variable: str) -> dict[float, str]:
-    """Return the meanings of the flags that occur in a variable."""
-    meanings = read_flag_meanings(dataset[variable].attrs)
-    present = {*np.unique(dataset[variable].values).tolist()} if meanings else set()
-    return {code: text.replace("_", " ") for code, text in meanings.items() if code in present}
-
-
-def _label_ticks(axis: Any, names: dict[Any, str]) -> None:
-    """Use names as tick labels, if there are any."""
-    if names:
-        axis.ticker, axis.major_label_overrides = _ticks(names)
-
-
-def _ticks(names: dict[Any, str]) -> tuple[FixedTicker, dict[Any, str]]:
-    """Return the ticker and the tick labels of named values."""
-    return FixedTicker(ticks=list(names)), {int(value): name for value, name in names.items()}

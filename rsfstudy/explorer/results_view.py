@@ -97,7 +97,7 @@ class ResultsView(View):
         """Create the widgets, and connect them with the plot."""
         names = ("Variable", "Plot", "x", "Colour", "Facets")
         self._choices = {
-            key: pn.widgets.Select(name=name, **_WIDE)
+            key: pn.widgets.Select(label=name, **_WIDE)
             for key, name in zip(_CHOICES, names, strict=True)
         }
         for key, widget in self._choices.items():
@@ -116,7 +116,7 @@ class ResultsView(View):
         self._cell_choices = {
             str(d): _create_point_widget(self.results, str(d)) for d in self.results["status"].dims
         }
-        self._cell_button = pn.widgets.Button(name="Show the cell", button_type="primary")
+        self._cell_button = pn.widgets.Button(label="Show the cell", color="primary")
         self._cell_button.on_click(lambda _event: self._show_chosen_cell())
 
     def controls(self) -> list[Any]:
@@ -169,7 +169,7 @@ class ResultsView(View):
         try:
             for key, widget in self._choices.items():
                 widget.param.update(options=options[key], value=getattr(selection, key))
-            self._choices["second"].name = "Vertical axis" if is_map else "Colour"
+            self._choices["second"].label = "Vertical axis" if is_map else "Colour"
             self._update_sliders()
         finally:
             self._is_updating = False
@@ -186,7 +186,7 @@ class ResultsView(View):
         for name, slider in self._sliders.items():
             slider.value = points[name]
             if isinstance(slider, pn.widgets.IntSlider):
-                slider.name = to_plain_text(describe_points(self.shown, {name: points[name]}))
+                slider.label = to_plain_text(describe_points(self.shown, {name: points[name]}))
 
     def _on_choice(self, key: str, event: Any) -> None:
         """Change one choice of the selection."""
@@ -372,7 +372,7 @@ def _create_slider(dataset: xr.Dataset, dimension: str) -> Any:
     if points.dtype.kind in "iuf":
         return pn.widgets.IntSlider(start=0, end=points.size - 1, **_WIDE)
     options = {str(point): index for index, point in enumerate(points)}
-    return pn.widgets.Select(name=dimension, options=options, **_WIDE)
+    return pn.widgets.Select(label=dimension, options=options, **_WIDE)
 
 
 def _create_point_widget(results: xr.Dataset, dimension: str) -> Any:
@@ -380,7 +380,7 @@ def _create_point_widget(results: xr.Dataset, dimension: str) -> Any:
     points = results[dimension].values
     if points.size > _MAX_OPTIONS:
         return pn.widgets.IntInput(
-            name=f"Index of {dimension}", start=0, end=points.size - 1, value=0, **_WIDE
+            label=f"Index of {dimension}", start=0, end=points.size - 1, value=0, **_WIDE
         )
     options = {str(point): index for index, point in enumerate(points.tolist())}
-    return pn.widgets.Select(name=dimension, options=options, value=0, **_WIDE)
+    return pn.widgets.Select(label=dimension, options=options, value=0, **_WIDE)

@@ -29,7 +29,6 @@ from rsfstudy.explorer.results_view import ResultsView
 from rsfstudy.measures import CriticalStep, VelocityStep
 from rsfstudy.status import Status
 
-pytestmark = pytest.mark.filterwarnings("ignore::PendingDeprecationWarning")  # of Panel 1.9
 #: Time in ms after which a page that does not show an expected setting fails the test.
 PATIENCE = 60_000
 VARIABLE = "critical_velocity_ratio"
