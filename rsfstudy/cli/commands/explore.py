@@ -48,4 +48,4 @@ def explore(given: options.CommandOptions) -> int:
 
 def _announce(url: str) -> None:
     """Print the first address of the page."""
-    print_line(f"{url}\nThe page is open until you press Ctrl-C.")
+    print_line(f"{url}\nThe page is open until you press Ctrl-C.", soft_wrap=True)
