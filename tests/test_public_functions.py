@@ -114,6 +114,7 @@ def calls(place: Path) -> dict[str, dict]:
         "compare": {"first": dataset, "second": dataset},
         "critical_step": {"scene": scene, "rtol": 1e-2, "engine": "compiled"},
         "events": {"time": np.arange(400.0), "shear_stress": np.zeros(400)},
+        "explore": {"source": scene},
         "limit_cycle": {"scene": cycling, "rtol": 1e-2, "engine": "compiled"},
         "fit": {"record": record(), "stiffness": 3e-3, **dict(FIT)},
         "read_record": {"source": place / "record.csv"},
@@ -314,7 +315,10 @@ OPTIONS = [
     (name, parameter)
     for name, command in command_line.cli.commands.items()
     for parameter in command.params
-    if not getattr(parameter, "is_flag", False) and parameter.name not in ("scheduler", "workers")
+    if not getattr(parameter, "is_flag", False)
+    and parameter.name not in ("scheduler", "workers")
+    # The server runs until it is interrupted; tests/explorer contains its tests.
+    and name != "explore"
 ]
 
 

@@ -100,7 +100,10 @@ class SceneControls:
         cards = [self._card("rig", self._rig_widgets())] if self._rig else []
         slider_fields = SceneFields.names_of_part(SliderParameters)
         cards.append(self._card("slider", self._fields(SliderParameters, slider_fields[:4])))
-        cards += [self._card(s.name, self._slot_widgets(s)) for s in SceneFields.SLOTS]
+        cards += [
+            self._card(f"{slot.name}: {self.part_of_slot(slot)}", self._slot_widgets(slot))
+            for slot in SceneFields.SLOTS
+        ]
         more = self._fields(SliderParameters, slider_fields[4:])
         cards.append(self._card("other slider parameters", more, collapsed=True))
         self.column.objects = [units, *cards]

@@ -69,7 +69,7 @@ class Explorer(NamedTuple):
         return self.process.wait(30)
 
 
-@pytest.fixture(scope="module")
+@pytest.fixture(scope="session")
 def explore() -> Iterator[Callable[..., Explorer]]:
     """Yield a function that starts ``rsfstudy explore`` with arguments on a free port."""
     started = []
@@ -90,6 +90,12 @@ def explore() -> Iterator[Callable[..., Explorer]]:
         process.kill()
         process.wait()
         process.stdout.close()
+
+
+@pytest.fixture(scope="session")
+def server(explore: Callable[..., Explorer]) -> Explorer:
+    """Return a server that shows a scene."""
+    return explore()
 
 
 def free_port() -> int:

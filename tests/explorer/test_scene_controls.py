@@ -21,7 +21,7 @@ SLOTS = {slot.name: slot for slot in SceneFields.SLOTS}
 
 def choose(controls, slot, name):
     """Select a part in the menu of a slot."""
-    cards = {card.title: card for card in controls.column.objects[1:]}
+    cards = {card.title.partition(":")[0]: card for card in controls.column.objects[1:]}
     cards[slot.replace("_", " ").capitalize()].objects[0].value = name
 
 

@@ -29,11 +29,6 @@ FIRST = "README: velocity steps and a hold"
 
 
 @pytest.fixture(scope="module")
-def server(explore):
-    return explore()
-
-
-@pytest.fixture(scope="module")
 def shared_page(server, open_page):
     shown = open_page(server.url, permissions=["clipboard-read", "clipboard-write"])
     shown.wait_for_function(DRAWN)

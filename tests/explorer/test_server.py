@@ -6,17 +6,12 @@ import re
 import socket
 import subprocess
 import sys
-from pathlib import Path
 
 import psutil
 import pytest
 
-STEP = Path(__file__).parents[2] / "studies" / "pages" / "step.csv"
-
-
-@pytest.fixture(scope="module")
-def server(explore):
-    return explore()
+from rsfstudy.errors import InvalidValue
+from rsfstudy.explorer import serve
 
 
 def ask(server, path, cookie="", **headers):
@@ -87,11 +82,9 @@ def test_ctrl_c_stops_the_server(explore):
 
 
 def test_a_port_in_use_is_refused(server):
-    port = server.origin.rpartition(":")[2]
-    command = [sys.executable, "-m", "rsfstudy.cli.command_line", "explore", "--port", port]
-    ran = subprocess.run(command, capture_output=True, text=True, timeout=120)
-    assert ran.returncode == 2
-    assert f"--port = {port}: cannot be used" in " ".join(ran.stderr.split())
+    port = int(server.origin.rpartition(":")[2])
+    with pytest.raises(InvalidValue, match=f"--port = {port}: cannot be used"):
+        serve(port=port, open_browser=False)
 
 
 def test_without_panel_the_command_names_the_extra(tmp_path):
