@@ -19,7 +19,7 @@ from rsfstudy.explorer.fit_choices import FitChoices, format_fit_command
 from rsfstudy.explorer.record_plot import RecordPlot
 from rsfstudy.explorer.record_widgets import create_choice_widgets, format_step
 from rsfstudy.explorer.scene_settings import format_call, quote_values
-from rsfstudy.explorer.view import View
+from rsfstudy.explorer.view import View, escape_markdown
 from rsfstudy.fitting import Record
 from rsfstudy.plots import Figure
 from rsfstudy.reporting import (
@@ -339,6 +339,11 @@ def _call_with_lock(method: Callable[[], None]) -> None:
 def _to_pane(piece: SummaryTableOrSentence) -> Any:
     """Return a Panel object that shows a table or a sentence."""
     if not isinstance(piece, TextTable):
-        return pn.pane.Str(str(piece), margin=(2, 10))
+        return _sentence(str(piece))
     table = pn.pane.DataFrame(pd.DataFrame(piece.rows), index=False)
-    return pn.Column(pn.pane.Str(piece.caption, margin=(10, 10, 0, 10)), table)
+    return pn.Column(_sentence(piece.caption), table)
+
+
+def _sentence(text: str) -> Any:
+    """Return a Panel object that shows a sentence in as many lines as necessary."""
+    return pn.pane.Markdown(escape_markdown(text), margin=(0, 10), sizing_mode="stretch_width")
