@@ -151,7 +151,7 @@ def test_what_never_repeats_itself_says_so(engine):
     cycle = LimitCycle(phases=2)(slow(0.853), accuracy)
     assert cycle.status is Status.NOT_PERIODIC
     assert cycle.status.is_answer
-    assert "peak at 10^0.5" in cycle.message
+    assert "peak slip rates of 10^0.5" in cycle.message
     assert "recurrence_interval" not in cycle.values
     found = Bifurcation(transient=32, events=32)(slow(0.853), accuracy)
     assert found.status is Status.NOT_PERIODIC

@@ -337,7 +337,7 @@ def test_a_mean_over_other_scales_is_refused_and_told_in_units():
         lattice, (Mean("m", "y"), InUnits("t", "y", units="min"), Mean("mean_t", "t"))
     )
     assert np.isnan(found["m"])
-    assert found["m"].attrs["refused"] == "y is in units of D_c, which varies"
+    assert found["m"].attrs["refused"] == "y is in units of D_c, which varies between the samples"
     assert found["t"].values * 60.0 == pytest.approx([5.0, 10.0, 30.0], rel=1e-14)
     assert float(found["mean_t"]) == pytest.approx(0.25, rel=1e-14)
     assert {found[f"mean_t{end}"].attrs["units"] for end in ("", "_stderr", "_error")} == {"min"}

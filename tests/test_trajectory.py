@@ -131,9 +131,9 @@ def test_a_motion_that_begins_beyond_the_norm_says_so():
     """
     # ln V jumps by K d/a = 15, and decreases again because K > b.
     jump = Scene(**PULSE | {"hold_time": 0.0}, displacement_step=3.0, stiffness_ratio=10.0)
-    with pytest.warns(NoResultWarning, match="from 0 D_c"):
+    with pytest.warns(NoResultWarning, match="after 0 D_c"):
         rsfstudy.simulate(jump, duration=1.0, rtol=1e-3)
-    with pytest.warns(NoResultWarning, match="from 114"):
+    with pytest.warns(NoResultWarning, match="after 114"):
         motion = rsfstudy.simulate(Scene(**PULSE, reference_rate=0.1), duration=150.0)
     at = motion.sel(time=float(motion.instability_time), method="nearest")
     # The sampling intervals are a few tenths of a decade.

@@ -29,7 +29,7 @@ from study_runs import call_main
 
 import rsfstudy
 from rsfstudy import Axis, Rig, Scene
-from rsfstudy.cli import options
+from rsfstudy.cli import rig_options
 from rsfstudy.critical_steps.critical_step import CriticalStep
 from rsfstudy.errors import InvalidValue
 from rsfstudy.measure_base.elasticities import Elasticities
@@ -123,8 +123,10 @@ def test_no_field_is_taken_for_nothing(fields, name):
 
 def test_rig_options_are_described_as_the_quantities_of_a_rig():
     meanings = {name: quantity.meaning for name, quantity in Rig.QUANTITIES.items()}
-    assert meanings | {"load_velocity": "load point velocity"} == options.MEANINGS_OF_RIG_OPTIONS
-    assert [*options.MEANINGS_OF_RIG_OPTIONS] == [*options.EXAMPLE_VALUES_OF_RIG_OPTIONS]
+    assert (
+        meanings | {"load_velocity": "load point velocity"} == rig_options.MEANINGS_OF_RIG_OPTIONS
+    )
+    assert [*rig_options.MEANINGS_OF_RIG_OPTIONS] == [*rig_options.EXAMPLE_VALUES_OF_RIG_OPTIONS]
 
 
 # ---- wordings ------------------------------------------------------------------------------------

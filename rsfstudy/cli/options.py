@@ -17,6 +17,7 @@ from typing import Any, TypeVar
 
 import click
 
+from rsfstudy.cli.rig_options import EXAMPLE_VALUES_OF_RIG_OPTIONS, describe_rig_option
 from rsfstudy.defaults import Defaults
 from rsfstudy.error_boundary import check_regular_file
 from rsfstudy.errors import InvalidValue
@@ -388,63 +389,10 @@ def make_set_scene_fields_option(
     return click.option("--set", "settings", multiple=True, metavar="FIELD=VALUE", help=help_text)
 
 
-#: Example values of the rig options. The help texts show these values.
-EXAMPLE_VALUES_OF_RIG_OPTIONS = {
-    "normal_stress": "5 MPa",
-    "slip_distance": "10 um",
-    "reference_velocity": "1 um/s",
-    "stiffness": "0.1 MPa/um",
-    "period": "10 ms",
-    "mass": "1e4 kg/m^2",
-    "shear_modulus": "30 GPa",
-    "density": "2700 kg/m^3",
-    "thermal_diffusivity": "1 mm^2/s",
-    "heat_capacity": "2.4 MJ/m^3/K",
-    "shear_zone_width": "0.1 mm",
-    "reference_temperature": "295 K",
-    "heat_loss_width": "0.7 mm",
-    "direct_activation_energy": "89 kJ/mol",
-    "evolution_activation_energy": "89 kJ/mol",
-    "pressurisation_factor": "0.14 MPa/K",
-    "load_velocity": "10 um/s",
-}
-
-
-#: Meanings of the rig options. The meanings are those of ``Rig.QUANTITIES``, which is not imported
-#: because the import would delay the start of every command.
-MEANINGS_OF_RIG_OPTIONS = {
-    "normal_stress": "normal stress",
-    "slip_distance": "slip distance",
-    "reference_velocity": "velocity of the load point before the test",
-    "stiffness": "stiffness of the machine with its sample",
-    "period": "period of free oscillation",
-    "mass": "mass per area of the fault",
-    "shear_modulus": "shear modulus of the medium",
-    "density": "density of the medium",
-    "thermal_diffusivity": "thermal diffusivity of the fault",
-    "heat_capacity": "volumetric heat capacity of the fault",
-    "shear_zone_width": "width of the shear zone",
-    "reference_temperature": "temperature in steady sliding at the reference velocity",
-    "heat_loss_width": "distance over which heat is conducted away",
-    "direct_activation_energy": "activation energy of the direct effect",
-    "evolution_activation_energy": "activation energy of the evolution effect",
-    "pressurisation_factor": "change of undrained pore pressure per change of temperature",
-    "load_velocity": "load point velocity",
-}
-
-
-def _describe_rig_option(name: str) -> str:
-    """Return the help text of a rig option."""
-    meaning, example = MEANINGS_OF_RIG_OPTIONS[name], EXAMPLE_VALUES_OF_RIG_OPTIONS[name]
-    return (
-        f"Rig parameter: {meaning}, for example '{example}'. A number without units is in SI units."
-    )
-
-
 #: Options that define a rig.
 rig_options = combine_option_decorators(
     *(
-        click.option(f"--{name.replace('_', '-')}", help=_describe_rig_option(name))
+        click.option(f"--{name.replace('_', '-')}", help=describe_rig_option(name))
         for name in EXAMPLE_VALUES_OF_RIG_OPTIONS
     )
 )
