@@ -59,12 +59,12 @@ class RecordView(View):
         self._is_updating = False
         self._widgets = create_choice_widgets()
         self._x = pn.widgets.RadioButtonGroup(
-            name="Horizontal axis", value="time",
+            label="Horizontal axis", value="time",
             options={"Time": "time", "Displacement": "displacement"},
         )  # fmt: skip
-        self._steps = pn.widgets.CheckBoxGroup(name="Steps to fit", options={}, value=[])
-        self._fit_button = pn.widgets.Button(name="Fit", button_type="primary")
-        self._whole_button = pn.widgets.Button(name="Whole record")
+        self._steps = pn.widgets.CheckBoxGroup(label="Steps to fit", options={}, value=[])
+        self._fit_button = pn.widgets.Button(label="Fit", color="primary")
+        self._whole_button = pn.widgets.Button(label="Whole record")
         self._plot = RecordPlot(self._choose_window, self._toggle_step)
         drawn = pn.pane.Bokeh(self._plot.layout, sizing_mode="stretch_width")
         self._plots = pn.Column(drawn, sizing_mode="stretch_width")
