@@ -7,6 +7,7 @@ files that you download. The modules are:
 - ``entry_points`` contains the functions ``explore`` and ``serve``.
 - ``views`` chooses the view of a scene, a dataset or a file.
 - ``view`` contains the base class ``View``, which adds code, downloads and messages to a view.
+- ``messages`` formats the messages of errors.
 - ``jobs`` runs computations in a thread, with a progress bar and a cancel button.
 - ``server`` serves the views to the browser of this computer only.
 - ``scene_view``, ``results_view`` and ``record_view`` contain one view each.

@@ -136,6 +136,7 @@ class SceneControls:
     def _choose_part(self, slot: Any, name: str) -> None:
         """Select a part, and drop the fields of the previous part."""
         classes = {**slot.built_in_parts, **slot.user_parts}
+        classes.pop(PROTOCOL, None)
         old = classes.get(self.part_of_slot(slot))
         new = classes.get(name)
         kept = set(SceneFields.names_of_part(new)) if new else set()
@@ -216,27 +217,27 @@ class SceneControls:
     def _field_widget(self, part: Any, field: str) -> Any:
         """Return the widget of a field."""
         declared = part.__dataclass_fields__[field]
-        quantity, default = QUANTITY_BY_FIELD[field], declared.default
+        about, default = declared.metadata["about"], declared.default
         name = rig_name(field) if self._rig else field
         stated = self.settings.scene.get(name, self.settings.scene.get(field))
         if isinstance(default, bool):
             box = pn.widgets.Checkbox(label=field, value=bool(stated))
             box.param.watch(lambda event: self._set_field(field, event.new or None), "value")
             return box
-        scale = scale_in_units(self._rig, quantity.scale) if self._rig and quantity.scale else 1.0
-        unit = UNITS_BY_SCALE[quantity.scale] if self._rig and quantity.scale else ""
+        scale = scale_in_units(self._rig, about["scale"]) if self._rig and about["scale"] else 1.0
+        unit = UNITS_BY_SCALE[about["scale"]] if self._rig and about["scale"] else ""
         typical = (default or _TYPICAL_VALUES.get(field, 1.0)) * scale
         limits = SliderRange.of_field(
-            default or 0.0, typical, declared.metadata["rule"], quantity.scale
+            default or 0.0, typical, declared.metadata["rule"], about["scale"]
         )
         number = default if stated is None else float(str(stated).partition(" ")[0])
         shown = number * scale if stated is None and number is not None else number
         return NumberWidget(
-            name, unit or quantity.scale, shown, limits,
+            name, unit or about["scale"], shown, limits,
             lambda value: self._set_field(
                 name, f"{value!r} {unit}" if unit and value is not None else value
             ),
-            quantity.long_name,
+            about["long_name"],
         ).row  # fmt: skip
 
     def _rig_widgets(self) -> list[Any]:

@@ -112,7 +112,8 @@ class SceneSettings:
         values = {
             name: value
             for name, value in described.items()
-            if name in defaults and value is not None and value != defaults[name]
+            if value is not None and name not in ("segments", "samples")
+            if value != defaults.get(name)
         }
         protocol = ""
         if values.pop("loading", None) is not None:
@@ -160,7 +161,7 @@ class SceneSettings:
         Scene
             Scene of the settings.
         """
-        values = dict(self.scene)
+        values = dict(SceneFields.replace_names_by_user_parts(self.scene, _find_user_parts()))
         if self.protocol:
             with tempfile.TemporaryDirectory() as directory:
                 path = Path(directory, "protocol.csv")
@@ -194,6 +195,10 @@ class SceneSettings:
     def python_code(self) -> str:
         """Return Python code that computes and saves the motion."""
         lines, values = ["import rsfstudy", ""], quote_values(self.scene)
+        for name, part in _find_user_parts().items():
+            for slot in [slot for slot in SceneFields.SLOT_NAMES if self.scene.get(slot) == name]:
+                values[slot] = getattr(part, "__name__", name)
+                lines.append(f"# Define or import the class {values[slot]} here.")
         rig_argument = ", rig" if self.rig else ""
         if self.rig:
             lines.append(f"rig = {format_call('rsfstudy.Rig', quote_values(self.rig))}")
@@ -326,6 +331,11 @@ def with_rig_units(rig: Rig, field_name: str, value: Any) -> Any:
 def scale_in_units(rig: Rig, scale: str) -> float:
     """Return a scale of a rig in the units that the page shows."""
     return float(rig.scales[scale].factor) / _SI_VALUES[UNITS_BY_SCALE[scale]]
+
+
+def _find_user_parts() -> dict[str, Any]:
+    """Return the user-defined parts that this process has used, by name."""
+    return {name: part for slot in SceneFields.SLOTS for name, part in slot.user_parts.items()}
 
 
 def _fields_of_rig(rig: Rig) -> set[str]:

@@ -17,10 +17,11 @@ from bokeh.plotting import figure as bokeh_figure
 
 from rsfstudy.errors import InvalidValue
 from rsfstudy.explorer.jobs import Report
+from rsfstudy.explorer.messages import escape_markdown
 from rsfstudy.explorer.scene_controls import SceneControls
 from rsfstudy.explorer.scene_presets import PRESETS
 from rsfstudy.explorer.scene_settings import SceneSettings
-from rsfstudy.explorer.view import View, escape_markdown
+from rsfstudy.explorer.view import View
 from rsfstudy.plots import Figure, plot_motion
 from rsfstudy.reporting import TextTable, build_motion_tables_and_sentences
 from rsfstudy.rig import DatasetUnits, Rig

@@ -24,7 +24,8 @@ from tornado.web import RequestHandler
 
 from rsfstudy.errors import InvalidValue
 from rsfstudy.explorer.jobs import route_warnings_to_pages
-from rsfstudy.explorer.view import STATE_ARGUMENT, create_message, load_panel
+from rsfstudy.explorer.messages import create_message
+from rsfstudy.explorer.view import STATE_ARGUMENT, load_panel
 from rsfstudy.explorer.views import create_view
 
 #: Address of the loopback interface, and port that is used by default if it is free.

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import io
 import json
-import logging
 import tempfile
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -18,9 +17,10 @@ import pandas as pd
 import panel as pn
 import xarray as xr
 
-from rsfstudy.error_boundary import format_exception
-from rsfstudy.errors import InvalidValue, RsfStudyError
+from rsfstudy.errors import InvalidValue
 from rsfstudy.explorer.jobs import Jobs
+from rsfstudy.explorer.messages import escape_markdown as escape_markdown
+from rsfstudy.explorer.messages import format_message
 from rsfstudy.plots import Figure, render_figure, style_context
 from rsfstudy.storage import write_dataset
 
@@ -258,7 +258,7 @@ class View(ABC):
         error : Exception
             Error. An error that rsfstudy does not raise itself is also logged.
         """
-        self._alert.object = _format_message(error)
+        self._alert.object = format_message(error)
         self._alert.visible = True
 
     def show_warnings(self, messages: Sequence[str]) -> None:
@@ -384,44 +384,3 @@ def load_panel() -> None:
     """
     if not pn.extension._loaded:
         pn.extension(inline=True, notifications=False)
-
-
-def create_message(error: Exception) -> Any:
-    """Return a page with the message of an error that prevents a view.
-
-    Parameters
-    ----------
-    error : Exception
-        Error, which is logged unless rsfstudy has raised it.
-
-    Returns
-    -------
-    panel.pane.Alert
-        Page.
-    """
-    return pn.pane.Alert(_format_message(error), alert_type="danger")
-
-
-def _format_message(error: Exception) -> str:
-    """Return the message of an error as Markdown, and log an unexpected error."""
-    if isinstance(error, RsfStudyError):
-        return escape_markdown(str(error))
-    logging.getLogger(__name__).error("the view failed", exc_info=error)
-    text = f"The view failed: {format_exception(error)}. Change a setting and try again."
-    return escape_markdown(text)
-
-
-def escape_markdown(text: str) -> str:
-    """Escape the characters that have a meaning in Markdown or HTML.
-
-    Parameters
-    ----------
-    text : str
-        Plain text.
-
-    Returns
-    -------
-    str
-        Markdown that shows the text.
-    """
-    return text.translate({ord(c): f"&#{ord(c)};" for c in "\\`*_{}[]<>#|~&"})

@@ -2,7 +2,10 @@
 
 import threading
 import time
+from dataclasses import dataclass
+from typing import ClassVar
 
+import panel as pn
 import pytest
 
 import rsfstudy
@@ -49,6 +52,18 @@ def test_every_part_can_be_chosen_and_left(slot, part, settings):
     assert len(calls) >= (part != settings.scene.get(slot, SLOTS[slot].default_part_name))
 
 
+@pytest.mark.parametrize("settings", [SETTINGS, RIG_SETTINGS], ids=["dimensionless", "rig"])
+def test_a_protocol_can_be_chosen_and_left(settings):
+    controls = SceneControls(settings, lambda: None)
+    for _ in range(2):  # the second time, the scene has had a protocol
+        choose(controls, "loading", "protocol")
+        assert len(scene_of(controls).parts.loading.segments) == 3
+        choose(controls, "loading", "slide_hold_slide")
+        assert scene_of(controls).parts.loading.hold_time == pytest.approx(100.0)
+    choose(controls, "loading", "step")
+    assert controls.settings == settings
+
+
 @pytest.mark.parametrize("label", PRESETS)
 def test_presets_survive_state_and_units(label):
     preset = PRESETS[label]
@@ -63,6 +78,26 @@ def test_presets_survive_state_and_units(label):
         for name, value in known.items():
             expected = pytest.approx(value, rel=1e-11) if isinstance(value, float) else value
             assert values[name] == expected, name
+
+
+def test_user_defined_parts_have_widgets():
+    from rsfstudy.parts import number
+    from rsfstudy.slider.laws.slowness import SlownessLaw
+
+    @dataclass(frozen=True, kw_only=True)
+    class ExplorerLaw(SlownessLaw):
+        name: ClassVar[str] = "explorer_law"
+        healing_power: float = number(2.0, "$h$", "1", "power of healing")
+
+    scene = rsfstudy.Scene(law=ExplorerLaw, healing_power=3.0)
+    settings = SceneSettings.from_scene(scene)
+    assert settings.build_scene(None) == scene
+    controls = SceneControls(settings, lambda: None)
+    rows = [row for card in controls.column.objects[1:] for row in card.objects]
+    sliders = {row.objects[0].label: row for row in rows if isinstance(row, pn.Row)}
+    sliders["healing_power"].objects[1].value = 4.0
+    assert scene_of(controls) == scene.with_(healing_power=4.0)
+    assert "law=ExplorerLaw" in settings.python_code()
 
 
 @pytest.mark.parametrize(

@@ -1,0 +1,63 @@
+"""Messages of errors as Markdown."""
+
+from __future__ import annotations
+
+import logging
+from typing import Any
+
+import panel as pn
+
+from rsfstudy.error_boundary import format_exception
+from rsfstudy.errors import RsfStudyError
+
+
+def create_message(error: Exception) -> Any:
+    """Return a page with the message of an error that prevents a view.
+
+    Parameters
+    ----------
+    error : Exception
+        Error, which is logged unless rsfstudy has raised it.
+
+    Returns
+    -------
+    panel.pane.Alert
+        Page.
+    """
+    return pn.pane.Alert(format_message(error), alert_type="danger")
+
+
+def format_message(error: Exception) -> str:
+    """Return the message of an error as Markdown, and log an unexpected error.
+
+    Parameters
+    ----------
+    error : Exception
+        Error.
+
+    Returns
+    -------
+    str
+        Message without a traceback.
+    """
+    if isinstance(error, RsfStudyError):
+        return escape_markdown(str(error))
+    logging.getLogger(__name__).error("the view failed", exc_info=error)
+    text = f"The view failed: {format_exception(error)}. Change a setting and try again."
+    return escape_markdown(text)
+
+
+def escape_markdown(text: str) -> str:
+    """Escape the characters that have a meaning in Markdown or HTML.
+
+    Parameters
+    ----------
+    text : str
+        Plain text.
+
+    Returns
+    -------
+    str
+        Markdown that shows the text.
+    """
+    return text.translate({ord(c): f"&#{ord(c)};" for c in "\\`*_{}[]<>#|~&"})
