@@ -16,10 +16,11 @@ import xarray as xr
 from rsfstudy.api import fit
 from rsfstudy.errors import DataError, InvalidValue
 from rsfstudy.explorer.fit_choices import FitChoices, format_fit_command
+from rsfstudy.explorer.messages import escape_markdown
 from rsfstudy.explorer.record_plot import RecordPlot
 from rsfstudy.explorer.record_widgets import create_choice_widgets, format_step
 from rsfstudy.explorer.scene_settings import format_call, quote_values
-from rsfstudy.explorer.view import View, escape_markdown
+from rsfstudy.explorer.view import View
 from rsfstudy.fitting import Record
 from rsfstudy.plots import Figure
 from rsfstudy.reporting import (
