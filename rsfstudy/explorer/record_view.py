@@ -16,10 +16,11 @@ import xarray as xr
 from rsfstudy.api import fit
 from rsfstudy.errors import DataError, InvalidValue
 from rsfstudy.explorer.fit_choices import FitChoices, format_fit_command
+from rsfstudy.explorer.messages import escape_markdown
 from rsfstudy.explorer.record_plot import RecordPlot
 from rsfstudy.explorer.record_widgets import create_choice_widgets, format_step
 from rsfstudy.explorer.scene_settings import format_call, quote_values
-from rsfstudy.explorer.view import View, escape_markdown
+from rsfstudy.explorer.view import View
 from rsfstudy.fitting import Record
 from rsfstudy.plots import Figure
 from rsfstudy.reporting import (
@@ -59,12 +60,12 @@ class RecordView(View):
         self._is_updating = False
         self._widgets = create_choice_widgets()
         self._x = pn.widgets.RadioButtonGroup(
-            name="Horizontal axis", value="time",
+            label="Horizontal axis", value="time",
             options={"Time": "time", "Displacement": "displacement"},
         )  # fmt: skip
-        self._steps = pn.widgets.CheckBoxGroup(name="Steps to fit", options={}, value=[])
-        self._fit_button = pn.widgets.Button(name="Fit", button_type="primary")
-        self._whole_button = pn.widgets.Button(name="Whole record")
+        self._steps = pn.widgets.CheckBoxGroup(label="Steps to fit", options={}, value=[])
+        self._fit_button = pn.widgets.Button(label="Fit", color="primary")
+        self._whole_button = pn.widgets.Button(label="Whole record")
         self._plot = RecordPlot(self._choose_window, self._toggle_step)
         drawn = pn.pane.Bokeh(self._plot.layout, sizing_mode="stretch_width")
         self._plots = pn.Column(drawn, sizing_mode="stretch_width")

@@ -45,30 +45,30 @@ def create_choice_widgets() -> dict[str, Any]:
     wide = {"sizing_mode": "stretch_width"}
     return {
         "columns": _text("Columns", "time=t (s), friction=mu"),
-        "decimal": kinds.Select(name="Decimal separator", options=[".", ","], **wide),
+        "decimal": kinds.Select(label="Decimal separator", options=[".", ","], **wide),
         "normal_stress": _text("Normal stress, if not in the file", "20 MPa"),
-        "begin": kinds.FloatInput(name="Begin (s)", value=None, **half),
-        "end": kinds.FloatInput(name="End (s)", value=None, **half),
-        "laws": kinds.MultiChoice(name="Laws", options=[*_LAWS], value=[*default.laws], **wide),
+        "begin": kinds.FloatInput(label="Begin (s)", value=None, **half),
+        "end": kinds.FloatInput(label="End (s)", value=None, **half),
+        "laws": kinds.MultiChoice(label="Laws", options=[*_LAWS], value=[*default.laws], **wide),
         "stiffness": _text("Stiffness", "0.04 MPa/um, 2e-3 1/um or from record"),
         "trend_degree": kinds.Select(
-            name="Trend of friction", options=_TREND_DEGREES, value=default.trend_degree, **wide
+            label="Trend of friction", options=_TREND_DEGREES, value=default.trend_degree, **wide
         ),
-        "more_free": kinds.MultiChoice(name="Also fit", options=_MORE_PARAMETERS, **wide),
+        "more_free": kinds.MultiChoice(label="Also fit", options=_MORE_PARAMETERS, **wide),
         "slip_distance": _text("Initial guess of Dc", "10 um"),
         "before": _text("Displacement before each step", "100 um"),
         "after": _text("Displacement after each step", "200 um"),
         "noise": kinds.Select(
-            name="Noise model", options=_NOISE_MODELS, value=default.noise, **wide
+            label="Noise model", options=_NOISE_MODELS, value=default.noise, **wide
         ),
-        "loading": kinds.Select(name="Loading", options=_LOADINGS, value=default.loading, **wide),
-        "together": kinds.Checkbox(name="Fit all steps jointly"),
+        "loading": kinds.Select(label="Loading", options=_LOADINGS, value=default.loading, **wide),
+        "together": kinds.Checkbox(label="Fit all steps jointly"),
     }
 
 
 def _text(name: str, example: str) -> Any:
     """Create a text field with an example."""
-    return pn.widgets.TextInput(name=name, placeholder=example, sizing_mode="stretch_width")
+    return pn.widgets.TextInput(label=name, placeholder=example, sizing_mode="stretch_width")
 
 
 def format_step(number: int, step: LoadingStep) -> str:

@@ -18,6 +18,7 @@ import xarray as xr
 from study_runs import call_main
 
 import rsfstudy
+from rsfstudy.explorer.record_view import RecordView
 from rsfstudy.reporting import format_with_error
 
 STEP = str(Path(__file__).parents[2] / "studies" / "pages" / "step.csv")
@@ -47,6 +48,14 @@ CURVE = """() => {
 def step_url(explore):
     """Return the address of the view of a record with two steps."""
     return explore(STEP).url
+
+
+@pytest.fixture(scope="module")
+def written(explore, tmp_path_factory):
+    """Return a file that tests write, and the address of its view."""
+    path = tmp_path_factory.mktemp("records") / "written.csv"
+    path.touch()
+    return path, explore(str(path)).url
 
 
 @pytest.fixture
@@ -210,14 +219,14 @@ def test_a_slow_fit_is_cancelled(open_step):
     assert "fitted" not in code(page, "State")
 
 
-def test_a_long_record_is_thinned_again_when_the_user_zooms(open_page, explore, tmp_path):
+def test_a_long_record_is_thinned_again_when_the_user_zooms(open_page, written):
     time = np.arange(60_000) * 0.01
     friction = np.full(60_000, 0.6)
     friction[31_234] = 0.7  # A spike of one row remains visible.
-    path = tmp_path / "long.csv"
+    path, url = written
     columns = {"Time (s)": time, "LP displacement (um)": time, "Friction": friction}
     pd.DataFrame(columns).to_csv(path, index=False)
-    page = open_page(explore(str(path)).url)
+    page = open_page(url)
     place(page, 300.0)  # Wait until the figure has been drawn.
     count, first, last, highest = page.evaluate(CURVE)
     assert count < 4000
@@ -232,11 +241,34 @@ def test_a_long_record_is_thinned_again_when_the_user_zooms(open_page, explore, 
     assert highest == 0.7
 
 
-def test_a_broken_file_shows_the_message_of_the_reader(open_page, explore, tmp_path):
-    path = tmp_path / "broken.csv"
+def test_a_broken_file_shows_the_message_of_the_reader(open_page, written):
+    path, url = written
     path.write_text("Time (s),LP displacement (um),Friction\n0,0,0.6\n1,1,oops\n")
     with pytest.raises(rsfstudy.errors.InvalidValue) as raised:
         rsfstudy.read_record(path)
-    page = open_page(explore(str(path)).url)
+    page = open_page(url)
     page.get_by_text(str(raised.value)).wait_for()
     assert page.locator("canvas").first.is_hidden()
+
+
+def test_the_code_of_a_record_in_memory_uses_the_record():
+    record = rsfstudy.read_record(STEP, **READING)
+    view = RecordView.restore(record, FIT | {"end": 130.0, "after": "60 um"})
+    assert view.command_line().startswith("#")
+    variables = {"record": record}
+    exec(view.python_code(), variables)
+    assert variables["record"].time[-1] == 130.0
+    assert variables["fit"].sizes["law"] == 1
+
+
+def test_a_record_of_slip_is_read_with_the_stiffness(tmp_path):
+    record = rsfstudy.read_record(STEP, **READING)
+    slip = record.columns["displacement"] - record.columns["friction"] / 2e-3
+    path = tmp_path / "slip.csv"
+    columns = {"Time (s)": record.time, "Slip (um)": slip, "Friction": record.columns["friction"]}
+    pd.DataFrame(columns).to_csv(path, index=False)
+    view = RecordView.restore(path, {"stiffness": "2e-3 1/um", "after": "60 um"})
+    reading = view.python_code().partition("fit = ")[0]
+    variables, _output = run_python(reading)
+    moved = variables["record"].columns["displacement"]
+    np.testing.assert_allclose(moved, record.columns["displacement"], atol=1e-9)
