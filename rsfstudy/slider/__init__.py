@@ -1,19 +1,19 @@
 """Physics of one spring-slider: parts, parameters, equations and stability.
 
-A ``Scene`` describes a slider by six parts: a state evolution law, a normal stress condition, a
-pore fluid, the dynamics, the loading and the temperature. The package checks scenes and provides
-their equations of motion, their steady states and the stability of steady sliding. The package
-never integrates the equations, never reads or writes files, and depends only on Python, NumPy and
-SciPy.
+A ``Scene`` describes a slider by seven parts: a state evolution law, a normal stress condition, a
+pore fluid, the dynamics, the loading, the temperature and noise. The package checks scenes and
+provides their equations of motion, their steady states and the stability of steady sliding. The
+package never integrates the equations, never reads or writes files, and depends only on Python,
+NumPy and SciPy.
 
 The parts are classes in the packages ``laws``, ``normal_stress``, ``fluid``, ``dynamics``,
-``loading`` and ``temperature``. Each of these packages contains one module per part. We suggest
-reading the other modules in the following order:
+``loading``, ``temperature`` and ``noise``. Each of these packages contains one module per part. We
+suggest reading the other modules in the following order:
 
 - ``scene`` combines the parts of a slider.
 - ``friction_relation`` defines the relation between stress, slip rate and states, and
   ``state_functions`` defines functions of the state variables. ``temperature_functions`` adds the
-  effects of a temperature that changes.
+  effects of a temperature that changes. ``noise_paths`` computes the paths of noise.
 - ``rate_functions`` and ``point_functions`` build the equations of motion from friction and from
   the dynamics. ``path_length`` defines the independent variable.
 - ``steady_state`` and ``stability`` compute steady sliding and its linear stability from the

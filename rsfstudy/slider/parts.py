@@ -1,9 +1,9 @@
 """Base class and field declarations of the parts of a slider.
 
-A scene has six slots: the state evolution law, the normal stress condition, the pore fluid, the
-dynamics, the loading and the temperature. Each choice for a slot is a frozen dataclass derived from
-``Part``, usually in its own module. The class declares the fields of the part with ``number`` and
-``flag``.
+A scene has seven slots: the state evolution law, the normal stress condition, the pore fluid, the
+dynamics, the loading, the temperature and noise. Each choice for a slot is a frozen dataclass
+derived from ``Part``, usually in its own module. The class declares the fields of the part with
+``number`` and ``flag``.
 
 The functions of a part are plain functions of floats. The functions receive the parameters of a
 scene as a flat tuple ``p``. The parameters of a part start at the index of its slot, for example
