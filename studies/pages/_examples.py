@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-#: Example scene for each built-in friction law, normal stress condition, fluid, dynamics, loading
+#: Example scene for each built-in friction law, normal stress condition, fluid, dynamics, loading,
 #: temperature and noise.
 SCENES = {
     "composite": 'Scene(law="composite", b_over_a=1.5, cutoff_velocity_ratio=0.1)',
@@ -40,6 +40,7 @@ SCENES = {
 #: Examples of measures and reductions that are not part of a named study.
 CALLS = {
     "Elasticities": 'Elasticities(LimitCycle(), parameters=("a", "b_over_a"))',
+    "EventStatistics": "EventStatistics(cycles=1000)",
     "Fit": 'Fit(records=(record,), free=("a", "b", "slip_distance"), step=1)',
     "PowerLaw": 'PowerLaw(name="exponent", of="recurrence_interval", on="load_velocity_ratio")',
 }
