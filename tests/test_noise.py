@@ -353,7 +353,7 @@ def test_stability_ignores_noise():
         ({"oscillation_amplitude": 0.1}, "cannot be added to the loading 'oscillation'"),
         ({"noise_seed": 0.5}, "whole number"),
         ({"stress_noise": -1.0}, "must be 0 or greater"),
-        ({"normal_stress_noise": 1e-3}, "is changed by the loading"),
+        ({"normal_stress_noise": 1e-3}, "cannot be combined with a loading or noise"),
         ({"noise": "none", "stress_noise": 1e-4}, "has no meaning without noise"),
     ],
 )

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-#: Example scene for each built-in friction law, normal stress condition, fluid, dynamics, loading
-#: and temperature.
+#: Example scene for each built-in friction law, normal stress condition, fluid, dynamics, loading,
+#: temperature and noise.
 SCENES = {
     "composite": 'Scene(law="composite", b_over_a=1.5, cutoff_velocity_ratio=0.1)',
     "cut_off": 'Scene(law="cut_off", b_over_a=1.5, cutoff_velocity_ratio=1000)',
@@ -22,6 +22,9 @@ SCENES = {
     "thermal": 'Scene(fluid="thermal", temperature="shear_heating", pressurisation=1.5)',
     "isothermal": 'Scene(temperature="isothermal")',
     "shear_heating": 'Scene(temperature="shear_heating", cooling=5, direct_activation=35)',
+    "none": 'Scene(noise="none")',
+    "white": 'Scene(noise="white", stress_noise=1e-4, noise_interval=0.25, noise_seed=3)',
+    "correlated": 'Scene(noise="correlated", stress_noise=1e-4, noise_correlation_time=2)',
     "inertia": "Scene(inertia=True, stiffness_ratio=0.8)",
     "quasi_static": "Scene(stiffness_ratio=1.2)",
     "radiation_damping": "Scene(radiation_damping=1e-4, stiffness_ratio=0.8)",
@@ -37,6 +40,7 @@ SCENES = {
 #: Examples of measures and reductions that are not part of a named study.
 CALLS = {
     "Elasticities": 'Elasticities(LimitCycle(), parameters=("a", "b_over_a"))',
+    "EventStatistics": "EventStatistics(cycles=1000)",
     "Fit": 'Fit(records=(record,), free=("a", "b", "slip_distance"), step=1)',
     "PowerLaw": 'PowerLaw(name="exponent", of="recurrence_interval", on="load_velocity_ratio")',
 }
