@@ -180,7 +180,7 @@ def test_coarse_sampling_is_fitted_as_far_as_intervals_cover(rows: float, status
     for name in ("a", "b", "slip_distance"):
         assert abs(synthetic.deviation_in_stderrs(found, name, EXACT_PARAMETERS[name])) < 3.5, name
     if status is Status.NOT_IDENTIFIED:
-        assert "1.5 are needed: sample faster" in found.message.item()
+        assert "1.5 are required. Sample faster" in found.message.item()
 
 
 def test_a_stiffness_that_is_bounded_from_below_only_is_reported() -> None:
