@@ -282,7 +282,7 @@ class RecordPlot:
             x, y = self._thin_rows(rows, "fitted_friction")
             for name, value in (rows | {"xs": x, "ys": y}).items():
                 curves.get(name, []).append(value)
-            x, y = self._thin_rows(rows, "innovation")
+            x, y = self._thin_rows(rows, "whitened_residual")
             looks = {name: [rows[name]] * len(x) for name in ("color", "law", "marker")}
             for name, values in (looks | {"x": x, "y": y}).items():
                 points[name].extend(values)
@@ -344,6 +344,6 @@ def _iterate_fitted_rows(dataset: xr.Dataset) -> Iterator[dict[str, Any]]:
             laws, colors, itertools.cycle(_MARKERS), itertools.cycle(_DASHES), strict=False
         )
     }
-    names = ("record_time", "record_displacement", "fitted_friction", "innovation")
+    names = ("record_time", "record_displacement", "fitted_friction", "whitened_residual")
     for one in split_into_single_fits(dataset):
         yield {name: one[name].values for name in names} | looks[one["law"].item()]

@@ -109,8 +109,8 @@ def expected_cells(fits):
     """Return the cells that a table of fits must show."""
     row = fits.rsf.fit_table().iloc[0]
     names = {"a": "a", "b": "b", "Dc (um)": "Dc", "mu_0": "mu_0"}
-    cells = {head: format_with_error(row[n], row[f"{n}_std"]) for head, n in names.items()}
-    return cells | {"AIC": f"{row['criterion']:.1f}"}
+    cells = {head: format_with_error(row[n], row[f"{n}_stderr"]) for head, n in names.items()}
+    return cells | {"AIC": f"{row['aic']:.1f}"}
 
 
 def run_python(text):
