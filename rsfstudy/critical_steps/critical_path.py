@@ -211,8 +211,8 @@ class CriticalPath(NamedTuple):
         """Yield the events of the path, starting at the tangency point.
 
         The integration ends early if the path cannot continue, or if the path exceeds its budget of
-        right-hand-side evaluations. The budget of right-hand-side evaluations depends on the
-        tolerance in the same way as the cost of an integrator of order eight.
+        right-hand-side evaluations. The budget increases with decreasing tolerance, in proportion
+        to the cost of an integrator of order eight.
         """
         start = self.tangency_point_at_instability_norm
         if start is None:

@@ -293,9 +293,9 @@ class CriticalStep(Measure):
         size. If the motions after the two steps do not confirm the critical step, the relative
         difference between the two step sizes and the critical step size is increased tenfold, up to
         2 %. The error of the critical step size is the difference at which the motions confirm the
-        critical step. A critical step that was computed from a critical path is rejected at the
-        first failure, without further differences. A smaller step may then be critical, because
-        oscillations below the instability norm may grow.
+        critical step. If a critical step was computed from a critical path, it is rejected if the
+        motions do not confirm it at the first difference. In this case, a smaller step may be
+        critical, because oscillations below the instability norm may grow.
         """
         first = (
             boundary.relative_error

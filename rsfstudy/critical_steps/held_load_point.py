@@ -156,7 +156,7 @@ def _stays_below_norm(scene: Scene, point: MotionPoint) -> bool:
 def _bound_pore_pressure_effect(scene: Scene, point: MotionPoint) -> tuple[float, float]:
     """Compute an upper bound of the increase of ln V due to pore pressure and heat.
 
-    The function returns the upper bound, and the smallest decrease of the state by stress and
+    The function returns the upper bound, and the smallest decrease of the state due to stress and
     temperature. The upper bound is infinite if no bound is found. A trial increase of ln V is an
     upper bound under one condition: at the increased ln V, the highest pore pressure and the
     highest temperature reduce strength by less than the product of a and the trial increase.

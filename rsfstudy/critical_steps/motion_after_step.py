@@ -53,7 +53,7 @@ _SETTLING_EVENT = approach_to_steady_state(_SETTLING_TOLERANCE_OVER_MAX_DISTANCE
 
 @dataclass(frozen=True)
 class _OrbitOutcome:
-    """One orbit of the motion after a step.
+    """Outcome of a single orbit of the motion after a step.
 
     Parameters
     ----------

@@ -9,10 +9,11 @@ matrix of the parameters is
 .. math:: s^2 (J^T R^{-1} J)^{-1}, \qquad s^2 = \frac{|W (y - f)|^2}{n - p},
 
 where :math:`J` is the Jacobian of the model, :math:`n` is the number of rows, and :math:`p` is the
-number of parameters. Errors of the step times and step velocities change the model by the columns
-of a matrix :math:`G` (see ``load_point_noise``). Step errors add :math:`A A^T` to the covariance
-matrix, with :math:`A = (J^T R^{-1} J)^{-1} J^T R^{-1} G`. The noise is estimated by restricted
-maximum likelihood [2]_.
+number of parameters. The friction of the model also depends on the step times and step velocities.
+Each column of a matrix :math:`G` contains the change of friction due to one independent error of
+the steps (see ``load_point_noise``). The step errors add :math:`A A^T` to the covariance matrix,
+with :math:`A = (J^T R^{-1} J)^{-1} J^T R^{-1} G`. The noise is estimated by restricted maximum
+likelihood [2]_.
 
 References
 ----------

@@ -95,7 +95,7 @@ class LoadingStep(NamedTuple):
 
     @property
     def middle(self) -> float:
-        """Time in s of an immediate step that gives the same later displacement.
+        """Time in s of an immediate step that results in the same displacement.
 
         If a record has few rows before a step, the detected step may last longer than the actual
         step. The middle of the detected step is then more accurate than its ends.

@@ -625,7 +625,7 @@ def shift_parameter(
 
 
 def parameter_to_coordinate(parameter_name: str, parameter_value: float) -> float:
-    """Convert a parameter to its logarithm if the fit varies the logarithm.
+    """Convert the value of a parameter to its fit coordinate.
 
     Parameters
     ----------
@@ -646,7 +646,7 @@ def parameter_to_coordinate(parameter_name: str, parameter_value: float) -> floa
 
 
 def coordinate_to_parameter(parameter_name: str, coordinate: float) -> float:
-    """Convert the logarithm of a parameter to its value if necessary.
+    """Convert a fit coordinate of a parameter to the value of the parameter.
 
     Parameters
     ----------

@@ -1,11 +1,12 @@
 r"""Noise of shear stress and normal stress that is added to the loading.
 
 Each module of this package defines one kind of noise. The function ``discover_parts`` finds the
-modules automatically. Noise is a sampled path, not a term of the equations. Between two samples,
-the stress changes at a constant rate, and the integrators follow the resulting motion to their
-tolerance. For noise that is independent of the motion, the motion converges to the solution of the
-stochastic differential equation as the sampling interval decreases (Wong-Zakai theorem). The module
-``noise_paths`` computes the paths from the seed. The base class is ``Noise``.
+modules automatically. Noise is a sampled path that is added to the loading, and not an additional
+term in the equations of motion. Between two samples, the stress changes at a constant rate, and the
+resulting motion is integrated to the requested tolerance. If the noise is independent of the
+motion, the motion converges to the solution of the stochastic differential equation as the sampling
+interval decreases (Wong-Zakai theorem). The module ``noise_paths`` computes the paths from the
+seed. The base class is ``Noise``.
 """
 
 from __future__ import annotations
