@@ -1,11 +1,11 @@
 """Critical paths, which are motions that just reach the instability norm.
 
 The main class is ``CriticalPath``. At the end of a critical path, ln V equals the instability norm
-and the time derivative of ln V is zero, which leaves one scalar equation for the stress. The path
-is integrated backwards in time from its end, which is called the tangency point. Neighbouring paths
-converge backwards in time. A few short integrations with a moderate tolerance are therefore
-accurate to many digits. An integration forwards in time would amplify every error. Gu et al. [1]_
-derive the critical path under the slip law.
+and the time derivative of ln V is zero. With these two conditions, the stress at the end follows
+from a scalar equation. The path is integrated backwards in time from its end, which is called the
+tangency point. Neighbouring paths converge backwards in time. A few short integrations with a
+moderate tolerance are therefore accurate to many digits. An integration forwards in time would
+amplify every error. Gu et al. [1]_ derive the critical path under the slip law.
 
 The unknowns of a critical path are the spring stress and one state. These two unknowns are
 sufficient if the effect of inertia is small at the instability norm. Inertia has no effect at an

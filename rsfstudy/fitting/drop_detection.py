@@ -91,7 +91,7 @@ class Detection(NamedTuple):
     detectable_drop : float
         Smallest detectable drop. A drop of this size is missed with a probability of 0.001.
     max_decrease : float
-        Largest decrease of the moving average of stress.
+        Largest decrease in the moving average of stress.
 
     Examples
     --------
@@ -348,7 +348,7 @@ class _WindowMeanDifferences:
     def find_drops_best_seen_in_window(
         self, longer_windows: list[_WindowMeanDifferences]
     ) -> list[tuple[int, int]]:
-        """Find drops whose detection scores are not higher with longer windows.
+        """Find drops whose detection scores are not clearly higher in longer windows.
 
         Parameters
         ----------

@@ -10,7 +10,7 @@ matrix of the parameters is
 
 where :math:`J` is the Jacobian of the model, :math:`n` is the number of rows, and :math:`p` is the
 number of parameters. The friction of the model also depends on the step times and step velocities.
-Each column of a matrix :math:`G` contains the change of friction due to one independent error of
+Each column of a matrix :math:`G` contains the change in friction due to one independent error of
 the steps (see ``load_point_noise``). The step errors add :math:`A A^T` to the covariance matrix,
 with :math:`A = (J^T R^{-1} J)^{-1} J^T R^{-1} G`. The noise is estimated by restricted maximum
 likelihood [2]_.
@@ -68,7 +68,7 @@ _MIN_LOG_GAP_BETWEEN_SLIP_DISTANCES = 1e-6
 #: Tested initial values of the slip distance, relative to the initial guess.
 _INITIAL_SLIP_DISTANCE_FACTORS = (0.1, 0.3, 1.0, 3.0, 10.0)
 #: Settings of the search. The first value is the largest number of iterations. Each iteration
-#: estimates the noise and the parameters. The iterations end if the changes of the parameters in
+#: estimates the noise and the parameters. The iterations end if the changes in the parameters in
 #: standard errors are smaller than the second value. The third value is the largest number of model
 #: evaluations per iteration, and the fourth value is the relative tolerance of the search. The last
 #: two settings apply to the final Gauss-Newton steps. The fifth setting contains the smallest
@@ -376,7 +376,7 @@ class FitProblem:
 
         First, Gauss-Newton steps :math:`(J^T R^{-1} J)^{-1} J^T R^{-1} (y - f)` with accurate
         derivatives refine the parameters. The numerical error of a parameter is the last
-        Gauss-Newton step, plus three times the change of the parameter if the integration
+        Gauss-Newton step, plus three times the change in the parameter if the integration
         tolerances are reduced by a factor of ten. The degrees of freedom of the fit are the degrees
         of freedom of the noise, multiplied by (n - p)/n for p parameters and n rows.
         """
@@ -571,11 +571,11 @@ def _has_converged(
     Parameters
     ----------
     last_coordinate_change : ndarray, shape (parameters,)
-        Last change of the coordinates of the free parameters.
+        Last change in the coordinates of the free parameters.
     whitened_jacobian : ndarray, shape (rows, parameters + 1)
         Whitened derivatives, followed by the whitened residuals.
     tolerance : float
-        Largest change of the coordinate of a parameter, as a fraction of the standard error of the
+        Largest change in the coordinate of a parameter, as a fraction of the standard error of the
         coordinate.
     """
     size = np.linalg.norm(whitened_jacobian[:, -1]) / math.sqrt(len(whitened_jacobian))

@@ -53,11 +53,11 @@ _MIN_SLOPE_FRACTION = {RELOADING: 0.6, UNLOADING: 0.3, INITIAL_LOADING: 0.6}
 #: Smallest ratio of a slope to its standard error, and smallest number of rows of a portion.
 _MIN_SLOPE_SIGMAS, _MIN_PORTION_ROWS = 12.0, 10
 #: Slopes are computed in windows. In each window, friction changes by this fraction of the change
-#: of friction in the whole portion.
+#: in friction in the whole portion.
 _SLOPE_WINDOW_RISE = 0.15
 #: Largest number of rows of a portion. The rows of longer portions are thinned.
 _MAX_PORTION_ROWS = 3000
-#: Smallest increase of friction during the initial loading.
+#: Smallest increase in friction during the initial loading.
 _MIN_INITIAL_RISE = 0.05
 #: Mean and standard deviation of the prior distributions of ln a and g.
 _PRIOR_OF_LOG_A, _PRIOR_OF_STATE_CHANGE = (math.log(0.01), 0.7), (0.0, 1.5)

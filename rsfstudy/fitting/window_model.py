@@ -368,7 +368,7 @@ class WindowModel:
         return sum((c * self.displacement**n for n, c in powers), np.zeros(len(self.time)))
 
     def compute_loading_error_sensitivity(self, values: ParameterValues) -> np.ndarray:
-        """Compute the changes of friction due to errors of the loading.
+        """Compute the changes in friction due to errors of the loading.
 
         Parameters
         ----------
@@ -378,7 +378,7 @@ class WindowModel:
         Returns
         -------
         ndarray, shape (rows, errors)
-            Change of friction due to each independent error of the steps. The size of each error is
+            Change in friction due to each independent error of the steps. The size of each error is
             one standard deviation. The values are NaN if a simulation fails.
         """
         if not self.loadings_with_shifted_steps:
@@ -609,7 +609,7 @@ def shift_parameter(
     parameter_name : str
         Name of the parameter to shift.
     coordinate_change : float
-        Change of the parameter, or of its logarithm for parameters in ``LOGARITHMIC_PARAMETERS``.
+        Change in the parameter, or in its logarithm for parameters in ``LOGARITHMIC_PARAMETERS``.
 
     Returns
     -------

@@ -54,7 +54,7 @@ class Noise(Part):
     def unknowns(self) -> tuple[Quantity, ...]:  # type: ignore[override]
         """Unknowns of the noise.
 
-        If the noise changes normal stress, the decrease of normal stress is an unknown. Noise of
+        If the noise changes normal stress, the decrease in normal stress is an unknown. Noise of
         shear stress does not need an unknown, because it changes the rate of the spring stress.
         """
         return _NORMAL_STRESS_UNKNOWNS if self.changes_normal_stress else ()
@@ -65,7 +65,7 @@ class Noise(Part):
         return bool(self.unknowns)
 
     def initial_unknowns(self, scene: SceneView) -> Numbers:
-        """Return the decrease of normal stress at the start of the path, which is zero.
+        """Return the decrease in normal stress at the start of the path, which is zero.
 
         Parameters
         ----------

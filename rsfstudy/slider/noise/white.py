@@ -110,7 +110,7 @@ class WhiteNoise(Noise):
         """Check that the loading of the scene can be combined with noise.
 
         See ``Part.check``. Noise can be added to loadings that consist of segments at constant
-        velocity, but not to records.
+        velocity, but not to sampled histories.
         """
         loading, fluid = scene.parts.loading, scene.parts.fluid
         if loading.unknowns or loading.reported_segment_count < len(loading.segments) - 1:
