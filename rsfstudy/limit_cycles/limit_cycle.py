@@ -7,7 +7,7 @@ The limit cycle is the fixed point of the return map.
 
 The motion is first integrated with a low accuracy until it approaches the limit cycle. The orbit is
 then refined until all unknowns repeat, first with the requested accuracy and then with smaller
-tolerances. The first cycle after the step is never accepted as the limit cycle.
+tolerances. The first cycle after the loading step is never accepted as the limit cycle.
 
 If the law or the fluid has several states, the motion may repeat only after 2, 4 or more cycles, or
 never. If the motion repeats after several cycles or never, the results describe the cycle with the

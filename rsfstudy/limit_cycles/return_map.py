@@ -4,10 +4,10 @@ The main methods are ``ReturnMap.find_periodic_orbit``, which searches for an or
 ``ReturnMap.refine_orbit``, which computes a known orbit with another accuracy.
 
 A cycle extends from one rise of V through V_0 to the next rise. At a rise, the slip rate is known,
-so the motion is determined by spring stress and the states. With inertia, the spring stress also
-includes the stress that accelerates the slider. The motion therefore defines a return map of spring
-stress and states from one section (rise of V through V_0) to the next. An orbit of n cycles is a
-fixed point of the n-th power of the return map.
+so the motion is determined by spring stress and the states. If the slider has inertia, the spring
+stress also includes the stress that accelerates the slider. The motion therefore defines a return
+map of spring stress and states from one section (rise of V through V_0) to the next. An orbit of n
+cycles is a fixed point of the n-th power of the return map.
 
 The eigenvalues of the derivative of the return map are the Floquet multipliers, the factors by
 which small perturbations grow during one orbit. The orbit repels if the absolute value of a
@@ -124,7 +124,7 @@ class PeriodicOrbit:
 
     @property
     def floquet_multipliers(self) -> np.ndarray:
-        """Complex Floquet multipliers by decreasing absolute value."""
+        """Complex Floquet multipliers, sorted by decreasing absolute value."""
         found = np.linalg.eigvals(multiply_cycle_derivatives(self.cycle_derivatives)).astype(
             complex
         )

@@ -21,12 +21,13 @@ quantities are the attributes of a ``MotionPoint``. The attribute ``apparent_fri
 friction coefficient that a rig measures. Extrema are available for ``log_slip_rate``,
 ``spring_stress`` and ``apparent_friction``.
 
-In addition to the requested events, the table lists the start of the motion, each change of regime,
-the beginning of each loading segment, the end of the motion, and the end of the step in which the
-last requested sample was recorded. An event at the transition between two regimes or segments is
-reported at the beginning of the later regime or segment. With inertia, a rupture begins and ends
-with a change of regime (``EventKind.REGIME``), unless a loading segment begins or ends at the same
-time. If a motion cannot continue, the integration raises ``MotionStopped`` with the reason.
+In addition to the requested events, the table lists the start and the end of the motion, each
+change of regime, and the beginning of each loading segment. The table also lists the end of the
+step in which the last requested sample was recorded. An event at the transition between two regimes
+or segments is reported at the beginning of the later regime or segment. With inertia, a rupture
+begins and ends with a change of regime (``EventKind.REGIME``), unless a loading segment begins or
+ends at the same time. If a motion cannot continue, the integration raises ``MotionStopped`` with
+the reason.
 """
 
 from __future__ import annotations

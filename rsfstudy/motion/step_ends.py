@@ -1,4 +1,4 @@
-"""Ends of steps at the end of a regime, of a loading segment or of the motion."""
+"""Steps that end with a regime, with a loading segment or with the motion."""
 
 from __future__ import annotations
 

@@ -369,7 +369,7 @@ class Quantile(_SampleStatistic):
         """Minimum number of samples for the standard error.
 
         With fewer samples, the level of the quantile plus or minus one binomial standard deviation
-        would be outside of the range from 0 to 1.
+        would be outside the range from 0 to 1.
         """
         rarer = min(self.level, 1.0 - self.level)
         return max(2, math.ceil((1.0 - rarer) / rarer - 1e-9))
