@@ -335,7 +335,7 @@ class CriticalPath(NamedTuple):
 
 @lru_cache(maxsize=256)
 def _end_events_of_path_search(log_slip_rate_at_norm: float) -> tuple[EventSpecification, ...]:
-    """Return the events at which the search for the start of a path is abandoned."""
+    """Return the events that end the search for the start of a path without success."""
     above_norm = log_slip_rate_at_norm + _LOG_RATE_OFFSET_ABOVE_INSTABILITY_NORM
     return (
         rise("log_slip_rate", above_norm, terminal=True, may_defer=True),

@@ -201,8 +201,8 @@ def _slow_orbit_grows_to_norm(
     """Return True if a slowly growing orbit grows up to the instability norm.
 
     The function tests successively larger orbits, until an orbit shrinks or reaches the instability
-    norm. The difference in size between successive orbits is reduced if the first peak of ln V on
-    the next orbit is above the instability norm.
+    norm. If the first peak of ln V on the next orbit is above the instability norm, the size of the
+    next orbit is reduced.
     """
     if not with_inertia and _orbit_touching_norm_shrinks(scene, integrator):
         return False

@@ -198,7 +198,7 @@ def _default_x(dataset: xr.Dataset, variable: str, choices: Sequence[str]) -> st
 
 
 def _default_second(dataset: xr.Dataset, candidates: Sequence[str], kind: str | None) -> str:
-    """Return the dimension with the most points for which all curves can be distinguished."""
+    """Return the largest dimension for which all curves can be distinguished."""
     if kind == MAP:
         return max(candidates, key=lambda name: dataset.sizes[name])
     few = [d for d in candidates if 1 < dataset.sizes[d] <= _MAX_CURVES_AT_START]

@@ -377,8 +377,9 @@ class FitProblem:
         First, Gauss-Newton steps :math:`(J^T R^{-1} J)^{-1} J^T R^{-1} (y - f)` with accurate
         derivatives refine the parameters. The numerical error of a parameter is the sum of two
         terms: the last Gauss-Newton step, and three times the change in the parameter when the
-        integration tolerances are reduced by a factor of ten. The degrees of freedom of the fit are
-        the degrees of freedom of the noise, multiplied by (n - p)/n for p parameters and n rows.
+        integration tolerances are reduced by a factor of ten. For p parameters and n rows, the
+        number of degrees of freedom of the fit is (n - p)/n times the number of degrees of freedom
+        of the noise.
         """
         change = math.inf
         for number in range(_NEWTON_STEP_COUNT_LIMITS[2]):

@@ -71,8 +71,8 @@ def describe_asymmetric_intervals(
     """Describe the parameters with very asymmetric confidence intervals.
 
     A record may provide only a lower or an upper limit for a parameter, for example for the
-    stiffness of a very stiff machine. The standard errors of all parameters that are correlated
-    with this parameter are then too small.
+    stiffness of a very stiff machine. In this case, the standard errors of all correlated
+    parameters are too small.
 
     Parameters
     ----------

@@ -147,7 +147,7 @@ def _reset_loading_unknowns(scene: Scene, states: Numbers) -> Numbers:
 
 
 def _find_specified_initial_states(scene: Scene, steady_states: Numbers) -> tuple[Numbers, float]:
-    """Find the states and ln(V/V_*) for the specified stress and state.
+    """Find the states and ln(V/V_*) for the initial stress and state of the scene.
 
     The function solves for the value of Psi at which the state variable has its specified value.
     """

@@ -489,7 +489,7 @@ def interpolate_rows(columns: np.ndarray, row_positions: np.ndarray, result: np.
     """Interpolate columns at fractional row numbers.
 
     Within a step, the function evaluates the polynomial through the samples of the step. Between
-    two regimes, it interpolates linearly. In compiled code,
+    two regimes, the function interpolates linearly. In compiled code,
     ``compiled.array_operations.interpolate_rows`` replaces this function.
 
     Parameters
@@ -530,7 +530,7 @@ INTERPOLATION_COEFFICIENTS = tuple(tuple(row) for row in _INVERSE_VANDERMONDE.to
 
 
 def _evaluate_polynomial(x: float, coefficients: Sequence[float]) -> float:
-    """Evaluate a polynomial. Coefficients are in the order of increasing powers."""
+    """Evaluate a polynomial. The coefficients are in order of increasing powers."""
     value = 0.0
     for coefficient in reversed(coefficients):
         value = coefficient + x * value

@@ -350,10 +350,10 @@ class Scene(SceneFunctions, SceneQuantities):
         """Sequences of loading segments that follow each other without a jump.
 
         A jump is a sudden change in load point displacement or normal stress, or the end of a
-        segment with unknowns. With noise, each sequence has a single segment. Each sequence is a
-        tuple of two elements: the scene during the first segment, and an array of shape (segments,
-        6) with the rows of the segment table. The columns of the table are defined in
-        ``parameter_layout``.
+        segment with unknowns. If the scene has noise, each sequence has a single segment. Each
+        sequence is a tuple of two elements: the scene during the first segment, and an array of
+        shape (segments, 6) with the rows of the segment table. The columns of the table are defined
+        in ``parameter_layout``.
         """
         if len(self._segments) == 1:
             return ((self, SINGLE_ENDLESS_SEGMENT_TABLE),)

@@ -233,7 +233,7 @@ def _tuple_sum_expression(tuple_name: str, term_count: int) -> str:
 def _build_function_from_expression(argument_names: str, expression: str) -> Function:
     """Create a function from source code for its arguments and its return value.
 
-    The source code has no loop, because the compiler cannot iterate over tuples.
+    The source code contains no loop, because the compiler cannot iterate over tuples.
     """
     function: Function = eval(f"lambda {argument_names}: {expression}", {"__name__": __name__})
     return function

@@ -72,7 +72,7 @@ def events(given: options.CommandOptions) -> int:
 
     A record needs shear stress or friction, and time or displacement. The command prints a table of
     the drops with their times, durations, intervals and sizes, and the smallest drop that can be
-    detected. With --json, all quantities are printed with their errors.
+    detected. If you pass --json, all quantities are printed with their errors.
     """
     reading = collect_reading_options(given)
     sign = None if given.sign is None else int(given.sign)

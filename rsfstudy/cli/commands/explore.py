@@ -25,9 +25,9 @@ def explore(given: options.CommandOptions) -> int:
 
     If FILE is omitted, the page shows a spring-slider model with sliders for its parameters. If
     FILE contains the results of a study (.nc or .zarr), the page shows the results. Other files,
-    such as CSV, are read as laboratory records, which you can fit.
+    such as CSV files, are read as laboratory records, and you can fit them.
 
-    The server listens on this computer only. Press Ctrl-C to stop it.
+    The server accepts connections only from this computer. Press Ctrl-C to stop it.
     """
     from rsfstudy.explorer import serve
 

@@ -173,7 +173,7 @@ def _skip_studies_without_engine(studies: Sequence[Study]) -> list[StudyRun]:
 def _print_expected_cost(study: Study, given: options.CommandOptions) -> None:
     """Print the estimated cost of a run if the user changed the accuracy.
 
-    If the compiled engine would be faster, the function also suggests this engine.
+    If the compiled engine would be faster, the function also recommends this engine.
     """
     from rsfstudy.cli import cost_estimates
     from rsfstudy.execution import CellPlan

@@ -208,8 +208,8 @@ def _find_header(
 def _split_header(line: str, delimiter: str, size: int) -> list[str]:
     """Split a line of text into headings.
 
-    If possible, the number of headings equals the number of fields of a row. The list is empty if
-    the line contains no text, or if the line contains a number.
+    If possible, the header is split into as many headings as there are fields in a row. The list is
+    empty if the line contains no text, or if the line contains a number.
     """
     text = line.strip().lstrip("".join(COMMENT_MARKS)).strip()
     if not text or _RULE_PATTERN.fullmatch(text):

@@ -239,9 +239,9 @@ class LawBase(Part):
     def check(self, scene: SceneView) -> None:
         r"""Check that the scene supports the stress effect and reversed slip.
 
-        The effect of shear stress requires that the integral of :math:`d\tau/\sigma` is known, so
-        normal stress must be proportional to shear stress or constant. Reversed slip requires
-        dynamics that allow a negative slip rate.
+        The effect of shear stress can be computed only if the integral of :math:`d\tau/\sigma` is
+        known, so normal stress must be proportional to shear stress or constant. Reversed slip
+        requires dynamics that allow a negative slip rate.
 
         Parameters
         ----------

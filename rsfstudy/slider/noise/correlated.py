@@ -12,7 +12,7 @@ from rsfstudy.slider.scene_view import SceneView
 
 @dataclass(frozen=True, kw_only=True)
 class CorrelatedNoise(WhiteNoise):
-    r"""Bounded noise of the stresses with a correlation time.
+    r"""Noise of shear stress and normal stress with a correlation time.
 
     The other fields are described in ``WhiteNoise``.
 

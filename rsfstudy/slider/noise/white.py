@@ -21,7 +21,7 @@ from rsfstudy.slider.scene_view import SceneView
 
 @dataclass(frozen=True, kw_only=True)
 class WhiteNoise(Noise):
-    r"""White noise of the stress rates.
+    r"""White noise in the rates of shear stress and normal stress.
 
     Parameters
     ----------

@@ -28,7 +28,7 @@ _MIN_RELATIVE_OSCILLATION_SLOPE_CHANGE = 0.1
 class CrossingStatus(IntEnum):
     """Outcome of the search for a level crossing.
 
-    Result files contain the integer values, so the values must not be changed.
+    The integer values are stored in results files, so they must not be changed.
     """
 
     OK, OUT_OF_REACH, NOT_UNIQUE, UNRESOLVED, TOO_FEW_POINTS = range(5)
