@@ -80,7 +80,9 @@ def test_every_field_with_a_scale_takes_units(about):
     scene = rig.scene(**CALLS.get(about.name, {}), **{about.name: text})
     assert getattr(scene, about.name) == pytest.approx(value, rel=1e-12)
     assert scene.reference_rate == V / D_C
-    with pytest.raises(InvalidValue, match=rf"{about.name} = '1 kg': has units of another kind"):
+    with pytest.raises(
+        InvalidValue, match=rf"{about.name} = '1 kg': has units that are incompatible with"
+    ):
         rig.scene(**{about.name: "1 kg"})
 
 
@@ -119,7 +121,7 @@ def test_mass_and_radiation():
 
 
 def test_a_scale_that_is_unusual_is_told():
-    with pytest.warns(UserWarning, match="slip_distance is 1 m: unusual for a rig. Is the unit"):
+    with pytest.warns(UserWarning, match="slip_distance is 1 m: this value is unusual for a rig"):
         Rig(**{**THREE, "slip_distance": 1.0})
 
 
