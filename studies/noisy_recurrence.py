@@ -209,7 +209,7 @@ study = Study(
         b_over_a=1.2,
         stiffness=0.001,
         radiation_damping=1e-4,
-        noise="white",
+        loading_noise="white",
         noise_interval=0.25,
     ),
     axes=[

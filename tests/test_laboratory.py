@@ -66,6 +66,8 @@ CALLS: dict[str, dict] = {
     "load_velocity_ratio": {},
     **{name: {"fluid": "dilatant"} for name in ("dilatancy", "drainage", "porosity_length")},
     "weakening_velocity_ratio": {"law": "flash_heating"},
+    "noise_interval": {"loading_noise": "white", "stress_noise": 1e-4},
+    "noise_correlation_time": {"loading_noise": "correlated", "stress_noise": 1e-4},
     "cooling": {"temperature": "shear_heating"},
     "pressurisation": {"temperature": "shear_heating", "fluid": "thermal"},
 }

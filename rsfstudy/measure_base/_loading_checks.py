@@ -21,10 +21,10 @@ def check_loading_changes_stress_only_in_steps(scene: Scene) -> None:
     InvalidValue
         If the load point velocity or the normal stress changes continuously, or if there is noise.
     """
-    loading, noise = scene.parts.loading, scene.parts.noise
+    loading, noise = scene.parts.loading, scene.parts.loading_noise
     if noise.is_active:
         rule = "changes stress at random, so that no motion settles or repeats"
-        remedy = "Set noise='none', or use EventStatistics or simulate."
+        remedy = "Set loading_noise='none', or use EventStatistics or simulate."
         raise InvalidValue("noise", noise.name, rule, remedy=remedy)
     if loading.unknowns:
         what = "load point velocity" if loading.has_load_point_unknown else "normal stress"

@@ -309,7 +309,9 @@ def get_motion_driver(
         if scene.parts.loading.unknowns
         else 0,
         may_reverse=scene.parts.law.regularised,
-        noise_rate_index=len(scene.parameter_values) - 1 if scene.parts.noise.is_active else 0,
+        noise_rate_index=len(scene.parameter_values) - 1
+        if scene.parts.loading_noise.is_active
+        else 0,
         starts_at_point=1,
         may_terminate=1,
         has_clock=with_time,

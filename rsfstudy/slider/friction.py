@@ -165,7 +165,7 @@ def build_friction_functions(scene: SceneView) -> FrictionFunctions:
         state_count=scene.state_count,
         indices_of_states_in_distance=(*range(law_states), *compared),
         spring_stress_rate=path_length.spring_stress_rate_with_noise
-        if scene.parts.noise.is_active
+        if scene.parts.loading_noise.is_active
         else path_length.spring_stress_rate,
     )
     if not scene.parts.temperature.unknowns:

@@ -99,7 +99,7 @@ SLOTS: tuple[Slot, ...] = (
         omit_if_default=True,
     ),
     Slot(
-        "noise",
+        "loading_noise",
         noise.Noise,
         noise.BUILT_IN_PARTS,
         "none",

@@ -77,7 +77,7 @@ class Scene(SceneFunctions, SceneQuantities):
     temperature : str or type, default: "isothermal"
         Temperature. With "isothermal", temperature is constant. With "shear_heating", the work of
         the shear stress heats the fault. A user-defined class is also accepted.
-    noise : str or type, default: "none"
+    loading_noise : str or type, default: "none"
         Noise that is added to the loading. With "white", the noise of the stresses is a Wiener
         process. With "correlated", the noise is bounded and has a correlation time.
     a : float, default: 0.0145
@@ -234,8 +234,8 @@ class Scene(SceneFunctions, SceneQuantities):
     ----------
     parts : SceneParts
         Parts of the scene: ``slider``, ``law``, ``normal_stress``, ``fluid``, ``dynamics``,
-        ``loading``, ``temperature`` and ``noise``. Each field of the scene belongs to one of the
-        parts.
+        ``loading``, ``temperature`` and ``loading_noise``. Each field of the scene belongs to one
+        of the parts.
 
     Raises
     ------
@@ -320,10 +320,10 @@ class Scene(SceneFunctions, SceneQuantities):
         If the loading has unknowns or noise, the load point of the returned scene moves at the
         velocity of the last segment, without noise. Otherwise the property is the scene itself.
         """
-        if not self.stress_loading.unknowns and not self.parts.noise.is_active:
+        if not self.stress_loading.unknowns and not self.parts.loading_noise.is_active:
             return self
         steady = self.with_segment(loading.Segment(self.load_velocity))
-        return Scene(steady.parts._replace(noise=NoNoise()))
+        return Scene(steady.parts._replace(loading_noise=NoNoise()))
 
     def segment_scene(self, segment_index: int) -> Scene:
         """Return the scene during one segment of its loading.
@@ -362,7 +362,7 @@ class Scene(SceneFunctions, SceneQuantities):
         )
         if self.parts.law.regularised:  # After reversed slip, a hold may have no solution.
             breaks = breaks | (table[:, parameter_layout.SEGMENT_VELOCITY] == 0.0)
-        breaks = breaks | self.parts.noise.is_active
+        breaks = breaks | self.parts.loading_noise.is_active
         first = np.flatnonzero(breaks[1:]) + 1
         acting = map(self.segment_scene, (0, *first.tolist()))
         return tuple(zip(acting, np.split(table, first), strict=True))
