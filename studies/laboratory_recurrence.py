@@ -54,7 +54,7 @@ def experiment_fields(normal_stress: float, noise: str) -> dict[str, Any]:
     """
     scene, rig = build_gualandi_scene(normal_stress), build_gualandi_rig(normal_stress)
     names = ("stiffness", "radiation_damping", "dilatancy")
-    fields = {"noise": noise, **{name: getattr(scene, name) for name in names}}
+    fields = {"loading_noise": noise, **{name: getattr(scene, name) for name in names}}
     if noise == "none":
         return fields
     return {**fields, "stress_noise": STRESS_NOISE / rig.normal_stress, "noise_interval": 0.1}

@@ -190,7 +190,7 @@ def test_noise_of_normal_stress(kind):
     scene = BASE.with_(
         normal_stress="imposed",
         alpha=0.3,
-        noise=kind,
+        loading_noise=kind,
         normal_stress_noise=1e-3,
         noise_interval=0.25,
         noise_seed=5,
@@ -340,7 +340,7 @@ def test_wrong_fields_of_the_measure(wrong):
 
 @pytest.mark.parametrize("measure", [LimitCycle(), CriticalStep(of="load_velocity_ratio")])
 def test_measures_of_smooth_loading_refuse_noise(measure):
-    with pytest.raises(InvalidValue, match=r"noise = 'white': changes stress at random"):
+    with pytest.raises(InvalidValue, match=r"loading_noise = 'white': changes stress at random"):
         measure(NOISY, Accuracy())
 
 

@@ -25,7 +25,7 @@ def check_loading_changes_stress_only_in_steps(scene: Scene) -> None:
     if noise.is_active:
         rule = "changes stress at random, so that no motion settles or repeats"
         remedy = "Set loading_noise='none', or use EventStatistics or simulate."
-        raise InvalidValue("noise", noise.name, rule, remedy=remedy)
+        raise InvalidValue("loading_noise", noise.name, rule, remedy=remedy)
     if loading.unknowns:
         what = "load point velocity" if loading.has_load_point_unknown else "normal stress"
         rule = f"changes {what} continuously, so the motion neither settles nor repeats itself"
