@@ -105,8 +105,8 @@ class Measure(ConstructorKeywordCheckMixin):
     exceeds the work budget. To compute a motion, pass the integrator to ``rsfstudy.simulate``:
     ``rsfstudy.simulate(scene, integrator=integrator)``. The functions ``rsfstudy.critical_step``
     and ``rsfstudy.limit_cycle`` also take ``integrator=integrator``. To use the outcome of another
-    measure, call the ``run_nested`` method of that measure. The results of
-    ``integrator.refined()``, whose tolerances are ten times smaller, are used to estimate errors.
+    measure, call the ``run_nested`` method of that measure. To estimate errors, repeat the
+    computation with ``integrator.refined()``, whose tolerances are ten times smaller.
 
     Override ``error_scales`` to set the status to ``unverified`` if the error estimates are far too
     large::
@@ -139,9 +139,9 @@ class Measure(ConstructorKeywordCheckMixin):
     name: ClassVar[str]
     #: Meanings of inner dimensions and fields that are not in the common vocabulary.
     dimensions: ClassVar[Sequence[Quantity]] = ()
-    #: Variants of the equations that are compiled before the first cell is computed: True for
-    #: motions with time, False for motions without time. The value is empty if the measure does not
-    #: integrate motions.
+    #: Variants of the equations of motion that are compiled before the first cell is computed. True
+    #: stands for the equations in which time is an unknown, and False for the equations without
+    #: time. The tuple is empty if the measure does not integrate motions.
     needs_time: ClassVar[tuple[bool, ...]] = (True,)
 
     def __init_subclass__(cls) -> None:
@@ -170,7 +170,7 @@ class Measure(ConstructorKeywordCheckMixin):
 
     @cached_attribute
     def optional_outputs(self) -> Sequence[str]:
-        """Names of the results that a successful outcome may omit.
+        """Names of the results that may be missing from a successful outcome.
 
         If an optional result is missing, the message of the outcome contains the reason.
         """
@@ -403,7 +403,8 @@ class Measure(ConstructorKeywordCheckMixin):
         Returns
         -------
         Outcome
-            Outcome of ``__call__``, without the advice on a larger budget.
+            Outcome as returned by ``__call__``, except that the message does not suggest a larger
+            budget.
         """
         outcome, own = self.run_metered(scene, integrator.accuracy)
         for regime, spent in own.evaluations_by_regime.items():
@@ -464,7 +465,7 @@ class Measure(ConstructorKeywordCheckMixin):
         declared, inner = self.variables, self.inner_coordinates
         given = outcome.values.items()
         values = {
-            # Most results are plain floats, for which the full check would take too long.
+            # The full check is slow and is not necessary for plain floats, the most common results.
             name: value
             if isinstance(value, float) and declared.get(name) == ()
             else _declaration_checks.check_output_value(declared, inner, name, value)
