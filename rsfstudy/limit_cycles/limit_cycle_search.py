@@ -184,7 +184,7 @@ class LimitCycleSearch:
 
     @property
     def orbit(self) -> PeriodicOrbit:
-        """Last cycle as a periodic orbit, with a correction to the limit cycle."""
+        """Last cycle as a periodic orbit, with the remaining correction to the limit cycle."""
         last, slopes = self.cycles[-1:], np.array(self._derivatives).T
         return PeriodicOrbit(
             tuple(last),

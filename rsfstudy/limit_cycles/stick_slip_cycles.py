@@ -34,8 +34,8 @@ from rsfstudy.slider import MotionPoint, Scene
 LN10 = math.log(10.0)
 #: Number of main results of a cycle.
 PRIMARY_OUTPUT_COUNT_PER_CYCLE = 5
-#: Kinds of events. Module variables avoid attribute lookups, which would take as long as all other
-#: operations for each event.
+#: Kinds of events. They are module variables because attribute lookups would take as long as all
+#: other operations on an event.
 _START, _RISE, _FALL = EventKind.START, EventKind.RISE, EventKind.FALL
 _SEGMENT, _SETTLED = EventKind.SEGMENT, EventKind.SETTLED
 _get_log_slip_rate, _get_spring_stress = attrgetter("log_slip_rate"), attrgetter("spring_stress")
@@ -181,7 +181,7 @@ def iterate_cycles(
 
 
 def suggest_raising_event_limit(event_count: int, option_name: str = "events") -> str:
-    """Return advice to allow more events, for use in a message.
+    """Return the part of a message that advises the user to allow more events.
 
     Parameters
     ----------
