@@ -217,8 +217,9 @@ class Healing(RecordingMeasure):
         by_friction = {"healing": 1.0, "relaxation": 1.0, "peak_displacement": turning}
         neglected = dict.fromkeys(values, first.neglected_error_until(first.peak_event.time))
         neglected["relaxation"] = first.neglected_error_until(first.segment_start_events[1].time)
-        # The displacement depends on the growth of friction at the peak, and the error of the
-        # growth rises earlier.
+        # The peak displacement depends on the growth rate of ln V at the peak. The error of the
+        # growth rate rises earlier than the error of ln V, so the error at the end of the record is
+        # used.
         neglected["peak_displacement"] = first.neglected_error_until(math.inf)
         errors = estimate_errors_at_instants(
             values, refined, by_friction, scene, integrator, neglected

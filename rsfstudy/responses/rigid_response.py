@@ -68,10 +68,10 @@ class RigidResponse(Measure):
     ``load_velocity_ratio`` of the scene. The direct effect changes the stress by ``a sigma
     ln(V/V_*)`` at the step. The stress then evolves with slip towards steady sliding at V.
 
-    ``evolution_distance`` is the slip at which 1/e of the evolution of stress towards steady
-    sliding remains. Under the slip law, ``evolution_distance`` is D_c. The outputs
-    ``shear_stress``, ``normal_stress_ratio`` and ``state_variable`` have the shape (points,), along
-    ``slip``. Slip is in units of D_c, and stresses are in units of sigma_*.
+    ``evolution_distance`` is the slip after which the difference between the stress and its steady
+    value has decreased to 1/e of the initial difference. Under the slip law, ``evolution_distance``
+    is D_c. The outputs ``shear_stress``, ``normal_stress_ratio`` and ``state_variable`` have the
+    shape (points,), along ``slip``. Slip is in units of D_c, and stresses are in units of sigma_*.
 
     Parameters
     ----------

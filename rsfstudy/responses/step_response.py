@@ -130,7 +130,8 @@ class StepResponse(RecordingMeasure):
     def error_scales(self, scene: Scene, values: Mapping[str, Any]) -> Mapping[str, float]:
         """Return the scale of the numerical error of the highest peak.
 
-        The scale is the absolute value plus one e-fold of slip rate, because the logarithm of V/V_*
+        The scale is the absolute value plus log10(e), which corresponds to an increase of the slip
+        rate by a factor of e. The absolute value is not sufficient, because the logarithm of V/V_*
         may be zero.
 
         Parameters
@@ -219,8 +220,8 @@ class StepResponse(RecordingMeasure):
 def _slip_rate_peaks_at_start(scene: Scene, event: Event) -> bool:
     """Return True if the motion starts with a maximum of slip rate.
 
-    With inertia, the slip rate may rise within the inertial time after the step. If the initial
-    rise is not integrated, the start of the motion is a maximum of slip rate.
+    If the scene has inertia, the slip rate may rise within the inertial time after the step. If the
+    initial rise is not integrated, the start of the motion is a maximum of slip rate.
     """
     return (
         _does_inertia_delay_initial_slip_rate_rise(scene)
