@@ -105,9 +105,9 @@ class LoadVelocityStepFamily(ShootingStepFamily):
     def _compute_max_size(self) -> float:
         """Return the largest size of the search.
 
-        After the largest upward step, the load point velocity equals the instability norm. After
-        the largest downward step, the load point has the smallest velocity at which sliding can be
-        steady.
+        After the largest upward step, the load point velocity corresponds to the instability norm.
+        After the largest downward step, the load point has the smallest velocity at which sliding
+        can be steady.
         """
         if self.sign > 0:
             return self.scene.log_instability_rate
@@ -421,6 +421,6 @@ class NormalStressStepFamily(ShootingStepFamily):
 
 
 def _reaches_norm_at_loose_tolerance(scene: Scene, integrator: Integrator) -> bool:
-    """Return True if a motion that is integrated with a loose tolerance reaches the norm."""
+    """Return True if a motion with a loose tolerance reaches the norm."""
     loose = replace(integrator.accuracy, rtol=LOCAL_TOLERANCE_OF_FIRST_ROOT, refinement=1.0)
     return motion_reaches_norm(scene, integrator.with_accuracy(loose))
