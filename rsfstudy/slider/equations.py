@@ -366,7 +366,7 @@ def slow_manifold_point(scene: SceneView, spring_stress: float, states: Numbers)
     Returns
     -------
     MotionPoint
-        Point with all fields.
+        Point with values of all fields.
     """
     return equations_between_ruptures(scene, with_time=False).evaluate_point(
         (spring_stress, *states)

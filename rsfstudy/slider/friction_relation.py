@@ -133,7 +133,7 @@ def zero_state_effect(
     normal_stress_derivative: float,
     p: Numbers,
 ) -> tuple[float, float]:
-    """Return a zero shift and a zero slope. Stress does not change the state."""
+    """Return a zero shift and slope, for a state that does not depend on stress."""
     return 0.0, 0.0
 
 
@@ -281,7 +281,7 @@ def load_point_stress(states: Numbers, p: Numbers) -> float:
 
 
 def wrap_with_load_point_stress(friction_function: Function) -> Function:
-    """Return a friction function that adds the stress of the load point.
+    """Return a friction function that includes the load point stress.
 
     The argument g of ``friction_function`` is the total frictional stress. The argument g of the
     returned function does not include the load point stress :math:`K D`.

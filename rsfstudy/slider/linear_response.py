@@ -15,8 +15,8 @@ shift. The sum of the states of the law acts on friction, so the vector of weigh
 If the scene has a fluid, the weight of the pore pressure :math:`P`, the last state, is minus the
 derivative of strength with respect to :math:`P`, and the weight of porosity is 0. Because the
 pressure also changes the shift, the last column of :math:`M` includes the product of :math:`E_s`
-and the derivative of the shift with respect to :math:`P`. The same applies to a temperature that
-changes.
+and the derivative of the shift with respect to :math:`P`. A changing temperature is treated in the
+same way.
 
 If the loading changes the normal stress by :math:`-dP`, the frictional stress changes by the
 additional term

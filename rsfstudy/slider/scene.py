@@ -86,9 +86,10 @@ class Scene(SceneFunctions, SceneQuantities):
         Steady-state friction coefficient at :math:`V_*`.
     stiffness_ratio : float, optional
         Ratio of the stiffness to the critical stiffness at :math:`V_*` without radiation damping.
-        Steady sliding is stable at stiffness ratios above 1. With radiation damping, steady sliding
-        is also stable at stiffness ratios slightly below 1. With several states, steady sliding may
-        also be stable at lower stiffness ratios. The default is 1 if ``stiffness`` is not given.
+        Steady sliding is stable at stiffness ratios above 1. If the scene has radiation damping,
+        steady sliding is also stable at stiffness ratios slightly below 1. If the law has several
+        states, steady sliding may also be stable at lower stiffness ratios. The default is 1 if
+        ``stiffness`` is not given.
     stiffness : float, optional
         Stiffness :math:`k D_c/\sigma_*`, as an alternative to ``stiffness_ratio``.
     period : float, default: 5.0
@@ -157,8 +158,8 @@ class Scene(SceneFunctions, SceneQuantities):
         If True, the slider has mass.
     radiation_damping : float, default: 0.0
         Damping coefficient :math:`\eta V_*/\sigma_*`, which is the damping stress due to seismic
-        waves at :math:`V_*`. A scene has either inertia or radiation damping. A slider with inertia
-        corresponds to a damping coefficient of the stiffness, multiplied by
+        waves at :math:`V_*`. A scene has either inertia or radiation damping. The damping
+        coefficient that corresponds to a slider with inertia is the stiffness multiplied by
         :math:`T V_*/(2 \pi D_c)`.
     oscillation_amplitude : float, default: 0.0
         Amplitude of an oscillation of imposed normal stress in :math:`\sigma_*`. If the driving

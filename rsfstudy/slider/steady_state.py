@@ -65,8 +65,8 @@ def steady_sliding(scene: SceneView, log_slip_rate: float) -> SteadySliding | No
     Returns
     -------
     SteadySliding or None
-        Stresses and states. None if no frictional stress satisfies the friction relation, or if
-        the steady temperature is unknown.
+        Stresses and states. The result is None if no frictional stress satisfies the friction
+        relation, or if the steady temperature is unknown.
 
     Notes
     -----
@@ -132,8 +132,8 @@ def frictional_stress_for_friction(
     Returns
     -------
     float or None
-        Deviation of frictional stress from :math:`\tau_*`, in units of :math:`\sigma_*`. None if no
-        frictional stress corresponds to the friction coefficient.
+        Deviation of frictional stress from :math:`\tau_*`, in units of :math:`\sigma_*`. The result
+        is None if no frictional stress corresponds to the friction coefficient.
 
     Notes
     -----
@@ -170,8 +170,8 @@ def frictional_stress_after_jump(
     Returns
     -------
     float or None
-        Deviation of frictional stress from :math:`\tau_*`, in units of :math:`\sigma_*`. None if no
-        frictional stress corresponds to `strength`.
+        Deviation of frictional stress from :math:`\tau_*`, in units of :math:`\sigma_*`. The result
+        is None if no frictional stress corresponds to `strength`.
 
     Notes
     -----
@@ -258,7 +258,7 @@ def min_steady_log_slip_rate(scene: SceneView) -> float:
 
     def excess(log_slip_rate: float) -> float:
         change = steady_friction_minus_reference(scene, log_slip_rate)
-        # Without a steady temperature, the slip rate is too small.
+        # If there is no steady temperature, the slip rate is treated as too small.
         return 1.0 if math.isnan(change) else change - strongest
 
     slower = -1.0

@@ -1,4 +1,4 @@
-"""Thermal pressurisation with drainage, and optionally with dilatancy (Rice 2006).
+"""Thermal pressurisation with drainage and optional dilatancy (Rice 2006).
 
 When the fault heats up, the pore fluid expands more than the pore space. The pore pressure
 therefore rises, and fluid flows out to the surroundings.
