@@ -24,9 +24,10 @@ friction coefficient that a rig measures. Extrema are available for ``log_slip_r
 In addition to the requested events, the table lists the start of the motion, each change of regime,
 the beginning of each loading segment, the end of the motion, and the end of the step in which the
 last requested sample was recorded. An event at the transition between two regimes or segments is
-reported at the beginning of the later regime or segment. With inertia, a rupture begins and ends
-with a change of regime (``EventKind.REGIME``), unless a loading segment begins or ends at the same
-time. If a motion cannot continue, the integration raises ``MotionStopped`` with the reason.
+reported at the beginning of the later regime or segment. If the scene has inertia, a rupture begins
+and ends with a change of regime (``EventKind.REGIME``), unless a loading segment begins or ends at
+the same time. If a motion cannot continue, the integration raises ``MotionStopped`` with the
+reason.
 """
 
 from __future__ import annotations

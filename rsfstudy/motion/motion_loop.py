@@ -146,8 +146,8 @@ def advance_motion(
     -------
     int
         Return code, for example ``PAUSED`` or ``MOTION_ENDED``. After ``PAUSED``, the caller reads
-        the tables and calls the function again. With noise, the loop pauses at the start of the
-        last segment, so that the caller can append the next segments.
+        the tables and calls the function again. If the scene has noise, the loop also pauses at the
+        start of the last segment, so that the caller can append the next segments.
     """
     motion = motion_memory[0]
     motion.event_rows = motion.recorded_rows = 0

@@ -164,8 +164,8 @@ def inertia_matters_at(scene: Scene, accuracy: Accuracy, point: MotionPoint) -> 
     Returns
     -------
     bool
-        True if the effect of inertia exceeds its limit on the slow manifold. Without inertia the
-        result is False.
+        True if the effect of inertia exceeds its limit on the slow manifold. The result is False if
+        the scene has no inertia.
     """
     if not scene.has_mass:
         return False
