@@ -277,9 +277,9 @@ class Axis:
         Parameters
         ----------
         table : mapping of str to sequence, DataFrame or Dataset
-            Columns by name, or the output of `rsfstudy.read_table`. The units of a column are the
-            units in the CSV file, the attribute ``units`` of a variable, or the units in the name
-            of a column such as ``slip_distance (um)``. The attribute ``units`` of a data frame maps
+            Columns by name, or the output of `rsfstudy.read_table`. The units of a column are read
+            from the CSV file, from the attribute ``units`` of a variable, or from the name of a
+            column such as ``slip_distance (um)``. The attribute ``units`` of a data frame maps
             columns to units.
         fields : mapping of str to str or callable, optional
             Fields that the axis sets, in the format that `samples` accepts. By default, each column
@@ -351,7 +351,7 @@ class Axis:
 
     @property
     def has_numbered_points(self) -> bool:
-        """True if the points are numbered, as for samples and cases."""
+        """True if the points are numbered, for example in axes of samples or cases."""
         return self.labels is None and self.dimension not in self.rows[0]
 
     @property
