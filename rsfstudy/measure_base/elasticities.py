@@ -92,9 +92,9 @@ class Elasticities(Measure):
 
     The elasticities are finite differences, so the measure is evaluated four times per parameter
     and once for the scene itself. If the result does not exist for a smaller or for a larger
-    parameter value, for example near a stability boundary, up to three smaller changes of the
-    parameter are tried. If the scene is exactly at a stability boundary, such as the critical
-    stiffness, the derivative is a one-sided difference.
+    parameter value, for example near a stability boundary, the computation is repeated with up to
+    three smaller changes of the parameter. If the scene is exactly at a stability boundary, such as
+    the critical stiffness, the derivative is a one-sided difference.
 
     Parameters
     ----------

@@ -525,7 +525,7 @@ class Measure(ConstructorKeywordCheckMixin):
 
     @classmethod
     def fields_from_description(cls, described: dict[str, Any], path: str) -> dict[str, Any]:
-        """Rebuild the fields that are not plain data from a description.
+        """Create the field values that are not plain data from a description.
 
         Parameters
         ----------
