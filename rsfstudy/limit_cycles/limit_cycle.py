@@ -194,7 +194,7 @@ class LimitCycle(RecordingMeasure):
             raise InvalidValue("events", self.events, "must be a whole number, 1 or more")
 
     def compute(self, scene: Scene, integrator: Integrator) -> Outcome:
-        """Compute the limit cycle, with error estimates.
+        """Compute the limit cycle and its error estimates.
 
         The motion is integrated until it approaches the limit cycle. The cycle is then computed
         twice, with the requested accuracy and with smaller tolerances.

@@ -220,9 +220,9 @@ def recorded_rows_of_cycles(
 
     Notes
     -----
-    The slip during the cycles is the load point displacement minus the increase of the spring
-    elongation, :math:`V_0 T - (f_1 - f_0)/K`, with the duration :math:`T` of the cycles and the
-    spring stresses :math:`f_0` and :math:`f_1` at the beginning and at the end.
+    The slip during the cycles is the load point displacement minus the increase in spring
+    elongation, :math:`V_0 T - (f_1 - f_0)/K`. Here :math:`T` is the duration of the cycles, and
+    :math:`f_0` and :math:`f_1` are the spring stresses at the beginning and at the end.
     """
     begin, end = cycles[0].start_point, cycles[-1].end_point
     passed = math.fsum(cycle.recurrence_interval for cycle in cycles)
