@@ -105,9 +105,9 @@ class Healing(RecordingMeasure):
     .. math:: \Delta\mu_c = \mu_h - \mu_0, \qquad \Delta\mu = \mu_p - \mu_0.
 
     Under the slowness law with :math:`b > a`, healing after long holds increases by :math:`b` if
-    the logarithm of the hold time increases by 1, and does not depend on the stiffness. Under the
-    slip law, healing decreases with increasing stiffness. The increase of static friction with the
-    logarithm of time was first measured by Dieterich [2]_.
+    the natural logarithm of the hold time increases by 1. This healing does not depend on the
+    stiffness. Under the slip law, healing decreases with increasing stiffness. The increase of
+    static friction with the logarithm of time was first measured by Dieterich [2]_.
 
     References
     ----------
@@ -162,7 +162,7 @@ class Healing(RecordingMeasure):
         return {name: abs(values[name]) + scale for name, scale in least.items()}
 
     def compute(self, scene: Scene, integrator: Integrator) -> Outcome:
-        """Compute relaxation and healing, with error estimates.
+        """Compute relaxation and healing, and their error estimates.
 
         The motion is computed twice, with the requested accuracy and with smaller tolerances. The
         difference between the two runs determines the error estimates.

@@ -140,8 +140,8 @@ class RigidResponse(Measure):
     def error_scales(self, scene: Scene, values: Mapping[str, Any]) -> Mapping[str, float]:
         """Return the scale of the numerical error of the evolution distance.
 
-        The scale is the sum of the evolution distance and of the change of the evolution distance
-        that results from a change of friction by ``a``, the parameter of the direct effect.
+        The scale is the sum of two terms: the evolution distance, and the change in evolution
+        distance if friction changes by the direct effect parameter ``a``.
 
         Parameters
         ----------
@@ -160,7 +160,7 @@ class RigidResponse(Measure):
         return {"evolution_distance": part * abs(values["evolution_distance"])}
 
     def compute(self, scene: Scene, integrator: Integrator) -> Outcome:
-        """Compute the response of the slider, with an error estimate.
+        """Compute the response of the slider and its error estimate.
 
         The response is computed twice, with the requested accuracy and with smaller tolerances. The
         difference between the two runs determines the error estimate.

@@ -250,7 +250,7 @@ class VelocityStep(RecordingMeasure):
         }
 
     def compute(self, scene: Scene, integrator: Integrator) -> Outcome:
-        """Compute the response to the step, with error estimates.
+        """Compute the response to the step, and error estimates.
 
         The motion is computed twice, with the requested accuracy and with smaller tolerances. The
         difference between the two runs determines the error estimates. Each run also integrates the
@@ -366,9 +366,9 @@ class VelocityStep(RecordingMeasure):
 
         At this event, the difference between friction and its final value is 1/e of the difference
         at the extremum of friction. The time and slip of the event are measured from this extremum.
-        A separate integration starts at the extremum of friction, because the recorded integration
-        step that contains the extremum may cross the friction level of the event both before and
-        after the extremum.
+        A separate integration starts at the extremum of friction, because friction may cross the
+        level of the event both before and after the extremum within a single recorded integration
+        step.
         """
         peak = recorded_motion.peak_event
         if peak is None or not peak.time < recorded_motion.last_event.time:
