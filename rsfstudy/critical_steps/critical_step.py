@@ -349,7 +349,7 @@ class CriticalStep(Measure):
         stable_value: float = math.nan,
         unstable_value: float = math.nan,
     ) -> dict[str, float]:
-        """Return the results by name, with NaN for missing results."""
+        """Return the results by name. The values of missing results are NaN."""
         of = self.primary_output
         return {
             of: step_family.step_size_to_field_value(step_size),
