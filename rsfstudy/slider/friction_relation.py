@@ -133,7 +133,7 @@ def zero_state_effect(
     normal_stress_derivative: float,
     p: Numbers,
 ) -> tuple[float, float]:
-    """Return a zero shift and slope, for a state that does not depend on stress."""
+    """Return a shift and slope of zero, because stress does not change the state."""
     return 0.0, 0.0
 
 

@@ -115,7 +115,7 @@ def build_slip_rate_functions(friction_functions: FrictionFunctions) -> tuple[Fu
         return (value - state_sum(psis)) / p[A], g, shift
 
     def inertial_stress(spring_stress: float, psis: Numbers, alone: Numbers, p: Numbers) -> float:
-        """Compute the stress that accelerates the mass, in sigma_*.
+        """Compute the stress in sigma_* that accelerates the mass.
 
         The quasi-static motion is passed as the tuple that ``quasi_static_values`` returns.
         """
