@@ -244,9 +244,11 @@ class Event(NamedTuple):
     specification : EventSpecification or None
         Specification of the event if it was requested, and otherwise None.
     time : float
-        Time since the start, in D_c/V_*. The value is NaN if time is not an unknown of the motion.
+        Time since the start of the motion, in D_c/V_*. The value is NaN if time is not an unknown
+        of the motion.
     slip : float
-        Slip since the start, in D_c. For most sliders, the slip is NaN if time is not an unknown.
+        Slip since the start of the motion, in D_c. For most sliders, the slip is NaN if time is not
+        an unknown.
     point : MotionPoint
         Point of the motion (slip rate, stresses, states and their derivatives) at the event.
     regime : str

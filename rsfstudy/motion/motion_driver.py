@@ -63,7 +63,7 @@ class MotionDriver:
     Parameters
     ----------
     slow_equations : Equations
-        Equations of the slow manifold, for the motion between ruptures.
+        Equations of the slow manifold, which describe the motion between ruptures.
     fast_equations : Equations, optional
         Inertial equations of motion in ruptures. Omit these equations if the scene has no inertia.
     engine : str

@@ -249,7 +249,7 @@ class Recording:
 
 
 def convert_to_recorded_units(scene: Scene, rows: np.ndarray) -> np.ndarray:
-    """Convert recorded rows from event loop units to output units, in place.
+    """Convert recorded rows in place from event loop units to output units.
 
     Natural logarithms of slip rates are converted to decimal logarithms, and stress deviations are
     converted to total stresses.

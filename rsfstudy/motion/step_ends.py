@@ -1,4 +1,4 @@
-"""Ends of steps at the end of a regime, of a loading segment or of the motion."""
+"""Truncation of steps at the end of a regime, segment or motion."""
 
 from __future__ import annotations
 

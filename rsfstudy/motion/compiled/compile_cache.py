@@ -159,7 +159,7 @@ def compile_cfunc_addresses(functions: Sequence[Callable[..., Any]]) -> tuple[in
 
 
 class _ContentKeyedCache(FunctionCache):  # type: ignore[misc]
-    """Numba cache of a function, with a content digest in the file name.
+    """Numba cache of a function. The file name contains a digest of the content.
 
     By default, Numba includes the closure values of a function in the cache key. Closure values
     include compiled functions, which differ between processes, so Numba would never find a cached
@@ -172,7 +172,7 @@ class _ContentKeyedCache(FunctionCache):  # type: ignore[misc]
 
 
 def _compile_cfunc(function: Any, *, use_cache: bool) -> Any:
-    """Compile a function with pointer arguments, with or without the cache."""
+    """Compile a function with pointer arguments, and optionally use the cache."""
     compiled = CFunc(
         function, normalize_signature(_CFUNC_SIGNATURE), locals={}, options=dict(_COMPILER_OPTIONS)
     )

@@ -1,4 +1,4 @@
-"""Explicit Runge-Kutta stepper of order eight, for plain Python and Numba.
+"""Explicit Runge-Kutta stepper of order eight. Numba can compile the code.
 
 The tableau, the error estimate and the step size control are equal to those of
 ``scipy.integrate.DOP853``. The Python engine calls the functions as methods of
