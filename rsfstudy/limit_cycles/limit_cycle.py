@@ -158,11 +158,11 @@ class LimitCycle(RecordingMeasure):
 
     Notes
     -----
-    If the scene has radiation damping, the limit of the peak slip rate is :math:`a \sigma_*/\eta`.
-    At the slip rate :math:`a \sigma_*/\eta`, a small change of slip rate changes the radiated
-    stress and the direct effect of friction by the same amount. If the scene has no radiation
-    damping, the limit is the instability norm. A motion settles with oscillations if the
-    slowest-decaying eigenvalues of steady sliding are a complex pair.
+    With radiation damping, the limit of the peak slip rate is :math:`a \sigma_*/\eta`. At the slip
+    rate :math:`a \sigma_*/\eta`, a small change in slip rate changes the radiated stress and the
+    direct effect of friction by the same amount. Without radiation damping, the limit is the
+    instability norm. A motion settles with oscillations if the slowest-decaying eigenvalues of
+    steady sliding are a complex pair.
 
     The error estimates are based on two computations of the cycle with different tolerances. The
     error estimates also include the correction of each result for the closure error, which is the

@@ -308,8 +308,9 @@ def _insert_steady_temperature(
 def steady_temperature_rise(scene: SceneView, log_slip_rate: float) -> float:
     r"""Compute the temperature rise of steady sliding.
 
-    Several temperatures may be steady at the same slip rate. The function follows the branch of
-    steady states from :math:`V_*`, where the temperature rise is zero, to the given slip rate.
+    Several temperatures may be steady at the same slip rate. Among these temperatures, the function
+    selects the temperature that changes continuously from zero as the slip rate changes from
+    :math:`V_*` to the given slip rate.
 
     Parameters
     ----------
@@ -321,8 +322,8 @@ def steady_temperature_rise(scene: SceneView, log_slip_rate: float) -> float:
     Returns
     -------
     float
-        Temperature rise :math:`\vartheta`. The result is NaN if the branch cannot be followed to
-        the given slip rate.
+        Temperature rise :math:`\vartheta`. The result is NaN if the temperature cannot be followed
+        continuously to the given slip rate.
     """
     functions, p = scene.friction_functions, scene.friction_parameter_values
     place, activated = scene.parts.law.state_count, temperature_parameter_values(scene)[1]
