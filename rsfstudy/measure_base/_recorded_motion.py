@@ -57,7 +57,7 @@ class RecordingMeasure(Measure):
 
     @property
     def recorded_point_count(self) -> int:
-        """Number of points of the record that are stored."""
+        """Number of record points that are stored."""
         return int(self.plain_fields["phases"])
 
     @cached_attribute

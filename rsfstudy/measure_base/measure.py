@@ -164,7 +164,7 @@ class Measure(ConstructorKeywordCheckMixin):
     def variables(self) -> Mapping[str, tuple[str, ...]]:
         """Inner dimensions of each result and error estimate, by name.
 
-        The dimensions of a scalar result are an empty tuple.
+        For a scalar result, the tuple of dimensions is empty.
         """
         return {name: about.dims for about in self.outputs for name in about.variable_names}
 
@@ -216,13 +216,13 @@ class Measure(ConstructorKeywordCheckMixin):
     def typical_work(self) -> int:
         """Typical number of right-hand-side evaluations per cell.
 
-        The typical number is valid for the default accuracy.
+        The number applies to the default accuracy.
         """
         raise TypeError(f"{type(self).__name__} does not define typical_work")
 
     @property
     def work_by_digits(self) -> Mapping[float, float]:
-        """Relative cost of the computation for each requested number of digits.
+        """Relative cost of the computation, by requested number of digits.
 
         The number of digits is ``-log10(rtol)``, and the work is relative to the work at the
         default accuracy. The default values were measured for limit cycles, the most demanding
@@ -294,10 +294,11 @@ class Measure(ConstructorKeywordCheckMixin):
     def error_scales(self, scene: Scene, values: Mapping[str, Any]) -> Mapping[str, float]:
         """Return the scale of the numerical error of each result.
 
-        The requested accuracy is relative to the scale of each result. If the error estimate of a
-        result is more than a hundred times the requested error, the status of the cell becomes
-        ``unverified``. Results without a scale are not checked. An override should omit statistical
-        results, and results whose resolution is an option of the measure.
+        The requested error of each result is the relative accuracy multiplied by the scale of the
+        result. If the error estimate of a result is more than a hundred times the requested error,
+        the status of the cell becomes ``unverified``. Results without a scale are not checked. An
+        override should omit statistical results, and results whose resolution is an option of the
+        measure.
 
         Parameters
         ----------
