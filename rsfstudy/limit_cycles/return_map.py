@@ -507,7 +507,7 @@ class ReturnMap:
     ) -> PeriodicOrbit | None:
         r"""Solve for a periodic orbit with a given number of cycles.
 
-        The number of cycles is the number of arrays in ``cycle_derivatives``.
+        The length of ``cycle_derivatives`` defines the number of cycles.
 
         Returns
         -------

@@ -72,8 +72,8 @@ class Cycle(NamedTuple):
         Largest value of ln(V/V_*) during the cycle.
     slip_arrest_point : MotionPoint
         First point after the rupture at which V is below V_0 and friction balances the spring. If
-        friction never balances the spring after the rupture, ``slip_arrest_point`` is the point
-        with the lowest slip rate.
+        friction never balances the spring after the rupture, the attribute contains the point with
+        the lowest slip rate.
     slowest_point : MotionPoint
         Point with the lowest slip rate.
     start_point : MotionPoint
