@@ -51,7 +51,7 @@ _OUTPUTS = (
 class LinearStability(Measure):
     r"""Critical stiffness of steady sliding at the load point velocity.
 
-    The critical stiffness is computed in three ways, which serve to verify each other. The first
+    The critical stiffness is computed by three methods, whose results are compared. The first
     result follows from the friction relation. The second result is the stiffness at which small
     perturbations neither grow nor decay according to the equations of motion. The third result is
     the quasi-static closed form, corrected for inertia and radiation damping.
@@ -72,8 +72,8 @@ class LinearStability(Measure):
 
     .. math:: K = \frac{b - a}{1 - (\mu_* - \alpha) \cot\varphi},
 
-    which is eq. 7 of [2]_. Eq. 8 of [2]_ is the critical stiffness at other slip rates. If normal
-    stress is constant, the term with :math:`\cot\varphi` is absent.
+    which is eq. 7 of [2]_. Eq. 8 of [2]_ gives the critical stiffness at other slip rates. If
+    normal stress is constant, the term with :math:`\cot\varphi` is absent.
 
     References
     ----------
