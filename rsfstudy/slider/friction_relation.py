@@ -274,8 +274,8 @@ def zero_load_point_stress(states: Numbers, p: Numbers) -> float:
 def load_point_stress(states: Numbers, p: Numbers) -> float:
     r"""Compute the shear stress :math:`K D` due to an oscillation of the load point.
 
-    The last element of the states is the unknown of the loading. The stress is zero at the start of
-    the oscillation.
+    The unknown of the loading is the last element of the tuple of states. The stress is zero at the
+    start of the oscillation.
     """
     return states[-1] - p[LOADING + 2]
 

@@ -26,8 +26,7 @@ class MotionPoint(NamedTuple):
     frictional_stress : float
         Deviation :math:`g` of the frictional stress from :math:`\tau_*`, in :math:`\sigma_*`.
     psi : float
-        Sum of the states :math:`\Psi_i` of the law. The effect of stress is removed from these
-        states.
+        Sum of the states :math:`\Psi_i` of the law. These states exclude the effect of stress.
     state : float
         State variable :math:`\Theta`. If the law has several states, ``state`` is the sum of the
         states.

@@ -319,7 +319,8 @@ class Scene(SceneFunctions, SceneQuantities):
         """Scene under a steadily moving load point, for stability analyses.
 
         If the loading has unknowns or noise, the load point of the returned scene moves at the
-        velocity of the last segment, without noise. Otherwise the property is the scene itself.
+        velocity of the last segment, without noise. Otherwise the property returns the scene
+        itself.
         """
         if not self.stress_loading.unknowns and not self.parts.noise.is_active:
             return self

@@ -42,7 +42,7 @@ class SteadySliding:
     spring_stress : float
         Deviation of spring stress from :math:`\tau_*`, in units of :math:`\sigma_*`.
     states : tuple of float
-        States :math:`\Psi_i`. The effect of stress is removed from these states.
+        States :math:`\Psi_i`. These states exclude the effect of stress.
     """
 
     log_slip_rate: float
@@ -191,7 +191,8 @@ def _min_frictional_stress(scene: SceneView) -> float:
     Normal stress is positive if the frictional stress exceeds the returned stress.
     """
     weakest = scene.parts.normal_stress.min_frictional_stress(scene)
-    # If slip may reverse, strength increases with the magnitude of positive and negative stress.
+    # If slip may reverse, strength increases with the magnitude of the stress, whose sign may be
+    # positive or negative.
     return max(weakest, -scene.mu_star) if scene.parts.law.regularised else weakest
 
 

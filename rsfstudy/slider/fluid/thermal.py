@@ -164,8 +164,8 @@ class ThermalFluid(Fluid):
     def parameter_values(self, scene: SceneView) -> Numbers:
         """Return the same parameters as for a dilatant fluid.
 
-        See ``Part.parameter_values``. The pressurisation factor is a parameter of the part
-        ``temperature``.
+        See ``Part.parameter_values``. The pressurisation factor is stored with the parameters of
+        the part ``temperature``.
         """
         return DilatantFluid.parameter_values(self, scene)  # type: ignore[arg-type]
 
