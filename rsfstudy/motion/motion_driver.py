@@ -44,7 +44,7 @@ from rsfstudy.status import Status
 
 #: Minimum number of rows of the event table, and number of rows of the recording table.
 _MIN_EVENT_ROWS, _RECORDING_ROWS = 64, 4096
-#: Constructor of named tuples that takes half the time of a normal constructor call.
+#: Constructor of named tuples, which is twice as fast as a normal constructor call.
 _make_named_tuple_without_checks = tuple.__new__
 _STEP_TOO_SHORT_TEXT = (
     "the required step size is smaller than the spacing of floating-point numbers"
@@ -158,8 +158,8 @@ class MotionDriver:
         recording : Recording, optional
             Object that receives the recorded rows.
         kinks_and_reported_count : tuple of (ndarray, int), optional
-            Two items: the rows of the segment table for all loading segments after the first, and a
-            number n. The starts of the last n loading segments are reported as events.
+            Rows of the segment table for all loading segments after the first, and the number n of
+            segments whose starts are reported as events. These are the last n segments.
         initial_imposed_stress : float, optional
             Initial value of the last unknown, if the load point oscillates. The imposed shear
             stress is the last unknown minus its initial value. The unknown ``spring_stress`` does

@@ -30,7 +30,7 @@ MIN_NORMAL_STRESS, MAX_NORMAL_STRESS = 1e-9, 1e6
 MIN_POSITIVE_NORMAL_STRESS = 1e-300
 #: Upper limit of ln(V/V_*) without inertia. The slip rate is unbounded above 10^120 V_*.
 MAX_LOG_SLIP_RATE_WITHOUT_INERTIA = 120.0 * math.log(10.0)
-#: Limits of ln(V/V_*) as constants of this module, because compiled functions read them.
+#: Limits of ln(V/V_*). They are constants of this module because compiled functions read them.
 LARGEST_LOG_SLIP_RATE = Scene.LARGEST_LOG_SLIP_RATE
 STOPPED_LOG_SLIP_RATE = Scene.STOPPED_LOG_SLIP_RATE
 #: Codes for the termination status of a motion.

@@ -170,7 +170,7 @@ def step_to_segment_end(motion, workspace, approximate_length):
 
 
 def take_step_with_time_as_clock(motion, workspace):
-    """Take one step in time, and return the error divided by the tolerance.
+    """Take one step with time as independent variable, and return its error ratio.
 
     Parameters
     ----------
