@@ -102,9 +102,9 @@ class CriticalStep(Measure):
         Type of the step: "load_velocity_ratio", "displacement_step" or "normal_stress_step". The
         scene field of this name is ignored. "velocity_step" is an alias of "load_velocity_ratio".
         After a step of displacement or of normal stress, the load point is held (V_0 = 0) unless
-        the scene specifies ``load_velocity_ratio``. Steps of normal stress require a scene in which
-        normal stress is not constant. If a decrease of normal stress triggers the instability, the
-        direction is "down" and the critical step is negative.
+        the scene specifies ``load_velocity_ratio``. Steps of normal stress require a normal stress
+        that is not constant. If a decrease in normal stress triggers the instability, the direction
+        is "down" and the critical step is negative.
     direction : {"up", "down"}, default: "up"
         Direction of the steps: "up" increases the load, and "down" decreases the load.
 

@@ -27,8 +27,8 @@ end, record and search a step are in ``step_integration``, ``step_ends``, ``step
 
 The header of ``array_layout`` lists the functions that write each field of ``motion``. The class
 ``Workspace`` describes the arrays of a regime, and the header of ``workspace`` lists the functions
-that write these arrays. Steppers only take integration steps. With all steppers, the event loop
-detects and locates the events.
+that write these arrays. Steppers only take integration steps. The event loop detects and locates
+the events in the same way for all steppers.
 
 The code of these modules is limited to Python features that Numba can compile. To debug a rupture,
 simulate a scene with ``inertia=True`` and ``engine="scipy"``. To debug the stages of an integration
