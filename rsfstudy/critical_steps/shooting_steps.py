@@ -218,7 +218,8 @@ class StepFamily:
     def inertia_shifts_critical_size(self, step_size: float, tolerance: float) -> bool:
         """Return True if inertia changes the critical size significantly.
 
-        With inertia, the motion after the step reaches the critical path only after a delay.
+        If the scene has inertia, the motion after the step reaches the critical path only after a
+        delay.
 
         Parameters
         ----------

@@ -1,4 +1,4 @@
-r"""Convergence of a motion to its limit cycle.
+r"""Search for the limit cycle that a motion approaches.
 
 If a scene has one state, use ``LimitCycleSearch``. The spring stress at a rise of V through V_0
 determines the subsequent motion. Two successive cycles are therefore sufficient to compute the

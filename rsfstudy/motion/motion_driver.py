@@ -150,7 +150,7 @@ class MotionDriver:
         parameters : tuple of float, optional
             Parameters that replace the parameters of the equations.
         switch_thresholds : SwitchThresholds, optional
-            Thresholds for changes between the regimes. A motion without inertia does not need
+            Thresholds for changes between the regimes. Motions without inertia do not require
             thresholds.
         evaluation_budget : float, default: inf
             Maximum number of right-hand side evaluations. The remaining budget of the work meter is

@@ -1,12 +1,13 @@
 """Criteria for changes between regimes and for the termination of motions.
 
-With inertia, a motion alternates between two regimes: the slow manifold, and the inertial equations
-of motion. The slow manifold approximates the effect of inertia by a series in the inertia weight
-:math:`(K/a) w^2`, where :math:`w` is the dimensionless slip rate norm. The event loop integrates
-the inertial equations of motion in ruptures. The function ``starts_on_slow_manifold`` chooses the
-regime at the beginning of a motion or loading segment. A rupture begins if
-``compute_inertia_effect_over_limit`` reaches 1, and ends if ``should_switch_back_to_slow_manifold``
-returns True. Most criteria are functions of floats, so all engines can call them.
+If the scene has inertia, a motion alternates between two regimes: the slow manifold, and the
+inertial equations of motion. The slow manifold approximates the effect of inertia by a series in
+the inertia weight :math:`(K/a) w^2`, where :math:`w` is the dimensionless slip rate norm. The event
+loop integrates the inertial equations of motion in ruptures. The function
+``starts_on_slow_manifold`` chooses the regime at the beginning of a motion or loading segment. A
+rupture begins if ``compute_inertia_effect_over_limit`` reaches 1, and ends if
+``should_switch_back_to_slow_manifold`` returns True. Most criteria are functions of floats, so all
+engines can call them.
 """
 
 from __future__ import annotations

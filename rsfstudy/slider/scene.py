@@ -113,8 +113,8 @@ class Scene(SceneFunctions, SceneQuantities):
         form of the friction law). Only quasi-static motions support reversed slip.
     b_over_a : float, default: 2.0
         Ratio :math:`b/a` of the evolution effect to the direct effect. Rate weakening requires
-        :math:`b > a`. Without rate weakening, there is no critical stiffness, and ``stiffness``
-        must be given.
+        :math:`b > a`. If friction is not rate weakening, there is no critical stiffness, and
+        ``stiffness`` must be given.
     cutoff_velocity_ratio : float, default: 100.0
         Cut-off velocity :math:`V_c/V_*` of the composite law and of the law with a cut-off. Above
         this velocity, the composite law has no healing, and the law with a cut-off has no evolution
@@ -126,8 +126,8 @@ class Scene(SceneFunctions, SceneQuantities):
     weakened_friction : float, default: 0.2
         Friction coefficient at slip rates far above the weakening velocity.
     weakening_exponent : float, default: 8.0
-        Exponent :math:`n` of the law with flash heating. With a larger exponent, the transition at
-        the weakening velocity is sharper.
+        Exponent :math:`n` of the law with flash heating. The transition at the weakening velocity
+        is sharper if the exponent is larger.
     b1_over_a : float, default: 1.0
         Ratio :math:`b_1/a` of the first state, for laws with two states. Laws with two states do
         not have the field ``b_over_a``. Negative values are allowed.
@@ -352,10 +352,10 @@ class Scene(SceneFunctions, SceneQuantities):
         """Sequences of loading segments that follow each other without a jump.
 
         A jump is a sudden change of load point displacement or normal stress, or the end of a
-        segment with unknowns. With noise, each sequence has a single segment. Each sequence is a
-        tuple of two elements: the scene during the first segment, and an array of shape
-        (segments, 6) with the rows of the segment table. The columns of the table are defined in
-        ``parameter_layout``.
+        segment with unknowns. If the scene has noise, each sequence has a single segment. Each
+        sequence is a tuple of two elements: the scene during the first segment, and an array of
+        shape (segments, 6) with the rows of the segment table. The columns of the table are defined
+        in ``parameter_layout``.
         """
         if len(self._segments) == 1:
             return ((self, SINGLE_ENDLESS_SEGMENT_TABLE),)

@@ -88,11 +88,11 @@ class ThermalFluid(Fluid):
     drainage : float, default: 1.0
         Drainage rate :math:`c^* D_c/V_*`.
     dilatancy : float, default: 0.0
-        Dilatancy :math:`\epsilon/(\beta \sigma_*)` (see ``DilatantFluid``). Without dilatancy, the
-        porosity is not an unknown.
+        Dilatancy :math:`\epsilon/(\beta \sigma_*)` (see ``DilatantFluid``). If the dilatancy is
+        zero, the porosity is not an unknown.
     porosity_length : float, default: 1.0
         Slip distance :math:`L_\varphi/D_c` over which the porosity evolves (see ``DilatantFluid``).
-        Without dilatancy, the slip distance has no effect.
+        If the dilatancy is zero, the slip distance has no effect.
 
     Notes
     -----

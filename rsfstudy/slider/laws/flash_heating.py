@@ -109,7 +109,7 @@ class FlashHeatingLaw(Law):
     weakened_friction : float, default: 0.2
         Friction coefficient :math:`f_w` of weakened contacts, which is less than :math:`\mu_*`.
     weakening_exponent : float, default: 8.0
-        Exponent :math:`n`. With a larger exponent, the transition at :math:`V_w` is sharper.
+        Exponent :math:`n`. The transition at :math:`V_w` is sharper if the exponent is larger.
 
     Notes
     -----
