@@ -5,8 +5,8 @@ scenes to the requested accuracy and counts right-hand side evaluations. The met
 ``Integrator.follow`` integrates a scene through its loading segments and regimes, and yields
 events. A ``Recording`` also stores the samples of the motion. To read the implementation, start
 with ``integrator``, followed by ``motion_driver`` and ``motion_loop``. The engines are SciPy,
-Python and the compiled engine. The package only integrates motions. The measures in
-``rsfstudy.measures`` compute results from the motions.
+Python and the compiled engine. The package only integrates motions, and never computes results from
+a motion. The measures in ``rsfstudy.measures`` compute the results.
 """
 
 from __future__ import annotations
