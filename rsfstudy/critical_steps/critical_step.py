@@ -103,7 +103,7 @@ class CriticalStep(Measure):
         scene field of this name is ignored. "velocity_step" is an alias of "load_velocity_ratio".
         After a step of displacement or of normal stress, the load point is held (V_0 = 0) unless
         the scene specifies ``load_velocity_ratio``. Steps of normal stress require a normal stress
-        that is not constant. If a decrease of normal stress triggers the instability, the direction
+        that is not constant. If a decrease in normal stress triggers the instability, the direction
         is "down" and the critical step is negative.
     direction : {"up", "down"}, default: "up"
         Direction of the steps: "up" increases the load, and "down" decreases the load.
@@ -184,7 +184,7 @@ class CriticalStep(Measure):
     def work_by_digits(self) -> Mapping[float, float]:
         """Relative cost of the computation for each requested number of digits.
 
-        The numbers of evaluations were measured for velocity steps in the study ``accuracy_cost``.
+        The relative costs were measured for velocity steps in the study ``accuracy_cost``.
         """
         return {3.0: 0.59, 5.0: 0.74, 7.0: 1.0, 8.0: 1.21, 9.0: 1.58, 10.0: 1.89}
 
@@ -349,7 +349,7 @@ class CriticalStep(Measure):
         stable_value: float = math.nan,
         unstable_value: float = math.nan,
     ) -> dict[str, float]:
-        """Return the results by name, with NaN for missing results."""
+        """Return the results by name. The values of missing results are NaN."""
         of = self.primary_output
         return {
             of: step_family.step_size_to_field_value(step_size),

@@ -19,7 +19,8 @@ def check_loading_changes_stress_only_in_steps(scene: Scene) -> None:
     Raises
     ------
     InvalidValue
-        If the load point velocity or the normal stress changes continuously, or if there is noise.
+        If the load point velocity or the normal stress changes continuously, or if the scene has
+        noise.
     """
     loading, noise = scene.parts.loading, scene.parts.loading_noise
     if noise.is_active:

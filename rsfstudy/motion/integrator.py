@@ -1,4 +1,4 @@
-"""Integrator of the motions of a measurement.
+"""Integrator of the motions from which a measure computes its results.
 
 An ``Integrator`` stores the requested accuracy and counts right-hand side evaluations. The method
 ``Integrator.follow`` integrates a scene through its loading segments and yields events. A chain is
@@ -43,9 +43,9 @@ from rsfstudy.slider import Equations, MotionPoint, Numbers, Scene
 class Integrator:
     """Integrator of motions with a requested accuracy and a work counter.
 
-    A measure receives the integrator of its cell. The attribute ``work_meter`` counts the
-    right-hand side evaluations of all motions that the integrator and its copies integrate. The
-    integrator and its copies share one work budget.
+    A measure receives an integrator together with the scene to evaluate. The attribute
+    ``work_meter`` counts the right-hand side evaluations of all motions that the integrator and its
+    copies integrate. The integrator and its copies share one work budget.
 
     Parameters
     ----------
@@ -109,7 +109,7 @@ class Integrator:
         Parameters
         ----------
         work_meter : WorkMeter
-            Counter of the copy. The counter also defines the work budget.
+            Work counter of the copy, which also defines the work budget.
 
         Returns
         -------

@@ -215,7 +215,7 @@ def select_event_specs(
 
 
 def drop_settling_if_unstable(scene: Scene, motion: Iterator[Event]) -> Iterator[Event]:
-    """Yield the events of a motion, without settling events at unstable steady sliding.
+    """Yield the events of a motion, except settling at unstable steady sliding.
 
     The stability is computed only if the motion has a settling event. Most motions do not have
     settling events.
@@ -238,7 +238,7 @@ def drop_settling_if_unstable(scene: Scene, motion: Iterator[Event]) -> Iterator
 
 
 def _is_steady_sliding_unstable(scene: Scene) -> bool:
-    """Return True if perturbations of steady sliding grow in the last loading segment."""
+    """Return True if steady sliding is unstable in the last loading segment."""
     if scene.log_load_velocity == -math.inf:
         return False
     growth = scene.segment_scene(-1).largest_linear_growth_rate(scene.log_load_velocity)

@@ -86,9 +86,10 @@ class Scene(SceneFunctions, SceneQuantities):
         Steady-state friction coefficient at :math:`V_*`.
     stiffness_ratio : float, optional
         Ratio of the stiffness to the critical stiffness at :math:`V_*` without radiation damping.
-        Steady sliding is stable at stiffness ratios above 1. With radiation damping, steady sliding
-        is also stable at stiffness ratios slightly below 1. With several states, steady sliding may
-        also be stable at lower stiffness ratios. The default is 1 if ``stiffness`` is not given.
+        Steady sliding is stable at stiffness ratios above 1. If the scene has radiation damping,
+        steady sliding is also stable at stiffness ratios slightly below 1. If the law has several
+        states, steady sliding may also be stable at lower stiffness ratios. The default is 1 if
+        ``stiffness`` is not given.
     stiffness : float, optional
         Stiffness :math:`k D_c/\sigma_*`, as an alternative to ``stiffness_ratio``.
     period : float, default: 5.0
@@ -112,8 +113,8 @@ class Scene(SceneFunctions, SceneQuantities):
         form of the friction law). Only quasi-static motions support reversed slip.
     b_over_a : float, default: 2.0
         Ratio :math:`b/a` of the evolution effect to the direct effect. Rate weakening requires
-        :math:`b > a`. Without rate weakening, there is no critical stiffness, and ``stiffness``
-        must be given.
+        :math:`b > a`. If friction is not rate weakening, there is no critical stiffness, and
+        ``stiffness`` must be given.
     cutoff_velocity_ratio : float, default: 100.0
         Cut-off velocity :math:`V_c/V_*` of the composite law and of the law with a cut-off. Above
         this velocity, the composite law has no healing, and the law with a cut-off has no evolution
@@ -125,8 +126,8 @@ class Scene(SceneFunctions, SceneQuantities):
     weakened_friction : float, default: 0.2
         Friction coefficient at slip rates far above the weakening velocity.
     weakening_exponent : float, default: 8.0
-        Exponent :math:`n` of the law with flash heating. With a larger exponent, the transition at
-        the weakening velocity is sharper.
+        Exponent :math:`n` of the law with flash heating. The transition at the weakening velocity
+        is sharper if the exponent is larger.
     b1_over_a : float, default: 1.0
         Ratio :math:`b_1/a` of the first state, for laws with two states. Laws with two states do
         not have the field ``b_over_a``. Negative values are allowed.
@@ -143,7 +144,7 @@ class Scene(SceneFunctions, SceneQuantities):
         Angle in degrees between the driving stress and the fault normal, for variable normal
         stress.
     dilatancy : float, default: 0.01
-        Dilatancy :math:`\epsilon/(\beta \sigma_*)` of the dilatant fluid: the decrease of pore
+        Dilatancy :math:`\epsilon/(\beta \sigma_*)` of the dilatant fluid: the decrease in pore
         pressure under undrained conditions if :math:`\ln V` increases by 1. If the dilatancy is
         negative, pores close when the slip rate increases. The default for the thermal fluid is 0.
     drainage : float, default: 1.0
@@ -151,14 +152,14 @@ class Scene(SceneFunctions, SceneQuantities):
     porosity_length : float, default: 1.0
         Slip distance of the porosity of the dilatant or thermal fluid, in :math:`D_c`.
     pressurisation : float, default: 1.0
-        Pressurisation factor :math:`\Lambda_p T_*/\sigma_*` of the thermal fluid: the increase of
+        Pressurisation factor :math:`\Lambda_p T_*/\sigma_*` of the thermal fluid: the increase in
         pore pressure under undrained conditions if the temperature rises by :math:`T_*`.
     inertia : bool, default: False
         If True, the slider has mass.
     radiation_damping : float, default: 0.0
         Damping coefficient :math:`\eta V_*/\sigma_*`, which is the damping stress due to seismic
-        waves at :math:`V_*`. A scene has either inertia or radiation damping. A slider with inertia
-        corresponds to a damping coefficient of the stiffness, multiplied by
+        waves at :math:`V_*`. A scene has either inertia or radiation damping. The damping
+        coefficient that corresponds to a slider with inertia is the stiffness multiplied by
         :math:`T V_*/(2 \pi D_c)`.
     oscillation_amplitude : float, default: 0.0
         Amplitude of an oscillation of imposed normal stress in :math:`\sigma_*`. If the driving
@@ -179,7 +180,7 @@ class Scene(SceneFunctions, SceneQuantities):
         Number of cycles after which an oscillation ends. The number may be fractional. By default
         an oscillation has no end.
     normal_stress_ramp : float, default: 0.0
-        Change of imposed normal stress during a ramp, in :math:`\sigma_*`. If the driving stress is
+        Change in imposed normal stress during a ramp, in :math:`\sigma_*`. If the driving stress is
         inclined, :math:`\sigma_3` changes. The field does not apply to constant normal stress.
     ramp_duration : float, default: 1.0
         Duration of the ramp of normal stress in :math:`D_c/V_*`.
@@ -189,13 +190,13 @@ class Scene(SceneFunctions, SceneQuantities):
     displacement_step : float, default: 0.0
         Sudden displacement of the load point in :math:`D_c`.
     normal_stress_step : float, default: 0.0
-        Sudden change of imposed normal stress in :math:`\sigma_*`. If the driving stress is
+        Sudden change in imposed normal stress in :math:`\sigma_*`. If the driving stress is
         inclined, :math:`\sigma_3` changes. The field does not apply to constant normal stress.
     velocity_oscillation : float, optional
         Amplitude of an oscillation of the load point velocity, relative to the mean velocity
         ``load_velocity_ratio``. By default there is no oscillation.
     velocity_ramp : float, default: 0.0
-        Change of the load point velocity during a ramp, in :math:`V_*`.
+        Change in the load point velocity during a ramp, in :math:`V_*`.
     velocity_ramp_duration : float, default: 10.0
         Duration of the ramp of load point velocity in :math:`D_c/V_*`.
     velocity_ramp_stairs : float, default: 64.0
@@ -315,10 +316,11 @@ class Scene(SceneFunctions, SceneQuantities):
 
     @property
     def under_steady_loading(self) -> Scene:
-        """Scene under a steadily moving load point, for stability analyses.
+        """Scene with a steadily moving load point, for stability analyses.
 
         If the loading has unknowns or noise, the load point of the returned scene moves at the
-        velocity of the last segment, without noise. Otherwise the property is the scene itself.
+        velocity of the last segment, without noise. Otherwise the property returns the scene
+        itself.
         """
         if not self.stress_loading.unknowns and not self.parts.loading_noise.is_active:
             return self
@@ -349,10 +351,10 @@ class Scene(SceneFunctions, SceneQuantities):
     def continuous_segments(self) -> tuple[tuple[Scene, np.ndarray], ...]:
         """Sequences of loading segments that follow each other without a jump.
 
-        A jump is a sudden change of load point displacement or normal stress, or the end of a
+        A jump is a sudden change in load point displacement or normal stress, or the end of a
         segment with unknowns. With noise, each sequence has a single segment. Each sequence is a
-        tuple of two elements: the scene during the first segment, and an array of shape
-        (segments, 6) with the rows of the segment table. The columns of the table are defined in
+        tuple of two elements: the scene during the first segment, and an array of shape (segments,
+        6) with the rows of the segment table. The columns of the table are defined in
         ``parameter_layout``.
         """
         if len(self._segments) == 1:
