@@ -8,7 +8,7 @@ import re
 
 import numpy as np
 import pytest
-from conftest import cot_phi
+from motion_helpers import cot_phi
 from site_pages import PAGES
 
 import rsfstudy
