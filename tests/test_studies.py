@@ -52,7 +52,7 @@ def test_every_verdict_is_the_expected_one(result):
 
 #: Claims with a tolerance larger than ``called_for``, and the reasons.
 WIDE = {
-    "accuracy_cost A1": "the range is chosen so that users can predict the error from the tolerance",
+    "accuracy_cost A1": "the range allows users to predict the error from the tolerance",
     "coverage T3": "the tolerance is two standard errors of a median",
     "design_of_steps D1": "the published result does not state the number of rows before the step",
     "design_of_steps D2": "sampling error of a standard deviation",
@@ -65,14 +65,14 @@ WIDE = {
     "fit_coverage_joint J1": "the tolerance is a number of binomial standard deviations",
     "fit_coverage_joint J2": "the tolerance is a number of binomial standard deviations",
     "injection I1": "a common bound for all cases: the pressure change within 2 D_c/V_*",
-    "laboratory_recurrence L1": "the value is read from a figure, and the event times are ambiguous",
+    "laboratory_recurrence L1": "read from a figure, and the event times are ambiguous",
     "laboratory_recurrence L3": "reading error of a figure, and sampling errors",
     "law_identification I1": "the expected value has two digits",
     "law_identification I2": "sampling error of a standard deviation",
     "laws L1": "the truncation error of finite differences is smaller for nearly linear laws",
     "laws_cycles L10": "the paper reports an integer multiple",
     "linear_stability C1": "the truncation error of finite differences varies between the points",
-    "normal_stress_steps R5": "a fifth of the first order; the second order almost vanishes in some cases",
+    "normal_stress_steps R5": "a fifth of the first order; the second order almost vanishes in places",
     "normal_stress_steps R6": "a common second-order bound for all steps and both laws",
     "rigid_response C5": "the paper gives one decimal",
     "slide_hold_slide P1": "the tolerance is the requested accuracy relative to a",
