@@ -72,7 +72,7 @@ WIDE = {
     "laws L1": "the truncation error of finite differences is smaller for nearly linear laws",
     "laws_cycles L10": "the paper reports an integer multiple",
     "linear_stability C1": "the truncation error of finite differences varies between the points",
-    "normal_stress_steps R5": "a fifth of the first order; the second order almost vanishes in places",
+    "normal_stress_steps R5": "a fifth of the first order; the second order may vanish",
     "normal_stress_steps R6": "a common second-order bound for all steps and both laws",
     "rigid_response C5": "the paper gives one decimal",
     "slide_hold_slide P1": "the tolerance is the requested accuracy relative to a",
