@@ -65,7 +65,10 @@ class PhaseResponse(Measure):
             "joint_noise_sensitivity",
             r"$\sqrt{D_\Theta}/T$",
             "1",
-            "the same for noise that also acts on the state variable",
+            (
+                "coefficient of variation of the interval over the amplitude of noise, if noise "
+                "also acts on the state variable"
+            ),
         ),
         Output("recurrence_interval"),
     )

@@ -228,7 +228,9 @@ study = Study(
             tolerance=0.01,
             reason="reading error of 0.3 %, and sampling error of 0.3 % of both values",
             expected="differs",
-            difference_reason="noise of the paper acts on the state variable and on normal stress",
+            difference_reason=(
+                "in the paper, noise also acts on the state variable and on normal stress"
+            ),
         ),
     ],
     plot=figure,
