@@ -53,7 +53,7 @@ _SETTLING_EVENT = approach_to_steady_state(_SETTLING_TOLERANCE_OVER_MAX_DISTANCE
 
 @dataclass(frozen=True)
 class _OrbitOutcome:
-    """One orbit of the motion after a step.
+    """Outcome of a single orbit of the motion after a step.
 
     Parameters
     ----------
@@ -96,7 +96,7 @@ def compute_excess_over_instability_norm(scene: Scene, integrator: Integrator) -
 
     The excess is negative if the slip rate never reaches the instability norm. With inertia, the
     excess is the height of the highest peak of ln V above the norm. Without inertia, the excess is
-    the increase of ln V from one peak to the next. If possible, the excess is a continuous function
+    the increase in ln V from one peak to the next. If possible, the excess is a continuous function
     of the step size at the boundary between stable and unstable steps.
 
     Parameters

@@ -51,7 +51,7 @@ _MIN_EFFECTIVE_FRICTION_OVER_MU_STAR = 0.1
 
 
 class LoadVelocityStepFamily(ShootingStepFamily):
-    """Steps of load point velocity with the size ``|ln(V_0/V_*)|``.
+    """Steps of load point velocity of size ``|ln(V_0/V_*)|``.
 
     Parameters
     ----------
@@ -118,7 +118,7 @@ class LoadVelocityStepFamily(ShootingStepFamily):
 
 
 class DisplacementStepFamily(StepFamily):
-    """Steps of load point displacement with the size ``|d|`` in units of D_c.
+    """Steps of load point displacement of size ``|d|`` in units of D_c.
 
     The load point is held after the step, unless the scene specifies a load point velocity.
 
@@ -245,7 +245,7 @@ class DisplacementStepFamily(StepFamily):
 
 
 class NormalStressStepFamily(ShootingStepFamily):
-    """Steps of imposed normal stress with the size ``|ln(1 + step/sigma_*)|``.
+    """Steps of imposed normal stress of size ``|ln(1 + step/sigma_*)|``.
 
     The load point is held after the step, unless the scene specifies a load point velocity. The
     critical path depends on the size, because the step changes the normal stress that acts on
@@ -270,11 +270,11 @@ class NormalStressStepFamily(ShootingStepFamily):
         # If the normal stress of the slider is constant, this call raises InvalidValue.
         scene.with_(normal_stress_step=sign * MIN_STEP_SIZE)
         super().__init__(scene, sign)
-        # The change of ln V is larger than the size by a factor of mu_*/a.
+        # The change in ln V is larger than the size by a factor of mu_*/a.
         self.min_size = min(self.min_size, MIN_STEP_SIZE * scene.a / scene.mu_star)
 
     def step_size_to_field_value(self, step_size: float) -> float:
-        """Return the change of normal stress of a step, in units of sigma_*.
+        """Return the change in normal stress of a step, in units of sigma_*.
 
         See ``StepFamily.step_size_to_field_value``.
         """
@@ -326,8 +326,8 @@ class NormalStressStepFamily(ShootingStepFamily):
     def _guess_critical_size(self) -> float:
         """Return a guess of the critical size.
 
-        For a decrease of normal stress, the guess is the change of Coulomb stress that reaches the
-        threshold of the slip law. For an increase of normal stress, the guess is the step after
+        For a decrease in normal stress, the guess is the change in Coulomb stress that reaches the
+        threshold of the slip law. For an increase in normal stress, the guess is the step after
         which steady sliding becomes unstable.
         """
         scene, law = self.scene, self.scene.parts.law
@@ -343,7 +343,7 @@ class NormalStressStepFamily(ShootingStepFamily):
     ) -> float:
         """Return the sign of the misfit, computed by integration forwards in time.
 
-        The result is NaN for increases of normal stress, or if the motion cannot continue.
+        The result is NaN for increases in normal stress, or if the motion cannot continue.
         """
         if self.sign != self.sign_of_triggering_steps:
             return math.nan
@@ -359,7 +359,7 @@ class NormalStressStepFamily(ShootingStepFamily):
 
         The largest step raises the slip rate to the instability norm immediately. With inertia, the
         range of step sizes is extended, because the slip rate rises with a delay while stress
-        relaxes. An increase of normal stress raises the slip rate only if its effect on the state
+        relaxes. An increase in normal stress raises the slip rate only if its effect on the state
         exceeds its effect on friction. If the load point moves, the search is limited to steps
         after which sliding can be steady.
         """
@@ -392,7 +392,7 @@ class NormalStressStepFamily(ShootingStepFamily):
     def _max_log_stress_ratio(self) -> float:
         """Return the largest step size after which the normal stress is positive.
 
-        If normal stress depends on shear stress, sigma_3 must remain positive after a decrease of
+        If normal stress depends on shear stress, sigma_3 must remain positive after a decrease in
         normal stress. If sigma_3 were negative, friction would decrease with slip faster than
         spring stress, at any slip rate.
         """

@@ -69,8 +69,8 @@ def _delay_interrupts() -> Iterator[None]:
     """Delay Ctrl-C and other signals until the end of the ``with`` block.
 
     A second Ctrl-C is not delayed. Processes that start inside the ``with`` block ignore Ctrl-C.
-    They also ignore the signal that a terminal sends when it closes. The main process can therefore
-    end the run before it ends its workers.
+    These processes also ignore the signal that a terminal sends when it closes. The main process
+    can therefore end the run before it ends its workers.
     """
     held: list[int] = []
     found = {int(number): signal.getsignal(number) for number in _SIGNALS_THAT_END_RUN}

@@ -10,7 +10,7 @@ _MIN_TIMED_CELLS, _MAX_RELATIVE_STDERR = 12, 0.2
 
 
 class TimeEstimate:
-    """Estimate of the time that the remaining cells of a run take.
+    """Estimate of the time needed to compute the remaining cells of a run.
 
     The first cells of a run are spread over the whole lattice (see
     ``order_cells_by_golden_section``), so their mean time is typical of the remaining cells.
@@ -39,7 +39,7 @@ class TimeEstimate:
             self._sum_of_squares += seconds * seconds
 
     def remaining_seconds(self, cell_count: int) -> float | None:
-        """Estimate the time that the remaining cells take.
+        """Estimate the time needed to compute the remaining cells.
 
         Parameters
         ----------

@@ -1,10 +1,10 @@
 """Detection of drops of shear stress in a noisy record.
 
 The function ``detect_drops`` compares the mean stress in a window before each sample with the mean
-stress in a window after the sample. The window lengths are 4, 8, 16 and so on, in sampling
-intervals. The scaled difference is the difference between the two mean stresses, divided by the
-standard deviation of the differences during loading. If a peak of the scaled difference exceeds a
-threshold, the peak is a stress drop (see ``scipy.signal.find_peaks``).
+stress in a window after the sample. The windows have lengths of 4, 8, 16, ... sampling intervals.
+The scaled difference is the difference between the two mean stresses, divided by the standard
+deviation of the differences during loading. If a peak of the scaled difference exceeds a threshold,
+the peak is a stress drop (see ``scipy.signal.find_peaks``).
 
 The standard deviation of the differences between mean stresses is estimated from the most frequent
 differences [1]_, which occur during loading. The estimate is valid if stress drops occupy at most a
@@ -91,7 +91,7 @@ class Detection(NamedTuple):
     detectable_drop : float
         Smallest detectable drop. A drop of this size is missed with a probability of 0.001.
     max_decrease : float
-        Largest decrease of the moving average of stress.
+        Largest decrease in the moving average of stress.
 
     Examples
     --------
@@ -348,7 +348,7 @@ class _WindowMeanDifferences:
     def find_drops_best_seen_in_window(
         self, longer_windows: list[_WindowMeanDifferences]
     ) -> list[tuple[int, int]]:
-        """Find drops that are detected better than with longer windows.
+        """Find drops whose detection scores are not clearly higher in longer windows.
 
         Parameters
         ----------

@@ -307,7 +307,7 @@ def _fit_three_lines(
     fraction of a longer drop. For this reason, a pair of times is rejected if the rate of stress
     decrease outside the drop exceeds 0.3 times the rate during the drop. A pair of times is also
     rejected if the stress decrease on one side of the drop exceeds the decrease expected from the
-    slope on the other side. The limit for the difference is half of the size of the drop.
+    slope on the other side by more than half of the drop size.
     """
     t0, t1 = corner_time_pairs[:, :1], corner_time_pairs[:, 1:]
     share = np.clip((time - t0) / (t1 - t0), 0.0, 1.0)

@@ -63,7 +63,7 @@ def fit_trend(
     Returns
     -------
     trend : float
-        Change of friction per um of load point displacement. The trend is 0 if the record contains
+        Change in friction per um of load point displacement. The trend is 0 if the record contains
         no steady sliding before or after a step.
     stderr : float
         Standard error of the trend.

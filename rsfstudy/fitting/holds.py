@@ -81,7 +81,7 @@ class Hold(NamedTuple):
 
     @property
     def exact_quantities(self) -> tuple[float, float, float, float]:
-        """Begin and duration of the hold in s, and velocities before and after in um/s."""
+        """Start time and duration of the hold in s, and adjacent velocities in um/s."""
         duration = self.reload.middle - self.stop.middle
         return self.stop.middle, duration, self.stop.velocity_before, self.reload.velocity_after
 
@@ -260,7 +260,7 @@ class HoldFit:
 
     @cached_property
     def _reference(self) -> LinearFit:
-        """Fit of rows without a peak. Its noise is used to select windows."""
+        """Fit of rows without a peak, whose noise is used to select windows."""
         rows, after = self.hold.rows_before, self.rows_after
         if len(after) > 1:
             gaps = np.gradient(self.time)
@@ -282,7 +282,8 @@ class HoldFit:
     def _choose_rows_of_hold_end(self) -> np.ndarray:
         """Return the rows of the window at the end of the hold.
 
-        Rows that are closer to the ends of the hold than the error of the step times are left out.
+        Rows are left out if their distance from an end of the hold is less than the error of the
+        step time.
         """
         time, begins, ends = self.time, self.hold.stop.end, self.hold.reload.start
         rows = np.flatnonzero((time > begins) & (time < ends))

@@ -310,7 +310,7 @@ def fit_noise(
     non_outlier_mask : ndarray of bool, shape (rows,), optional
         Mask that is False for outliers. By default, no rows are outliers.
     min_noise_sd : float, default: 0.0
-        Lower bound of the noise levels, for example the standard deviation of rounding errors.
+        Lower bound on the noise levels, for example the standard deviation of rounding errors.
     averaging_time : float, default: 0.0
         Averaging time of friction in s, or 0 if friction was not averaged.
 
@@ -390,7 +390,7 @@ def guess_noise_by_moments(
     non_outlier_mask : ndarray of bool, shape (rows,), optional
         Mask that is False for outliers. By default, no rows are outliers.
     min_noise_sd : float, default: 0.0
-        Lower bound of the noise levels.
+        Lower bound on the noise levels.
     averaging_time : float, default: 0.0
         Averaging time of friction in s, or 0 if friction was not averaged.
 
@@ -399,7 +399,7 @@ def guess_noise_by_moments(
     noise : NoiseModel
         Noise model of the record.
     min_noise_sd : float
-        Lower bound of the noise levels, relative to the first noise level.
+        Lower bound on the noise levels, relative to the first noise level.
     """
     if non_outlier_mask is not None:
         time, residuals = time[non_outlier_mask], residuals[non_outlier_mask]

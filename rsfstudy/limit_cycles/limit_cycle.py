@@ -158,7 +158,7 @@ class LimitCycle(RecordingMeasure):
     Notes
     -----
     With radiation damping, the limit of the peak slip rate is :math:`a \sigma_*/\eta`. At the slip
-    rate :math:`a \sigma_*/\eta`, a small change of slip rate changes the radiated stress and the
+    rate :math:`a \sigma_*/\eta`, a small change in slip rate changes the radiated stress and the
     direct effect of friction by the same amount. Without radiation damping, the limit is the
     instability norm. A motion settles with oscillations if the slowest-decaying eigenvalues of
     steady sliding are a complex pair.

@@ -1,4 +1,4 @@
-"""Options, columns and rows that all functions for reading records share.
+"""Options, columns and rows that are common to all functions for reading records.
 
 The functions `read_record`, `events` and `history` use different columns of a file. `read_columns`
 reads the columns that one of these functions can use, from a source in any format.

@@ -143,7 +143,7 @@ class Scene(SceneFunctions, SceneQuantities):
         Angle in degrees between the driving stress and the fault normal, for variable normal
         stress.
     dilatancy : float, default: 0.01
-        Dilatancy :math:`\epsilon/(\beta \sigma_*)` of the dilatant fluid: the decrease of pore
+        Dilatancy :math:`\epsilon/(\beta \sigma_*)` of the dilatant fluid: the decrease in pore
         pressure under undrained conditions if :math:`\ln V` increases by 1. If the dilatancy is
         negative, pores close when the slip rate increases. The default for the thermal fluid is 0.
     drainage : float, default: 1.0
@@ -151,7 +151,7 @@ class Scene(SceneFunctions, SceneQuantities):
     porosity_length : float, default: 1.0
         Slip distance of the porosity of the dilatant or thermal fluid, in :math:`D_c`.
     pressurisation : float, default: 1.0
-        Pressurisation factor :math:`\Lambda_p T_*/\sigma_*` of the thermal fluid: the increase of
+        Pressurisation factor :math:`\Lambda_p T_*/\sigma_*` of the thermal fluid: the increase in
         pore pressure under undrained conditions if the temperature rises by :math:`T_*`.
     inertia : bool, default: False
         If True, the slider has mass.
@@ -179,7 +179,7 @@ class Scene(SceneFunctions, SceneQuantities):
         Number of cycles after which an oscillation ends. The number may be fractional. By default
         an oscillation has no end.
     normal_stress_ramp : float, default: 0.0
-        Change of imposed normal stress during a ramp, in :math:`\sigma_*`. If the driving stress is
+        Change in imposed normal stress during a ramp, in :math:`\sigma_*`. If the driving stress is
         inclined, :math:`\sigma_3` changes. The field does not apply to constant normal stress.
     ramp_duration : float, default: 1.0
         Duration of the ramp of normal stress in :math:`D_c/V_*`.
@@ -189,13 +189,13 @@ class Scene(SceneFunctions, SceneQuantities):
     displacement_step : float, default: 0.0
         Sudden displacement of the load point in :math:`D_c`.
     normal_stress_step : float, default: 0.0
-        Sudden change of imposed normal stress in :math:`\sigma_*`. If the driving stress is
+        Sudden change in imposed normal stress in :math:`\sigma_*`. If the driving stress is
         inclined, :math:`\sigma_3` changes. The field does not apply to constant normal stress.
     velocity_oscillation : float, optional
         Amplitude of an oscillation of the load point velocity, relative to the mean velocity
         ``load_velocity_ratio``. By default there is no oscillation.
     velocity_ramp : float, default: 0.0
-        Change of the load point velocity during a ramp, in :math:`V_*`.
+        Change in the load point velocity during a ramp, in :math:`V_*`.
     velocity_ramp_duration : float, default: 10.0
         Duration of the ramp of load point velocity in :math:`D_c/V_*`.
     velocity_ramp_stairs : float, default: 64.0
@@ -315,7 +315,7 @@ class Scene(SceneFunctions, SceneQuantities):
 
     @property
     def under_steady_loading(self) -> Scene:
-        """Scene under a steadily moving load point, for stability analyses.
+        """Scene with a steadily moving load point, for stability analyses.
 
         If the loading has unknowns or noise, the load point of the returned scene moves at the
         velocity of the last segment, without noise. Otherwise the property is the scene itself.
@@ -349,10 +349,10 @@ class Scene(SceneFunctions, SceneQuantities):
     def continuous_segments(self) -> tuple[tuple[Scene, np.ndarray], ...]:
         """Sequences of loading segments that follow each other without a jump.
 
-        A jump is a sudden change of load point displacement or normal stress, or the end of a
+        A jump is a sudden change in load point displacement or normal stress, or the end of a
         segment with unknowns. With noise, each sequence has a single segment. Each sequence is a
-        tuple of two elements: the scene during the first segment, and an array of shape
-        (segments, 6) with the rows of the segment table. The columns of the table are defined in
+        tuple of two elements: the scene during the first segment, and an array of shape (segments,
+        6) with the rows of the segment table. The columns of the table are defined in
         ``parameter_layout``.
         """
         if len(self._segments) == 1:

@@ -254,8 +254,9 @@ def compare_results(first: xr.Dataset, second: xr.Dataset) -> Comparison:
 def _add_axes_of_other_dataset(dataset: xr.Dataset, other: xr.Dataset) -> xr.Dataset:
     """Add the missing axes to a dataset.
 
-    The function adds the axes that only ``other`` has. Each added axis has a single point, which is
-    the fixed value of the coordinate in ``dataset``.
+    If ``other`` has axes that ``dataset`` does not have, the function adds these axes to
+    ``dataset``. Each added axis has a single point, which is the fixed value of the coordinate in
+    ``dataset``.
     """
     cells = set(dataset["status"].dims)
     for dimension in other["status"].dims:

@@ -55,8 +55,8 @@ class RootAttributes(TypedDict):
 class StoredFingerprint(TypedDict):
     """Code digests and versions that affect the results.
 
-    The other entries of a fingerprint need no declared type, because they are only compared with
-    the entries of another fingerprint.
+    The struct does not declare types for the other entries of a fingerprint, because these entries
+    are only compared with the entries of another fingerprint.
     """
 
     own_code: str

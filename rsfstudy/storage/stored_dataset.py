@@ -1,4 +1,4 @@
-"""What a dataset that rsfstudy has written contains besides numbers, in one object."""
+"""Object that reads the declaration, provenance and scenes of a dataset."""
 
 from __future__ import annotations
 

@@ -1,7 +1,7 @@
 """Claims, which compare results with published values.
 
-A claim contains only plain data. Therefore, a claim can be stored in a NetCDF file, and the file
-can be checked without the study that created the file.
+A claim contains only plain data. A claim can therefore be stored in a NetCDF file, and the results
+in the file can be checked without the study that created the file.
 """
 
 from __future__ import annotations
@@ -154,7 +154,7 @@ class Claim:
 
     @classmethod
     def below(cls, **claim_fields: Any) -> Claim:
-        """Create a claim that the result is smaller than the published value.
+        """Create a claim that a result is smaller than a published value.
 
         Parameters
         ----------
@@ -170,7 +170,7 @@ class Claim:
 
     @classmethod
     def above(cls, **claim_fields: Any) -> Claim:
-        """Create a claim that the result is larger than the published value.
+        """Create a claim that a result is larger than a published value.
 
         Parameters
         ----------

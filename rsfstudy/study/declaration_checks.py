@@ -236,7 +236,7 @@ def check_override_of_partly_set_field(
     field_name: str,
     new_value: Any,
 ) -> None:
-    """Reject an override of a field that is set at only some axis points.
+    """Raise InvalidValue if an overridden field is set at only some axis points.
 
     At the axis points that do not set the field, the field has the value of the base scene. The
     override would not change this value. The override is accepted if the field has no value or no

@@ -427,7 +427,7 @@ class Study:
     def _inapplicable_base_fields(self) -> frozenset[str]:
         """Fields that have no meaning for the parts of the base scene.
 
-        The set applies to cells in which no axis selects a part.
+        The set is valid for cells in which no axis selects a part.
         """
         parts = self.user_parts
         return SceneFields.find_inapplicable(

@@ -56,7 +56,7 @@ def study_html(
 
 
 def _html_details(caption: str, content: HtmlMarkup) -> HtmlMarkup:
-    """Return HTML code that shows the content after a click on the caption."""
+    """Return HTML code that shows the content when the user clicks the caption."""
     return HtmlMarkup(
         f"<details><summary>{HtmlMarkup.escape(caption)}</summary>{content}</details>"
     )

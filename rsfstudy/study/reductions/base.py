@@ -52,8 +52,8 @@ class Reduction(ConstructorKeywordCheckMixin):
     """Base class of all reductions.
 
     If you call a reduction, as in ``reduction(dataset)``, it returns a dataset with the new
-    variables. To write your own reduction, derive a frozen dataclass from this class. Fields other
-    than ``name`` and ``of`` are options of the reduction. A reduction must define one method::
+    variables. To write your own reduction, derive a frozen dataclass from this class. All fields
+    except ``name`` and ``of`` are options of the reduction. A reduction must define one method::
 
         __call__(self, dataset) -> xarray.Dataset
 
@@ -309,7 +309,7 @@ def refused_result_mask(
 
 
 def mask_failures(dataset: xr.Dataset) -> xr.Dataset:
-    """Replace failed cells by finished cells without a value.
+    """Treat failed cells as finished cells without a value.
 
     Pending cells are not changed.
 
@@ -470,8 +470,8 @@ def add_propagated_errors(
 
     with the rounding error :math:`\epsilon` of double precision. Absolute values are added because
     the errors of a solver are systematic, so the errors of neighbouring cells do not cancel. To
-    first order, the sum is an upper bound of the error of the result if the error estimate of each
-    cell is an upper bound of the error of the cell.
+    first order, the sum is an upper bound on the error of the result if the error estimate of each
+    cell is an upper bound on the error of the cell.
     """
     of, name = f"{reduction.of}_error", f"{reduction.name}_error"
     if of not in dataset or reduction.name not in reduction_results:

@@ -320,7 +320,7 @@ class Quantile(_SampleStatistic):
 
     The quantile is interpolated linearly between two neighbouring samples. The standard error is
     half the difference between two other quantiles. The levels of these two quantiles are ``level``
-    plus and minus one binomial standard deviation.
+    plus one binomial standard deviation and ``level`` minus one binomial standard deviation.
 
     Parameters
     ----------
