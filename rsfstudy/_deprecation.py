@@ -663,7 +663,7 @@ def translate_former_member_name(owner_class: type, member_name: str) -> str:
 
 
 def add_new_names_for_former_members(subclass: type) -> None:
-    """Give each member of a subclass that has a former name its new name too.
+    """Add the new names of members that a subclass defines under former names.
 
     If the subclass also defines the new name, the former name is ignored. A dataclass field becomes
     a property if its new name is a property of the base class. If the new name is not a property of

@@ -1,4 +1,4 @@
-"""Former names of variables and fields in files, and of columns in tables.
+"""Former names of variables and fields in files, and of table columns.
 
 Variables and declarations of older files are renamed when a file is read. The former name of a
 column still selects the column of a table, with a ``DeprecationWarning``, until version 1.0.0.

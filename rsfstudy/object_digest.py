@@ -110,7 +110,7 @@ class ObjectDigest:
             self._sha256.update(text.encode(errors="surrogatepass") + b"\0")
 
     def _is_first_visit(self, key: Hashable, value: Any) -> bool:
-        """Return True if an object is new. Otherwise add the number of its first visit."""
+        """Return True if an object is new, or add the number of its first visit."""
         if key in self._visited:
             self._add_texts(f"object {self._visited[key][0]}")
             return False

@@ -1,7 +1,7 @@
 """Options that several commands share.
 
-The functions that check option values import slow modules. The import of this module is therefore
-fast.
+The slow modules are imported inside the functions that check option values. The import of this
+module is therefore fast.
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
 """Results of one study, for printed output and for JSON output.
 
-The functions whose names begin with ``print`` print one section of the results. The other functions
-collect the results without printing.
+Each function whose name begins with ``print`` prints one section of the results. The other
+functions collect the results without printing.
 """
 
 from __future__ import annotations

@@ -1,11 +1,11 @@
 """Critical paths, which are motions that just reach the instability norm.
 
 The main class is ``CriticalPath``. At the end of a critical path, ln V equals the instability norm
-and the time derivative of ln V is zero, which leaves one scalar equation for the stress. The path
-is integrated backwards in time from its end, which is called the tangency point. Neighbouring paths
-converge backwards in time. A few short integrations with a moderate tolerance are therefore
-accurate to many digits. An integration forwards in time would amplify every error. Gu et al. [1]_
-derive the critical path under the slip law.
+and the time derivative of ln V is zero. With these two conditions, the stress at the end follows
+from a scalar equation. The path is integrated backwards in time from its end, which is called the
+tangency point. Neighbouring paths converge backwards in time. A few short integrations with a
+moderate tolerance are therefore accurate to many digits. An integration forwards in time would
+amplify every error. Gu et al. [1]_ derive the critical path under the slip law.
 
 The unknowns of a critical path are the spring stress and one state. These two unknowns are
 sufficient if the effect of inertia is small at the instability norm. Inertia has no effect at an
@@ -211,8 +211,8 @@ class CriticalPath(NamedTuple):
         """Yield the events of the path, starting at the tangency point.
 
         The integration ends early if the path cannot continue, or if the path exceeds its budget of
-        right-hand-side evaluations. The budget of right-hand-side evaluations depends on the
-        tolerance in the same way as the cost of an integrator of order eight.
+        right-hand-side evaluations. The budget increases with decreasing tolerance, in proportion
+        to the cost of an integrator of order eight.
         """
         start = self.tangency_point_at_instability_norm
         if start is None:

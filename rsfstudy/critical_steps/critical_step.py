@@ -1,6 +1,6 @@
 """Critical step, the smallest step of the load that triggers instability.
 
-The step may be a change of load point velocity, load point displacement or normal stress. A step is
+The step may be a change in load point velocity, load point displacement or normal stress. A step is
 critical if the peak slip rate after the step just reaches the instability norm.
 
 If the effect of inertia is small up to the instability norm, the end of the critical path is known.
@@ -92,7 +92,7 @@ class CriticalStep(Measure):
     r"""Smallest step after which slip rate reaches the instability norm.
 
     Depending on ``of``, the critical step is a velocity ratio, a displacement (in units of D_c), or
-    a change of normal stress (in units of sigma_*). The outputs include the sizes of two steps that
+    a change in normal stress (in units of sigma_*). The outputs include the sizes of two steps that
     confirm the critical step. The slider settles after the smaller step, and becomes unstable after
     the larger step.
 
@@ -191,7 +191,7 @@ class CriticalStep(Measure):
     def error_scales(self, scene: Scene, values: Mapping[str, Any]) -> Mapping[str, float]:
         """Return the scale of the numerical error of the critical step.
 
-        The scale is the magnitude of the change of velocity, displacement or normal stress.
+        The scale is the magnitude of the change in velocity, displacement or normal stress.
 
         Parameters
         ----------
@@ -293,9 +293,9 @@ class CriticalStep(Measure):
         size. If the motions after the two steps do not confirm the critical step, the relative
         difference between the two step sizes and the critical step size is increased tenfold, up to
         2 %. The error of the critical step size is the difference at which the motions confirm the
-        critical step. A critical step that was computed from a critical path is rejected at the
-        first failure, without further differences. A smaller step may then be critical, because
-        oscillations below the instability norm may grow.
+        critical step. If a critical step was computed from a critical path, it is rejected if the
+        motions do not confirm it at the first difference. In this case, a smaller step may be
+        critical, because oscillations below the instability norm may grow.
         """
         first = (
             boundary.relative_error

@@ -33,11 +33,11 @@ from rsfstudy.status import Status
 #: is the minimum spacing. The second number is the ratio of the spacing to the difference between
 #: ln V and the instability norm.
 _MIN_LEVEL_SPACING, _RELATIVE_LEVEL_SPACING = 1.0, 0.12
-#: Decreases of ln V at which the weakening of friction by the states is tested.
+#: Decreases in ln V at which the weakening of friction by the states is tested.
 _TESTED_LOG_RATE_DECREASES = (0.0, 1.0, 3.0, 10.0, 30.0, 100.0, 300.0)
-#: Increases of ln V that are tested as upper bounds of the effect of pore pressure.
+#: Increases in ln V that are tested as upper bounds of the effect of pore pressure.
 _TESTED_LOG_RATE_INCREASES = (1e-4, 1e-3, 1e-2, 0.1, 1.0)
-#: Maximum ratio of the weakening of friction by the states to the decrease of spring stress. No
+#: Maximum ratio of the weakening of friction by the states to the decrease in spring stress. No
 #: further peak of ln V is possible below this ratio.
 _MAX_WEAKENING_OVER_SPRING_UNLOADING = 0.5
 
@@ -128,8 +128,8 @@ def _stays_below_norm(scene: Scene, point: MotionPoint) -> bool:
     friction approaches its steady state at the present slip rate. If b > 0, the steady state rises
     as ln V decreases, so the state continues to strengthen friction.
 
-    The loss of strength due to pore pressure and heat, divided by a, is an upper bound of the
-    increase of ln V due to these two effects. If ln V is increased by this bound, the states must
+    The loss of strength due to pore pressure and heat, divided by a, is an upper bound on the
+    increase in ln V due to these two effects. If ln V is increased by this bound, the states must
     weaken friction more slowly than the spring stress decreases.
     """
     _value, slope, shift, shift_slope = scene.friction_relation(point.psis)(point.frictional_stress)
@@ -154,10 +154,10 @@ def _stays_below_norm(scene: Scene, point: MotionPoint) -> bool:
 
 
 def _bound_pore_pressure_effect(scene: Scene, point: MotionPoint) -> tuple[float, float]:
-    """Compute an upper bound of the increase of ln V due to pore pressure and heat.
+    """Compute an upper bound on the increase in ln V due to pore pressure and heat.
 
-    The function returns the upper bound, and the smallest decrease of the state by stress and
-    temperature. The upper bound is infinite if no bound is found. A trial increase of ln V is an
+    The function returns the upper bound, and the smallest decrease in the state due to stress and
+    temperature. The upper bound is infinite if no bound is found. A trial increase in ln V is an
     upper bound under one condition: at the increased ln V, the highest pore pressure and the
     highest temperature reduce strength by less than the product of a and the trial increase.
     """

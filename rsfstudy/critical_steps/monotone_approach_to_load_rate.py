@@ -3,8 +3,8 @@
 If seismic waves radiate most of the stress, the slip rate V rises over a slip of eta V_0/(K D_c),
 which is many times D_c. During the rise of the slip rate, the state stays close to its steady
 state. An explicit integrator would need steps of about D_c during the whole rise of the slip rate.
-The functions of this module test if the slip rate rises monotonically to the load point velocity.
-If the rise is monotonic, the integration ends early.
+The functions of this module test whether the slip rate rises monotonically to the load point
+velocity. If the rise is monotonic, the integration ends early.
 
 The test uses two curves in the plane of ln V and state. The two curves meet only at the point of
 steady sliding. The first curve is the steady state as a function of ln V. On the second curve, the
@@ -51,7 +51,7 @@ _TESTED_LOG_DISTANCES_BELOW_LOAD_RATE = (
     _MAX_TEST_SPACING,
     _DIFFERENCE_STEP,
 ) = 2.0, 0.25, 1e-4, 0.25, 1e-5
-#: Largest ratio of the change of ln V over a slip of D_c to the difference ln V_0 - ln V. The test
+#: Largest ratio of the change in ln V over a slip of D_c to the difference ln V_0 - ln V. The test
 #: for a monotonic rise is worthwhile only below this ratio, because the integration of such a slow
 #: motion would take hundreds of steps.
 _MAX_GROWTH_OVER_DISTANCE_TO_LOAD_RATE = 0.02
@@ -129,10 +129,10 @@ def rises_monotonically_to_load_rate(scene: Scene, point: MotionPoint) -> bool:
 def _build_log_rate_and_state_lag_derivatives(
     scene: Scene,
 ) -> Callable[[float, float], tuple[float, float]]:
-    """Build a function that computes the changes of ln V and of the state lag.
+    """Build a function that computes the changes in ln V and in the state lag.
 
     The arguments of the function are ln(V/V_*) and the lag of the state behind the steady state.
-    The function returns the changes of ln V and of the lag per D_c of slip. The results are NaN if
+    The function returns the changes in ln V and in the lag per D_c of slip. The results are NaN if
     no stress corresponds to the friction at this slip rate and lag.
     """
     relation, evolution = (
@@ -173,7 +173,7 @@ def build_single_state_evolution_function(scene: Scene) -> Callable[[float, floa
     Returns
     -------
     callable
-        Function ``(ln(V/V_*), state) -> change of the state per unit slip``.
+        Function ``(ln(V/V_*), state) -> change in the state per unit slip``.
     """
     evolve = scene.state_evolution_function()
     return lambda log_slip_rate, state: evolve(log_slip_rate, (state,), 0.0)[0]

@@ -39,7 +39,7 @@ LOCAL_TOLERANCE_OF_FIRST_ROOT = 1e-5
 _MIN_SLOPE_DISTANCE, _MAX_SLOPE_DISTANCE = 1e-3, 0.05
 _MAX_SECANT_ITERATIONS = 8
 #: Largest increment and upper limit of logit(step size/largest step size) in the search for a sign
-#: change of the misfit.
+#: change in the misfit.
 _MAX_STRIDE, _MAX_POSITION = 0.7, 4.0
 #: Number of successive step sizes without a critical path after which the search is abandoned.
 _MAX_SEARCH_STRIDES_WITHOUT_CRITICAL_PATH = 3
@@ -136,7 +136,7 @@ class StepFamily:
     def size_tolerance(self, step_size: float, value_tolerance: float) -> float:
         r"""Return the tolerance of the size for a tolerance of the step value.
 
-        If the size has the returned relative error, the change of the step value has the relative
+        If the size has the returned relative error, the change in the step value has the relative
         error ``value_tolerance``. The size tolerance is at most ``value_tolerance``.
 
         Parameters
@@ -144,7 +144,7 @@ class StepFamily:
         step_size : float
             Size of the step.
         value_tolerance : float
-            Relative tolerance of the change of the step value.
+            Relative tolerance of the change in the step value.
 
         Returns
         -------
@@ -239,8 +239,8 @@ class StepFamily:
     def size_error_if_neutrally_stable(self, step_size: float, tolerance: float) -> float:
         """Return the error of the step size close to neutral stability.
 
-        Close to neutral stability, motions that are integrated forwards in time do not reveal if
-        oscillations grow or decay.
+        Close to neutral stability, motions that are integrated forwards in time do not reveal
+        whether oscillations grow or decay.
 
         Parameters
         ----------

@@ -21,9 +21,9 @@ class SteadySlidingWithMargin(SteadySliding):
     """Steady sliding at the load point velocity, and its stability margin.
 
     At constant normal stress and critical stiffness, steady sliding is neutrally stable and every
-    orbit is closed. Gu et al. (1984) show this for the slip law, and Ranjith and Rice (1999) for
-    the slowness law. If steady sliding is neutrally stable, only numerical errors change the height
-    of the peaks.
+    orbit is closed. Gu et al. (1984) prove this result for the slip law, and Ranjith and Rice
+    (1999) prove it for the slowness law. If steady sliding is neutrally stable, only numerical
+    errors change the height of the peaks.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Measure that tests if the step of a scene triggers an instability."""
+"""Measure that tests whether the step of a scene triggers an instability."""
 
 from __future__ import annotations
 

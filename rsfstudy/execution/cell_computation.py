@@ -321,14 +321,15 @@ def _shorten_message_for_storage(message: str) -> str:
 class _CpuTimeLimits:
     """CPU time limits for the threads that compute cells in this process.
 
-    If a thread exceeds its limit, the operating system ends the process. This also works if the
-    thread holds the lock of the Python interpreter. CPU time is limited instead of wall time,
-    because a busy machine needs more wall time for the same computation.
+    If a thread exceeds its limit, the operating system ends the process. The limit also applies if
+    the thread holds the global interpreter lock. CPU time is limited instead of wall time, because
+    a busy machine needs more wall time for the same computation.
 
     The operating system measures the CPU time of the whole process. The limit is therefore
     multiplied by the number of computing threads. The limit is set once per batch instead of once
-    per cell. This is sufficient because a batch stops ``_FINISHED_CELLS_HANDOVER_INTERVAL`` after
-    its start, so only the last cell of a batch can run for a long time.
+    per cell. Setting the limit once is sufficient, because a batch stops
+    ``_FINISHED_CELLS_HANDOVER_INTERVAL`` after its start, so only the last cell of a batch can run
+    for a long time.
     """
 
     def __init__(self) -> None:

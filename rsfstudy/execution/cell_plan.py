@@ -75,7 +75,7 @@ def _digest_cell_fields(
 
 
 class CellPlan:
-    """Plan of a study: keys of all cells, in row-major order.
+    """Plan of a study, with the keys of all cells in row-major order.
 
     A plan does not store the scenes of all cells, so that the plan of a large lattice fits in
     memory.
@@ -260,7 +260,8 @@ def order_cells_by_golden_section(cell_numbers: np.ndarray) -> np.ndarray:
 
     Neighbouring cells in the new order are about ``0.618 * n`` positions apart in ``cell_numbers``
     (modulo ``n``), where ``n`` is the number of cells. The first few cells are therefore spread
-    over the whole lattice. Their computation times and failures are typical of the remaining cells.
+    over the whole lattice. The computation times and failures of these cells are therefore typical
+    of the remaining cells.
 
     Parameters
     ----------

@@ -143,7 +143,7 @@ class _Module:
 
 
 def _find_imports(code: CodeType) -> list[tuple[str, list[str]]]:
-    """Find the modules of the package that the code imports, with the imported names.
+    """Find the package modules that the code imports, with the imported names.
 
     A string that is the name of a module is treated as an import, because the code may pass the
     string to ``importlib.import_module``.

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import math
 
-#: Minimum number of timed cells, and maximum relative standard error of their mean time. Both must
-#: hold before the remaining time is estimated, so that the estimate is correct to a factor of two.
+#: Minimum number of timed cells, and maximum relative standard error of their mean time. The
+#: remaining time is estimated only if both conditions are met, so that the estimate is correct to a
+#: factor of two.
 _MIN_TIMED_CELLS, _MAX_RELATIVE_STDERR = 12, 0.2
 
 
 class TimeEstimate:
-    """Estimate of the time that the remaining cells of a run take.
+    """Estimate of the time needed to compute the remaining cells of a run.
 
     The first cells of a run are spread over the whole lattice (see
     ``order_cells_by_golden_section``), so their mean time is typical of the remaining cells.
@@ -39,7 +40,7 @@ class TimeEstimate:
             self._sum_of_squares += seconds * seconds
 
     def remaining_seconds(self, cell_count: int) -> float | None:
-        """Estimate the time that the remaining cells take.
+        """Estimate the time needed to compute the remaining cells.
 
         Parameters
         ----------

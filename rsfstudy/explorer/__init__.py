@@ -1,7 +1,7 @@
 """Interactive views of scenes, results and records, in a browser or a notebook.
 
-A view consists of widgets and plots. It calls public functions of rsfstudy for every computation,
-so the package contains no physics, and it never writes a file on its own: the browser saves the
+A view consists of widgets and plots. A view calls public functions of rsfstudy for every
+computation, so this package contains no physics. A view never writes files. The browser saves the
 files that you download. The modules are:
 
 - ``entry_points`` contains the functions ``explore`` and ``serve``.

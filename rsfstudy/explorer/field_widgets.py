@@ -144,7 +144,7 @@ class NumberWidget:
             self._changed(event.new)
 
     def _set(self, widget: Any, value: float) -> None:
-        """Set a widget without a call of the function ``changed``."""
+        """Set the value of a widget without calling the function ``changed``."""
         self._is_moved_by_code = True
         try:
             widget.value = value

@@ -1,8 +1,8 @@
-"""Choices of a user in the record view, and the calls that follow from the choices.
+"""Choices of the user in the record view, and the resulting function calls.
 
 The class ``FitChoices`` contains the choices. Its methods return the arguments of
-``rsfstudy.read_record`` and ``rsfstudy.fit``, and the Python code and the command line with the
-same arguments.
+``rsfstudy.read_record`` and ``rsfstudy.fit``. The function ``format_fit_command`` returns the
+command line with the same arguments.
 """
 
 from __future__ import annotations
@@ -124,7 +124,7 @@ class FitChoices:
         return found
 
     def add_stiffness_for_slip(self, reading_arguments: dict[str, Any]) -> dict[str, Any]:
-        """Add the stiffness, which a record with slip instead of displacement needs.
+        """Add the stiffness, which is required for a record of slip.
 
         Parameters
         ----------

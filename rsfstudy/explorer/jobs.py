@@ -24,9 +24,10 @@ _COLLECTED = threading.local()
 
 
 def route_warnings_to_pages() -> None:
-    """Let ``collected_warnings`` receive the warnings of rsfstudy, instead of the terminal.
+    """Send warnings to ``collected_warnings`` instead of the terminal.
 
-    The server calls the function once. A notebook shows warnings in the usual way.
+    The server calls this function once. In a notebook, the function is not called, and warnings are
+    displayed as usual.
     """
     print_warning = warnings.showwarning
 
@@ -59,14 +60,14 @@ def collected_warnings() -> Iterator[list[str]]:
 class Cancelled(KeyboardInterrupt):
     """Raised in the thread of a computation when the user cancels the computation.
 
-    The class is derived from ``KeyboardInterrupt``, because runs of studies and fits record any
-    other exception as the outcome of a cell. A computation is therefore cancelled in the same way
-    as Ctrl-C interrupts a command.
+    The class is a subclass of ``KeyboardInterrupt``, because studies and fits record every other
+    exception as the outcome of a cell. Cancelling a computation therefore has the same effect as
+    pressing Ctrl-C.
     """
 
 
 class _Job(NamedTuple):
-    """Computation that waits for its thread, and the functions that receive its outcome."""
+    """Waiting computation, with the callbacks that receive its outcome."""
 
     label: str
     compute: Callable[[Report], Any]
@@ -76,12 +77,12 @@ class _Job(NamedTuple):
 
 
 class Jobs:
-    """Runner of the computations of one view, with at most one thread.
+    """Runner for the computations of a view, in one thread at a time.
 
-    If a computation is started while another one is running, the new computation waits, and it
-    replaces a computation that is already waiting. Results of a computation are discarded if a new
-    computation is waiting. A slider that moves faster than the computation therefore causes no
-    queue.
+    If a computation is started while another computation is running, the new computation waits. It
+    replaces any computation that is already waiting, so at most one computation waits. When the
+    running computation ends, its results are discarded if another computation is waiting.
+    Therefore, moving a slider quickly does not build up a queue of computations.
 
     Parameters
     ----------
@@ -142,7 +143,7 @@ class Jobs:
         pn.state.onload(partial(self._enqueue, job))
 
     def _enqueue(self, job: _Job) -> None:
-        """Start a job, or let it wait if another job is running."""
+        """Start a job, or keep it waiting if another job is running."""
         with self._lock:
             if self._running is not None:
                 self._waiting = job

@@ -1,4 +1,4 @@
-"""Messages of errors as Markdown."""
+"""Conversion of error messages to Markdown."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from rsfstudy.errors import RsfStudyError
 
 
 def create_message(error: Exception) -> Any:
-    """Return a page with the message of an error that prevents a view.
+    """Return a page with an error message, for display instead of a view.
 
     Parameters
     ----------
@@ -48,7 +48,7 @@ def format_message(error: Exception) -> str:
 
 
 def escape_markdown(text: str) -> str:
-    """Escape the characters that have a meaning in Markdown or HTML.
+    """Escape characters with a special meaning in Markdown or HTML.
 
     Parameters
     ----------

@@ -1,7 +1,8 @@
 """Reduction of long curves to the pixels of a plot.
 
-A record may have millions of rows, and a plot about a thousand pixels. The functions keep the
-minimum and the maximum in each pixel, so that spikes and stress drops remain visible.
+A record may have millions of rows, but a plot has only about a thousand pixels. The functions keep
+the minimum and the maximum of the curve in each column of pixels, so that spikes and stress drops
+remain visible.
 """
 
 from __future__ import annotations

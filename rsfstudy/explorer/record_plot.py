@@ -1,7 +1,8 @@
 """Plot of a record, with its steps, its holds, the fitted window and the fits.
 
-The plot consists of Bokeh figures with a common horizontal axis. The browser receives the minimum
-and the maximum in each pixel. When the user zooms, the visible rows are reduced again.
+The plot consists of Bokeh figures with a common horizontal axis. Only the minimum and the maximum
+of each curve in each column of pixels are sent to the browser. When the user zooms, the visible
+rows are thinned again.
 """
 
 from __future__ import annotations
@@ -72,7 +73,8 @@ class RecordPlot:
     Parameters
     ----------
     on_window : callable
-        Function that is called with the times in s between which the user drags.
+        Function that is called with the ends in s of the interval that the user selects by
+        dragging.
     on_step : callable
         Function that is called with the index of the step that the user clicks.
     """
@@ -201,7 +203,7 @@ class RecordPlot:
         return made
 
     def _label_lowest_axis(self) -> None:
-        """Write the label of the horizontal axis below the lowest visible figure only."""
+        """Label the horizontal axis of the lowest visible figure only."""
         visible = [each for each in self.figures.values() if each.visible]
         for each in visible:
             each.xaxis.axis_label = _LABELS[self._x_name][0] if each is visible[-1] else None
@@ -262,7 +264,7 @@ class RecordPlot:
         return float(time[min(first, len(time) - 1)]), float(time[max(last, 0)])
 
     def _thin_again(self) -> None:
-        """Reduce the visible rows to the pixels of the figures."""
+        """Thin the visible rows to the pixel resolution of the figures."""
         if self._record is None:
             return
         x, columns = self._x(), self._record.columns
@@ -275,7 +277,7 @@ class RecordPlot:
         self._thin_fits()
 
     def _thin_fits(self) -> None:
-        """Reduce the fitted curves and the whitened residuals."""
+        """Thin the fitted curves and the whitened residuals."""
         curves: dict[str, list[Any]] = {n: [] for n in ("xs", "ys", "color", "law", "dash")}
         points: dict[str, list[Any]] = {n: [] for n in ("x", "y", "color", "law", "marker")}
         for rows in self._fitted:
@@ -289,7 +291,7 @@ class RecordPlot:
         self._fit_curves.data, self._fit_residuals.data = curves, points
 
     def _thin_rows(self, rows: dict[str, Any], name: str) -> tuple[np.ndarray, np.ndarray]:
-        """Reduce the rows of a fit in which a variable is not NaN."""
+        """Thin the rows of a fit in which a variable is not NaN."""
         known = np.isfinite(rows[name])
         x = rows[f"record_{self._x_name}"][known]
         return thin_to_pixels(x, rows[name][known], self._limits, self._pixel_count())
@@ -302,7 +304,7 @@ class RecordPlot:
             return _ASSUMED_WIDTH
 
     def _zoomed(self, event: RangesUpdate) -> None:
-        """Reduce the rows again after the user has changed the visible range."""
+        """Thin the rows again after the user has changed the visible range."""
         limits = float(event.x0), float(event.x1)
         if limits != self._limits and limits[0] < limits[1]:
             self._limits = limits
@@ -320,7 +322,7 @@ class RecordPlot:
             self._on_step(int(near[apart[near].argmin()]))
 
     def _dragged(self, event: SelectionGeometry) -> None:
-        """Report the times between which the user has dragged."""
+        """Report the time interval that the user has selected by dragging."""
         if event.final and self._record is not None:
             left, right = sorted(float(event.geometry[name]) for name in ("x0", "x1"))
             begin, end = self._times_between((left, right))
@@ -329,7 +331,7 @@ class RecordPlot:
 
 
 def _is_selection_tool(tool: Any) -> bool:
-    """Return True for the selection tool of a figure, and of the common toolbar."""
+    """Return True if a tool is the selection tool of a figure or the toolbar."""
     return isinstance(getattr(tool, "tools", [tool])[0], BoxSelectTool)
 
 

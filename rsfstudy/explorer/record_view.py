@@ -1,4 +1,4 @@
-"""View of a laboratory record, with the choice of steps and of a window, and with fits."""
+"""View of a laboratory record, for selecting a window and steps to fit."""
 
 from __future__ import annotations
 
@@ -137,7 +137,7 @@ class RecordView(View):
 
     @contextmanager
     def _updating(self) -> Iterator[None]:
-        """Ignore changes of widgets that the view makes itself."""
+        """Ignore widget changes that are made by the view and not by the user."""
         self._is_updating = True
         try:
             yield
@@ -215,7 +215,7 @@ class RecordView(View):
             self._change_choices()
 
     def _choose_window(self, begin: float | None, end: float | None) -> None:
-        """Fit the rows between two times in s."""
+        """Select the rows between two times in s for the fit."""
         with self._updating():
             self._widgets["begin"].value, self._widgets["end"].value = begin, end
         self._show_window()
@@ -240,7 +240,7 @@ class RecordView(View):
     # ---- fit ------------------------------------------------------------------------------------
 
     def _change_choices(self) -> None:
-        """Remove the fit, which belongs to other choices, and update the code."""
+        """Remove the fit, which is out of date, and update the code."""
         self.jobs.cancel()
         self._show_fit(None)
 
@@ -329,7 +329,7 @@ class RecordView(View):
 
 
 def _call_with_lock(method: Callable[[], None]) -> None:
-    """Call a method that changes Bokeh models, which requires the lock of the document."""
+    """Call a method that changes Bokeh models while holding the document lock."""
     document = pn.state.curdoc
     if document is None or not document.session_context:
         method()
@@ -346,5 +346,5 @@ def _to_pane(piece: SummaryTableOrSentence) -> Any:
 
 
 def _sentence(text: str) -> Any:
-    """Return a Panel object that shows a sentence in as many lines as necessary."""
+    """Return a Panel object that shows a sentence with line breaks."""
     return pn.pane.Markdown(escape_markdown(text), margin=(0, 10), sizing_mode="stretch_width")

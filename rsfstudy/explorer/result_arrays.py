@@ -1,6 +1,6 @@
-"""Numbers that a selection of results shows.
+"""Data of the curves and maps of a selection of results.
 
-The functions return arrays for the curves and the maps of a plot, and never draw.
+The functions return arrays, and never draw a plot.
 """
 
 from __future__ import annotations
@@ -110,7 +110,7 @@ def shows_cells(dataset: xr.Dataset, variable: str) -> bool:
 
 
 def iterate_panels(dataset: xr.Dataset, selection: Selection) -> Iterator[Selection]:
-    """Yield the selection of each panel, without a facet.
+    """Yield one selection without a facet for each panel.
 
     At most 12 points of the facet dimension are selected, at regular intervals.
     """

@@ -1,4 +1,4 @@
-"""Cells of the results of a study: scene, outcome and motion, computed again."""
+"""Recomputation of a single cell: scene, outcome and motion."""
 
 from __future__ import annotations
 
@@ -88,8 +88,8 @@ def recompute(
     """Compute the outcome and the motion of a cell again.
 
     If the measure records the motion, for example a limit cycle, the result contains the recorded
-    motion. Otherwise, the motion of the scene is simulated. If the measure solves for the load, the
-    load is the value that the measure has verified as unstable.
+    motion. Otherwise, the motion of the scene is simulated. If the measure solves for a critical
+    load, the motion is simulated at the load that the measure has verified to be unstable.
 
     Parameters
     ----------
@@ -198,8 +198,8 @@ def tabulate_outcome(cell: RecomputedCell, results: xr.Dataset) -> pd.DataFrame:
 def motion_figures(motion: xr.Dataset, height: int = 240) -> list[Any]:
     """Return Bokeh figures of stress and slip rate against displacement or time.
 
-    If a motion without inertia and damping passes the instability norm, the figures end there,
-    because the rest of the motion has no physical meaning.
+    If the slip rate of a motion without inertia and damping exceeds the instability norm, the
+    curves end at the norm, because the rest of the motion has no physical meaning.
 
     Parameters
     ----------

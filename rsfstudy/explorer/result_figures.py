@@ -1,7 +1,7 @@
 """Bokeh figures of curves and maps of results.
 
-A figure keeps its data sources. A slider replaces only the data, so that the browser does not build
-the figure again.
+Each figure keeps its Bokeh data sources. When the user moves a slider, only the data are replaced,
+so the browser does not have to build the figure again.
 """
 
 from __future__ import annotations
@@ -185,7 +185,7 @@ def _mark_columns(symbols: dict[int, str], marks: Marks, x: Any, y: Any) -> dict
 
 
 class CurvesPlot(Plot):
-    """Curves with error bars. The symbols of the statuses are at the bottom of the figure."""
+    """Plot of curves with error bars, and with status symbols at the bottom."""
 
     def choose_y_type(self, dataset: xr.Dataset, panel: Selection) -> str:
         """Return "log" if all values of the variable are positive and span decades."""
@@ -308,7 +308,7 @@ def _point_columns(curves: Sequence[Curve], styles: Sequence[dict[str, Any]]) ->
 
 
 class MapPlot(Plot):
-    """Map with colours. Cells without a value are grey, and symbols show the statuses."""
+    """Colour map with status symbols, in which cells without a value are grey."""
 
     def choose_y_type(self, dataset: xr.Dataset, panel: Selection) -> str:
         """Return "log" if the points along y are spaced logarithmically."""

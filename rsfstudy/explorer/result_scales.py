@@ -69,7 +69,7 @@ def flag_names(dataset: xr.Dataset, variable: str) -> dict[float, str]:
 
 
 def label_ticks(axis: Any, names: dict[Any, str]) -> None:
-    """Use names as tick labels, if there are any."""
+    """Use the names of points as tick labels, if the points have names."""
     if names:
         axis.ticker, axis.major_label_overrides = ticks(names)
 

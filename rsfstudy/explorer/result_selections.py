@@ -126,11 +126,11 @@ def complete_selection(
     facet: str | None = None,
     points: Mapping[str, int] | None = None,
 ) -> Selection:
-    """Return a selection that contains requested choices.
+    """Complete a selection by adding defaults to the requested choices.
 
-    Choices that are missing or that contradict another choice are replaced by a default. For
-    example, a dimension along x cannot also be the dimension of the facets. The first choices in
-    the list of parameters take precedence.
+    A default replaces each choice that is missing or that contradicts another choice. For example,
+    a dimension along x cannot also be the dimension of the facets. If two choices contradict each
+    other, the earlier parameter takes precedence.
 
     Parameters
     ----------

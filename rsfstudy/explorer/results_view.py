@@ -120,7 +120,7 @@ class ResultsView(View):
         self._cell_button.on_click(lambda _event: self._show_chosen_cell())
 
     def controls(self) -> list[Any]:
-        """Return the selectors, the sliders and the choice of a cell."""
+        """Return the selectors, the sliders and the widgets that select a cell."""
         hint = "Click a point or a position of a map, or choose the cell here."
         cell = pn.Card(
             pn.pane.Markdown(hint, margin=(0, 5)),
@@ -255,7 +255,7 @@ class ResultsView(View):
     # ---- cells ----------------------------------------------------------------------------------
 
     def _show_chosen_cell(self) -> None:
-        """Show the cell of the widgets."""
+        """Show the cell that the widgets select."""
         index = [widget.value for widget in self._cell_choices.values()]
         self._on_cell(int(np.ravel_multi_index(index, self.results["status"].shape)))
 

@@ -1,4 +1,4 @@
-"""Scenes that the scene view offers: figures of the paper, and the rigs of the README."""
+"""Presets of the scene view: figures of the paper, and the rigs of the README."""
 
 from __future__ import annotations
 

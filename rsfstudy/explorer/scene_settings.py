@@ -1,4 +1,4 @@
-"""Settings of the scene view: the fields of a scene, as Python code and command line state them.
+"""Settings of the scene view: the scene fields in the notation of Python code.
 
 The settings contain texts such as ``"5 MPa"``. The view builds the scene from these texts, so the
 code that the view shows reproduces the scene exactly.
@@ -138,7 +138,7 @@ class SceneSettings:
         return {name: value for name, value in asdict(self).items() if value}
 
     def with_field(self, name: str, value: Any) -> Self:
-        """Return the settings with a field that is set, or removed if the value is None."""
+        """Return settings with a changed field, or without it if the value is None."""
         changed = {n: v for n, v in self.scene.items() if n != name}
         return replace(self, scene=changed if value is None else changed | {name: value})
 

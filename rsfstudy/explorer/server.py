@@ -1,9 +1,9 @@
-"""Web server of the explorer, which only the browser of this computer can use.
+"""Web server of the explorer, which is accessible only from this computer.
 
-The server listens on the loopback interface. The first address contains a random token. The server
-answers this first request with a cookie and a redirection to the address without the token, so that
-the token does not remain in the history of the browser. All other requests need the cookie,
-including requests for scripts and websockets.
+The server listens on the loopback interface. The URL that is opened first contains a random token.
+The server responds to this first request with a cookie, and redirects the browser to the URL
+without the token, so that the token does not remain in the browser history. All other requests
+require the cookie, including requests for scripts and websockets.
 """
 
 from __future__ import annotations
@@ -97,7 +97,7 @@ class ExplorerServer:
 
 
 def _build_page(source: Any) -> Any:
-    """Build the page of one browser tab, or the message of the error that prevents it."""
+    """Build the page of a browser tab, or a page with an error message."""
     arguments = pn.state.session_args.get(STATE_ARGUMENT, [b""])
     try:
         return create_view(source, arguments[0].decode(errors="replace")).panel()
@@ -129,7 +129,10 @@ def _find_free_port(port: int | None) -> int:
 
 
 def _cookie_name(port: int) -> str:
-    """Return the name of the cookie. Cookies of a host apply to all ports of the host."""
+    """Return the name of the cookie, which contains the port.
+
+    The port is part of the name because a browser sends the cookies of a host to all its ports.
+    """
     return f"rsfstudy-explore-{port}"
 
 
@@ -180,7 +183,7 @@ class _RefusalHandler(RequestHandler):
     """Handler that refuses all requests."""
 
     def prepare(self) -> None:
-        """Answer with the status 403 and the remedy."""
+        """Respond with the HTTP status 403, and explain how to open the page."""
         self.set_status(403)
         self.set_header("Content-Type", "text/plain; charset=utf-8")
         self.finish(

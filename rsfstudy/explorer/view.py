@@ -378,9 +378,10 @@ def _write_to_memory(write: Callable[[], bytes]) -> io.BytesIO:
 
 
 def load_panel() -> None:
-    """Load the JavaScript of Panel in a notebook, and the settings of Panel elsewhere.
+    """Load the JavaScript of Panel in a notebook, or configure Panel elsewhere.
 
-    The resources come from the installed package, so that no page needs a network.
+    The resources are loaded from the installed package, so the page does not need an internet
+    connection.
     """
     if not pn.extension._loaded:
         pn.extension(inline=True, notifications=False)

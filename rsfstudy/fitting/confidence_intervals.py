@@ -2,7 +2,7 @@
 
 The profile likelihood of a parameter is the likelihood at a fixed value of the parameter, maximised
 with respect to all other parameters [1]_. The squared distance between the fixed value and the best
-value is the increase of the sum of squared whitened residuals, divided by the noise variance. At
+value is the increase in the sum of squared whitened residuals, divided by the noise variance. At
 the ends of a confidence interval, the squared distance from the best value is :math:`t^2`, where
 :math:`t` is a quantile of Student's t distribution with the degrees of freedom of the fit. If the
 log-likelihood is nearly quadratic, the interval is computed from the standard error.
@@ -125,7 +125,7 @@ class LikelihoodProfile:
     stderr_from_noise : float
         Contribution of the friction noise to the standard error of the coordinate of the parameter.
     coordinate_change_ratios : ndarray, shape (parameters,)
-        Change of the coordinate of each free parameter, per unit change of the coordinate of the
+        Change in the coordinate of each free parameter, per unit change in the coordinate of the
         parameter ``parameter_name``.
     """
 
@@ -184,7 +184,7 @@ class LikelihoodProfile:
         """Compute the squared distance of a parameter from its best value.
 
         The squared distance between a value of the parameter and the best value is twice the
-        decrease of the log-likelihood. The squared distance is equal to the increase of the sum of
+        decrease in the log-likelihood. The squared distance is equal to the increase in the sum of
         squared residuals, divided by the noise variance. If the log-likelihood is nearly quadratic,
         the method returns the quadratic approximation.
 
@@ -255,7 +255,7 @@ class LikelihoodProfile:
         return float(residuals @ residuals - np.square(self.solution.whitened_residuals).sum())
 
     def _compute_linearised_excess_sum_of_squares(self, coordinates: np.ndarray) -> float:
-        """Compute the increase of the sum of squares with a linearised model.
+        """Compute the increase in the sum of squares with a linearised model.
 
         The result is the difference between the sum of squares and its minimum. The sum of squares
         is minimised with respect to all parameters except the parameter of the profile likelihood.

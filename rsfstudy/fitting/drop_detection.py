@@ -1,10 +1,10 @@
 """Detection of drops of shear stress in a noisy record.
 
 The function ``detect_drops`` compares the mean stress in a window before each sample with the mean
-stress in a window after the sample. The window lengths are 4, 8, 16 and so on, in sampling
-intervals. The scaled difference is the difference between the two mean stresses, divided by the
-standard deviation of the differences during loading. If a peak of the scaled difference exceeds a
-threshold, the peak is a stress drop (see ``scipy.signal.find_peaks``).
+stress in a window after the sample. The windows have lengths of 4, 8, 16, ... sampling intervals.
+The scaled difference is the difference between the two mean stresses, divided by the standard
+deviation of the differences during loading. If a peak of the scaled difference exceeds a threshold,
+the peak is a stress drop (see ``scipy.signal.find_peaks``).
 
 The standard deviation of the differences between mean stresses is estimated from the most frequent
 differences [1]_, which occur during loading. The estimate is valid if stress drops occupy at most a
@@ -91,7 +91,7 @@ class Detection(NamedTuple):
     detectable_drop : float
         Smallest detectable drop. A drop of this size is missed with a probability of 0.001.
     max_decrease : float
-        Largest decrease of the moving average of stress.
+        Largest decrease in the moving average of stress.
 
     Examples
     --------
@@ -311,7 +311,8 @@ class _WindowMeanDifferences:
         self.excess_decrease = change - max(0.0, self.typical_decrease)
         lag = estimate_mean_and_sd_of_mode(stress[window_samples:] - stress[:-window_samples])[1]
         self.noise_sd = max(lag / math.sqrt(2.0), rounding_quantum / math.sqrt(12.0))
-        # The limits correspond to white noise, and to noise that is constant within a window.
+        # The lower limit is correct for white noise, and the upper limit for noise that is constant
+        # within a window.
         ratio = (
             self.decrease_standard_deviation
             / (self.noise_sd or 1.0)
@@ -348,7 +349,7 @@ class _WindowMeanDifferences:
     def find_drops_best_seen_in_window(
         self, longer_windows: list[_WindowMeanDifferences]
     ) -> list[tuple[int, int]]:
-        """Find drops that are detected better than with longer windows.
+        """Find drops whose detection scores are not clearly higher in longer windows.
 
         Parameters
         ----------
@@ -362,7 +363,7 @@ class _WindowMeanDifferences:
             For each drop, the index of the first sample after its start, and the index of the first
             sample after its end.
         """
-        # The padding allows for peaks at the ends.
+        # The values are padded because a peak may be at an end of the record.
         padded = np.concatenate([[0.0], self.excess_decrease, [0.0]])
         peaks, about = find_peaks(padded, height=self.detection_threshold, prominence=0.0)
         peaks = peaks[about["prominences"] > _MIN_RELATIVE_PROMINENCE * padded[peaks]]

@@ -23,14 +23,14 @@ from rsfstudy.fitting.filters import LOW_PASS_ORDERS, Filter
 from rsfstudy.fitting.fit_solution import FitSolution, compute_aic
 
 #: Lengths of the tested running means in rows, and criteria for detecting a filter. The first
-#: criterion is the smallest decrease of the AIC due to the filter. The second criterion is the
+#: criterion is the smallest decrease in the AIC due to the filter. The second criterion is the
 #: smallest change of a parameter due to the filter, in standard errors.
 _TESTED_AVERAGE_LENGTHS_IN_ROWS, _MIN_AIC_GAIN_OF_RUNNING_MEAN, _MIN_PARAMETER_CHANGE_IN_STDERRS = (
     range(2, 21),
     20.0,
     0.5,
 )
-#: Smallest decrease of the AIC for which a low-pass filter is detected. This limit is larger than
+#: Smallest decrease in the AIC for which a low-pass filter is detected. This limit is larger than
 #: the limit for running means, because an inaccurate step time or stiffness has a similar effect to
 #: a low-pass filter.
 _MIN_AIC_GAIN_OF_LOW_PASS = 60.0

@@ -1,7 +1,7 @@
 r"""Estimation of friction parameters by generalised least squares.
 
-The class ``FitProblem`` minimises :math:`|W (y - f(p))|^2` with respect to the parameters
-:math:`p`, where :math:`y` is the recorded friction and :math:`f` is the model [1]_. The matrix
+The class ``FitProblem`` minimises :math:`|W (y - f(\theta))|^2` with respect to the parameters
+:math:`\theta`, where :math:`y` is the recorded friction and :math:`f` is the model [1]_. The matrix
 :math:`W` whitens the noise, so that :math:`W^T W` is the inverse of the correlation matrix
 :math:`R` of the noise. The algorithm estimates the parameters and the noise in turn. The covariance
 matrix of the parameters is
@@ -9,10 +9,11 @@ matrix of the parameters is
 .. math:: s^2 (J^T R^{-1} J)^{-1}, \qquad s^2 = \frac{|W (y - f)|^2}{n - p},
 
 where :math:`J` is the Jacobian of the model, :math:`n` is the number of rows, and :math:`p` is the
-number of parameters. Errors of the step times and step velocities change the model by the columns
-of a matrix :math:`G` (see ``load_point_noise``). Step errors add :math:`A A^T` to the covariance
-matrix, with :math:`A = (J^T R^{-1} J)^{-1} J^T R^{-1} G`. The noise is estimated by restricted
-maximum likelihood [2]_.
+number of parameters. The friction of the model also depends on the step times and step velocities.
+Each column of a matrix :math:`G` contains the change in friction due to one independent error of
+the steps (see ``load_point_noise``). The step errors add :math:`A A^T` to the covariance matrix,
+with :math:`A = (J^T R^{-1} J)^{-1} J^T R^{-1} G`. The noise is estimated by restricted maximum
+likelihood [2]_.
 
 References
 ----------
@@ -67,7 +68,7 @@ _MIN_LOG_GAP_BETWEEN_SLIP_DISTANCES = 1e-6
 #: Tested initial values of the slip distance, relative to the initial guess.
 _INITIAL_SLIP_DISTANCE_FACTORS = (0.1, 0.3, 1.0, 3.0, 10.0)
 #: Settings of the search. The first value is the largest number of iterations. Each iteration
-#: estimates the noise and the parameters. The iterations end if the changes of the parameters in
+#: estimates the noise and the parameters. The iterations end if the changes in the parameters in
 #: standard errors are smaller than the second value. The third value is the largest number of model
 #: evaluations per iteration, and the fourth value is the relative tolerance of the search. The last
 #: two settings apply to the final Gauss-Newton steps. The fifth setting contains the smallest
@@ -341,7 +342,7 @@ class FitProblem:
 
         Returns
         -------
-        initial_coordinates : ndarray, shape (parameters,)
+        coordinates : ndarray, shape (parameters,)
             Coordinates at the minimum.
         jacobian : ndarray, shape (rows, parameters)
             Derivatives of the model at the minimum.
@@ -375,7 +376,7 @@ class FitProblem:
 
         First, Gauss-Newton steps :math:`(J^T R^{-1} J)^{-1} J^T R^{-1} (y - f)` with accurate
         derivatives refine the parameters. The numerical error of a parameter is the last
-        Gauss-Newton step, plus three times the change of the parameter if the integration
+        Gauss-Newton step, plus three times the change in the parameter if the integration
         tolerances are reduced by a factor of ten. The degrees of freedom of the fit are the degrees
         of freedom of the noise, multiplied by (n - p)/n for p parameters and n rows.
         """
@@ -570,11 +571,11 @@ def _has_converged(
     Parameters
     ----------
     last_coordinate_change : ndarray, shape (parameters,)
-        Last change of the coordinates of the free parameters.
+        Last change in the coordinates of the free parameters.
     whitened_jacobian : ndarray, shape (rows, parameters + 1)
         Whitened derivatives, followed by the whitened residuals.
     tolerance : float
-        Largest change of the coordinate of a parameter, as a fraction of the standard error of the
+        Largest change in the coordinate of a parameter, as a fraction of the standard error of the
         coordinate.
     """
     size = np.linalg.norm(whitened_jacobian[:, -1]) / math.sqrt(len(whitened_jacobian))

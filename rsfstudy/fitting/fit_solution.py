@@ -53,7 +53,7 @@ class FitSolution:
     jacobian : ndarray, shape (rows, parameters)
         Derivatives of the fitted friction with respect to the parameter coordinates.
     loading_error_sensitivity : ndarray, shape (rows, errors)
-        Change of friction due to each independent error of the step times and step velocities. The
+        Change in friction due to each independent error of the step times and step velocities. The
         size of each error is one standard deviation.
     aic : float
         Akaike information criterion of the fit, including the noise model. A smaller value means a

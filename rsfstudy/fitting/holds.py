@@ -5,11 +5,11 @@ A hold is an interval in which the load point is at rest between sliding and rel
 and :math:`\mu_p` the peak friction after reloading. As in the measure ``Healing``, relaxation is
 :math:`\mu_h - \mu_0`, and healing is :math:`\mu_p - \mu_0`.
 
-The three frictions are estimated jointly by generalised least squares with correlated noise.
-:math:`\mu_0` is the mean friction of the linear portion before the hold. :math:`\mu_h` is the value
-of a polynomial in the logarithm of the hold time at the end of the hold. :math:`\mu_p` is the
-maximum of a polynomial in time. The common linear trend of friction with load point displacement is
-subtracted.
+The three friction values are estimated jointly by generalised least squares with correlated noise.
+:math:`\mu_0` is the mean friction of the linear portion before the hold. :math:`\mu_h` is obtained
+from a polynomial in the logarithm of the hold time, which is evaluated at the end of the hold.
+:math:`\mu_p` is the maximum of a polynomial in time. The common linear trend of friction with load
+point displacement is subtracted.
 """
 
 from __future__ import annotations
@@ -81,7 +81,7 @@ class Hold(NamedTuple):
 
     @property
     def exact_quantities(self) -> tuple[float, float, float, float]:
-        """Begin and duration of the hold in s, and velocities before and after in um/s."""
+        """Start time and duration of the hold in s, and adjacent velocities in um/s."""
         duration = self.reload.middle - self.stop.middle
         return self.stop.middle, duration, self.stop.velocity_before, self.reload.velocity_after
 
@@ -260,7 +260,7 @@ class HoldFit:
 
     @cached_property
     def _reference(self) -> LinearFit:
-        """Fit of rows without a peak. Its noise is used to select windows."""
+        """Fit of rows without a peak, whose noise is used to select windows."""
         rows, after = self.hold.rows_before, self.rows_after
         if len(after) > 1:
             gaps = np.gradient(self.time)
@@ -282,7 +282,8 @@ class HoldFit:
     def _choose_rows_of_hold_end(self) -> np.ndarray:
         """Return the rows of the window at the end of the hold.
 
-        Rows that are closer to the ends of the hold than the error of the step times are left out.
+        Rows are left out if their distance from an end of the hold is less than the error of the
+        step time.
         """
         time, begins, ends = self.time, self.hold.stop.end, self.hold.reload.start
         rows = np.flatnonzero((time > begins) & (time < ends))
@@ -347,7 +348,7 @@ class HoldFit:
         of_slope = powers * np.append(0.0, of_value[:-1])
         curvature = -float(polynomial.polyval(at, polynomial.polyder(coefficients, 2)))
         value = float(of_value @ coefficients)
-        # The position of the maximum has an error, so the maximum is too high by this difference.
+        # Because of the error of its position, the maximum is too high by this difference.
         excess = 0.5 * float(of_slope @ covariance @ of_slope) / curvature
         misfit = 0.0
         if not is_adequate:

@@ -336,7 +336,7 @@ class JointModel:
         return np.concatenate(blocks)
 
     def compute_loading_error_sensitivity(self, values: ParameterValues) -> np.ndarray:
-        """Compute the changes of friction due to errors of the loading.
+        """Compute the changes in friction due to errors of the loading.
 
         Parameters
         ----------
@@ -346,7 +346,7 @@ class JointModel:
         Returns
         -------
         ndarray, shape (rows, errors)
-            Change of friction due to each independent error of the loading. The size of each error
+            Change in friction due to each independent error of the loading. The size of each error
             is one standard deviation. An error of the loading changes friction in one window only.
         """
         return np.asarray(

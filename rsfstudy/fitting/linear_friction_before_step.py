@@ -13,7 +13,7 @@ from rsfstudy.fitting.velocity_steps import CumulativeLineFitSums
 #: friction, and the smallest number of block averages in each of two lines. The third value is the
 #: smallest number of rows to test.
 _MAX_FITTED_ROW_MEANS, _MIN_ROW_MEANS_BESIDE_BREAK, _MIN_ROWS_OF_LINEAR_PORTION = 120, 6, 20
-#: Smallest decrease of the sum of squared residuals if two lines are fitted instead of one line.
+#: Smallest decrease in the sum of squared residuals if two lines are fitted instead of one line.
 #: The decrease is divided by the residual variance and by ln n for n block averages. The residual
 #: variance is increased if the residuals are correlated.
 _MIN_SQUARES_REDUCTION_BY_SLOPE_BREAK = 15.0
@@ -25,7 +25,7 @@ _MIN_FRICTION_DEPARTURE_FROM_LINE, _MIN_FRICTION_DEPARTURE_SIGMAS = 4e-4, 4.0
 #: Fraction of the rows before a step from which the noise is estimated. These rows are the rows
 #: closest to the step.
 _FRACTION_OF_ROWS_FOR_NOISE = 0.4
-#: Upper bound of the estimated correlation between successive block averages.
+#: Upper bound on the estimated correlation between successive block averages.
 _MAX_CORRELATION_OF_ROW_MEANS = 0.98
 
 

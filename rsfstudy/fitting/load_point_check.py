@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from scipy.optimize import minimize_scalar
 
-#: Maximum number of rows in the comparison, and number of trial times for the change of velocity.
+#: Maximum number of rows in the comparison, and number of trial times for the change in velocity.
 _MAX_ROWS, _TRIAL_TIMES = 400, 40
 #: Two straight lines are fitted to the displacement, and to the displacement plus elastic
 #: shortening. If the second sum of squared residuals is less than this fraction of the first sum,

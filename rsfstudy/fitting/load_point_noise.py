@@ -117,7 +117,7 @@ def _compute_step_time_and_velocity_errors(
     -------
     list of (ndarray, ndarray)
         Pair of arrays for each independent error: the shifts of the step times in s, with shape
-        (steps,), and the changes of the velocities in um/s, with shape (steps + 1,).
+        (steps,), and the changes in the velocities in um/s, with shape (steps + 1,).
     """
     found, time = record.loading_steps, record.time
     begins = max((s.end for s in found if s.end < steps[0].start), default=time[0])

@@ -261,7 +261,7 @@ class Record:
             ``velocity_before`` and ``velocity_after`` in um/s, ``friction_before``,
             ``peak_friction``, ``healing``, ``relaxation``, and ``peak_displacement`` in um. For
             ``friction_before`` and the quantities after it, ``<name>_stderr`` is the standard
-            error. The scalar ``healing_rate`` is the increase of healing per decade of hold
+            error. The scalar ``healing_rate`` is the increase in healing per decade of hold
             duration, and ``healing_rate_stderr`` is the standard error of the healing rate.
             ``trend`` is the trend of friction in 1/um. The trend is subtracted from friction. If
             friction has no peak after a hold, or if the record has too few rows, the values are

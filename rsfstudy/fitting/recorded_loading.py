@@ -25,8 +25,8 @@ def loading_history(
 ) -> np.ndarray:
     """Return the loading history of a record between two times.
 
-    Before the first segment of the loading history, the slider slides steadily. Its slip rate is
-    the load point velocity before the first step.
+    Before the first segment of the loading history, the slider slides steadily. The slip rate
+    during this steady sliding is the load point velocity before the first step.
 
     Parameters
     ----------

@@ -19,9 +19,10 @@ where :math:`\mu_1` and :math:`v_1` are the values at :math:`x = 0`. The curve i
 generalised least squares with correlated noise. The parameters :math:`a` and :math:`g` have broad
 prior distributions, so the standard error of :math:`k` includes the uncertainty of the slip.
 
-Friction may have a trend during sliding. The trend contributes to the slope of a locked portion if
-it accrues with load point displacement, and does not contribute if it accrues with slip. Half of
-the trend is subtracted from the stiffness, and the other half is included in the standard error.
+Friction may have a trend during sliding. If the trend depends on load point displacement, it
+contributes to the slope of a locked portion. If the trend depends on slip, it does not contribute.
+Half of the trend is subtracted from the stiffness, and the other half is included in the standard
+error.
 """
 
 from __future__ import annotations
@@ -44,7 +45,7 @@ from rsfstudy.fitting.noise import (
 from rsfstudy.fitting.velocity_steps import CumulativeLineFitSums, LoadingStep, noise_variance
 from rsfstudy.netcdf_encoding import copy_with_cf_encoding
 
-#: Kinds of portions.
+#: Kinds of locked portions of a record.
 RELOADING, UNLOADING, INITIAL_LOADING = "reloading", "unloading", "initial loading"
 #: A portion ends where the slope falls below this fraction of its largest value. During unloading,
 #: the fault slips forward at first, and the slope is up to twice the stiffness.
@@ -52,11 +53,11 @@ _MIN_SLOPE_FRACTION = {RELOADING: 0.6, UNLOADING: 0.3, INITIAL_LOADING: 0.6}
 #: Smallest ratio of a slope to its standard error, and smallest number of rows of a portion.
 _MIN_SLOPE_SIGMAS, _MIN_PORTION_ROWS = 12.0, 10
 #: Slopes are computed in windows. In each window, friction changes by this fraction of the change
-#: of friction in the whole portion.
+#: in friction in the whole portion.
 _SLOPE_WINDOW_RISE = 0.15
 #: Largest number of rows of a portion. The rows of longer portions are thinned.
 _MAX_PORTION_ROWS = 3000
-#: Smallest increase of friction during the initial loading.
+#: Smallest increase in friction during the initial loading.
 _MIN_INITIAL_RISE = 0.05
 #: Mean and standard deviation of the prior distributions of ln a and g.
 _PRIOR_OF_LOG_A, _PRIOR_OF_STATE_CHANGE = (math.log(0.01), 0.7), (0.0, 1.5)
@@ -366,7 +367,7 @@ def _friction_while_locked(x: np.ndarray, parameters: np.ndarray, unloads: bool)
     z = np.minimum(k * x / a, 600.0)
     if unloads:
         rate = -math.exp(log_rate)
-    else:  # The ratio refers to the last row.
+    else:  # The slip rate ratio belongs to the last row.
         end = math.exp(-min(k * x[-1] / a, 600.0))
         rate = 1.0 / max(math.exp(-log_rate) / end + g * (1.0 / end - 1.0), 1e-300)
     loss = rate * np.expm1(z)

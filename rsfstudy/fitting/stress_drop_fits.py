@@ -91,7 +91,7 @@ def find_drops(time: np.ndarray, stress: np.ndarray) -> tuple[list[FittedDropCan
 
 
 def _compute_drop_size(drop: FittedStressDrop) -> float:
-    """Return the decrease of stress in a drop."""
+    """Return the decrease in stress in a drop."""
     return drop.stress_before - drop.stress_after
 
 

@@ -21,12 +21,12 @@ from scipy.ndimage import find_objects, label
 
 from rsfstudy.fitting.velocity_steps import LoadingStep
 
-#: Smallest change of normal stress that is detected as a step. The first value is relative to the
+#: Smallest change in normal stress that is detected as a step. The first value is relative to the
 #: normal stress. The second value is relative to a robust standard deviation of the differences
 #: between successive windows.
 MIN_RELATIVE_NORMAL_STRESS_CHANGE, _MIN_NORMAL_STRESS_CHANGE_SIGMAS = 0.02, 6.0
 #: Largest difference between the normal stress in a short window and the normal stress in a long
-#: window next to a change of normal stress. The difference is relative to the change. If the
+#: window next to a change in normal stress. The difference is relative to the change. If the
 #: difference is larger, the change belongs to a longer ramp.
 _MAX_STRESS_LEVEL_DRIFT_OVER_CHANGE = 0.25
 #: A difference between the normal stresses of successive windows belongs to a step if it exceeds
@@ -40,7 +40,7 @@ _MAX_ROWS_FOR_STEP_DETECTION, _RECORD_PARTITION_COUNTS, _MIN_ROWS_PER_RECORD_PAR
     (400, 100, 25),
     8,
 )
-#: A ramp is fitted to the rows in which the change of normal stress is between these two fractions
+#: A ramp is fitted to the rows in which the change in normal stress is between these two fractions
 #: of the total change. The last value is the smallest number of rows for the fit.
 _RAMP_FIT_CHANGE_FRACTIONS, _MIN_RAMP_ROWS = (0.1, 0.9), 3
 #: Ratio of the standard deviation to the median absolute deviation for Gaussian noise.
@@ -75,7 +75,7 @@ def find_stress_steps(time: np.ndarray, normal_stress: np.ndarray) -> list[Stres
     Returns
     -------
     list of StressStep
-        Steps in order of time. Changes of normal stress by less than 2 % are ignored.
+        Steps in order of time. Changes in normal stress of less than 2 % are ignored.
     """
     every = max(1, math.ceil(len(time) / _MAX_ROWS_FOR_STEP_DETECTION))
     count = len(time) // every * every
@@ -120,7 +120,7 @@ def _median_stress_before_and_after(
 
 
 def _find_stress_level_changes(stress: np.ndarray, window_rows: int) -> list[slice]:
-    """Find the changes of mean normal stress for one window length.
+    """Find the changes in mean normal stress for one window length.
 
     Returns
     -------
@@ -226,7 +226,7 @@ def set_stress_levels(
     Returns
     -------
     tuple of LoadingStep
-        Steps with normal stresses. If the change of normal stress is immediate, it is replaced by a
+        Steps with normal stresses. If the change in normal stress is immediate, it is replaced by a
         change that lasts one sampling interval.
     """
     ends = [-math.inf, *(step.end for step in steps)]
@@ -242,7 +242,7 @@ def set_stress_levels(
             )
             step = step._replace(stress_before=before, stress_after=after)
         if step.start == step.end and step.stress_ratio != 1.0:
-            # A change of normal stress takes at least one sampling interval.
+            # A change in normal stress takes at least one sampling interval.
             row = int(np.clip(np.searchsorted(time, step.start, "right"), 1, len(time) - 1))
             step = step._replace(start=float(time[row - 1]), end=float(time[row]))
         found.append(step)

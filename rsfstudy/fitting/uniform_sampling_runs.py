@@ -1,7 +1,7 @@
 """Segmentation of a record into runs with uniform sampling and noise.
 
 The sampling intervals are classified by their running mean, so that timing jitter does not affect
-the classes. Changes of the noise level are detected by binary segmentation of the whitened
+the classes. Changes in the noise level are detected by binary segmentation of the whitened
 residuals.
 """
 
@@ -21,8 +21,8 @@ _MAX_SAMPLING_INTERVAL_RATIO = 2.0
 #: with a separate noise process, and smallest number of rows of a run.
 _RUNNING_MEAN_ROWS, _MIN_ROWS_PER_NOISE_PROCESS, _MIN_ROWS_PER_SAMPLING_RUN = 15, 100, 30
 #: Criteria for separate noise levels. The first two values are the smallest number of rows, and the
-#: smallest fraction of the record. The third value is the smallest increase of the likelihood,
-#: divided by ln n for n rows. The fourth value is the largest number of changes of the noise level.
+#: smallest fraction of the record. The third value is the smallest increase in the likelihood,
+#: divided by ln n for n rows. The fourth value is the largest number of changes in the noise level.
 (
     _MIN_ROWS_PER_NOISE_LEVEL,
     _MIN_RECORD_FRACTION_PER_NOISE_LEVEL,
@@ -84,7 +84,7 @@ def find_sampling_runs(time: np.ndarray) -> tuple[SamplingRun, ...]:
 def split_runs_at_level_changes(
     runs: Sequence[SamplingRun], change_rows: Sequence[int]
 ) -> tuple[SamplingRun, ...]:
-    """Split sampling runs at changes of the noise level.
+    """Split sampling runs at changes in the noise level.
 
     Parameters
     ----------
@@ -167,14 +167,14 @@ def find_noise_level_changes(
 
     The function segments the logarithms of the absolute differences between successive residuals. A
     misfit of the model near a step is either smooth or short, so that the misfit affects only a few
-    differences. In contrast, a change of the noise level affects all differences after the change.
+    differences. In contrast, a change in the noise level affects all differences after the change.
 
     Parameters
     ----------
     whitened_residuals : ndarray, shape (rows,)
         Whitened residuals.
     min_absolute_value : float, default: 0.0
-        Lower bound of the absolute differences between successive residuals.
+        Lower bound on the absolute differences between successive residuals.
 
     Returns
     -------

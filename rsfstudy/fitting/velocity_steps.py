@@ -28,9 +28,9 @@ from rsfstudy.error_boundary import wrap_methods_in_error_boundary
 #: Largest number of rows that are segmented. Longer records are first averaged over blocks of rows.
 _MAX_ROWS_FOR_STEP_DETECTION = 20_000
 #: Criteria for separate segments of constant velocity. The first value is the smallest number of
-#: rows of a segment. The second value is the smallest change of velocity between two segments,
+#: rows of a segment. The second value is the smallest change in velocity between two segments,
 #: relative to the faster velocity. The third value is the smallest displacement due to the change
-#: of velocity, relative to the standard deviation of the residuals. The third criterion is
+#: in velocity, relative to the standard deviation of the residuals. The third criterion is
 #: necessary because a servo-controlled load point fluctuates around its set point.
 _MIN_SEGMENT_ROWS, _MIN_RELATIVE_VELOCITY_CHANGE, _MIN_DISPLACEMENT_CHANGE_SIGMAS = 5, 0.2, 10.0
 #: Smallest reduction of the sum of squares by a split, divided by the noise variance and by ln n
@@ -95,7 +95,7 @@ class LoadingStep(NamedTuple):
 
     @property
     def middle(self) -> float:
-        """Time in s of an immediate step that gives the same later displacement.
+        """Time in s of an immediate step that results in the same displacement.
 
         If a record has few rows before a step, the detected step may last longer than the actual
         step. The middle of the detected step is then more accurate than its ends.
@@ -408,7 +408,7 @@ def _merge_similar_segments(
 ) -> list[int]:
     """Remove boundaries between segments with similar velocities.
 
-    The boundary with the smallest change of velocity is removed first.
+    The boundary with the smallest change in velocity is removed first.
     """
     while len(segment_boundaries) > 2:
         pieces = [*itertools.pairwise(segment_boundaries)]
@@ -448,7 +448,7 @@ def _line_intersection_time(
     The time of intersection is limited to a neighbourhood of the boundary between the rows of the
     two lines. Because of noise, the boundary has an uncertainty of about :math:`(s^2 h/\Delta
     V^2)^{1/3}`, where :math:`s^2` is the noise variance, :math:`h` is the sampling interval, and
-    :math:`\Delta V` is the change of velocity.
+    :math:`\Delta V` is the change in velocity.
     """
     (last, first), change = boundary_times, second_line[1] - first_line[1]
     middle, gap = 0.5 * (last + first), first - last
@@ -488,7 +488,7 @@ def _group_velocity_changes(
 ) -> Iterator[tuple[int, int]]:
     """Group successive velocity changes into steps.
 
-    A step may contain several changes of velocity if the segments between the changes are short or
+    A step may contain several changes in velocity if the segments between the changes are short or
     have few rows. For example, a ramp between two velocities is a single step, and a velocity that
     overshoots and returns is also a single step.
 

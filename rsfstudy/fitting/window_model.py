@@ -85,8 +85,8 @@ LOADING_STEP_SHIFT_OVER_STANDARD_ERROR = 0.01
 #: Domains of bounded parameters. Near the ends of a domain, one-sided finite differences are used.
 _PARAMETER_DOMAINS = {"law_exponent": (0.0, 1.0), "alpha": (0.0, math.inf)}
 #: Scales of some parameters. The step size of a finite difference is proportional to the scale of
-#: the parameter. The method ``WindowModel._parameter_scale`` computes the scales of all other
-#: parameters.
+#: the parameter. The method ``WindowModel._typical_parameter_size`` computes the scales of all
+#: other parameters.
 _TYPICAL_PARAMETER_SIZES = {"mu_star": 0.6, "alpha": 0.5, "law_exponent": 1.0}
 #: The largest number of right-hand-side evaluations of a simulation is the sum of three terms: a
 #: constant, a number for each loading segment, and a number for a stiff spring, which has an upper
@@ -311,7 +311,7 @@ class WindowModel:
         Raises
         ------
         MotionStopped
-            If the work budget of the meter is exhausted.
+            If the work budget is exhausted.
         """
         budget, nothing = self.integrator.work_meter.budget, np.full(len(self.time), math.nan)
         stiff = 4.0 * values["stiffness"] * float(np.ptp(self.displacement)) / values["a"]
@@ -368,7 +368,7 @@ class WindowModel:
         return sum((c * self.displacement**n for n, c in powers), np.zeros(len(self.time)))
 
     def compute_loading_error_sensitivity(self, values: ParameterValues) -> np.ndarray:
-        """Compute the changes of friction due to errors of the loading.
+        """Compute the changes in friction due to errors of the loading.
 
         Parameters
         ----------
@@ -378,7 +378,7 @@ class WindowModel:
         Returns
         -------
         ndarray, shape (rows, errors)
-            Change of friction due to each independent error of the steps. The size of each error is
+            Change in friction due to each independent error of the steps. The size of each error is
             one standard deviation. The values are NaN if a simulation fails.
         """
         if not self.loadings_with_shifted_steps:
@@ -609,7 +609,7 @@ def shift_parameter(
     parameter_name : str
         Name of the parameter to shift.
     coordinate_change : float
-        Change of the parameter, or of its logarithm for parameters in ``LOGARITHMIC_PARAMETERS``.
+        Change in the parameter, or in its logarithm for parameters in ``LOGARITHMIC_PARAMETERS``.
 
     Returns
     -------
@@ -625,7 +625,7 @@ def shift_parameter(
 
 
 def parameter_to_coordinate(parameter_name: str, parameter_value: float) -> float:
-    """Convert a parameter to its logarithm if the fit varies the logarithm.
+    """Convert the value of a parameter to its fit coordinate.
 
     Parameters
     ----------
@@ -646,7 +646,7 @@ def parameter_to_coordinate(parameter_name: str, parameter_value: float) -> floa
 
 
 def coordinate_to_parameter(parameter_name: str, coordinate: float) -> float:
-    """Convert the logarithm of a parameter to its value if necessary.
+    """Convert a fit coordinate of a parameter to the value of the parameter.
 
     Parameters
     ----------

@@ -1,14 +1,15 @@
 r"""Statistics of the events of motions that do not repeat.
 
-The recurrence intervals of a slider with noise, and of a slider in chaos, have a distribution. The
-measure ``EventStatistics`` computes moments of this distribution. Three errors are reported
-separately: the error of the integrator on the path of the noise, the error of the sampled path, and
-the standard error for a finite number of events.
+If a slider has noise, or if its motion is chaotic, the recurrence intervals vary from event to
+event. The measure ``EventStatistics`` computes moments of their distribution. The measure reports
+three errors separately: the integration error for the given noise path, the error due to the
+sampling interval of the noise, and the standard error due to the finite number of events.
 
-Under white noise, :math:`\ln V` is as rough as the path, so the slip rate crosses each level many
-times. Event detection in scenes with noise therefore uses two levels. An event begins when the slip
-rate first exceeds a multiple of the load point velocity, and it ends when the slip rate falls below
-the load point velocity. In scenes without noise, the events are the cycles of ``iterate_cycles``.
+With white noise, :math:`\ln V` fluctuates as rapidly as the noise, so the slip rate crosses each
+level many times. Event detection in scenes with noise therefore uses two levels. An event begins
+when the slip rate first exceeds a multiple of the load point velocity, and it ends when the slip
+rate falls below the load point velocity. In scenes without noise, the events are the cycles of
+``iterate_cycles``.
 """
 
 from __future__ import annotations
@@ -74,12 +75,12 @@ class _Event(NamedTuple):
 class EventStatistics(Measure):
     r"""Moments of recurrence intervals and stress drops of successive events.
 
-    The measure serves scenes with noise, and scenes without noise whose motion may be chaotic. If
-    a scene has noise, the recurrence interval is the time between the beginnings of successive
-    events. The static stress drop is the spring stress at which the slip rate last exceeded the
-    load point velocity before the event, minus the spring stress at the end of the event. Without
-    noise, both quantities have the same definitions as in ``LimitCycle``, and differ between
-    successive cycles.
+    Use this measure for scenes with noise, and for scenes without noise whose motion may be
+    chaotic. If a scene has noise, the recurrence interval is the time between the beginnings of
+    successive events. The static stress drop is the difference between two spring stresses. The
+    first is the spring stress when the slip rate last rises above the load point velocity before
+    the event, and the second is the spring stress at the end of the event. If a scene has no noise,
+    both quantities are defined as in ``LimitCycle``, but are computed for each cycle.
 
     If the motion settles to steady sliding, the status is ``no_limit_cycle``. If a scene with noise
     has too few events, the status is ``work_budget_spent``.
@@ -273,7 +274,7 @@ def _iterate_smooth_events(scene: Scene, integrator: Integrator) -> Iterator[_Ev
 
 
 def _samples(events: list[_Event]) -> tuple[np.ndarray, np.ndarray]:
-    """Return the recurrence intervals, and the stress drops of the events that end them."""
+    """Return the recurrence intervals, and the stress drop at the end of each."""
     intervals = [after.time - before.time for before, after in pairwise(events)]
     return np.array(intervals), np.array([event.stress_drop for event in events[1:]])
 

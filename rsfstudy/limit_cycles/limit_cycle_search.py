@@ -61,7 +61,7 @@ from rsfstudy.status import Status
 #: contraction ratio is above the first limit, the search continues from the extrapolated fixed
 #: point. If the contraction ratio is above the second limit, the cycles do not converge.
 _MIN_CONTRACTION_TO_LEAP, _MAX_CONTRACTION = 0.03, 0.98
-#: Maximum change of the range of ln V by a leap to the extrapolated fixed point, as a fraction of
+#: Maximum change in the range of ln V by a leap to the extrapolated fixed point, as a fraction of
 #: the range of ln V.
 _MAX_FIXED_POINT_LEAP_OVER_LOG_RATE_RANGE = 0.1
 #: Maximum number of cycles after which a periodic motion repeats.
@@ -115,7 +115,7 @@ class LimitCycleSearch:
         self._image_change = self._image
         #: Vector from the section s to the fixed point, and the resulting change of the image P(s).
         self._correction, self._image_correction = self._section, self._image
-        #: Change of spring stress over the cycle before the last leap to an extrapolated fixed
+        #: Change in spring stress over the cycle before the last leap to an extrapolated fixed
         #: point.
         self._distance_at_leap = np.inf
 
@@ -285,7 +285,7 @@ class LimitCycleSearch:
 
         A leap to the extrapolated fixed point is useless if the next cycle would come equally close
         to the fixed point. A long leap towards the fixed point is avoided, because the motion may
-        settle to steady sliding after a long leap. If a leap does not halve the change of spring
+        settle to steady sliding after a long leap. If a leap does not halve the change in spring
         stress per cycle, no further leap follows, because repeated leaps may form a loop.
         """
         cycle = self.cycles[-1]

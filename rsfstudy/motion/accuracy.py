@@ -173,10 +173,10 @@ class Accuracy:
 
     @property
     def max_inertia_correction(self) -> float:
-        """Maximum change of ln V due to inertia on the slow manifold.
+        """Maximum change in ln V due to inertia on the slow manifold.
 
-        If friction weakens strongly with slip, a motion reaches this limit of the change of ln V
-        before it reaches the limit ``max_inertia_weight``. If the maximum change of ln V is
+        If friction weakens strongly with slip, a motion reaches this limit of the change in ln V
+        before it reaches the limit ``max_inertia_weight``. If the maximum change in ln V is
         :math:`d`, the error of a limit cycle is up to :math:`0.07 d^3` in random scenes, and
         :math:`0.0014 d^3` for the slider of the published study. The test suite measures both
         coefficients.
@@ -228,7 +228,7 @@ def estimate_error(
     Notes
     -----
     The estimate is three times the difference between the two results, plus the error floor and the
-    rounding error. Three times the difference is an upper bound of the error of the first run if
+    rounding error. Three times the difference is an upper bound on the error of the first run if
     the error of the refined run is at most two thirds of the error of the first run.
     """
     value = float(value)

@@ -1,7 +1,7 @@
 """Layout of the arrays that the event loop reads and writes.
 
 The module defines the fields of the motion state and the columns of the tables. A kink is a
-boundary between two loading segments at which the loading rate changes and the stress does not
+boundary between two loading segments at which the loading rate changes, but the stress does not
 jump. The fields of ``MOTION_STATE_DTYPE`` are written by the following functions. Functions without
 a module name belong to ``motion_loop``, ``regime_starts`` or ``step_ends``.
 

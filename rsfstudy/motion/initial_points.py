@@ -138,8 +138,8 @@ def compute_restart_point(scene: Scene, spring_stress: float, states: Numbers) -
 def _reset_loading_unknowns(scene: Scene, states: Numbers) -> Numbers:
     """Replace the unknowns of the loading by their initial values.
 
-    The unknowns of the loading follow the states of the friction law and the temperature. Unknowns
-    of the previous loading are removed.
+    In the tuple of unknowns, the unknowns of the loading come after the states of the friction law
+    and the temperature. Unknowns of the previous loading are removed.
     """
     begun, parts = scene.stress_loading.initial_unknowns(scene), scene.parts
     kept = parts.law.state_count + len(parts.temperature.unknowns)

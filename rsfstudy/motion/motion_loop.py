@@ -21,9 +21,9 @@ functions are called in the following order::
         start_next_segment             after the end of a loading segment
         enter_initial_regime           after the end of a loading segment
 
-The functions that start regimes and segments are in ``regime_starts``. The functions that take,
-end, record and search a step are in ``step_integration``, ``step_ends``, ``step_samples`` and
-``step_events``.
+The functions that start regimes and segments are in ``regime_starts``. The functions that take a
+step, end a step, record samples and detect events are in ``step_integration``, ``step_ends``,
+``step_samples`` and ``step_events``, respectively.
 
 The header of ``array_layout`` lists the functions that write each field of ``motion``. The class
 ``Workspace`` describes the arrays of a regime, and the header of ``workspace`` lists the functions

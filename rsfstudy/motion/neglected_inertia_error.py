@@ -72,7 +72,7 @@ def estimate_neglected_inertia_error(
     - The residual of the inertial equation of motion on the slow manifold. Let :math:`W` be the
       inertia weight and :math:`s` the sum of slip and load point displacement. Friction is smaller
       than spring stress by :math:`a W \, d(\ln V)/ds`. The residual divided by :math:`a` is the
-      local error :math:`e` of ln V. The resulting change of spring stress and state is at most the
+      local error :math:`e` of ln V. The resulting change in spring stress and state is at most the
       integral of :math:`e` over :math:`(1 + K/a) \, d\delta + |d\Psi|/a`. Errors decay along the
       motion, so the largest :math:`e` is another upper bound.
     - The slip in D_c that is neglected when the motion returns to the slow manifold, because ln V
@@ -108,7 +108,7 @@ def estimate_neglected_inertia_error(
 def _bound_log_rate_changes_by_residuals(
     scene: Scene, recorded_rows: np.ndarray, slip_rate_norms: np.ndarray
 ) -> np.ndarray:
-    """Compute an upper bound of the change of ln V due to residuals.
+    """Compute an upper bound on the change in ln V due to residuals.
 
     For each row, the upper bound is the smaller of two values: the integrated residual and the
     largest residual so far.

@@ -350,7 +350,7 @@ def resample_along_path(  # type: ignore[no-untyped-def]
 ):
     """Resample a recorded motion at points along its path.
 
-    Half of the path length is due to changes of time, ln V and stress, and the other half is
+    Half of the path length is due to changes in time, ln V and stress, and the other half is
     proportional to the number of rows. The points closest to extrema of slip rate and stress are
     moved to the extrema.
 

@@ -33,7 +33,7 @@ from rsfstudy.parts import (
     SEGMENT_VELOCITY,
 )
 
-#: Change of ln V_0 between two loading segments above which the stepper selects a new initial step
+#: Change in ln V_0 between two loading segments above which the stepper selects a new initial step
 #: size. The path length depends on V + V_0, so the step size of the previous segment would be
 #: rejected several times.
 MAX_LOG_LOAD_RATE_CHANGE_KEEPING_STEP_SIZE = 3.0

@@ -41,14 +41,14 @@ CONTINUES, NORMAL_STRESS_VANISHED, NORMAL_STRESS_UNBOUNDED, SLIP_STOPPED, SLIP_R
 
 
 class SwitchThresholds(NamedTuple):
-    r"""Thresholds for changes between slow manifold and inertial equations.
+    r"""Thresholds for changes between the slow manifold and inertial equations.
 
     Parameters
     ----------
     max_slip_rate_norm : float
         Maximum slip rate norm :math:`w` on the slow manifold.
     max_inertia_correction : float
-        Maximum change of ln V due to inertia on the slow manifold.
+        Maximum change in ln V due to inertia on the slow manifold.
     max_remaining_slip : float
         Maximum slip during a transition to the slow manifold, in D_c.
     stiffness_over_a : float
@@ -136,7 +136,7 @@ def compute_inertia_effect_over_limit(
     Returns
     -------
     float
-        Larger of two ratios: the slip rate norm divided by its threshold, and the change of ln V
+        Larger of two ratios: the slip rate norm divided by its threshold, and the change in ln V
         due to inertia divided by its threshold. The motion must leave the slow manifold if the
         result is 1 or larger.
     """
@@ -180,8 +180,8 @@ def slip_during_transition(
 ) -> float:
     r"""Compute the slip during a transition between two slip rates.
 
-    If the transition is treated as a jump of the slip rate, the states do not evolve over the slip
-    during the transition.
+    If the transition is approximated by a jump of the slip rate, the evolution of the states over
+    this slip is neglected.
 
     Parameters
     ----------
@@ -193,12 +193,12 @@ def slip_during_transition(
     Returns
     -------
     float
-        Upper bound of the slip in D_c, multiplied by the change of ln V. The formula contains the
+        Upper bound on the slip in D_c, multiplied by the change in ln V. The formula contains the
         larger of the two slip rate norms, so the result is an upper bound.
 
     Notes
     -----
-    The upper bound of the slip is :math:`(K/a) w^2` in D_c, where :math:`w` is the larger of the
+    The upper bound on the slip is :math:`(K/a) w^2` in D_c, where :math:`w` is the larger of the
     two slip rate norms.
     """
     norm = max(
@@ -319,7 +319,7 @@ def should_switch_back_to_slow_manifold(
     .. math:: \frac{K}{2a} w^2 \min(1, |x - x_s|)
 
     in D_c, where :math:`w` is the larger slip rate norm. If the motion returns to the slow manifold
-    immediately, the states do not evolve over this slip during the change of ln V.
+    immediately, the states do not evolve over this slip during the change in ln V.
 
     The function also returns False shortly before an extremum of the slip rate. If the slip rate
     rises and friction exceeds spring stress, the slip rate on the slow manifold falls. The slip

@@ -185,8 +185,8 @@ def select_event_specs(
     """Select the requested events that can occur in a segment chain.
 
     The motion can settle only in the last chain. Settling events are omitted if the load point
-    oscillates. Terminal settling events are also omitted if steady sliding is unstable, because
-    they would end the motion. See ``drop_settling_if_unstable`` for other settling events.
+    oscillates. If steady sliding is unstable, terminal settling events are also omitted, because
+    these events would end the motion. See ``drop_settling_if_unstable`` for other settling events.
 
     Parameters
     ----------

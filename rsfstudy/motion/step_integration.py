@@ -101,7 +101,8 @@ def slip_since_start(motion, clock, time, spring_stress, parameters):
     r"""Compute the slip since the start of the motion.
 
     Slip is the independent variable of a rigid slider. For other sliders, slip is computed from the
-    spring stress :math:`f = f_0 + K (V_0 t - \delta)`, less the change of spring stress by noise.
+    spring stress :math:`f = f_0 + K (V_0 t - \delta)`, after the change in spring stress due to
+    noise has been subtracted.
 
     Parameters
     ----------
@@ -223,9 +224,9 @@ def is_dense_output_accurate(motion, workspace):
     """Return True if the dense output of the step is accurate.
 
     The function compares the derivatives of dense output with the right-hand side at two points of
-    the step. Let h be the step size and e the error of dense output. The derivatives then differ by
-    a few times e/h, and by the effect of e on the right-hand side. If stability limits the step
-    size, the two contributions are comparable.
+    the step. Let h be the step size and e the error of dense output. The difference of the
+    derivatives then has two contributions: a few times e/h, and the effect of e on the right-hand
+    side. If stability limits the step size, the two contributions are comparable.
 
     Parameters
     ----------

@@ -1,8 +1,8 @@
 """Figures of study results, motions and fits.
 
 Most functions take a dataset, and either return a figure or draw on existing axes. The package
-``rsfstudy.plots`` also exports helper functions for user-defined figures. It never computes
-results, and never calls ``show()``.
+``rsfstudy.plots`` also exports helper functions for user-defined figures. The package never
+computes results, and never calls ``show()``.
 """
 
 from __future__ import annotations

@@ -178,7 +178,7 @@ def _row_of_panel(axes: Axes) -> int:
 
 
 def _add_header(figure: Figure, dataset: xr.Dataset) -> None:
-    """Add a header that lists overrides of the study, and missing and failed cells."""
+    """Add a header that lists overridden settings, and missing and failed cells."""
     overrides = StoredDataset(dataset).declaration.overrides
     missing, is_warning = _missing_cells_note(dataset)
     lines = [_format_note_on_overrides(dataset, header_line_length(figure))] if overrides else []
@@ -188,9 +188,9 @@ def _add_header(figure: Figure, dataset: xr.Dataset) -> None:
 
 
 def _missing_cells_note(dataset: xr.Dataset) -> tuple[str, bool]:
-    """Return a note in brackets about missing and failed cells, and if the note is a warning.
+    """Return a note about missing and failed cells, and True if it is a warning.
 
-    The note is empty if the results are complete.
+    The note is in brackets. It is empty if the results are complete.
     """
     completeness = dataset.attrs.get("completeness", "complete")
     failed = failed_cell_mask(dataset["status"]) & (dataset["status"] != Status.PENDING)

@@ -117,7 +117,7 @@ def _draw_record(table: xr.Dataset, record: Record, axes: Axes) -> None:
 
 
 def _draw_healing(table: xr.Dataset, axes: Axes) -> None:
-    """Draw healing and relaxation against the duration of the holds."""
+    """Draw healing and relaxation against the hold duration."""
     duration = table["duration"].values
     for number, (name, label, sign) in enumerate(
         (

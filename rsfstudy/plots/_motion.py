@@ -141,7 +141,8 @@ def plot_motion(
 def _create_motion_panels(columns: int) -> tuple[NotebookFigure, Axes, Axes, Axes]:
     """Create a figure with empty panels for friction, slip rate and the phase plane.
 
-    The phase plane is right of the other panels if there are two columns, and below them otherwise.
+    If there are two columns, the phase plane is to the right of the other panels. Otherwise, the
+    phase plane is below the other panels.
     """
     rows = 2 if columns == 2 else 3
     size = figure_size(columns, rows, PANEL_HEIGHT_MM)

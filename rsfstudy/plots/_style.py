@@ -446,8 +446,8 @@ def merge_common_legends(figure: Figure, panel_axes: Sequence[Axes]) -> None:
 def enlarge_for_legends(figure: Figure, panel_rows: Sequence[Sequence[Axes]]) -> None:
     """Increase the figure height by the height of its legends, header and long labels.
 
-    Because of the additional height, legends, the header, and titles and tick labels with several
-    lines do not reduce the height of the panels.
+    The additional height ensures that legends, headers and long labels do not reduce the height of
+    the panels.
 
     Parameters
     ----------

@@ -1,8 +1,8 @@
 """Corner plots of samples and cases.
 
 The function ``corner_figure`` builds a corner plot of the primary output and the sampled fields: a
-triangle of scatter plots with histograms on its diagonal. Colours distinguish the points of the
-other axes of the study.
+triangle of scatter plots with histograms on its diagonal. The points of the other axes of the study
+are shown in different colours.
 """
 
 from __future__ import annotations

@@ -88,7 +88,7 @@ def _describe_unfitted_step(place: str, fits: Sequence[xr.Dataset]) -> str:
 def _compare_laws_of_fits(fits: Sequence[xr.Dataset]) -> Iterator[str]:
     """Yield a sentence that names the law with the lowest AIC.
 
-    The sentence also reports whether the AIC of the second-best law is higher by a decisive amount.
+    The sentence also states whether the AIC of the second-best law is significantly higher.
     """
     known = [(one["aic"].item(), str(one["law"].item())) for one in fits]
     known = sorted(pair for pair in known if math.isfinite(pair[0]))

@@ -115,7 +115,7 @@ def describe_study_origin(dataset: xr.Dataset) -> dict[str, str]:
 
 
 def note_on_norms_near_load_velocity(dataset: xr.Dataset) -> str:
-    """Describe results with an instability norm close to the load point velocity.
+    """Return a note if an instability norm is close to the load point velocity.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Options, columns and rows that all functions for reading records share.
+"""Options, columns and rows that are common to all functions for reading records.
 
 The functions `read_record`, `events` and `history` use different columns of a file. `read_columns`
 reads the columns that one of these functions can use, from a source in any format.
@@ -27,7 +27,7 @@ _STRESS_COLUMNS = ("shear_stress", "normal_stress")
 
 @dataclass(frozen=True)
 class ReadingOptions(RowSelection):
-    """Reading options that all functions for records share.
+    """Reading options that all record-reading functions share.
 
     The class `RowSelection` describes the options that are not listed here.
 

@@ -1,6 +1,6 @@
 """Quantities of a rig, and scene fields with dimensionless units.
 
-The function ``convert_rig_value_to_si`` converts quantities of a rig. It calls
+The function ``convert_rig_value_to_si`` converts quantities of a rig. This function calls
 ``units.convert_to_si``, and also converts stiffness in units of friction divided by displacement.
 """
 

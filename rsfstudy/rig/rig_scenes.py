@@ -85,7 +85,7 @@ class LatticeScenesOnRig:
                     )
 
     def _derive_fields(self, rig_values: Mapping[str, Any]) -> dict[str, Any]:
-        """Compute scene fields from the rig, without heat if the base has no heat."""
+        """Compute scene fields from the rig, with heat only if the base has heat."""
         hot = self.base_scene.parts.temperature.name != "isothermal"
         return derive_scene_fields_from_rig(rig_values, with_heat=hot)
 

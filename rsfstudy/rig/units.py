@@ -232,7 +232,7 @@ def multiply_by_exact_fraction(values: Any, factor: Fraction) -> Any:
 
 
 def _fraction_of_shortest_digits(number: float) -> Fraction:
-    """Return the fraction with the fewest digits that rounds to a number."""
+    """Return the shortest decimal fraction that rounds to a number."""
     return Fraction(repr(float(number)))
 
 

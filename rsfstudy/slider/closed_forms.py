@@ -180,8 +180,8 @@ def effective_friction(mu_star: float, b_over_a: float, alpha: float) -> float:
 
     Notes
     -----
-    The effective friction coefficient converts a small change of normal stress to an equivalent
-    change of shear stress. The coefficient is smaller than :math:`\mu_*` because a decrease of
+    The effective friction coefficient converts a small change in normal stress to an equivalent
+    change in shear stress. The coefficient is smaller than :math:`\mu_*` because a decrease in
     normal stress also increases the state variable.
 
     References
@@ -277,7 +277,7 @@ def critical_normal_stress_step(
     Returns
     -------
     float
-        Critical change of the imposed normal stress in units of :math:`\sigma_*`, a negative
+        Critical change in the imposed normal stress in units of :math:`\sigma_*`, a negative
         number. The result is NaN if no drop of normal stress causes an instability.
 
     Notes

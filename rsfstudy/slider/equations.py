@@ -50,7 +50,7 @@ class Equations(NamedTuple):
         Names of the unknowns.
     unknown_scales : tuple of float
         Scale of each unknown. If an unknown changes by its scale, the effect on the motion is as
-        large as the effect of a change of :math:`\ln V` by 1.
+        large as the effect of a change in :math:`\ln V` by 1.
     rate_function : callable
         Function ``rate(state, p) -> tuple`` that returns the derivatives of the unknowns.
     point_function : callable
@@ -61,7 +61,7 @@ class Equations(NamedTuple):
         Number of states of the scene.
     force_balance_function : callable, optional
         Function ``force_balance_function(spring, psis, p)`` that returns :math:`\ln(V/V_*)`, the
-        frictional stress and the stress-induced decrease of the state. The value is None in the
+        frictional stress and the stress-induced decrease in the state. The value is None in the
         equations for ruptures and for rigid sliders.
     """
 

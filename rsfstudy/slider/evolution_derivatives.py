@@ -33,7 +33,7 @@ class StateEvolutionDerivatives(NamedTuple):
     ----------
     with_respect_to_log_slip_rate, with_respect_to_state_shift : list of float
         Derivatives of the state evolution with respect to :math:`\ln V`, and with respect to the
-        stress-induced decrease of the state (shift). Each list has one element per state.
+        stress-induced decrease in the state (shift). Each list has one element per state.
     with_respect_to_states : list of list of float
         Derivatives of the state evolution with respect to each state, as a square matrix.
     relative_error : float
@@ -102,7 +102,7 @@ def compute_state_evolution_derivatives(
     shift = relation(steady_state.frictional_stress)[2]
     arguments = [steady_state.log_slip_rate, shift, *steady_state.states]
     scales, columns, errors = _finite_difference_scales(scene, steady_state, shift), [], []
-    # Each unit is the change of an argument that is equivalent to a change of ln V by 1. Rounding
+    # Each unit is the change of an argument that is equivalent to a change in ln V by 1. Rounding
     # errors are proportional to the units.
     units = [scales[0], *(scale / _STATE_SCALE_OVER_B for scale in scales[1:])]
     rounding = _ROUNDING_ERROR * (

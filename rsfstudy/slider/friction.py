@@ -80,7 +80,7 @@ class FrictionFunctions(NamedTuple):
         Function ``(psis, p)`` that returns the shear stress :math:`K D`. The frictional stress g
         does not include this stress.
     load_point_stress_change : callable
-        Function ``(changes)`` that returns the change of the shear stress :math:`K D`.
+        Function ``(changes)`` that returns the change in the shear stress :math:`K D`.
     state_count : int
         Number of states.
     indices_of_states_in_distance : tuple of int
@@ -305,7 +305,7 @@ def compute_steady_states(scene: SceneView, log_slip_rate: float, state_shift: f
     log_slip_rate : float
         Natural logarithm of the slip rate, :math:`\ln(V/V_*)`.
     state_shift : float
-        Stress-induced decrease of the state variable.
+        Stress-induced decrease in the state variable.
 
     Returns
     -------

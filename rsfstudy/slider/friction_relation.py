@@ -9,7 +9,7 @@ friction law :math:`\tau = \sigma [\mu_* + a \ln(V/V_*) + \Theta]` becomes
     a \ln(V/V_*) + \Psi = \mathrm{strength}(g), \qquad
     \mathrm{strength}(g) = \frac{\mu_* + g}{s(g)} - \mu_* + \mathrm{shift}(g).
 
-The shift is the stress-induced decrease of the state variable :math:`\Theta`, for example
+The shift is the stress-induced decrease in the state variable :math:`\Theta`, for example
 :math:`\alpha \ln s`. The state :math:`\Psi` does not change when stress changes suddenly. Only the
 evolution law changes :math:`\Psi`. If a law has several states, :math:`\Psi` is the sum of all
 states.
@@ -51,7 +51,7 @@ _MIN_NONZERO_FRICTION_COEFFICIENT = 1e-280
 
 
 def zero_normal_stress_excess(frictional_stress: float, p: Numbers) -> tuple[float, float]:
-    """Return a zero change of normal stress and a zero derivative."""
+    """Return a zero change in normal stress and a zero derivative."""
     return 0.0, 0.0
 
 

@@ -2,13 +2,14 @@ r"""Sample paths of noise that depend only on a seed and on the time.
 
 A path is defined at all dyadic times :math:`H j/2^l` of a base interval :math:`H`. The base
 interval is the product of a power of two and the sampling interval. The level :math:`l = 0`
-contains independent increments. Each further level inserts the midpoints by a bridge: the value at
-a midpoint is normally distributed about a mean of both neighbours. A longer path therefore begins
-with the shorter path, and half the sampling interval refines the same path.
+contains independent increments. Each further level inserts values at the midpoints. The value at a
+midpoint is drawn from a normal distribution, whose mean is a weighted sum of the values at the two
+neighbouring times (bridge sampling). If a path is extended, its earlier values do not change. If
+the sampling interval is halved, the values at the previous sampling times do not change.
 
-The random numbers are raw 64-bit words of the counter-based generator Philox. The key is the seed,
-and the counter contains the level and the index of the midpoint, so any section of a path can be
-computed without the preceding sections.
+The random numbers are raw 64-bit words of the counter-based generator Philox. The key of the
+generator is the seed, and its counter contains the level and the index of the midpoint. Any section
+of a path can therefore be computed without the preceding sections.
 """
 
 from __future__ import annotations
@@ -99,14 +100,14 @@ class Path(NamedTuple):
         return np.array(values[:stop])
 
     def _transition(self, spacing: float) -> tuple[float, float]:
-        """Return the factor of the last value, and the deviation of the next value."""
+        """Return the factor of the last value, and the standard deviation of the next."""
         if self.correlation_time is None:
             return 1.0, math.sqrt(spacing)
         decay = 2.0 * spacing / self.correlation_time
         return math.exp(-0.5 * decay), math.sqrt(-0.5 * self.correlation_time * math.expm1(-decay))
 
     def _bridge(self, spacing: float) -> tuple[float, float]:
-        r"""Return the weight of both neighbours and the deviation of a midpoint.
+        r"""Return the weight of both neighbours, and the midpoint standard deviation.
 
         With the correlation :math:`\rho` over half the spacing, the weight is
         :math:`\rho/(1 + \rho^2)`, and the variance of the Ornstein-Uhlenbeck process is reduced by
@@ -120,7 +121,7 @@ class Path(NamedTuple):
         return correlation / (1.0 + correlation * correlation), math.sqrt(variance)
 
     def _normals(self, level: int, first: int, count: int) -> np.ndarray:
-        """Return normally distributed numbers of a level."""
+        """Return the normally distributed random numbers of a level."""
         skipped = first % _WORDS_PER_COUNT
         generator = np.random.Philox(
             key=np.array([self.seed, self.stream], dtype=np.uint64),

@@ -1,11 +1,12 @@
 """Layout of the parameter tuple ``p`` that the equations of a scene read.
 
-The tuple starts with the parameters that every scene has, followed by the parameters of each slot.
-The parameters of the law are ``p[LAW]``, ``p[LAW + 1]`` and so on. The parameters of the law come
-last, because a law can have any number of parameters. Only if the temperature changes, its
-parameters follow those of the law. In a scene with noise, the last two parameters are the inertial
-time and the rate at which noise changes the spring stress. The module also defines the columns of
-segment tables and limits that prevent overflow.
+The tuple starts with the parameters that every scene has. They are followed by the parameters of
+the parts, in the order of the slots. The parameters of the law are ``p[LAW]``, ``p[LAW + 1]`` and
+so on. The parameters of the law come last, because a law can have any number of parameters. If the
+temperature changes, the parameters of the temperature come after the parameters of the law. In a
+scene with noise, the last two parameters are the inertial time and the rate at which noise changes
+the spring stress. The module also defines the columns of segment tables and limits that prevent
+overflow.
 """
 
 from __future__ import annotations
@@ -18,10 +19,10 @@ from rsfstudy.errors import InvalidValue
 from rsfstudy.slider.parts import Numbers, Part, collect_parameter_values
 from rsfstudy.slider.scene_view import SceneView
 
-#: Indices of the parameters that every scene has: the direct effect parameter a, the change of the
+#: Indices of the parameters that every scene has: the direct effect parameter a, the change in the
 #: states per unit of ln V (b for a law with one state), the friction coefficient mu_*, the
 #: stiffness K = k D_c/sigma_*, the load point velocity V_0/V_* and its logarithm, the effect c of
-#: shear stress on the state, and the imposed change of normal stress in sigma_*.
+#: shear stress on the state, and the imposed change in normal stress in sigma_*.
 (
     A,
     B,
@@ -42,7 +43,7 @@ LOADING = FLUID
 BOUNDARY_PRESSURE_RATE = DYNAMICS - 1
 
 #: Columns of the segment table of a loading: start time, end time, load point velocity V_0/V_*, its
-#: logarithm, rate of normal stress, and decrease of normal stress at the start. The last two
+#: logarithm, rate of normal stress, and decrease in normal stress at the start. The last two
 #: columns are NaN if the loading has no unknowns. The segment tables of noise have another column,
 #: the rate at which noise changes the spring stress.
 (

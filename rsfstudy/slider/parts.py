@@ -123,8 +123,8 @@ class Part:
     def parameter_values(self, scene: SceneView) -> Numbers:
         """Return the values that the functions of the part read from ``p``.
 
-        The first value is stored at the index of the slot. A law can have any number of values. The
-        other parts have room for a few values only (see ``parameter_layout``). Fields that a
+        The first value is stored at the index of the slot. A law can have any number of values. For
+        all other parts, the number of values is limited (see ``parameter_layout``). Fields that a
         subclass declares with ``number`` are appended in the order of their declaration. Override
         ``parameter_values`` only if the functions read values other than the declared fields.
 
@@ -372,7 +372,7 @@ def _fields_appended_to_parameter_values(part_class: type[Part]) -> tuple[str, .
 
 
 def collect_parameter_values(part: Part, scene: SceneView) -> Numbers:
-    """Return the values of ``part.parameter_values`` and then the appended fields.
+    """Return ``part.parameter_values``, followed by the appended fields.
 
     Parameters
     ----------

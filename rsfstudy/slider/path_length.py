@@ -15,10 +15,10 @@ While contacts heal, :math:`\ln V` decreases as the logarithm of displacement. W
 a rupture, :math:`\ln V` decreases as the logarithm of the remaining time. If displacement or time
 were the independent variable, each integration step would have to be a fraction of the elapsed or
 remaining displacement or time, and many steps would be necessary. In contrast, the path length of
-such an interval is only a few units. The change of :math:`\ln V` is divided by 6 because this
+such an interval is only a few units. The change in :math:`\ln V` is divided by 6 because this
 reduces the number of integration steps near the largest slip rate. The direction of the path then
-changes over six units of :math:`\ln V` instead of one unit. Factors from 4 to 12 instead of 6 need
-similar numbers of steps.
+changes over six units of :math:`\ln V` instead of one unit. With any factor between 4 and 12, the
+number of steps is similar.
 """
 
 from __future__ import annotations
@@ -37,7 +37,7 @@ STOPPED_LOG_SLIP_RATE = -290.0 * math.log(10.0)
 #: below exp(-100).
 MAX_LOG_LOAD_OVER_SLIP_VELOCITY = 100.0
 
-#: Change of ln V that has the same path length as one unit of displacement (D_c) or one unit of
+#: Change in ln V that has the same path length as one unit of displacement (D_c) or one unit of
 #: inertial time.
 LOG_SLIP_RATE_PER_PATH_LENGTH = 6.0
 #: Largest slope of the path for which the square of the slope is computed. The slope is the

@@ -32,7 +32,7 @@ def build_motion_point_assembling_function(friction_functions: FrictionFunctions
         Function ``(x, growth, forces, states, changes, shift, p) -> MotionPoint``. The arguments
         ``x`` and ``growth`` are :math:`x = \ln(V/V_*)` and its derivative. The tuple ``forces``
         contains f, the derivative of f, g, and the derivative of g. The other arguments are the
-        states, the derivatives of the states, the stress-induced decrease of the state variable,
+        states, the derivatives of the states, the stress-induced decrease in the state variable,
         and the parameters.
 
     Notes

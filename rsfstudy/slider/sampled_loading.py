@@ -27,7 +27,7 @@ from rsfstudy.slider.scene_view import SceneView
 from rsfstudy.slider.user_loadings import UserLoading
 
 #: Columns of the sample table: time since the first sample, load point velocity after the sample,
-#: decrease of normal stress from sigma_* at the sample, and rate of normal stress after the sample.
+#: decrease in normal stress from sigma_* at the sample, and rate of normal stress after the sample.
 TIME_COLUMN, VELOCITY_COLUMN, STRESS_FALL_COLUMN, STRESS_RATE_COLUMN = range(4)
 _NORMAL_STRESS_UNKNOWNS = (
     Quantity("recorded_fall", "$P$", "1", "imposed decrease of normal stress", "sigma_*"),
@@ -115,12 +115,12 @@ class SampledHistory(UserLoading):
             Load point velocity between each sample and the next sample, in :math:`V_*`. The last
             velocity also applies after the end of the record.
         normal_stress_fall : ndarray or None
-            Decrease of normal stress from :math:`\sigma_*` at the samples, in :math:`\sigma_*`.
+            Decrease in normal stress from :math:`\sigma_*` at the samples, in :math:`\sigma_*`.
             After the last sample, normal stress remains constant.
         name : str
             Name of the history in results.
         of_pressure : bool, default: False
-            If True, pore pressure is the only cause of the decrease of effective normal stress.
+            If True, pore pressure is the only cause of the decrease in effective normal stress.
         first_reversal : tuple of (str, float, str), optional
             Name, value and position of the first sample that moves the load point backwards.
 
@@ -180,7 +180,7 @@ class SampledHistory(UserLoading):
     def unknowns(self) -> tuple[Quantity, ...]:  # type: ignore[override]
         """Unknowns of the loading.
 
-        If normal stress is sampled, the decrease of normal stress is an unknown of the loading.
+        If normal stress is sampled, the decrease in normal stress is an unknown of the loading.
         Otherwise the loading has no unknowns.
         """
         return _NORMAL_STRESS_UNKNOWNS if self.of_stress else ()
@@ -194,7 +194,7 @@ class SampledHistory(UserLoading):
         return self.first_reversal or ("velocity", velocity, f"sample {segment_index + 1}")
 
     def initial_unknowns(self, scene: SceneView) -> Numbers:
-        """Return the decrease of normal stress at the first sample.
+        """Return the decrease in normal stress at the first sample.
 
         See ``Loading.initial_unknowns``.
         """

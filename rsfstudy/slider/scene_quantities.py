@@ -152,14 +152,14 @@ class SceneQuantities(SceneBase):
 
     @cached_attribute
     def imposed_normal_stress(self) -> float:
-        """Total change of imposed normal stress after the last step, in sigma_*."""
+        """Total change in imposed normal stress after the last step, in sigma_*."""
         return self._segments[-1].normal_stress
 
     @property
     def spring_stress_step(self) -> float:
-        r"""Change of spring stress due to the first displacement step.
+        r"""Change in spring stress due to the first displacement step.
 
-        The change of spring stress is in units of :math:`\sigma_*`.
+        The change in spring stress is in units of :math:`\sigma_*`.
         """
         return self.stiffness * self._segments[0].displacement
 

@@ -90,7 +90,7 @@ class SceneView(Protocol):
 
     @property
     def imposed_normal_stress(self) -> float:
-        """Imposed change of normal stress in units of sigma_*."""
+        """Imposed change in normal stress in units of sigma_*."""
 
     @property
     def inertial_time(self) -> float:

@@ -133,7 +133,7 @@ def all_critical_stiffnesses(scene: SceneView, log_slip_rate: float) -> list[flo
 def _find_critical_stiffnesses(
     linearised_balance: LinearisedForceBalance, min_stiffness: float
 ) -> list[float]:
-    """Find all stiffnesses for which a growth rate is imaginary, above a minimum.
+    """Find all stiffnesses above a minimum at which a growth rate is imaginary.
 
     The stiffnesses are in ascending order. If inertia prevents a finite critical stiffness at some
     frequency, the list contains ``math.inf``.

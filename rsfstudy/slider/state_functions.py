@@ -60,7 +60,7 @@ def default_steady_state(log_slip_rate: float, state_shift: float, p: Numbers) -
     log_slip_rate : float
         Natural logarithm of the slip rate, :math:`\ln(V/V_*)`.
     state_shift : float
-        Decrease of the state variable due to stress.
+        Decrease in the state variable due to stress.
     p : tuple of float
         Parameters of the scene.
 

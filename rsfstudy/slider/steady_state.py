@@ -155,14 +155,14 @@ def frictional_stress_for_friction(
 def frictional_stress_after_jump(
     scene: SceneView, strength: float, states: Numbers = ()
 ) -> float | None:
-    r"""Compute the frictional stress after a sudden change of stress or slip rate.
+    r"""Compute the frictional stress after a sudden change in stress or slip rate.
 
     Parameters
     ----------
     scene : Scene
         Scene with friction parameters.
     strength : float
-        Strength after the sudden change of stress or slip rate, in units of :math:`\sigma_*`.
+        Strength after the sudden change in stress or slip rate, in units of :math:`\sigma_*`.
     states : tuple of float, optional
         States :math:`\Psi_i`, from which the pore pressure is read. By default, the function uses
         the pore pressure of steady sliding.

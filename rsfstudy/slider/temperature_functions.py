@@ -1,9 +1,9 @@
 r"""Effects of the temperature rise on friction, and its evolution.
 
 The temperature rise :math:`\vartheta` is the first element of the tuple of states after the states
-of the law. With :math:`\Lambda = -\vartheta/(1 + \vartheta)`, the state
-:math:`\Psi = \Theta + \mathrm{shift}_\sigma(g)`, in which :math:`\mathrm{shift}_\sigma` is the
-decrease of the state variable due to stress, obeys
+of the law. With :math:`\Lambda = -\vartheta/(1 + \vartheta)`, the state :math:`\Psi = \Theta +
+\mathrm{shift}_\sigma(g)`, in which :math:`\mathrm{shift}_\sigma` is the decrease in the state
+variable due to stress, obeys
 
 .. math::
 
@@ -15,8 +15,8 @@ parameters of the temperature follow the parameters of the law in the parameter 
 :math:`a q_a`, :math:`b q_b`, the pressurisation factor of the fluid, and the parameters that the
 temperature part declares.
 
-The function `build_replacements` is the main function. The functions that it returns have the
-arguments that ``friction.FrictionFunctions`` describes.
+The function `build_replacements` is the main function. The returned functions have the arguments
+that are described in ``friction.FrictionFunctions``.
 """
 
 from __future__ import annotations
@@ -43,7 +43,7 @@ _MIN_TEMPERATURE = 1e-3
 _MIN_NORMAL_STRESS, _MAX_NORMAL_STRESS = 1e-12, 1e12
 #: Number of Newton iterations for the normal stress, if it depends nonlinearly on shear stress.
 _NORMAL_STRESS_ITERATION_COUNT = 30
-#: Largest change of ln V between two points along the branch of steady sliding.
+#: Largest change in ln V between two points along the branch of steady sliding.
 _MAX_LOG_SLIP_RATE_CHANGE = 0.25
 #: Value of ln(V/V_*) below which slip does not heat the fault, to double precision.
 _MIN_HEATING_LOG_SLIP_RATE = -60.0
@@ -54,9 +54,10 @@ _MAX_SECANT_COUNT, _ROOT_TOLERANCE, _STAGNATION_TOLERANCE = 30, 1e-14, 1e-10
 
 
 class _Places(NamedTuple):
-    """Places of the temperature in the tuples of states and parameters.
+    """Indices of the temperature in the tuples of states and parameters.
 
-    The index of the state is negative. The last parameter precedes the index ``end``.
+    The index of the state is negative. The index ``end`` is one greater than the index of the last
+    parameter.
     """
 
     state: int
@@ -119,7 +120,7 @@ def build_replacements(scene: SceneView, isothermal: Mapping[str, Any]) -> dict[
 
 
 def inverse_temperature_change(rise: float) -> float:
-    r"""Compute the change of the inverse temperature.
+    r"""Compute the change in the inverse temperature.
 
     Parameters
     ----------
@@ -287,8 +288,9 @@ def _insert_steady_temperature(
 ) -> Function:
     """Return the steady states with NaN for the temperature rise.
 
-    The function `steady_temperature_rise` must solve an equation for the temperature rise, and the
-    distance from steady sliding does not contain it.
+    The temperature rise is not computed here, because ``steady_temperature_rise`` would have to
+    solve an equation, and because the distance from steady sliding does not depend on the
+    temperature rise.
     """
 
     def steady_states(log_slip_rate: float, shift: float, p: Numbers) -> Numbers:
@@ -381,7 +383,7 @@ def thermal_friction_change(scene: SceneView, states: Numbers) -> float:
     Returns
     -------
     float
-        Change of the friction coefficient, :math:`(a q_a - b q_b) \Lambda`. The change is zero if
+        Change in the friction coefficient, :math:`(a q_a - b q_b) \Lambda`. The change is zero if
         the friction does not depend on temperature.
     """
     if not any(scene.parts.temperature.activation):

@@ -1,7 +1,7 @@
 """Conversion of finished cells to rows of a journal and to columns.
 
-``OutputPacker`` converts the outcome of a cell to a row of the journal. ``CellColumns`` contains
-arrays with the results of many cells. Datasets are assembled from these arrays.
+The class ``OutputPacker`` converts the outcome of a cell to a row of the journal. ``CellColumns``
+contains arrays with the results of many cells. Datasets are assembled from these arrays.
 """
 
 from __future__ import annotations

@@ -6,8 +6,8 @@ finished, so that an interrupted run can be resumed. Only one run at a time can 
 The key of a cell is a digest of the exact values of the scene fields and the measure fields. The
 fingerprint of a journal contains all other settings that affect the results. If the fingerprint of
 the journal differs from the fingerprint of the run, the run rejects the journal (see
-``fingerprints``). There is one exception: the work budget of the journal may be smaller than the
-work budget of the run.
+``fingerprints``). As an exception, the work budget in the fingerprint of the run may be larger than
+the work budget in the fingerprint of the journal.
 """
 
 from __future__ import annotations
@@ -284,7 +284,8 @@ def _fill_cell_columns(
 ) -> None:
     """Copy stored rows of the journal into columns.
 
-    If a row is damaged, the function raises a KeyError, OverflowError, TypeError or ValueError.
+    If a row is damaged, the function raises a ``KeyError``, ``OverflowError``, ``TypeError`` or
+    ``ValueError``.
     """
     if any(compute_checksum(*known) != checksum for *known, checksum in stored_rows):
         raise ValueError("checksum")

@@ -3,8 +3,8 @@
 The structs define the format of a declaration in a results file. The functions build studies,
 scenes, measures and reductions from the structs. A missing entry is never replaced by a default
 value, because a default value could change the meaning of the study. A results file does not
-contain code. The functions therefore look up the classes of measures and reductions in rsfstudy, by
-name.
+contain code. The functions therefore look up the classes of measures and reductions by name in
+rsfstudy.
 """
 
 from __future__ import annotations
@@ -366,7 +366,7 @@ def _find_class(
     class with this name, the function also searches the modules of the named studies.
     """
     for exported in exporting_package.__all__:
-        getattr(exporting_package, exported)  # This loads the module of the class.
+        getattr(exporting_package, exported)  # The attribute access loads the module of the class.
     if declared_name not in _named_subclasses(base_class):
         for study in study_names():
             load_study(study)

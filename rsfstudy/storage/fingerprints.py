@@ -4,8 +4,8 @@ A fingerprint contains the settings and the code digests that affect results. Th
 contains one code digest for each module of rsfstudy that the measure and the parts of the scenes
 import directly or indirectly. Two fingerprints may contain different modules. For example, the
 fingerprint of a study with more laws contains the modules of these laws. The code of two
-fingerprints agrees if each module that both fingerprints contain has equal digests. Older
-fingerprints contain one digest of all modules.
+fingerprints agrees if all modules that occur in both fingerprints have the same digests in both.
+Older fingerprints contain one digest of all modules.
 """
 
 from __future__ import annotations

@@ -55,8 +55,8 @@ class RootAttributes(TypedDict):
 class StoredFingerprint(TypedDict):
     """Code digests and versions that affect the results.
 
-    The other entries of a fingerprint need no declared type, because they are only compared with
-    the entries of another fingerprint.
+    The struct does not declare types for the other entries of a fingerprint, because these entries
+    are only compared with the entries of another fingerprint.
     """
 
     own_code: str
@@ -165,7 +165,7 @@ def is_of_single_scene(dataset: xr.Dataset) -> bool:
     Returns
     -------
     bool
-        True for a motion, a limit cycle or a critical step. False for the results of a study.
+        True for a motion, a limit cycle or a critical step, and False for the results of a study.
     """
     return "scene" in dataset.attrs and "declaration" not in dataset.attrs
 

@@ -1,7 +1,7 @@
 """Claims, which compare results with published values.
 
-A claim contains only plain data. Therefore, a claim can be stored in a NetCDF file, and the file
-can be checked without the study that created the file.
+A claim contains only plain data. A claim can therefore be stored in a NetCDF file, and the results
+in the file can be checked without the study that created the file.
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ _VERDICT_TABLE_COLUMNS = (
     *("id", "claim", "source", "relation", "published", "computed"),
     *("tolerance", "reason", "verdict", "expected", "difference_reason", "verdict_changed"),
 )
-#: Default reason for the tolerance of a claim. The default is accepted only for inequalities.
+#: Default reason for the tolerance of a claim. An equality requires another reason.
 TOLERANCE_REASON_OF_INEQUALITY = "an inequality"
 _EXPECTED_VERDICTS = (REPRODUCED_VERDICT, DIFFERS_VERDICT)
 _TEXT_FIELDS = (
@@ -73,8 +73,8 @@ class Claim:
     relation : {"equals", "below", "above"}, default: "equals"
         Expected relation of the result to the published value.
     baseline : mapping of str to object, optional
-        Coordinate values that select a second value. If ``baseline`` is given, the second value is
-        subtracted from the first value, and the difference is compared with the published value.
+        Coordinate values that select a second value. If you pass ``baseline``, the difference
+        between the first value and the second value is compared with the published value.
     baseline_variable : str, optional
         Name of the variable of the second value. The default is ``variable``.
     expected : {"reproduced", "differs"}, default: "reproduced"
@@ -154,7 +154,7 @@ class Claim:
 
     @classmethod
     def below(cls, **claim_fields: Any) -> Claim:
-        """Create a claim that the result is smaller than the published value.
+        """Create a claim that a result is smaller than a published value.
 
         Parameters
         ----------
@@ -170,7 +170,7 @@ class Claim:
 
     @classmethod
     def above(cls, **claim_fields: Any) -> Claim:
-        """Create a claim that the result is larger than the published value.
+        """Create a claim that a result is larger than a published value.
 
         Parameters
         ----------

@@ -236,7 +236,7 @@ def check_override_of_partly_set_field(
     field_name: str,
     new_value: Any,
 ) -> None:
-    """Reject an override of a field that is set at only some axis points.
+    """Raise InvalidValue if an overridden field is set at only some axis points.
 
     At the axis points that do not set the field, the field has the value of the base scene. The
     override would not change this value. The override is accepted if the field has no value or no
@@ -342,7 +342,8 @@ def unknown_name_error(
 def _describe_measure_outputs(measure: Measure) -> str:
     """Describe the results of a measure and the fields that the measure solves for.
 
-    The description is a string, because two NaN values are equal only as strings.
+    The description is a string, because two NaN values compare equal only after conversion to
+    strings.
     """
     inner = {name: np.asarray(at).tolist() for name, at in measure.inner_coordinates.items()}
     return repr((measure.primary_output, dict(measure.variables), inner, measure.solved_fields))

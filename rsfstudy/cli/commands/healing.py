@@ -86,11 +86,11 @@ def healing(given: options.CommandOptions) -> int:
 
     The command prints one row per hold with its duration, the friction before the hold, the peak
     friction on reloading, healing and relaxation. The standard errors include the correlation of
-    the noise. The healing rate is the increase of healing per decade of hold duration. The command
+    the noise. The healing rate is the increase in healing per decade of hold duration. The command
     also prints the stiffness of the machine, and writes a figure and a data file.
 
-    The exit status is 1 if no hold has a peak of friction on reloading, and 2 for wrong usage.
-    Otherwise the exit status is 0.
+    The exit status is 1 if no hold has a peak of friction on reloading, and 2 if the command line
+    is invalid. Otherwise the exit status is 0.
     """
     from rsfstudy.cli.data_files import check_output_may_be_replaced
     from rsfstudy.cli.figure_files import write_figure

@@ -93,7 +93,7 @@ def _exit_status_of_motion(motion: xr.Dataset) -> int:
 
 
 def _build_scene_and_rig(given: options.CommandOptions) -> tuple[Scene, Rig | None]:
-    """Build a scene from the options. Also build a rig if the options define one."""
+    """Build a scene, and a rig if the options define a rig."""
     from rsfstudy.cli import assignment_parsing as parsing
 
     fields = parsing.parse_scene_field_assignments(given.settings)

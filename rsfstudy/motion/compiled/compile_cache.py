@@ -1,7 +1,7 @@
 """Compilation of functions with Numba, and a cache of the results on disk.
 
-``compile_function`` and ``compile_cfunc_addresses`` are the main functions. They copy a function
-and all functions that it calls, replace the functions listed in
+``compile_function`` and ``compile_cfunc_addresses`` are the main functions. These two functions
+copy a Python function together with all functions that it calls, replace the functions listed in
 ``COMPILED_REPLACEMENT_BY_PYTHON_FUNCTION``, and compile the copy.
 
 Each compiled function is stored in a folder whose name contains a digest of the source functions,
@@ -209,7 +209,7 @@ def _load_or_compile(entry_name: str, compile_with_cache_path: Callable[[str], A
 
 
 def _cache_entry_folder(entry_name: str) -> Path | None:
-    """Return the cache folder of an entry, or None if others can write to it.
+    """Return the cache folder of an entry, or None if other users can write to it.
 
     The function also returns None if the folder cannot be created.
     """
@@ -238,7 +238,7 @@ def _warn_folder_not_private(folder: Path) -> None:
 
 
 def _is_private_folder(folder: Path) -> bool:
-    """Return True if only the current user owns and can write to a folder."""
+    """Return True if the current user owns a folder, and only this user can write."""
     if not hasattr(os, "geteuid"):  # Windows has no numeric owners and modes.
         return True
     found = folder.stat()

@@ -1,9 +1,9 @@
 """Readers of tables in files and in memory.
 
 Each module of this package reads one group of file formats. A reader consists of two functions: the
-first function recognises a source by its first bytes or by its type, and the second function
-converts the source to a ``Table``. To add a format, write the two functions, and add them to
-``READERS``.
+first function checks if a source has the format of the reader, based on its first bytes or its
+type, and the second function converts the source to a ``Table``. To add a format, write the two
+functions, and add them to ``READERS``.
 """
 
 from __future__ import annotations

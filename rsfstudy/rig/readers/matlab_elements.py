@@ -1,7 +1,8 @@
 """Numeric arrays in MATLAB files of versions 5 to 7.
 
-The functions check all lengths in the file. They are used in place of ``scipy.io.loadmat``, because
-a damaged file can crash the Python interpreter in ``scipy.io.loadmat``.
+The functions check all lengths in the file. These functions are used in place of
+``scipy.io.loadmat``, because ``scipy.io.loadmat`` can crash the Python interpreter if a file is
+damaged.
 """
 
 from __future__ import annotations

@@ -27,7 +27,7 @@ class Dynamics(Part):
     ``rsfstudy.slider.FrictionFunctions``. The dynamics have the following functions:
 
     - ``build_slip_rate_functions(friction)`` returns two functions. The function ``balance(spring,
-      psis, p)`` returns :math:`\ln(V/V_*)`, the frictional stress g and the decrease of the state
+      psis, p)`` returns :math:`\ln(V/V_*)`, the frictional stress g and the decrease in the state
       due to stress. The function ``growth(state, rates, x, g, p)`` returns the derivative of
       :math:`x = \ln(V/V_*)` along the motion. The argument ``state`` contains the spring stress and
       the states ``psis``, and ``rates`` contains the derivatives of ``state``.

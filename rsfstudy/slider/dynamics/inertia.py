@@ -144,7 +144,7 @@ def build_slip_rate_functions(friction_functions: FrictionFunctions) -> tuple[Fu
         """Compute the quasi-static motion and the inertia weight.
 
         The returned tuple contains ln(V/V_*), its derivative, the slope of the strength, the
-        inertia weight and the decrease of the state due to stress.
+        inertia weight and the decrease in the state due to stress.
         """
         a = p[A]
         value, slope, shift, _shift_slope = strength(spring_stress, psis, p)

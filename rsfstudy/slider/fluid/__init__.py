@@ -67,7 +67,7 @@ class Fluid(Part):
         return 0.0
 
     def highest_pressure(self, log_slip_rate: float, states: Numbers) -> float:
-        r"""Compute an upper bound of the future pore pressure.
+        r"""Compute an upper bound on the future pore pressure.
 
         Parameters
         ----------
@@ -79,8 +79,8 @@ class Fluid(Part):
         Returns
         -------
         float
-            Upper bound of the pore pressure P. The base class returns infinity, because the base
-            class knows no upper bound of the pore pressure.
+            Upper bound on the pore pressure P. The base class returns infinity, because the base
+            class knows no upper bound on the pore pressure.
         """
         return math.inf
 
@@ -98,7 +98,8 @@ PORE_PRESSURE_QUANTITY = Quantity(
 def declare_dilatancy_field(default: float) -> Any:
     """Declare the field ``dilatancy`` of a fluid.
 
-    The value may be negative. The pores then close when the slip rate increases.
+    The value may be negative. If the dilatancy is negative, the pores close when the slip rate
+    increases.
 
     Parameters
     ----------

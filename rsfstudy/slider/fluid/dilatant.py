@@ -57,7 +57,7 @@ def porosity_and_pressure_rates(
 def rates_with_porosity_length(
     log_slip_rate: float, states: Numbers, slip_per_independent_variable: float, p: Numbers
 ) -> Numbers:
-    r"""Compute the rates if porosity has a slip distance of its own.
+    r"""Compute the rates if porosity has a separate slip distance.
 
     The function differs from ``porosity_and_pressure_rates`` in the slip distance
     :math:`L_\varphi` of the porosity. It reads :math:`D_c/L_\varphi` from ``p[FLUID + 2]``.
@@ -97,8 +97,9 @@ def choose_porosity_rates(porosity_length: float) -> Function:
 def check_porosity_length(fluid: Fluid, scene: SceneView) -> None:
     """Check that the scene supports the slip distance of the porosity.
 
-    The parameters of a loading with unknowns are stored at the places of the parameters of the
-    fluid, so these loadings leave no place for a slip distance of the porosity.
+    The parameters of a loading with unknowns occupy elements of the parameter tuple that are
+    reserved for the fluid. With such a loading, the tuple has no free element for the slip distance
+    of the porosity.
 
     Parameters
     ----------
@@ -151,7 +152,7 @@ class DilatantFluid(Fluid):
     Parameters
     ----------
     dilatancy : float, default: 0.01
-        Dilatancy :math:`\epsilon/(\beta \sigma_*)`. Without drainage, an increase of :math:`\ln V`
+        Dilatancy :math:`\epsilon/(\beta \sigma_*)`. Without drainage, an increase in :math:`\ln V`
         by 1 decreases the pore pressure by the dilatancy, in units of :math:`\sigma_*`. A negative
         value describes compaction.
     drainage : float, default: 1.0
@@ -202,7 +203,7 @@ class DilatantFluid(Fluid):
             )
 
     def highest_pressure(self, log_slip_rate: float, states: Numbers) -> float:
-        r"""Compute an upper bound of the future pore pressure.
+        r"""Compute an upper bound on the future pore pressure.
 
         See ``Fluid.highest_pressure``. The upper bound follows from the drainage rate and from the
         largest rate at which pores can close. The closing rate is :math:`V (\varphi - \varphi_0 -

@@ -48,7 +48,7 @@ def pressure_rate(log_slip_rate: float, states: Numbers, fraction: float, p: Num
     Returns
     -------
     tuple of float
-        Change of the pore pressure per unit slip in :math:`D_c`, multiplied by ``fraction``.
+        Change in the pore pressure per unit slip in :math:`D_c`, multiplied by ``fraction``.
     """
     time = fraction * math.exp(min(-log_slip_rate, LARGEST_LOG_SLOWNESS))
     return (-p[FLUID + 1] * time * states[0],)
@@ -83,7 +83,7 @@ class ThermalFluid(Fluid):
     ----------
     pressurisation : float, default: 1.0
         Pressurisation factor :math:`\Lambda_p T_*/\sigma_*`, where :math:`\Lambda_p` is the
-        undrained increase of pore pressure per kelvin. If the temperature rises by :math:`T_*`
+        undrained increase in pore pressure per kelvin. If the temperature rises by :math:`T_*`
         without drainage, the pore pressure in :math:`\sigma_*` increases by this factor.
     drainage : float, default: 1.0
         Drainage rate :math:`c^* D_c/V_*`.
@@ -143,7 +143,7 @@ class ThermalFluid(Fluid):
         return steady_porosity_and_pressure if self.dilatancy else steady_pressure
 
     def highest_pressure(self, log_slip_rate: float, states: Numbers) -> float:
-        """Compute an upper bound of the future pore pressure, except for heating.
+        """Compute an upper bound on the future pore pressure, except for heating.
 
         See ``Fluid.highest_pressure``.
         """

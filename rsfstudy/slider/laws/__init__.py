@@ -1,9 +1,9 @@
 r"""State evolution laws of rate- and state-dependent friction.
 
 Each module of this package defines one law. The function ``discover_parts`` finds the modules
-automatically, so a new law needs no entry in a list. Modules with a leading underscore contain code
-that several laws share. In all laws, the state variable :math:`\Theta` is a contribution to the
-friction coefficient:
+automatically, so a new law does not have to be registered. Modules with a leading underscore
+contain code that several laws share. In all laws, the state variable :math:`\Theta` is a
+contribution to the friction coefficient:
 
 .. math::
 
@@ -98,10 +98,10 @@ class LawBase(Part):
     in which the parameters of the law start at ``p[LAW]``.
 
     A law with one state defines ``evolution(log_slip_rate, state, p)``. The function returns the
-    change of the state variable per unit slip in :math:`D_c` at constant normal stress. The default
+    change in the state variable per unit slip in :math:`D_c` at constant normal stress. The default
     steady state is :math:`\Theta = -b \ln(V/V_*)`. If the steady state of a law differs from the
     default, the law also defines ``steady_states(log_slip_rate, shift, p)``, which returns the
-    states :math:`\Psi` in steady sliding. The argument ``shift`` is the decrease of the state
+    states :math:`\Psi` in steady sliding. The argument ``shift`` is the decrease in the state
     variable that stress causes. In steady sliding at :math:`V_*`, the state variables must add up
     to zero, because the friction coefficient is :math:`\mu_*`. A scene rejects a law if its
     evolution does not vanish at its steady states.
@@ -176,7 +176,7 @@ class LawBase(Part):
     evolutions: ClassVar[Function | None] = None
     steady_states: ClassVar[Function | None] = None
     #: Function ``state_effect(friction, ratio, change, p) -> (shift, slope)``. The value ``shift``
-    #: is the decrease of the state variable due to stress. The value ``slope`` is the derivative of
+    #: is the decrease in the state variable due to stress. The value ``slope`` is the derivative of
     #: ``shift`` with respect to frictional stress. Most laws do not define ``state_effect``.
     state_effect: ClassVar[Function | None] = None
 
@@ -219,7 +219,7 @@ class LawBase(Part):
 
     @property
     def state_change_over_a(self) -> float:
-        """Change of the states per unit of ln V, divided by a.
+        """Change in the states per unit of ln V, divided by a.
 
         The value is always positive.
         """
@@ -293,10 +293,10 @@ class Law(LawBase):
 
         evolution(log_slip_rate, state, p) -> float
 
-    The function returns the change of :math:`\Theta` per unit slip in :math:`D_c` at constant
-    normal stress. The arguments are described for ``LawBase``. The element ``p[LAW]`` is b, where
-    the constant ``LAW`` can be imported from ``rsfstudy.parts``. Declare the parameters of the law
-    as fields, with ``rsfstudy.parts.number``. The parameters follow b in the order of their
+    The function returns the change in :math:`\Theta` per unit slip in :math:`D_c` at constant
+    normal stress. See ``LawBase`` for a description of the arguments. The element ``p[LAW]`` is b,
+    where the constant ``LAW`` can be imported from ``rsfstudy.parts``. Declare the parameters of
+    the law as fields, with ``rsfstudy.parts.number``. The parameters follow b in the order of their
     declaration, as ``p[LAW + 1]``, ``p[LAW + 2]`` and so on. Two methods are optional::
 
         parameter_values(self, scene) -> tuple[float, ...]
@@ -362,7 +362,7 @@ class Law(LawBase):
     def min_weakening_b_over_a(self) -> float:
         """Smallest b/a for which steady friction decreases with slip rate.
 
-        The change of friction with slip rate is evaluated in steady sliding at :math:`V_*`.
+        The change in friction with slip rate is evaluated in steady sliding at :math:`V_*`.
         """
         return 1.0
 

@@ -81,7 +81,7 @@ def steady_states(log_slip_rate: float, state_shift: float, p: Numbers) -> Numbe
     log_slip_rate : float
         Natural logarithm of the slip rate, :math:`\ln(V/V_*)`.
     state_shift : float
-        Stress-induced decrease of the state variable.
+        Stress-induced decrease in the state variable.
     p : tuple of float
         Parameters of the scene.
 

@@ -39,7 +39,7 @@ class Segment(NamedTuple):
     normal_stress : float, default: 0.0
         Deviation of the imposed normal stress from :math:`\sigma_*` during the segment, divided by
         :math:`\sigma_*`. If the driving stress is inclined to the fault, the deviation is a change
-        of :math:`\sigma_3`, and changes of shear stress also change the normal stress.
+        in :math:`\sigma_3`, and changes in shear stress also change the normal stress.
 
     Examples
     --------
@@ -89,7 +89,7 @@ class Loading(Part):
     If a loading changes normal stress continuously, the changes are described by unknowns. A
     loading with unknowns defines the class attributes ``unknowns``, ``auxiliary_rates`` and
     ``auxiliary_steady_states`` in the same way as ``Fluid``, and the method ``initial_unknowns``.
-    All unknowns must be zero in steady sliding. The last unknown is the decrease of imposed normal
+    All unknowns must be zero in steady sliding. The last unknown is the decrease in imposed normal
     stress, divided by :math:`\sigma_*`. Only the first segment of the loading has unknowns.
 
     Examples
@@ -112,12 +112,12 @@ class Loading(Part):
     """
 
     #: True if the last unknown of the loading determines a shear stress, and False if the last
-    #: unknown is a decrease of normal stress. The displacement of the load point relative to its
+    #: unknown is a decrease in normal stress. The displacement of the load point relative to its
     #: mean motion causes the shear stress. The shear stress equals the last unknown minus the third
     #: element of ``parameter_values``.
     has_load_point_unknown: ClassVar[bool] = False
     received_quantities = frozenset({SLIP_RATE})
-    #: True if the loading decreases the effective normal stress by an increase of pore pressure. In
+    #: True if the loading decreases the effective normal stress by an increase in pore pressure. In
     #: a scene whose fluid has unknowns, the loading increases the pore pressure around the fault.
     of_pressure: ClassVar[bool] = True
 
@@ -238,7 +238,7 @@ class Loading(Part):
     def jump_mask(self) -> Any:
         """True for each segment that starts with a jump of the loading.
 
-        A jump of the loading is a sudden change of load point displacement or normal stress. The
+        A jump of the loading is a sudden change in load point displacement or normal stress. The
         end of a segment with unknowns also counts as a jump of the loading.
         """
         before, found = 0.0, []

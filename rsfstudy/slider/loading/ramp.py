@@ -24,13 +24,13 @@ def pending_normal_stress_rates(
 ) -> Numbers:
     r"""Compute the rate of the remaining normal stress change of a ramp.
 
-    See ``Fluid`` for the arguments. The only state is :math:`P`, the remaining change of normal
+    See ``Fluid`` for the arguments. The only state is :math:`P`, the remaining change in normal
     stress. The function reads the rate of imposed normal stress, in :math:`\sigma_* V_*/D_c`, from
     ``p[LOADING]``.
 
     Notes
     -----
-    The unknown decreases at a steady rate from the total change of normal stress to zero:
+    The unknown decreases at a steady rate from the total change in normal stress to zero:
 
     .. math::
 
@@ -112,7 +112,7 @@ class NormalStressRamp(LoadingWithFinalLoadVelocity):
         return last._replace(duration=self.ramp_duration), last
 
     def initial_unknowns(self, scene: SceneView) -> Numbers:
-        """Return the total change of normal stress.
+        """Return the total change in normal stress.
 
         See ``Loading.initial_unknowns``.
         """

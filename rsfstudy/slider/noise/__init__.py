@@ -1,11 +1,12 @@
 r"""Noise of shear stress and normal stress that is added to the loading.
 
 Each module of this package defines one kind of noise. The function ``discover_parts`` finds the
-modules automatically. Noise is a sampled path, not a term of the equations. Between two samples,
-the stress changes at a constant rate, and the integrators follow the resulting motion to their
-tolerance. For noise that is independent of the motion, the motion converges to the solution of the
-stochastic differential equation as the sampling interval decreases (Wong-Zakai theorem). The module
-``noise_paths`` computes the paths from the seed. The base class is ``Noise``.
+modules automatically. Noise is a sampled path that is added to the loading, and not an additional
+term in the equations of motion. Between two samples, the stress changes at a constant rate, and the
+resulting motion is integrated to the requested tolerance. If the noise is independent of the
+motion, the motion converges to the solution of the stochastic differential equation as the sampling
+interval decreases (Wong-Zakai theorem). The module ``noise_paths`` computes the paths from the
+seed. The base class is ``Noise``.
 """
 
 from __future__ import annotations
@@ -53,7 +54,7 @@ class Noise(Part):
     def unknowns(self) -> tuple[Quantity, ...]:  # type: ignore[override]
         """Unknowns of the noise.
 
-        If the noise changes normal stress, the decrease of normal stress is an unknown. Noise of
+        If the noise changes normal stress, the decrease in normal stress is an unknown. Noise of
         shear stress does not need an unknown, because it changes the rate of the spring stress.
         """
         return _NORMAL_STRESS_UNKNOWNS if self.changes_normal_stress else ()
@@ -64,7 +65,7 @@ class Noise(Part):
         return bool(self.unknowns)
 
     def initial_unknowns(self, scene: SceneView) -> Numbers:
-        """Return the decrease of normal stress at the start of the path, which is zero.
+        """Return the decrease in normal stress at the start of the path, which is zero.
 
         Parameters
         ----------

@@ -48,10 +48,10 @@ class WhiteNoise(Noise):
           \sigma(t) = \sigma_{\mathrm{smooth}}(t) + \epsilon_\sigma W_\sigma(t).
 
     The Wiener processes :math:`W` and :math:`W_\sigma` start at zero. Between the samples at
-    :math:`t_i = i h`, the paths are linear. The noise of shear stress does not change the state
-    variable, so :math:`\ln V` fluctuates as the stress does. The seed, the interval and the
-    amplitudes define the paths. A longer motion and a motion with half the interval have the same
-    path.
+    :math:`t_i = i h`, the paths are linear. The noise of shear stress does not directly change the
+    state variable, so :math:`\ln V` has the same fluctuations as the shear stress. The seed, the
+    interval and the amplitudes define the paths. If the motion is longer, or if the interval is
+    halved, the motion has the same path.
 
     References
     ----------
@@ -110,7 +110,7 @@ class WhiteNoise(Noise):
         """Check that the loading of the scene can be combined with noise.
 
         See ``Part.check``. Noise can be added to loadings that consist of segments at constant
-        velocity, but not to records.
+        velocity, but not to sampled histories.
         """
         loading, fluid = scene.parts.loading, scene.parts.fluid
         if loading.unknowns or loading.reported_segment_count < len(loading.segments) - 1:

@@ -47,10 +47,9 @@ class NormalStress(Part):
         """Effect of normal stress on the state variable.
 
         The property is None if normal stress has no effect on the state. If normal stress affects
-        the state, the property is a function
-        ``state_effect(friction, ratio, change, p) -> (shift, slope)``. The shift is the decrease of
-        the state variable due to normal stress, and the slope is the derivative of the shift with
-        respect to frictional stress.
+        the state, the property is a function ``state_effect(friction, ratio, change, p) -> (shift,
+        slope)``. The shift is the decrease in the state variable due to normal stress, and the
+        slope is the derivative of the shift with respect to frictional stress.
         """
         return None
 

@@ -1,6 +1,6 @@
 """Effect of normal stress on the state variable (Linker and Dieterich 1992).
 
-An increase of normal stress decreases the state variable.
+An increase in normal stress decreases the state variable.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ def linker_dieterich_effect(
     normal_stress_derivative: float,
     p: Numbers,
 ) -> tuple[float, float]:
-    r"""Compute the decrease of the state variable due to normal stress.
+    r"""Compute the decrease in the state variable due to normal stress.
 
     See ``NormalStress.state_effect`` for the arguments. The function reads :math:`\alpha` from
     ``p[NORMAL_STRESS]``.

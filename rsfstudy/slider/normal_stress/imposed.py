@@ -16,7 +16,7 @@ from rsfstudy.slider.scene_view import SceneView
 def imposed_normal_stress_excess(frictional_stress: float, p: Numbers) -> tuple[float, float]:
     r"""Compute the imposed normal stress.
 
-    See ``NormalStress`` for the arguments. The function reads the imposed change of normal stress
+    See ``NormalStress`` for the arguments. The function reads the imposed change in normal stress
     from ``p[IMPOSED_NORMAL_STRESS]``.
     """
     return p[IMPOSED_NORMAL_STRESS], 0.0

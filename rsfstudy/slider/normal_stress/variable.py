@@ -1,7 +1,7 @@
 r"""Normal stress that varies with shear stress.
 
-A driving stress inclined to the fault couples normal stress to shear stress. Changes of normal
-stress that the loading imposes are changes of :math:`\sigma_3`.
+A driving stress inclined to the fault couples normal stress to shear stress. Changes in normal
+stress that the loading imposes are changes in :math:`\sigma_3`.
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ def shear_coupled_normal_stress_excess(frictional_stress: float, p: Numbers) -> 
 
         \frac{\sigma}{\sigma_*} = 1 + e + \cot\phi \, \frac{\tau - \tau_*}{\sigma_*}.
 
-    The change of :math:`\sigma_3` does not affect shear stress.
+    The change in :math:`\sigma_3` does not affect shear stress.
     """
     cot_phi = p[NORMAL_STRESS + 1]
     excess = cot_phi * frictional_stress + p[IMPOSED_NORMAL_STRESS]

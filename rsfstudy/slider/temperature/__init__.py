@@ -39,7 +39,7 @@ class Temperature(Part):
     ``unknowns``. The subclass also defines the following function as a static method:
 
     - ``temperature_rate(log_slip_rate, rise, friction, normal_stress, fraction, parameters)``
-      returns the change of the temperature rise per unit slip in :math:`D_c`, multiplied by
+      returns the change in the temperature rise per unit slip in :math:`D_c`, multiplied by
       ``fraction``, which is the slip per unit of the independent variable. The argument
       ``friction`` is the friction coefficient, and ``normal_stress`` is the effective normal stress
       in :math:`\sigma_*`. The tuple ``parameters`` contains the values of ``parameter_values``,
@@ -87,7 +87,7 @@ class Temperature(Part):
         return 0.0, 0.0
 
     def rise_bounds(self, scene: SceneView, rise: float, power: float) -> tuple[float, float]:
-        r"""Compute bounds of the future temperature rise.
+        r"""Compute bounds on the future temperature rise.
 
         Parameters
         ----------
@@ -96,7 +96,7 @@ class Temperature(Part):
         rise : float
             Current temperature rise.
         power : float
-            Upper bound of the product of shear stress and slip rate, in :math:`\sigma_* V_*`.
+            Upper bound on the product of shear stress and slip rate, in :math:`\sigma_* V_*`.
 
         Returns
         -------

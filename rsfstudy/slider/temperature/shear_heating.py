@@ -45,7 +45,7 @@ def temperature_rate(
     Returns
     -------
     float
-        Change of the temperature rise per unit slip in :math:`D_c`, multiplied by ``fraction``.
+        Change in the temperature rise per unit slip in :math:`D_c`, multiplied by ``fraction``.
 
     Notes
     -----
@@ -159,7 +159,7 @@ class ShearHeating(Temperature):
         return self.heating, self.cooling, self.heating * scene.mu_star
 
     def rise_bounds(self, scene: SceneView, rise: float, power: float) -> tuple[float, float]:
-        """Compute bounds of the future temperature rise.
+        """Compute bounds on the future temperature rise.
 
         See ``Temperature.rise_bounds``. At each time, the temperature approaches the steady
         temperature at the current power. The steady temperature lies between the steady temperature

@@ -18,9 +18,9 @@ from scipy.optimize import brentq
 MIN_SAMPLES_OF_CURVE = 4
 #: Number of intervals that are examined on each side of the interval with the crossing.
 _EXAMINED_INTERVALS_BESIDE_BRACKET = 3
-#: Changes of slope below this fraction of the largest slope are regarded as rounding errors.
+#: Changes in slope below this fraction of the largest slope are regarded as rounding errors.
 _MAX_ROUNDING_ERROR_OF_SLOPE_CHANGES = 1e-9
-#: Smallest change of slope that indicates an oscillation, relative to the largest change of slope
+#: Smallest change in slope that indicates an oscillation, relative to the largest change in slope
 #: and to the smallest slope of the neighbouring intervals.
 _MIN_RELATIVE_OSCILLATION_SLOPE_CHANGE = 0.1
 
@@ -78,15 +78,15 @@ def find_crossing(x: np.ndarray, y: np.ndarray, level: float) -> Crossing:
 
     .. math:: \frac{T u (h - u)}{h}.
 
-    :math:`T` is estimated by the change of slope from the previous chord to the next chord. The
+    :math:`T` is estimated by the change in slope from the previous chord to the next chord. The
     estimate is exact for a single kink. For a parabola, the estimate is twice the true value. In
     the first and the last interval, the kink may also be located next to the end of the curve. If
     the kink is next to the end of the curve, the curve follows the extrapolated chord of the
     neighbouring interval.
 
-    If the slope does not vary monotonically over the neighbouring intervals, changes of slope with
+    If the slope does not vary monotonically over the neighbouring intervals, changes in slope with
     opposite signs partly cancel. In this case, the largest :math:`T` of the neighbouring intervals
-    is doubled and used for all intervals. If the changes of slope alternate in sign, the samples
+    is doubled and used for all intervals. If the changes in slope alternate in sign, the samples
     may hide an oscillation, and the bounds enclose at least the whole interval.
     """
     if x.size < MIN_SAMPLES_OF_CURVE:
@@ -155,7 +155,7 @@ def _build_result_without_crossing(crossing_status: CrossingStatus) -> Crossing:
 def _estimate_slope_changes(
     slopes: np.ndarray, interval_numbers: range
 ) -> tuple[dict[int, float], bool]:
-    """Estimate the total change of slope within each of several intervals.
+    """Estimate the total change in slope within each of several intervals.
 
     Parameters
     ----------
@@ -167,9 +167,9 @@ def _estimate_slope_changes(
     Returns
     -------
     turns : dict of int to float
-        Total change of slope within each interval, by interval index.
+        Total change in slope within each interval, by interval index.
     alternates : bool
-        True if the changes of slope alternate in sign.
+        True if the changes in slope alternate in sign.
     """
     bends = np.diff(slopes)
     sizes = np.abs(bends)
@@ -194,7 +194,7 @@ def _estimate_slope_changes(
 
 
 def _count_sign_reversals(slope_changes: np.ndarray, min_slope_change: float) -> int:
-    """Count the sign reversals among large changes of slope."""
+    """Count the sign reversals among large changes in slope."""
     counted = slope_changes[np.abs(slope_changes) > min_slope_change]
     return int((counted[1:] * counted[:-1] < 0.0).sum())
 

@@ -28,8 +28,9 @@ DatasetOrArray = TypeVar("DatasetOrArray", xr.Dataset, xr.DataArray)
 #: some cells. The second item contains coordinates of these cells along some dimensions.
 DerivativesByVariable = Sequence[tuple[xr.DataArray, Mapping[str, Any]]]
 
-#: Names of reduction fields, by the suffix of the result name. The fields contain the names of
-#: variables. The units of a result are derived from the units of these variables.
+#: Names of the reduction fields that determine the units of a result, by the suffix of the result
+#: name. Each field contains the name of a variable, and the units of the result are derived from
+#: the units of these variables.
 UnitFieldsByResultSuffix = Mapping[str, Sequence[str]]
 
 #: Value of the attribute ``comment`` of propagated errors.
@@ -52,8 +53,8 @@ class Reduction(ConstructorKeywordCheckMixin):
     """Base class of all reductions.
 
     If you call a reduction, as in ``reduction(dataset)``, it returns a dataset with the new
-    variables. To write your own reduction, derive a frozen dataclass from this class. Fields other
-    than ``name`` and ``of`` are options of the reduction. A reduction must define one method::
+    variables. To write your own reduction, derive a frozen dataclass from this class. All fields
+    except ``name`` and ``of`` are options of the reduction. A reduction must define one method::
 
         __call__(self, dataset) -> xarray.Dataset
 
@@ -309,7 +310,7 @@ def refused_result_mask(
 
 
 def mask_failures(dataset: xr.Dataset) -> xr.Dataset:
-    """Replace failed cells by finished cells without a value.
+    """Treat failed cells as finished cells without a value.
 
     Pending cells are not changed.
 
@@ -470,8 +471,8 @@ def add_propagated_errors(
 
     with the rounding error :math:`\epsilon` of double precision. Absolute values are added because
     the errors of a solver are systematic, so the errors of neighbouring cells do not cancel. To
-    first order, the sum is an upper bound of the error of the result if the error estimate of each
-    cell is an upper bound of the error of the cell.
+    first order, the sum is an upper bound on the error of the result if the error estimate of each
+    cell is an upper bound on the error of the cell.
     """
     of, name = f"{reduction.of}_error", f"{reduction.name}_error"
     if of not in dataset or reduction.name not in reduction_results:

@@ -221,7 +221,7 @@ class ProportionalFit(LinearFit):
     """Linear fit with a fixed intercept.
 
     The equation ``of - intercept = name * on`` is fitted by unweighted least squares. If the
-    intercept is not 0, as in ``V_0/V_* - 1``, the variable and the slope are regarded as
+    intercept is not 0, as in ``V_0/V_* - 1``, the variable and the slope are assumed to be
     dimensionless.
 
     Parameters
@@ -295,7 +295,7 @@ class SemilogFit(LinearFit):
     """Linear fit of a variable against the decimal logarithm of a coordinate.
 
     The equation ``of = constant + name * log10(on)`` is fitted by unweighted least squares. The
-    slope is the change of the variable per decade. Points are omitted if the coordinate is not
+    slope is the change in the variable per decade. Points are omitted if the coordinate is not
     positive. To fit a power law, use `PowerLaw`. If you apply `SemilogFit` to the result of
     `Logarithm`, which is a natural logarithm, the slope is 2.303 times the exponent of the power
     law.

@@ -145,7 +145,7 @@ def standard_deviation(
         Standard deviation. NaN if the number of samples does not exceed
         ``degrees_of_freedom_lost``.
     """
-    with warnings.catch_warnings():  # raised by older versions of xarray
+    with warnings.catch_warnings():  # Older versions of xarray raise this warning.
         warnings.filterwarnings("ignore", "Degrees of freedom", RuntimeWarning)
         return values.std(sample_dimension, ddof=degrees_of_freedom_lost)
 
@@ -320,7 +320,7 @@ class Quantile(_SampleStatistic):
 
     The quantile is interpolated linearly between two neighbouring samples. The standard error is
     half the difference between two other quantiles. The levels of these two quantiles are ``level``
-    plus and minus one binomial standard deviation.
+    plus one binomial standard deviation and ``level`` minus one binomial standard deviation.
 
     Parameters
     ----------
@@ -369,7 +369,7 @@ class Quantile(_SampleStatistic):
         """Minimum number of samples for the standard error.
 
         With fewer samples, the level of the quantile plus or minus one binomial standard deviation
-        would be outside of the range from 0 to 1.
+        would be outside the range from 0 to 1.
         """
         rarer = min(self.level, 1.0 - self.level)
         return max(2, math.ceil((1.0 - rarer) / rarer - 1e-9))
@@ -457,7 +457,7 @@ def _interpolated_quantile(
 @wrap_methods_in_error_boundary
 @dataclass(frozen=True)
 class StatusShares(Reduction):
-    """Share of the samples that ended with each status, including failures.
+    """Shares of the samples with each status, including failures.
 
     The standard error of a share is the standard deviation of the posterior beta distribution for a
     uniform prior. Therefore, the standard error is positive even if the share is 0 or 1.
