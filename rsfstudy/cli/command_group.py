@@ -1,8 +1,8 @@
 """Click classes that import the module of a command only when it is needed.
 
 The command ``rsfstudy NAME`` imports only the module of the command ``NAME``. The command
-``rsfstudy --help`` imports the modules of all commands. It does not import the large libraries,
-because the functions of the commands import them.
+``rsfstudy --help`` imports the modules of all commands. However, large libraries are not imported
+by ``--help``, because they are imported inside the functions of the commands.
 """
 
 from __future__ import annotations

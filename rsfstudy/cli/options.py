@@ -1,7 +1,7 @@
 """Options that several commands share.
 
-The slow modules are imported inside the functions that check option values. The import of this
-module is therefore fast.
+To keep the import of this module fast, slow modules are imported inside the functions that check
+option values.
 """
 
 from __future__ import annotations

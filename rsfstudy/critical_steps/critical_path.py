@@ -7,9 +7,9 @@ tangency point. Neighbouring paths converge backwards in time. A few short integ
 moderate tolerance are therefore accurate to many digits. An integration forwards in time would
 amplify every error. Gu et al. [1]_ derive the critical path under the slip law.
 
-The unknowns of a critical path are the spring stress and one state. These two unknowns are
-sufficient if the effect of inertia is small at the instability norm. Inertia has no effect at an
-instant at which ln V is stationary.
+A critical path has two unknowns, the spring stress and one state. These two unknowns are sufficient
+if the effect of inertia is small at the instability norm. Inertia has no effect at an instant at
+which ln V is stationary.
 
 Stresses are deviations from steady sliding at V_* and are divided by sigma_*, slip is divided by
 D_c, and slip rate is divided by V_*.

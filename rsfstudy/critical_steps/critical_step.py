@@ -453,9 +453,9 @@ class CriticalStep(Measure):
     ) -> Outcome:
         """Return the outcome if no step up to the largest size is critical.
 
-        The status is ``norm_unreachable`` if inertia keeps the slip rate below the instability
-        norm, ``ok`` if the largest step itself raises the slip rate to the norm, and
-        ``stable_for_all_steps`` otherwise.
+        If inertia keeps the slip rate below the instability norm, the status is
+        ``norm_unreachable``. If the largest step itself raises the slip rate to the norm, the
+        status is ``ok``. Otherwise, the status is ``stable_for_all_steps``.
         """
         if (
             step_family.scene.has_mass

@@ -1,8 +1,8 @@
 """Peak slip rate of a motion with a held load point.
 
 The main function is ``compute_peak_excess_over_instability_norm``. Spring stress can only decrease
-while the load point is held. With one state variable, ln V has only one peak, because friction
-weakens less and less with slip after the first peak.
+while the load point is held. With one state variable, ln V has only one peak, because the weakening
+of friction with slip becomes slower and slower after the first peak.
 
 If the law has several state variables, friction may weaken repeatedly. State variables with b < 0
 weaken friction when the slip rate decreases. Pore pressure also weakens friction when the slip rate
@@ -46,9 +46,9 @@ def compute_peak_excess_over_instability_norm(scene: Scene, integrator: Integrat
     """Compute the height of the highest ln V peak above the instability norm.
 
     The peak is the highest value of ln V in the motion. If the effect of inertia is small, the
-    motion is integrated only up to the instability norm. The function then returns the squared rate
-    of change of ln V at the instability norm in place of the height of the peak. At the boundary
-    between stable and unstable steps, this rate of change is zero.
+    motion is integrated only up to the instability norm. In this case, the function returns the
+    square of d(ln V)/dt at the instability norm instead of the peak height. At the boundary between
+    stable and unstable steps, this rate of change is zero.
 
     Parameters
     ----------
@@ -157,9 +157,9 @@ def _bound_pore_pressure_effect(scene: Scene, point: MotionPoint) -> tuple[float
     """Compute an upper bound on the increase in ln V due to pore pressure and heat.
 
     The function returns the upper bound, and the smallest decrease in the state due to stress and
-    temperature. The upper bound is infinite if no bound is found. A trial increase in ln V is an
-    upper bound under one condition: at the increased ln V, the highest pore pressure and the
-    highest temperature reduce strength by less than the product of a and the trial increase.
+    temperature. The upper bound is infinite if no bound is found. To find the bound, the function
+    tests trial increases in ln V. A trial increase is an upper bound if the highest pore pressure
+    and temperature at the increased ln V reduce strength by less than a times the trial increase.
     """
     value, _slope, shift, _ = scene.friction_relation(point.psis)(point.frictional_stress)
     if not scene.parts.fluid.unknowns and not scene.parts.temperature.unknowns:

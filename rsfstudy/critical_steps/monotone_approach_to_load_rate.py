@@ -8,8 +8,8 @@ velocity. If the rise is monotonic, the integration ends early.
 
 The test uses two curves in the plane of ln V and state. The two curves meet only at the point of
 steady sliding. The first curve is the steady state as a function of ln V. On the second curve, the
-state lags behind its steady state, and motions can cross the second curve only towards smaller
-lags. A motion between the two curves remains between the curves, and its slip rate rises.
+state lags behind its steady state, and motions can cross this curve only in the direction of
+smaller lags. A motion between the two curves remains between the curves, and its slip rate rises.
 """
 
 from __future__ import annotations

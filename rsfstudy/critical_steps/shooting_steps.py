@@ -341,8 +341,9 @@ class ShootingStepFamily(StepFamily):
 
         At the critical step, the critical path begins with the state before the step. An
         approximate root of the misfit, and the slope of the misfit at the root, are computed first
-        with a loose tolerance. For each smaller tolerance, one to three paths are integrated. With
-        several states, there are no critical paths. See ``StepFamily.find_sizes_by_critical_path``.
+        with a loose tolerance. For each smaller tolerance, one to three paths are integrated. If
+        the scene has several states, there are no critical paths. See
+        ``StepFamily.find_sizes_by_critical_path``.
         """
         path_at = self.build_critical_path_factory(integrator)
         loose = (

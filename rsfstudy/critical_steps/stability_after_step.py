@@ -228,7 +228,8 @@ def steady_sliding_with_margin(scene: Scene) -> SteadySlidingWithMargin:
 def _is_stable_to_small_perturbations(scene: Scene) -> bool:
     """Return True if small perturbations of steady sliding decay.
 
-    With several states, perturbations may decay below the critical stiffness.
+    If the scene has several states, perturbations may decay even if the stiffness is below the
+    critical stiffness.
     """
     return bool(
         scene.linear_growth_rates(scene.log_load_velocity)[0].real < -_NEUTRAL_STABILITY_MARGIN

@@ -1,7 +1,7 @@
 """Setuptools build command that stores the commit in wheels of the package.
 
-Setuptools loads this module by its path, without importing the package. No other module imports
-this module.
+Setuptools loads this module by its path, without importing the package. The module is not imported
+by any other module.
 """
 
 from __future__ import annotations

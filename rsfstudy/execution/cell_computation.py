@@ -138,9 +138,9 @@ def compute_serially(task: CellTask, batches: CellBatchIterator) -> Generator[St
 def serialize_task(task: CellTask) -> bytes:
     """Serialise a task for the workers.
 
-    The serialised task includes the code that workers cannot import. It also includes the code of
-    modules of named studies. If a worker imported these modules instead, it would load all modules
-    that are needed to declare and reduce studies.
+    The serialised task includes the code that workers cannot import. The serialised task also
+    includes the code of the modules of named studies. If a worker imported these modules instead,
+    it would load all modules that are needed to declare and reduce studies.
 
     Parameters
     ----------

@@ -1,7 +1,7 @@
 """Redirection of worker errors to a log file.
 
-The log file contains stack traces of threads. It also contains the tracebacks that Dask and the
-libraries of Dask print.
+The log file contains stack traces of threads. The log file also contains the tracebacks that Dask
+and its libraries print.
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
 """Choices of the user in the record view, and the resulting function calls.
 
-The class ``FitChoices`` contains the choices. Its methods return the arguments of
+The class ``FitChoices`` contains the choices. The methods of this class return the arguments of
 ``rsfstudy.read_record`` and ``rsfstudy.fit``. The function ``format_fit_command`` returns the
 command line with the same arguments.
 """

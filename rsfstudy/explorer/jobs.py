@@ -79,10 +79,10 @@ class _Job(NamedTuple):
 class Jobs:
     """Runner for the computations of a view, in one thread at a time.
 
-    If a computation is started while another computation is running, the new computation waits. It
-    replaces any computation that is already waiting, so at most one computation waits. When the
-    running computation ends, its results are discarded if another computation is waiting.
-    Therefore, moving a slider quickly does not build up a queue of computations.
+    If a computation is started while another computation is running, the new computation waits. The
+    new computation replaces any computation that is already waiting, so at most one computation
+    waits. When the running computation ends, its results are discarded if another computation is
+    waiting. Therefore, moving a slider quickly does not build up a queue of computations.
 
     Parameters
     ----------

@@ -257,7 +257,7 @@ class SceneView(View):
             self._duration.value = settings.duration  # which computes the motion
 
     def _settings_changed(self) -> None:
-        """Compute the motion again after a change of a setting."""
+        """Compute the motion again after a setting has changed."""
         duration = self._duration.value.strip()
         self._controls.settings = replace(self._controls.settings, duration=duration)
         if self._controls.settings != PRESETS.get(self._preset.value):
@@ -346,7 +346,7 @@ class SceneView(View):
 
 
 def _read_settings(source: Any) -> SceneSettings:
-    """Return the settings of a scene, of a rig, or of the scene of a motion."""
+    """Return the settings of a scene, a rig or a motion."""
     if source is None:
         return next(iter(PRESETS.values()))
     if isinstance(source, Rig):

@@ -41,10 +41,10 @@ setTimeout(() => { button.label = "Copy" }, 1500)
 class View(ABC):
     """Base class of a view, which adds code, downloads and messages to widgets and plots.
 
-    A subclass creates its widgets in ``__init__``, and implements the abstract methods. It calls
-    ``refresh`` after each change of its widgets, and ``show_error`` or the context manager
-    ``errors_shown`` around computations. The methods ``figure``, ``table`` and ``dataset`` are
-    called when the user downloads a file.
+    A subclass creates its widgets in ``__init__``, and implements the abstract methods. The
+    subclass calls ``refresh`` after each change to its widgets. To handle errors of computations,
+    the subclass calls ``show_error`` or uses the context manager ``errors_shown``. The methods
+    ``figure``, ``table`` and ``dataset`` are called when the user downloads a file.
 
     Parameters
     ----------
@@ -240,7 +240,7 @@ class View(ABC):
         return json.dumps(self.state(), separators=(",", ":"))
 
     def refresh(self) -> None:
-        """Update the code and the address of the page after a change of the view."""
+        """Update the code and the address of the page after the view has changed."""
         with self.errors_shown():
             texts = self.python_code(), self.command_line(), self.state_text
             for box, text in zip(self._codes.values(), texts, strict=True):

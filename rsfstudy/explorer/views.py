@@ -54,8 +54,9 @@ def create_view(source: Any = None, state: str | None = None) -> View:
 def _find_kind(source: Any) -> tuple[str, Any]:
     """Return the kind of a view and the object that the view shows.
 
-    If the source is a results file, the function opens the file. It does not read the file of a
-    record, because the record view reads the file with options that the user can change.
+    If the source is a results file, the function opens the file. If the source is the file of a
+    record, the function does not read the file, because the record view reads it with options that
+    the user can change.
     """
     if source is None or isinstance(source, Scene | Rig):
         return "scene", source

@@ -6,9 +6,9 @@ start time and end time, the lines are fitted by least squares. The fit with the
 squares determines the start and the end of the drop. The size of the drop is the difference between
 the highest and the lowest stress.
 
-The confidence intervals of the start time and the end time contain all pairs of times with a sum of
-squares close to the smallest sum of squares. The difference between the two sums of squares must be
-less than a fixed multiple of the noise variance [1]_.
+The confidence intervals of the start time and the end time contain all pairs of times for which the
+sum of squares exceeds the smallest sum of squares by less than a fixed multiple of the noise
+variance [1]_.
 
 References
 ----------

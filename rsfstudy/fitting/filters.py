@@ -235,8 +235,8 @@ class Filter:
     def _running_mean_time_offsets(self, time: np.ndarray) -> np.ndarray:
         """Return the time offsets of the points in a running mean.
 
-        Each offset is a time in s relative to the time of a row. If the averaging time is at least
-        four sampling intervals, the points are one sampling interval apart.
+        Each offset is given in s, relative to the time of the row. If the averaging time is at
+        least four sampling intervals, the points are one sampling interval apart.
         """
         count = max(round(self.size / float(np.median(np.diff(time)))), 1)
         count *= (

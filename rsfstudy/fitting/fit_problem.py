@@ -375,10 +375,10 @@ class FitProblem:
         """Compute the final parameters, their errors and the noise.
 
         First, Gauss-Newton steps :math:`(J^T R^{-1} J)^{-1} J^T R^{-1} (y - f)` with accurate
-        derivatives refine the parameters. The numerical error of a parameter is the last
-        Gauss-Newton step, plus three times the change in the parameter if the integration
-        tolerances are reduced by a factor of ten. The degrees of freedom of the fit are the degrees
-        of freedom of the noise, multiplied by (n - p)/n for p parameters and n rows.
+        derivatives refine the parameters. The numerical error of a parameter is the sum of two
+        terms: the last Gauss-Newton step, and three times the change in the parameter when the
+        integration tolerances are reduced by a factor of ten. The degrees of freedom of the fit are
+        the degrees of freedom of the noise, multiplied by (n - p)/n for p parameters and n rows.
         """
         change = math.inf
         for number in range(_NEWTON_STEP_COUNT_LIMITS[2]):
@@ -484,9 +484,9 @@ class FitProblem:
     def _compute_aic_without_steps(self, jacobian: np.ndarray, noise: NoiseModel) -> float:
         """Compute the AIC of a model without a response to the steps.
 
-        The model without a response contains only trends and has a = b = 0. It uses the noise model
-        of the fit, because a newly estimated noise model would describe the response to the steps
-        as correlated noise.
+        The model without a response contains only trends and has a = b = 0. The computation uses
+        the noise model of the fit, because a newly estimated noise model would describe the
+        response to the steps as correlated noise.
         """
         linear = [self.model.is_linear_in_parameter(name) for name in self.free_parameters]
         columns = np.column_stack([jacobian[:, linear], self.model.friction])

@@ -1,6 +1,6 @@
 """Model of several windows that are fitted jointly.
 
-All windows of a joint fit share the parameters of the material. Three parameters have a separate
+In a joint fit, all windows have the same material parameters. Three parameters have a separate
 value in each window: the friction before the step (``mu_star_1``, ``mu_star_2``, ...), the trend,
 and the step time.
 """

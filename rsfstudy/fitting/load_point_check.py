@@ -20,8 +20,8 @@ def displacement_is_slip(
 
     The velocity of a load point is constant before a velocity step, and again constant after the
     step. If the displacement is the slip of the fault, the displacement itself does not have
-    constant velocities. In this case, the sum of the displacement and the elastic shortening of the
-    machine has constant velocities.
+    constant velocities. In this case, the velocities are constant only if the elastic shortening of
+    the machine is added to the displacement.
 
     Parameters
     ----------

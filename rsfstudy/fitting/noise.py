@@ -1,9 +1,9 @@
 r"""White and autoregressive models of the noise of a record.
 
 The function ``fit_noise`` estimates a ``NoiseModel`` from the residuals of a fit by restricted
-maximum likelihood (REML) [1]_. REML accounts for the fraction of the noise that the fitted
-parameters absorb. Let :math:`J` be the Jacobian of the model, :math:`R` the correlation matrix of
-the noise, :math:`p` the number of parameters, and :math:`n` the number of rows. REML minimises
+maximum likelihood (REML) [1]_. REML accounts for the noise variance that the fitted parameters
+absorb. Let :math:`J` be the Jacobian of the model, :math:`R` the correlation matrix of the noise,
+:math:`p` the number of parameters, and :math:`n` the number of rows. REML minimises
 
 .. math:: (n - p) \ln\frac{S}{n - p} + \ln|R| + \ln|J^T R^{-1} J|,
 

@@ -209,9 +209,9 @@ class Record:
     def loading_steps(self) -> tuple[LoadingStep, ...]:
         """Steps of the record, as a tuple of ``LoadingStep``.
 
-        If the user specified steps, the property contains the specified steps. Otherwise, it
-        contains the detected steps. If the record has a normal stress, each step includes the
-        normal stresses before and after the step.
+        If the user specified steps, the property contains the specified steps. Otherwise, the
+        property contains the detected steps. If the record has a normal stress, each step includes
+        the normal stresses before and after the step.
         """
         stress, moved = self.columns.get("normal_stress"), self.columns["displacement"]
         steps = (

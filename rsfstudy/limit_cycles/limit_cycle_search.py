@@ -199,8 +199,7 @@ class LimitCycleSearch:
         """Trace of the derivative A of the return map.
 
         The trace is the ratio of successive distances to the limit cycle. The other eigenvalue of A
-        is zero, because a displacement of the section along the motion has no effect on the next
-        section.
+        is zero, because shifting the section along the motion has no effect on the next section.
         """
         return self._derivatives[0][0] + self._derivatives[1][1]
 

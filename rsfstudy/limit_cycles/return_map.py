@@ -125,7 +125,7 @@ class PeriodicOrbit:
 
     @property
     def floquet_multipliers(self) -> np.ndarray:
-        """Complex Floquet multipliers by decreasing absolute value."""
+        """Complex Floquet multipliers, sorted by decreasing absolute value."""
         found = np.linalg.eigvals(multiply_cycle_derivatives(self.cycle_derivatives)).astype(
             complex
         )

@@ -30,9 +30,9 @@ def resample_motion_along_path(
     """Resample a recorded motion at points along its path.
 
     Half of the points are spaced evenly in path length. The path length is computed from time, ln V
-    and stress. The other half of the points are distributed like the integration steps. The
-    integration steps are short where the path bends. Each extremum of slip rate and of stress is
-    one of the points.
+    and stress. The other half of the points have the same distribution as the integration steps.
+    The integration steps are short where the path bends. The points include all extrema of slip
+    rate and stress.
 
     Parameters
     ----------

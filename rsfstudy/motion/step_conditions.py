@@ -1,8 +1,9 @@
 """Conditions whose roots are located within a step.
 
-Each event occurs at a root of a quantity, such as a derivative of ln V. The end of a regime, a
-requested time and the termination of the motion are also roots of conditions. If a condition
-changes sign between the ends of the step, ``locate_sign_change`` finds the root with dense output.
+Each event occurs at a root of a function of time, for example a derivative of ln V. The end of a
+regime, a requested time and the termination of the motion are also represented by roots of
+functions, which are called conditions. If a condition changes sign between the ends of the step,
+``locate_sign_change`` finds the root with dense output.
 """
 
 from __future__ import annotations

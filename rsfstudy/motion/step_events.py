@@ -125,9 +125,9 @@ def append_step_end_event(motion, workspace, event_table, event_code):
 def append_start_events(motion, workspace, last_point, event_table):
     """Append the events at the start of a regime or segment.
 
-    The first event is the start of the regime or segment, unless the start of the segment is not
-    reported. The function also appends requested events that occur at the jump between the previous
-    and the new regime or segment.
+    The first event is the start of the regime or segment. The start of a segment is omitted if the
+    loading does not report it. The function also appends requested events that occur at the jump
+    between the previous and the new regime or segment.
 
     Parameters
     ----------

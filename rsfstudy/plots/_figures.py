@@ -190,7 +190,7 @@ def _add_header(figure: Figure, dataset: xr.Dataset) -> None:
 def _missing_cells_note(dataset: xr.Dataset) -> tuple[str, bool]:
     """Return a note about missing and failed cells, and True if it is a warning.
 
-    The note is in brackets. It is empty if the results are complete.
+    The note is in brackets. If the results are complete, the note is empty.
     """
     completeness = dataset.attrs.get("completeness", "complete")
     failed = failed_cell_mask(dataset["status"]) & (dataset["status"] != Status.PENDING)

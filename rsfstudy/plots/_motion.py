@@ -1,7 +1,7 @@
 """Figure of a single motion or limit cycle.
 
-The function ``plot_motion`` draws friction and slip rate against displacement or time, and the
-trajectory of the motion in the phase plane.
+The function ``plot_motion`` plots friction and slip rate against displacement or time, and draws
+the trajectory of the motion in the phase plane.
 """
 
 from __future__ import annotations

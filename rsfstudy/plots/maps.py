@@ -271,7 +271,8 @@ def _hatch_cells_without_value_by_status(
 def _find_horizontal_cell_runs(cell_mask: np.ndarray) -> list[tuple[int, int, int]]:
     """Find runs of consecutive True values in the rows of an array.
 
-    Each run is a tuple of its row, its first column, and the column after its last column.
+    Each run is represented by a tuple: its row, its first column, and the column after its last
+    column.
     """
     change = np.diff(np.pad(cell_mask.astype(int), ((0, 0), (1, 1))), axis=1)
     first, last = np.argwhere(change == 1), np.argwhere(change == -1)

@@ -119,8 +119,8 @@ def _convert_rows_to_axis_units(
 ) -> tuple[list[dict[str, Any]], dict[str, str]]:
     """Convert the rows of an axis to numbers and return their units.
 
-    The function converts field names to their names on axes. The units of a field are the units of
-    the axis, the units of the first value of the column, or SI units, in this order of priority.
+    The function converts field names to their names on axes. The units of a field are, in order of
+    priority, the units of the axis, the units of the first value of the column, or SI units.
     """
     found: list[dict[str, Any]] = [{} for _row in rows]
     stated: dict[str, str] = {}

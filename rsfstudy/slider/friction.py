@@ -195,8 +195,8 @@ def _build_stress_functions(
 ) -> tuple[Function, Function, Function, Function]:
     """Build the friction functions whose argument is the frictional stress.
 
-    The argument ``last_unknown`` is ``"pressure"``, ``"load point"`` or an empty string. It
-    describes the last element of the tuple of states. The function returns the first three
+    The argument ``last_unknown`` is ``"pressure"``, ``"load point"`` or an empty string. This
+    argument specifies the last element of the tuple of states. The function returns the first three
     functions of ``FrictionFunctions``, and a function for the derivatives with respect to the last
     unknown.
     """

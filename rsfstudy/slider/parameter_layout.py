@@ -1,12 +1,11 @@
 """Layout of the parameter tuple ``p`` that the equations of a scene read.
 
-The tuple starts with the parameters that every scene has. They are followed by the parameters of
-the parts, in the order of the slots. The parameters of the law are ``p[LAW]``, ``p[LAW + 1]`` and
-so on. The parameters of the law come last, because a law can have any number of parameters. If the
-temperature changes, the parameters of the temperature come after the parameters of the law. In a
-scene with noise, the last two parameters are the inertial time and the rate at which noise changes
-the spring stress. The module also defines the columns of segment tables and limits that prevent
-overflow.
+The tuple starts with the parameters that every scene has. The parameters of the parts follow in the
+order of the slots. The parameters of the law are ``p[LAW]``, ``p[LAW + 1]`` and so on. The
+parameters of the law come last, because a law can have any number of parameters. If the temperature
+changes, the parameters of the temperature come after the parameters of the law. In a scene with
+noise, the last two parameters are the inertial time and the rate at which noise changes the spring
+stress. The module also defines the columns of segment tables and limits that prevent overflow.
 """
 
 from __future__ import annotations

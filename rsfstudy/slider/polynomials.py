@@ -64,8 +64,8 @@ def find_roots_with_one_distant_root(polynomial: PolynomialCoefficients) -> np.n
 
     If the mass of the slider is small, one root is about 1e20 times larger than the other roots. If
     all roots were computed together, the small roots would lose digits. The function therefore
-    computes the small roots from the polynomial without its leading coefficient. It then improves
-    all roots by Newton iterations.
+    computes the small roots from the polynomial without its leading coefficient. Finally, the
+    function refines all roots by Newton iterations.
     """
     falling = polynomial[::-1]
     roots = np.append(np.roots(falling[1:]), -falling[1] / falling[0]).astype(complex)

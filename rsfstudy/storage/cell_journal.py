@@ -141,9 +141,9 @@ class CellJournal:
     ) -> None:
         """Check that the stored fingerprint is compatible with the fingerprint of a run.
 
-        Only the code digests of modules that both fingerprints contain must be equal, because the
-        results in the journal do not depend on the other modules. The work budget of the run may
-        also be larger, because the result of a finished cell does not depend on the budget. In
+        The code digests must be equal only for the modules that both fingerprints contain, because
+        the results in the journal do not depend on the other modules. The work budget of the run
+        may also be larger, because the result of a finished cell does not depend on the budget. In
         these two cases, the method stores the merged fingerprint. For any other difference, the
         method raises ``DataError``.
         """

@@ -89,8 +89,8 @@ def _build_damaged_file_error(path: str, part_name: str) -> DataError:
 def _compute_digests(dataset: xr.Dataset) -> dict[str, str]:
     """Compute one digest for each variable and each attribute.
 
-    The entry of a variable consists of the sizes, the units and the scale of the variable, followed
-    by the digest of its values.
+    The entry of a variable consists of its sizes, units and scale, followed by the digest of its
+    values.
     """
     texts = {
         name: str(dataset.attrs[name])

@@ -130,8 +130,8 @@ def open_zarr_store(path: Path) -> xr.Dataset:
     """Open a Zarr store lazily.
 
     Zarr stores attributes as JSON, and JSON does not distinguish numeric types. The function
-    therefore converts the flag values of each variable to the dtype of the variable. It also
-    removes the dtype of string variables from their encoding, because older versions of xarray
+    therefore converts the flag values of each variable to the dtype of the variable. The function
+    also removes the dtype of string variables from their encoding, because older versions of xarray
     cannot write this dtype to a NetCDF file.
 
     Parameters

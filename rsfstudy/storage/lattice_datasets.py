@@ -76,8 +76,8 @@ def build_lattice_variables(
 ) -> dict[Any, tuple[tuple[str, ...], np.ndarray, dict[str, Any]]]:
     """Build the variables of a block of cells.
 
-    The variables include all outputs of the measure. They also include the status, the message, the
-    wall time and the number of right-hand-side evaluations of each cell.
+    The variables include all outputs of the measure. The variables also include the status, the
+    message, the wall time and the number of right-hand-side evaluations of each cell.
 
     Parameters
     ----------

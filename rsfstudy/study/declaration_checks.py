@@ -238,9 +238,9 @@ def check_override_of_partly_set_field(
 ) -> None:
     """Raise InvalidValue if an overridden field is set at only some axis points.
 
-    At the axis points that do not set the field, the field has the value of the base scene. The
-    override would not change this value. The override is accepted if the field has no value or no
-    meaning at the points that do not set the field.
+    At the other axis points, the field has the value of the base scene, and the override would not
+    change this value. The override is accepted if the field has no value or no meaning at the
+    points that do not set the field.
 
     Parameters
     ----------

@@ -23,9 +23,9 @@ from rsfstudy.errors import SignalInterrupt
 def explore(given: options.CommandOptions) -> int:
     """Show a scene, results or a record in the browser.
 
-    Without FILE, the page shows a spring-slider with sliders for its parameters. If FILE contains
-    the results of a study (.nc or .zarr), the page shows the results. Other files, such as CSV, are
-    read as laboratory records, which you can fit.
+    If FILE is omitted, the page shows a spring-slider model with sliders for its parameters. If
+    FILE contains the results of a study (.nc or .zarr), the page shows the results. Other files,
+    such as CSV, are read as laboratory records, which you can fit.
 
     The server listens on this computer only. Press Ctrl-C to stop it.
     """

@@ -2,8 +2,8 @@
 
 The event loop calls the functions of this module, which call the methods of the stepper object. In
 the compiled loop, the functions of ``order_eight`` replace the functions of this module. For each
-regime, the loop first calls ``begin_regime``. In each step, it calls ``attempt_step`` once, or
-``step_to_segment_end`` if a loading segment ends in the step. After each step, the loop may call
+regime, the loop first calls ``begin_regime``. In each step, the loop calls ``attempt_step`` once,
+or ``step_to_segment_end`` if a loading segment ends in the step. After each step, the loop may call
 ``interpolate_unknowns`` and ``retake_step`` any number of times.
 """
 
@@ -77,7 +77,8 @@ class Stepper(ABC):
 
         The sign of ``motion.direction`` is the direction of the step. The method must set
         ``workspace.y_end``, ``workspace.rates_at_end``, ``motion.end`` and ``motion.step_length``.
-        It must also call ``workspace.count_evaluations`` for its right-hand side evaluations.
+        The method must also call ``workspace.count_evaluations`` for its right-hand side
+        evaluations.
 
         Parameters
         ----------

@@ -20,8 +20,8 @@ _FORMATS = "text, Excel, MATLAB, TDMS, NetCDF and xlook"
 def is_binary(source: Source) -> bool:
     """Return True if the beginning of a file contains a null byte.
 
-    The xlook format has no signature. The other binary formats must therefore be tested before this
-    function is called.
+    The xlook format has no signature. For this reason, all other binary formats must be tested
+    before this function is called.
 
     Parameters
     ----------

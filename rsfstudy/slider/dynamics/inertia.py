@@ -221,7 +221,7 @@ def compute_inertia_weight(
 
     The inertia weight is the lag of :math:`\ln V` behind its quasi-static value, divided by the
     derivative of :math:`\ln V`. If possible, the function computes the slip rate from the ratio
-    ``load_to_slip_velocity_ratio``, which saves the evaluation of an exponential function.
+    ``load_to_slip_velocity_ratio``, to avoid the evaluation of an exponential function.
 
     Parameters
     ----------

@@ -103,8 +103,8 @@ class LawBase(Part):
     default, the law also defines ``steady_states(log_slip_rate, shift, p)``, which returns the
     states :math:`\Psi` in steady sliding. The argument ``shift`` is the decrease in the state
     variable that stress causes. In steady sliding at :math:`V_*`, the state variables must add up
-    to zero, because the friction coefficient is :math:`\mu_*`. A scene rejects a law if its
-    evolution does not vanish at its steady states.
+    to zero, because the friction coefficient is :math:`\mu_*`. A scene rejects a law if the states
+    are not constant in steady sliding.
 
     A law with several states sets the attribute ``state_count``, for example ``state_count = 3``. A
     law with several states must also define ``steady_states`` and ``evolutions(log_slip_rate, psis,

@@ -161,9 +161,9 @@ class ShearHeating(Temperature):
     def rise_bounds(self, scene: SceneView, rise: float, power: float) -> tuple[float, float]:
         """Compute bounds on the future temperature rise.
 
-        See ``Temperature.rise_bounds``. At each time, the temperature approaches the steady
-        temperature at the current power. The steady temperature lies between the steady temperature
-        without slip and the steady temperature at the largest power.
+        See ``Temperature.rise_bounds``. At any time, the temperature evolves towards the steady
+        temperature for the current power. The steady temperature lies between the steady
+        temperature without slip and the steady temperature at the largest power.
         """
         over_cooling = self.heating / self.cooling
         lowest = -over_cooling * scene.mu_star

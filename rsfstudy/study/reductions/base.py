@@ -256,9 +256,8 @@ def mask_unusable_values(
 ) -> xr.Dataset:
     """Replace the values of failed cells and invalid error bounds by NaN.
 
-    The values of failed cells are replaced by NaN. If ``variable_name`` is the name of a standard
-    error or of a bound of a confidence interval, standard errors and bounds that are not valid are
-    also replaced by NaN.
+    The values of failed cells are replaced by NaN. If the variable is a standard error or a bound
+    of a confidence interval, values that are not valid are also replaced by NaN.
 
     Parameters
     ----------

@@ -30,11 +30,12 @@ _SOBOL_INDEX_NAMES = ("first_order", "total")
 class SobolIndices(Reduction):
     """First-order and total Sobol indices.
 
-    The first-order index of a quantity is the share of the variance that is caused by this quantity
-    without interactions. The total index is the share of the variance that remains if all other
-    quantities are fixed. Confidence intervals of 95 % are computed by a bootstrap over the sample
-    points. If a cell failed or has no value, all indices are NaN, because the remaining samples
-    would have a different distribution. The indices are computed by `scipy.stats.sobol_indices`.
+    The first-order index of a quantity is the share of the variance that is caused only by this
+    quantity, without interactions with other quantities. The total index is the share of the
+    variance that remains if all other quantities are fixed. Confidence intervals of 95 % are
+    computed by a bootstrap over the sample points. If a cell failed or has no value, all indices
+    are NaN, because the remaining samples would have a different distribution. The indices are
+    computed by `scipy.stats.sobol_indices`.
 
     Parameters
     ----------
