@@ -28,7 +28,7 @@ class PeakStatistics(EventStatistics):
 
         See ``EventStatistics``.
         """
-        if scene.parts.noise.is_active:
+        if scene.parts.loading_noise.is_active:
             return super()._events(scene, integrator, cycles)
         first = self.discarded_cycles
         return list(islice(_iterate_peaks(scene, integrator), first, first + cycles + 1))

@@ -65,7 +65,10 @@ class PhaseResponse(Measure):
             "joint_noise_sensitivity",
             r"$\sqrt{D_\Theta}/T$",
             "1",
-            "the same for noise that also acts on the state variable",
+            (
+                "coefficient of variation of the interval over the amplitude of noise, if noise "
+                "also acts on the state variable"
+            ),
         ),
         Output("recurrence_interval"),
     )
@@ -86,7 +89,7 @@ class PhaseResponse(Measure):
         Outcome
             Status and results.
         """
-        if scene.has_mass or scene.parts.noise.is_active:
+        if scene.has_mass or scene.parts.loading_noise.is_active:
             raise InvalidValue("scene", scene, "must have neither mass nor noise")
         cycle = LimitCycle(phases=2).run_nested(scene, integrator)
         if cycle.status is not Status.OK:
@@ -240,7 +243,7 @@ class NoisyRecurrence(EventStatistics):
         See ``EventStatistics.compute``.
         """
         outcome = super().compute(scene, integrator)
-        theory = compute_phase_response(scene.with_(noise="none"))
+        theory = compute_phase_response(scene.with_(loading_noise="none"))
         if Status.OK not in (outcome.status, theory.status) or not theory.values:
             return outcome
         expected = scene.stress_noise * theory.values["stress_noise_sensitivity"]

@@ -427,7 +427,7 @@ def cheapest_claim(label: str, digits: float) -> Claim:
     return Claim.below(
         id="A2",
         statement=f"{label}: DOP853 needs at most 1.25 times the least work, {digits:g} digits",
-        source="this project's choice of DOP853 in every regime",
+        source="the default settings of the package use DOP853 in every regime",
         variable="cheapest_ratio",
         where={"problem": label, "digits": digits},
         published=1.25,

@@ -276,7 +276,9 @@ def decaying_peaks_claim(
     """
     return Claim.below(
         id="C11",
-        statement=f"quasi-static, {normal_stress}, {stiffness_ratio:g} k_cr, {rate:g} V_*: decays",
+        statement=(
+            f"quasi-static, {normal_stress}, {stiffness_ratio:g} k_cr, {rate:g} V_*: peaks decay"
+        ),
         source=source,
         variable="peak_ratio",
         where={
@@ -359,10 +361,11 @@ study = Study(
             reason="'by one order of magnitude'",
             expected="differs",
             difference_reason=(
-                "peaks are 10^13.335 and 10^8.952 V_*. Without mass every part of the stress the "
-                "spring carries beyond the state's strength goes into slip rate, e-fold for each "
-                "a sigma; with mass it goes into acceleration. The gap is one order for V_0 = 19 "
-                "V_*, or for 200 V_* on a spring of 1.12 k_cr"
+                "the peaks are 10^13.335 and 10^8.952 V_*. Without inertia, any stress above "
+                "the strength at the current state increases the slip rate, by a factor of e "
+                "for each a sigma. With inertia, this stress accelerates the slider. The "
+                "difference is one order of magnitude for V_0 = 19 V_*, or for V_0 = 200 V_* "
+                "and a stiffness of 1.12 k_cr"
             ),
         ),
         Claim(
@@ -389,7 +392,7 @@ study = Study(
         ),
         Claim.above(
             id="C18",
-            statement="V_0 = 200 V_*: with inertia, the slip is a rupture beyond the norm 5e-4",
+            statement="V_0 = 200 V_*: with inertia, the peak slip rate exceeds the norm of 5e-4",
             source=f"{PAPER}, section 4",
             variable="max_log10_slip_rate",
             where={**LARGEST_STEP, "inertia": True},

@@ -321,7 +321,7 @@ COVERAGE_CLAIMS: tuple[tuple[str, str, dict[str, Any]], ...] = (
         {"relation": "below", "published": 3.0},
     ),
     (
-        "the usual estimate is within ten times the error",
+        "the median estimate is less than ten times the error",
         "covered_typical",
         {
             "relation": "below",

@@ -108,7 +108,9 @@ def expected_error_claim(design: str, k: float, published: float) -> Claim:
     return Claim(
         id="D1",
         statement=f"{design}, k = {k:g} per um: standard error of the exponent",
-        source="Fisher's information; of 500 rows a step and white noise of 5e-4, if not said",
+        source=(
+            "Fisher information for 500 rows per step and white noise of 5e-4, unless specified"
+        ),
         variable="promised_spread",
         where={
             "design": design,
@@ -140,7 +142,7 @@ def fit_error_claim(k: float, parameter: str) -> Claim:
     """
     return Claim(
         id="D2",
-        statement=f"k = {k:g} per um: estimates of {parameter} scatter as predicted",
+        statement=f"k = {k:g} per um: the scatter of {parameter} agrees with the prediction",
         source="Fisher's information",
         variable="kept_off",
         where={"stiffness": k * SLIP_DISTANCE, "parameter": parameter},

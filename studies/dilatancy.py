@@ -184,17 +184,25 @@ study = Study(
         closed_form_claim(1.0, 0.00444076),
         closed_form_claim(10.0, 0.00499026),
         drainage_limit_claim(
-            1e-3, 0.003, "undrained", 1e-8, "grows with c squared: 6.7e-5 at c = 0.1 (D1)"
+            1e-3,
+            0.003,
+            "undrained",
+            1e-8,
+            "the difference increases as c^2, and is 6.7e-5 at c = 0.1 (D1)",
         ),
         drainage_limit_claim(
-            1e3, 0.005, "drained", 2e-9, "falls with c squared: 9.7e-6 at c = 10 (D1)"
+            1e3,
+            0.005,
+            "drained",
+            2e-9,
+            "the difference decreases as 1/c^2, and is 9.7e-6 at c = 10 (D1)",
         ),
         growth_threshold_claim(0.002, 1e-3),
         growth_threshold_claim(0.004, 1.0),
         growth_threshold_claim(0.012, 1e3),
         Claim.below(
             id="D4",
-            statement="E = 0.006 > b - a: stable almost everywhere undrained",
+            statement="E = 0.006 > b - a: k_cr is almost zero if drainage is slow",
             source=SEGALL_RICE,
             variable="critical_stiffness",
             where={"dilatancy": 0.012, "drainage": 1e-3},
@@ -203,7 +211,7 @@ study = Study(
         ),
         Claim.above(
             id="D4",
-            statement="E = 0.006 > b - a: yet unstable at k = 0.75 (b - a) where c* D_c/V = 1",
+            statement="E = 0.006 > b - a: k_cr exceeds 0.75 (b - a) sigma_*/D_c at c* D_c/V = 1",
             source=SEGALL_RICE,
             variable="critical_stiffness",
             where={"dilatancy": 0.012, "drainage": 1.0},

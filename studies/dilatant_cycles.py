@@ -45,7 +45,7 @@ def peak_slip_rate_claim(
     return Claim(
         id="D7",
         statement=f"{law} law, dilatancy {dilatancy:g}: {what}",
-        source=f"{SEGALL_RICE}: dilatancy may prevent instability, with slow slip in its place",
+        source=f"{SEGALL_RICE}: dilatancy can prevent instability and cause slow slip",
         variable="max_log10_slip_rate",
         where={"law": law, "drainage": 1.0, "dilatancy": dilatancy},
         relation=relation,
@@ -142,7 +142,7 @@ figure = Figure(
 
 study = Study(
     name="dilatant_cycles",
-    title="Stick-slip of a dilatant fault, k = 0.5 (b-a) sigma_*/D_c, with mass",
+    title="Stick-slip of a dilatant fault, k = 0.5 (b-a) sigma_*/D_c, with inertia",
     summary=Study.caption(__doc__),
     base=DILATANT_FAULT.with_(stiffness=0.0025, load_velocity_ratio=1.0, inertia=True),
     axes=[
@@ -160,12 +160,12 @@ study = Study(
             peak_slip_rate_claim(law, 0.008, "below", 2.5, "slow slip"),
             Claim.below(
                 id="D8",
-                statement=f"{law} law: slow cycles drop less than a fifth of the stress",
+                statement=f"{law} law: the stress drop of slow cycles is less than 0.05 sigma_*",
                 source=SEGALL_RICE,
                 variable="static_stress_drop",
                 where={"law": law, "drainage": 1.0, "dilatancy": 0.008},
                 published=0.05,
-                reason="an inequality; 0.24 to 0.27 without dilatancy",
+                reason="an inequality; the stress drop without dilatancy is 0.24 to 0.27 sigma_*",
             ),
         )
     ],

@@ -46,7 +46,10 @@ def stabilisation_claim(fault: str, drainage: float, by: float) -> Claim:
     """
     return Claim.above(
         id="D5",
-        statement=f"{fault}, drainage {drainage:.3g}: {by:g} V_* more than drained",
+        statement=(
+            f"{fault}, drainage {drainage:.3g}: the critical step is larger by {by:g} V_* than "
+            "drained"
+        ),
         source=f"{SEGALL_RICE}: dilatancy opposes nucleation",
         variable="critical_velocity_ratio",
         where={"fault": fault, "drainage": drainage},
@@ -104,7 +107,7 @@ study = Study(
         stabilisation_claim("dilatancy 0.004", 1.0, 5.0),
         Claim.below(
             id="D6",
-            statement="dilatancy 0.004: ten times faster drainage lowers the boundary",
+            statement="dilatancy 0.004: ten times faster drainage reduces the critical step",
             source=SEGALL_RICE,
             variable="critical_velocity_ratio",
             where={"fault": "dilatancy 0.004", "drainage": 10.0},
@@ -113,14 +116,16 @@ study = Study(
         ),
         Claim.above(
             id="D6",
-            statement="dilatancy 0.004, drainage 1: steady sliding is as if drained, to 12 %; the "
-            "boundary is as if undrained, to 5 %",
+            statement=(
+                "dilatancy 0.004, drainage 1: the stability of steady sliding is within 12 % of "
+                "the drained limit, but the critical step is within 5 % of the undrained limit"
+            ),
             source=SEGALL_RICE,
             variable="critical_velocity_ratio",
             where={"fault": "dilatancy 0.004", "drainage": 1.0},
             baseline={"fault": "dilatancy 0.004", "drainage": 0.1},
             published=-0.5,
-            reason="an inequality, 5 % of the boundary",
+            reason="an inequality; the bound is 5 % of the critical step",
         ),
     ],
     plot=figure,

@@ -156,13 +156,16 @@ study = Study(
             CONSTANT_NORMAL_STRESS,
             1.0,
             2e-5,
-            "eq. 14 holds for an infinite norm: exp(-10.9 (b/a - 1)) is left",
+            (
+                "eq. 14 holds for an infinite norm; the default norm changes it by exp(-10.9 "
+                "(b/a - 1))"
+            ),
         ),
         closeness_claim(
             CONSTANT_NORMAL_STRESS,
             2.0,
             2e-3,
-            "an infinite norm is approached more slowly when stiff",
+            "on stiff springs, the limit of an infinite norm is approached more slowly",
         ),
         closeness_claim(WEAK_NORMAL_STRESS_EFFECT, 1.0, 0.03, PAPER_WORDS_ON_CLOSENESS),
         closeness_claim(STRONG_NORMAL_STRESS_EFFECT, 1.0, 0.03, PAPER_WORDS_ON_CLOSENESS),

@@ -294,7 +294,7 @@ study = Study(
         Claim(
             id="E2",
             statement="full scene: two unknowns between ruptures",
-            source="the equations are assembled from the effects of the scene",
+            source="the equations contain only the effects of the scene",
             variable="unknowns",
             where={"law": "slip", **FULL_SCENE_PLACE},
             published=2.0,
@@ -303,8 +303,8 @@ study = Study(
         ),
         Claim.below(
             id="E2",
-            statement="full scene, slip law: the full equations need only a fraction of the work",
-            source="inertia is integrated where it acts",
+            statement="full scene, slip law: less than 90 % of the evaluations are in ruptures",
+            source="inertia is integrated explicitly only during ruptures",
             variable="share_in_rupture",
             where={"law": "slip", **FULL_SCENE_PLACE},
             published=0.9,

@@ -255,7 +255,7 @@ def seldom_flagged_claim(process: str, law: str) -> Claim:
     """
     return Claim.below(
         id="F7",
-        statement=f"{process} record, {law} law: the fit seldom reports errors that are not valid",
+        statement=f"{process} record, {law} law: the fit rarely reports that errors are not valid",
         source="design goal of the standard errors of fits",
         variable="flagged_share",
         where={"process": process, "law": law},
@@ -282,8 +282,9 @@ def naive_errors_claim(process: str, law: str) -> Claim:
     """
     return Claim.below(
         id="F3",
-        statement=f"{process} noise, {law} law: naive 68.3 % confidence intervals have far lower "
-        "coverage",
+        statement=(
+            f"{process} noise, {law} law: 68.3 % intervals of the usual formula are too short"
+        ),
         source="correlated noise reduces the effective sample size",
         variable="naive_share_one_least",
         where={"process": process, "law": law},

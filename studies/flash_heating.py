@@ -83,7 +83,7 @@ figure = Figure(
             style={"markersize": 2},
             x_label="Slip rate, $V/V_*$",
             y_label=r"Steady friction, $\mu_{ss}$",
-            title="Steady friction falls towards $f_w$",
+            title="Steady friction decreases to $f_w$",
             log="x",
         ),
     ]
@@ -118,7 +118,7 @@ study = Study(
         ),
         Claim.above(
             id="H3",
-            statement="V = V_w: k_cr is more than 40 times that at V_*",
+            statement="V = V_w: k_cr is more than 40 times the value at V_*",
             source=f"{RICE}, and {INDEPENDENT}",
             variable="critical_stiffness",
             where={"weakening_velocity_ratio": 1e5, "load_velocity_ratio": 1e5},

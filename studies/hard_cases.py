@@ -495,7 +495,10 @@ study = Study(
     claims=[
         Claim.below(
             id="H1",
-            statement=f"{label}: error below the 1e-7 asked for, switch between regimes included",
+            statement=(
+                f"{label}: the error is less than the requested 1e-7, including the switch "
+                "between regimes"
+            ),
             source=known.EXTENDED_PRECISION_SOURCE,
             variable="measured_error",
             where={"hard_case": label},

@@ -350,9 +350,11 @@ def critical_stiffness_claim(at: str, law: str, case: str) -> Claim:
     """
     return Claim(
         id="I1",
-        statement=f"{law} law, {case}, slowest record: k/k_cr where small departures "
-        f"{_GROWTH_DESCRIPTIONS[at]}",
-        source="critical stiffness at the pressure and slip rate of the moment",
+        statement=(
+            f"{law} law, {case}, slowest record: k/k_cr when small perturbations "
+            f"{_GROWTH_DESCRIPTIONS[at]}"
+        ),
+        source="critical stiffness at the current pressure and slip rate",
         variable=f"{at}_stiffness_ratio",
         where={"law": law, "case": case, "record": SLOWEST_RECORD},
         published=1.0,
@@ -386,9 +388,11 @@ def critical_pressure_claim(at: str, law: str, case: str, within: float, reason:
     where = {"law": law, "case": case, "record": SLOWEST_RECORD}
     return Claim(
         id="I2",
-        statement=f"{law} law, {case}, slowest record: pressure where small departures "
-        f"{_GROWTH_DESCRIPTIONS[at]}, less that at which k is critical at V_0",
-        source="critical stiffness at the pressure of the moment",
+        statement=(
+            f"{law} law, {case}, slowest record: pressure when small perturbations "
+            f"{_GROWTH_DESCRIPTIONS[at]}, minus the pressure at which k is critical at V_0"
+        ),
+        source="critical stiffness at the current pressure",
         variable=f"{at}_pressure",
         where=where,
         baseline=where,
@@ -533,7 +537,7 @@ figure = Figure(
 
 study = Study(
     name="injection",
-    title="Slow injection ends instability, and begins it: k = 0.98 k_cr before",
+    title="Slow injection that ends instability and lets it begin again, initially k = 0.98 k_cr",
     summary=Study.caption(__doc__),
     base=base,
     axes=[

@@ -151,8 +151,8 @@ study = Study(
     claims=[
         Claim(
             id="C17",
-            statement="'~2361 V_*' at k = 1.5 k_cr implies our default norm",
-            source=f"{PAPER}, section 4, which states no norm",
+            statement="'~2361 V_*' at k = 1.5 k_cr implies the default norm of the package",
+            source=f"{PAPER}, section 4, which does not specify the norm",
             variable="implied_norm",
             where={"boundary": STIFF_BOUNDARY},
             published=5e-4,

@@ -54,7 +54,7 @@ def experiment_fields(normal_stress: float, noise: str) -> dict[str, Any]:
     """
     scene, rig = build_gualandi_scene(normal_stress), build_gualandi_rig(normal_stress)
     names = ("stiffness", "radiation_damping", "dilatancy")
-    fields = {"noise": noise, **{name: getattr(scene, name) for name in names}}
+    fields = {"loading_noise": noise, **{name: getattr(scene, name) for name in names}}
     if noise == "none":
         return fields
     return {**fields, "stress_noise": STRESS_NOISE / rig.normal_stress, "noise_interval": 0.1}
@@ -228,7 +228,9 @@ study = Study(
             tolerance=0.01,
             reason="reading error of 0.3 %, and sampling error of 0.3 % of both values",
             expected="differs",
-            difference_reason="noise of the paper acts on the state variable and on normal stress",
+            difference_reason=(
+                "in the paper, noise also acts on the state variable and on normal stress"
+            ),
         ),
     ],
     plot=figure,

@@ -145,7 +145,7 @@ def all_records_decide_claim(law: str, design: str, size: float) -> Claim:
     return Claim(
         id="L1",
         statement=f"{law} law, {design}, noise {size:g}: every record identifies the law",
-        source="the standard error of the exponent is below .1",
+        source="the standard error of the exponent is less than 0.1",
         variable="chosen_right",
         where={"law": law, "design": design, "noise_size": size},
         published=1.0,
@@ -168,8 +168,8 @@ def seldom_wrong_claim(law: str) -> Claim:
     """
     return Claim.below(
         id="L2",
-        statement=f"{law} law, one step up, noise 0.005: fewer than half mislead",
-        source="likelihood: the other law leads by e^2 in one record of nine at most",
+        statement=f"{law} law, one step up, noise 0.005: fewer than half of the choices are wrong",
+        source="likelihood ratio: the wrong law leads by e^2 in at most one of nine records",
         variable="chosen_wrong",
         where={"law": law, "design": "one step up", "noise_size": 5e-3},
         published=0.5,

@@ -169,8 +169,10 @@ def design_claims(design: str) -> list[Claim]:
     return [
         Claim(
             id="I1",
-            statement=f"{design}: standard error of the exponent by Fisher's information",
-            source="augmented equations of the sensitivities, 500 rows a step, white noise of 5e-4",
+            statement=f"{design}: standard error of the exponent from the Fisher information",
+            source=(
+                "augmented equations of the sensitivities, 500 rows per step, white noise of 5e-4"
+            ),
             variable="promised_spread",
             where={**where, "seed": 0},
             published=EXPECTED_STDERRS[design],
@@ -179,7 +181,7 @@ def design_claims(design: str) -> list[Claim]:
         ),
         Claim(
             id="I2",
-            statement=f"{design}: estimates scatter by as much",
+            statement=f"{design}: the scatter of the estimates equals the standard error",
             source="Fisher's information",
             variable="scatter_off",
             where=where,

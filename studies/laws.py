@@ -127,7 +127,7 @@ def variable_normal_stress_claim(law: str, published: float) -> Claim:
     """
     return Claim(
         id="L4",
-        statement=f"{law}, k = k_cr: variable normal stress moves the step by a few per cent",
+        statement=f"{law}, k = k_cr: variable normal stress changes the step by a few percent",
         source="Fig. 7 of the paper, for the slip law: 'maximum difference of a few percents'",
         variable="lowering",
         where={"evolution": law, "normal_stress": "variable", "stiffness_ratio": 1.0},
@@ -209,8 +209,11 @@ study = Study(
         critical_displacement_claim("L2", PERRIN_RICE_ZHENG, 2.0, 0.5 * math.asinh(2.0), 5e-9),
         Claim(
             id="L3",
-            statement="slowness law, k = 2 k_cr: only a jump to the norm itself is critical",
-            source="K >= b/eps: the spring unloads faster than the state falls",
+            statement=(
+                "slowness law, k = 2 k_cr: the critical step raises the slip rate directly to "
+                "the norm"
+            ),
+            source="K >= b/eps: the spring unloads faster than the state weakens",
             variable="critical_displacement",
             where={"evolution": SLOWNESS_END, "normal_stress": "constant", "stiffness_ratio": 2.0},
             published=0.5 * base.log_instability_rate,

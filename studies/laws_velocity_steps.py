@@ -51,8 +51,8 @@ def law_order_claim(smaller: str, larger: str) -> Claim:
     """
     return Claim.above(
         id="L5",
-        statement=f"constant, k = 1.25 k_cr: step by {larger} above that by {smaller}",
-        source="the faster the state falls above steady sliding, the smaller the step",
+        statement=f"constant, k = 1.25 k_cr: the critical step of {larger} exceeds {smaller}",
+        source="the critical step is smaller if the state evolves faster above steady sliding",
         variable="critical_velocity_ratio",
         where={"evolution": larger, **STIFF_FIELDS},
         baseline={"evolution": smaller, **STIFF_FIELDS},
@@ -118,8 +118,11 @@ study = Study(
         *map(variable_normal_stress_claim, LABELLED_LAWS),
         Claim.below(
             id="L6",
-            statement="slowness law, k = 1.75 k_cr: variable normal stress does not lower it",
-            source="the end of what the paper finds for the slip law",
+            statement=(
+                "slowness law, k = 1.75 k_cr: variable normal stress does not lower the critical "
+                "step"
+            ),
+            source="limit of the result that the paper reports for the slip law",
             variable="lowering",
             where={"evolution": SLOWNESS_END, "normal_stress": "variable", "stiffness_ratio": 1.75},
             published=0.0,

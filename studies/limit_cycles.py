@@ -281,7 +281,9 @@ study = Study(
         *(
             Claim.above(
                 id="C14",
-                statement=f"slowness law, {stress}: drops in acceleration and deceleration unequal",
+                statement=(
+                    f"slowness law, {stress}: stress drops in acceleration and deceleration differ"
+                ),
                 source=f"{PAPER}, section 3.4, Fig. 11",
                 variable="drop_asymmetry",
                 where=cycle_place("slowness", stress),
@@ -292,7 +294,7 @@ study = Study(
         ),
         Claim.above(
             id="C14",
-            statement="constant normal stress: the asymmetry is far larger than with the slip law",
+            statement="constant normal stress: the asymmetry is larger than under the slip law",
             source=f"{PAPER}, section 3.4, Rice and Tse (1986)",
             variable="drop_asymmetry",
             where=cycle_place("slowness", "constant"),

@@ -79,7 +79,7 @@ def steepness_claim(phi: float, gentler: float) -> Claim:
     """
     return Claim.below(
         id="C1",
-        statement=f"k_cr falls with V more steeply at {phi:g} than at {gentler:g} degrees",
+        statement=f"k_cr decreases with V more steeply at {phi:g} than at {gentler:g} degrees",
         source=f"{PAPER}, section 2.2, Fig. 2",
         variable="stiffness_slope",
         where={"mass": NO_MASS, "phi": phi},
@@ -242,7 +242,7 @@ study = Study(
     claims=[
         Claim.below(
             id="C1",
-            statement="phi = 60 degrees: k_cr falls with V",
+            statement="phi = 60 degrees: k_cr decreases with V",
             source=f"{PAPER}, section 2.2, Fig. 2",
             variable="stiffness_slope",
             where={"mass": NO_MASS, "phi": 60.0},
@@ -278,7 +278,9 @@ study = Study(
         ),
         Claim.below(
             id="C2",
-            statement="phi = 50: sliding at 0.8 k_cr(V_*) is stable from a velocity below 1000 V_*",
+            statement=(
+                "phi = 50: sliding at 0.8 k_cr(V_*) becomes stable at a velocity below 1000 V_*"
+            ),
             source=f"{PAPER}, section 2.2, Fig. 2",
             variable="stabilising_velocity",
             where={"mass": NO_MASS, "phi": 50.0},

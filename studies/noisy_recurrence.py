@@ -92,8 +92,10 @@ def cv_claim(amplitude: float) -> Claim:
     """
     return Claim.below(
         id="N1",
-        statement=f"the CV at an amplitude of {amplitude:g} follows from the phase response, "
-        "within 1.5 % for the correlation of intervals and three standard errors",
+        statement=(
+            f"amplitude {amplitude:g}: the CV agrees with the phase response to within 1.5 % and "
+            "three standard errors"
+        ),
         source=INDEPENDENT,
         variable="theory_deviation",
         where={"stress_noise": amplitude},
@@ -209,7 +211,7 @@ study = Study(
         b_over_a=1.2,
         stiffness=0.001,
         radiation_damping=1e-4,
-        noise="white",
+        loading_noise="white",
         noise_interval=0.25,
     ),
     axes=[
@@ -235,7 +237,7 @@ study = Study(
         theory_claim("recurrence_interval", LIMIT_CYCLE_INTERVAL, "interval without noise"),
         Claim.above(
             id="N3",
-            statement="at an amplitude of 1e-3, the CV exceeds the theory",
+            statement="amplitude 1e-3: the CV exceeds the value of the phase response",
             source=INDEPENDENT,
             variable="interval_cv",
             where={"stress_noise": 1e-3},

@@ -136,8 +136,10 @@ def rigid_limit_claim(law: str, step: float) -> Claim:
     read, rigid = expected_readings(law, step, STIFFEST)[0], expected_readings(law, step)[0]
     return Claim(
         id="R5",
-        statement=f"{law} law, step of {step:+g} sigma_*, k = {STIFFEST:g} k_cr: the apparent "
-        f"alpha is that of a rigid slider, {rigid:.4f}, except for O(a/K)",
+        statement=(
+            f"{law} law, step of {step:+g} sigma_*, k = {STIFFEST:g} k_cr: the apparent alpha "
+            f"agrees with the closed form to first order in a/K (rigid slider: {rigid:.4f})"
+        ),
         source=CLOSED_FORM_SOURCE,
         variable="apparent_alpha",
         where={"law": law, "normal_stress_step": step, "stiffness_ratio": STIFFEST},
@@ -167,8 +169,10 @@ def slip_distance_claim(law: str, step: float) -> Claim:
     quicker = initial_log_rate(step) if law == "slip" else -initial_log_rate(step)
     return Claim(
         id="R6",
-        statement=f"{law} law, step of {step:+g} sigma_*, k = {STIFFEST:g} k_cr: the apparent D_c "
-        f"is that of a rigid slider, {rigid:.4f} D_c, except for O(a/K)",
+        statement=(
+            f"{law} law, step of {step:+g} sigma_*, k = {STIFFEST:g} k_cr: the apparent D_c "
+            f"agrees with the closed form to first order in a/K (rigid slider: {rigid:.4f} D_c)"
+        ),
         source=CLOSED_FORM_SOURCE,
         variable="apparent_slip_distance",
         where={"law": law, "normal_stress_step": step, "stiffness_ratio": STIFFEST},

@@ -178,11 +178,16 @@ study = Study(
             reason="'very close'; the tolerance is approximately the size of the symbols in the "
             "figure",
             expected="differs",
-            difference_reason="it is lower by 5.7 %, half of that at alpha = 0.56, and by 6 % "
-            "above k_cr",
+            difference_reason=(
+                "the boundary is lower by 5.7 %, which is half of the difference at alpha = "
+                "0.56; above k_cr, it is lower by 6 %"
+            ),
         ),
         eq_11_claim(
-            1.0, 1.0, 1e-7, "exact; a finite norm leaves exp[-10.9 (b/a - 1)] = 7e-9 of it"
+            1.0,
+            1.0,
+            1e-7,
+            "exact; a finite norm changes it by a relative amount of exp[-10.9 (b/a - 1)] = 7e-9",
         ),
         eq_11_claim(1.1, 0.99, 0.006, PAPER_WORDS_ON_UNDERESTIMATE),
         eq_11_claim(1.5, 0.98, 0.006, PAPER_WORDS_ON_UNDERESTIMATE),

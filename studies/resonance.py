@@ -141,9 +141,13 @@ def resonance_claim(law: str, period: float) -> Claim:
     }
     return Claim.above(
         id="R2",
-        statement=f"{law} law, k = {STIFFNESS_RATIOS[0]:g} k_cr: gain is larger than at "
-        f"{period / RESONANCE_PERIOD:g} times the period",
-        source="linear theory: resonance at omega D_c/V = sqrt((b - a)/a) as k falls to k_cr",
+        statement=(
+            f"{law} law, k = {STIFFNESS_RATIOS[0]:g} k_cr: the gain at resonance exceeds that at "
+            f"{period / RESONANCE_PERIOD:g} times the period"
+        ),
+        source=(
+            "linear theory: as k decreases to k_cr, resonance is at omega D_c/V = sqrt((b - a)/a)"
+        ),
         variable="gain",
         where={**at, "oscillation_period": RESONANCE_PERIOD},
         baseline={**at, "oscillation_period": period},
@@ -174,7 +178,7 @@ def linear_range_claim(law: str, ratio: float, amplitude: float, *, still: bool 
         id="R3",
         statement=f"{law} law, k = {ratio:g} k_cr at resonance, A = {amplitude:g}: linear theory "
         f"{'holds' if still else 'no longer holds'} to a tenth",
-        source="it takes changes of ln V for small, which grow as the gain",
+        source="linear theory assumes small changes of ln V, which increase with the gain",
         variable="departure_from_linear",
         where={
             "law": law,
@@ -209,7 +213,9 @@ def failure_order_claim(softer: float, stiffer: float) -> Claim:
         id="R4",
         statement=f"slowness law: linear theory fails at a smaller amplitude at {softer:g} k_cr "
         f"than at {stiffer:g} k_cr",
-        source="changes of ln V grow as the gain, which is larger nearer to critical stiffness",
+        source=(
+            "changes of ln V increase with the gain, which is larger closer to critical stiffness"
+        ),
         variable="failing_amplitude",
         where={**at, "stiffness_ratio": softer},
         baseline={**at, "stiffness_ratio": stiffer},

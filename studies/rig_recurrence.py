@@ -57,9 +57,11 @@ def slip_law_drop_claim(stress: float, drop: str, multiple: float) -> Claim:
     """
     return Claim(
         id="S1",
-        statement=f"slip law, {stress:g} MPa: {drop} drop falls by {multiple:g} (b-a) sigma with "
-        "ln V_0",
-        source=f"{CLOSED_FORM_SOURCE}" + ", and an overshoot as large" * (drop == "static"),
+        statement=(
+            f"slip law, {stress:g} MPa: {drop} drop decreases by {multiple:g} (b-a) sigma per "
+            "unit of ln V_0"
+        ),
+        source=f"{CLOSED_FORM_SOURCE}" + ", and an overshoot of equal size" * (drop == "static"),
         variable=f"{drop}_slope",
         where={"law": "slip", "sigma_star": stress},
         published=-multiple * weakening,
@@ -86,8 +88,8 @@ def slowness_law_drop_claim(stress: float) -> Claim:
     """
     return Claim.below(
         id="S2",
-        statement=f"slowness law, {stress:g} MPa: static drop falls faster still",
-        source="contacts heal at rest, for a time that is proportional to the drop",
+        statement=f"slowness law, {stress:g} MPa: the static drop decreases more steeply",
+        source="contacts heal between events, for a time that is proportional to the drop",
         variable="static_slope",
         where={"law": "slowness", "sigma_star": stress},
         published=-2.0 * weakening,

@@ -156,7 +156,9 @@ study = Study(
         *(slower_evolution_claim("slowness", rate, "Fig. 4", "C4") for rate in (1e-4, 1e-2)),
         Claim.above(
             id="C3",
-            statement="slip law, 4 decades down: more stress evolves than upward",
+            statement=(
+                "slip law, 4 decades: more stress evolves after a step down than after a step up"
+            ),
             source=f"{PAPER}, section 2.3, Fig. 3",
             variable="evolution_asymmetry",
             where={"law": "slip", "normal_stress": "variable", "load_velocity_ratio": 1e-4},
@@ -166,21 +168,21 @@ study = Study(
         ),
         Claim.above(
             id="C3",
-            statement="slip law, 4 decades down: higher direct stress change than upward",
+            statement="slip law, 4 decades: the direct stress change is larger for a step down",
             source=f"{PAPER}, section 2.3",
             variable="direct_asymmetry",
             where={"law": "slip", "normal_stress": "variable", "load_velocity_ratio": 1e-4},
             published=0.0,
             expected="differs",
             difference_reason=(
-                "the jump itself is smaller for the downward step, because strength increases "
-                "more slowly at higher stress; the paper measures the jump in curves of stress "
-                "minus its future steady-state value"
+                "the jump itself is smaller for the step down, because strength increases "
+                "more slowly at higher stress. In the paper, the jump is measured in curves "
+                "of stress minus its future steady-state value"
             ),
         ),
         Claim(
             id="C4",
-            statement="slowness law, constant: down steps of 2-4 decades are indistinguishable",
+            statement="slowness law, constant: steps down of 2 to 4 decades are indistinguishable",
             source=f"{PAPER}, section 2.3, Fig. 4",
             variable="separation",
             where={"law": "slowness", "normal_stress": "constant"},

@@ -47,7 +47,7 @@ def relaxation_claim(ratio: float) -> Claim:
     """
     return Claim(
         id="P1",
-        statement=f"slowness law, b > a, k = {ratio:g} k_cr: relaxation ends",
+        statement=f"slowness law, b > a, k = {ratio:g} k_cr: relaxation approaches a limit",
         source=f"{CLOSED_FORM_SOURCE}: -a k^ ln(k^)/(k^ - 1), k^ = k/k_cr",
         variable="relaxation",
         where={"case": SLOWNESS, "stiffness": ratio * a, "hold_time": LONGEST_HOLD_TIME},
@@ -80,9 +80,11 @@ def reloading_peak_claim(ratio: float) -> Claim:
         where={"case": SLOWNESS, "stiffness": stiffness, "hold_time": LONGEST_HOLD_TIME},
         published=b * math.log(LONGEST_HOLD_TIME) - late,
         tolerance=2e-5 * b,
-        reason="2e-5 of b: most peaks are accurate to 2e-7, but if parameters are changed in the "
-        "last bit, 3 of 100 peaks have different integration steps and are accurate to 1.2e-5, in "
-        "agreement with their error estimates",
+        reason=(
+            "2e-5 of b: most peaks are accurate to 2e-7. If parameters are changed in the last "
+            "bit, 3 of 100 peaks have different integration steps and are accurate to 1.2e-5, in "
+            "agreement with their error estimates"
+        ),
     )
 
 
@@ -194,7 +196,9 @@ study = Study(
         *(
             Claim(
                 id="P2",
-                statement=f"slowness law, b < a, k = {ratio:g} a sigma_*/D_c: relaxation goes on",
+                statement=(
+                    f"slowness law, b < a, k = {ratio:g} a sigma_*/D_c: relaxation continues"
+                ),
                 source=f"{CLOSED_FORM_SOURCE}: slope -(a - b) against ln t",
                 variable="relaxation_per_decade",
                 where={"case": STRENGTHENING, "stiffness": ratio * a},
@@ -211,7 +215,7 @@ study = Study(
             Claim.below(
                 id="P5",
                 statement=f"slip law: healing per decade decreases from {soft:g} to {stiff:g} k_cr",
-                source="with the slip law, healing is only due to slip during the hold",
+                source="under the slip law, healing is only due to slip during the hold",
                 variable="healing_per_decade",
                 where={"case": SLIP, "stiffness": stiff * a},
                 baseline={"case": SLIP, "stiffness": soft * a},
@@ -221,8 +225,8 @@ study = Study(
         ),
         Claim.below(
             id="P5",
-            statement="slip law, k = 3 k_cr: relaxation goes on from 1e6 to 1e8 D_c/V_*",
-            source="with the slip law, relaxation does not end",
+            statement="slip law, k = 3 k_cr: relaxation continues from 1e6 to 1e8 D_c/V_*",
+            source="under the slip law, relaxation has no limit",
             variable="relaxation",
             where={"case": SLIP, "stiffness": 3.0 * a, "hold_time": LONGEST_HOLD_TIME},
             baseline={"case": SLIP, "stiffness": 3.0 * a, "hold_time": 1e6},

@@ -340,7 +340,7 @@ def edge_claim(law: str, normal_stress: str, says: str, **held: Any) -> Claim:
     return Claim(
         id="C1",
         statement=f"{law} law, {normal_stress}: {says}",
-        source=f"{PAPER}, section 2.2, eqs. 7 and 8; eigenvalues with mass",
+        source=f"{PAPER}, section 2.2, eqs. 7 and 8; eigenvalues with inertia",
         where={"law": law, "normal_stress": normal_stress},
         published=0.0,
         **held,

@@ -91,7 +91,7 @@ def slowness_law_drop_claim(case: str) -> Claim:
     """
     return Claim.below(
         id="C16",
-        statement=f"slowness law, {case}: static drop falls with ln V_0",
+        statement=f"slowness law, {case}: the static drop decreases with ln V_0",
         source=f"{PAPER}, section 3.5",
         variable="static_slope",
         where={"law": "slowness", "case": case, "stiffness_ratio": 0.8},
@@ -292,7 +292,7 @@ study = Study(
         slowness_law_drop_claim(VARIABLE_CASE),
         Claim.below(
             id="C16",
-            statement="slowness law: steeper with variable normal stress",
+            statement="slowness law: the slope is steeper at variable normal stress",
             source=f"{PAPER}, section 3.5",
             variable="static_slope",
             where={"law": "slowness", "case": VARIABLE_CASE, "stiffness_ratio": 0.8},

@@ -77,7 +77,9 @@ study = Study(
         cycle_claim("static_stress_drop", "slip", 0.001, 0.072637758467),
         Claim.above(
             id="H14",
-            statement="slip law: the stress drop at E = 0.01 exceeds that at E = 1e-4 by 0.37",
+            statement=(
+                "slip law: the stress drop is larger by 0.37 sigma_* at E = 0.01 than at E = 1e-4"
+            ),
             source=f"{RICE}, and {INDEPENDENT}",
             variable="static_stress_drop",
             where={"law": "slip", "heating": 0.01},

@@ -52,7 +52,7 @@ CASES: dict[str, dict[str, str | float]] = {
 }
 EXPONENTS = {"slip": 0.0, "slowness": 1.0}
 HELD_LOAD_POINT_SOURCE = (
-    "load point held: u begins at mu_* (q-1)/a - alpha (1/a - 1/b) ln q, threshold h(u*) = -q k^"
+    "load point held: initially u = mu_* (q-1)/a - alpha (1/a - 1/b) ln q, threshold h(u*) = -q k^"
 )
 
 #: Effective friction mu' for alpha = 0.56 and b/a = 2.
@@ -86,7 +86,10 @@ def critical_fall_claim(law: str, alpha: float, ratio: float, within: float, rea
     )
     return Claim(
         id="N1",
-        statement=f"{law} law, imposed, alpha = {alpha:g}, k = {ratio:g} k_cr: critical fall",
+        statement=(
+            f"{law} law, imposed, alpha = {alpha:g}, k = {ratio:g} k_cr: critical decrease of "
+            "stress"
+        ),
         source=f"{HELD_LOAD_POINT_SOURCE}, q = sigma_*/sigma, k^ = k/k_cr",
         variable="critical_normal_stress_step",
         where={
@@ -117,8 +120,10 @@ def coulomb_limit_claim(law: str, case: str) -> Claim:
     """
     return Claim(
         id="N2",
-        statement=f"{law} law, {case}, k = 0.05 k_cr: falls and displacements trigger at the same "
-        "change of Coulomb stress",
+        statement=(
+            f"{law} law, {case}, k = 0.05 k_cr: normal stress decreases and displacements trigger "
+            "at the same change of Coulomb stress"
+        ),
         source="mu' = mu_* - alpha (1 - a/b), to first order in k/k_cr",
         variable="coulomb_ratio",
         where={"law": law, "case": case, "stiffness_ratio": 0.05},
@@ -146,8 +151,10 @@ def normal_stress_effect_claim(law: str) -> Claim:
     where = {"law": law, "stiffness_ratio": 0.5}
     return Claim.below(
         id="N3",
-        statement=f"{law} law, imposed, k = 0.5 k_cr: with alpha = 0.56 a larger fall is needed",
-        source="Linker and Dieterich (1992): a fall of normal stress strengthens the state",
+        statement=(
+            f"{law} law, imposed, k = 0.5 k_cr: a larger decrease is needed for alpha = 0.56"
+        ),
+        source="Linker and Dieterich (1992): a decrease of normal stress increases the state",
         variable="critical_normal_stress_step",
         where={**where, "case": IMPOSED_WITH_ALPHA},
         baseline={**where, "case": IMPOSED_WITHOUT_ALPHA},
@@ -227,7 +234,7 @@ panel = Panel(
     facet=["law"],
     style={"markersize": 2.6},
     x_limits=(0.0, None),
-    legend_title="Filled markers: fall of normal stress, case by case",
+    legend_title="Filled markers: decrease of normal stress, by case",
 )
 VELOCITY_STEP_LABEL = r"velocity step, $a\,\ln(V_0/V_*)$"
 figure = Figure(
@@ -281,7 +288,11 @@ study = Study(
         critical_fall_claim("slip", 0.56, 0.25, 2e-9, TOLERANCE_REASON),
         critical_fall_claim("slip", 0.56, 0.5, 2e-9, TOLERANCE_REASON),
         critical_fall_claim(
-            "slip", 0.56, 1.0, 3e-5, "a finite norm leaves exp(-10.9 (b/a - 1)/(q k^)) = 3e-5 of it"
+            "slip",
+            0.56,
+            1.0,
+            3e-5,
+            "a finite norm changes the result by exp(-10.9 (b/a - 1)/(q k^)) = 3e-5",
         ),
         critical_fall_claim("slowness", 0.56, 0.25, 2e-9, TOLERANCE_REASON),
         *(
@@ -304,7 +315,7 @@ study = Study(
         Claim(
             id="N4",
             statement="slip law, imposed, alpha = 0, k = k_cr: Coulomb stress is exact, mu' = mu_*",
-            source="mu_* (1 - 1/q) = a k^: that of a displacement, at any stiffness",
+            source="mu_* (1 - 1/q) = a k^: the stress change equals that of a displacement step",
             variable="coulomb_ratio",
             where={"law": "slip", "case": IMPOSED_WITHOUT_ALPHA, "stiffness_ratio": 1.0},
             published=1.0,
@@ -324,9 +335,11 @@ study = Study(
         ),
         Claim.above(
             id="N6",
-            statement="slowness law, inclined, alpha = 0.56, k = 1.25 k_cr: Coulomb stress is "
-            "misleading",
-            source="a fall also lowers the critical stiffness: h(u*) = -q k^",
+            statement=(
+                "slowness law, inclined, alpha = 0.56, k = 1.25 k_cr: Coulomb stress is a poor "
+                "predictor"
+            ),
+            source="a decrease of normal stress also lowers the critical stiffness: h(u*) = -q k^",
             variable="coulomb_ratio",
             where={"law": "slowness", "case": INCLINED_STRONG, "stiffness_ratio": 1.25},
             published=2.0,

@@ -188,7 +188,7 @@ peaks_panel = Panel(
     x="stiffness_ratio",
     y_label=r"Peak slip rate, $\log_{10}(V_{peak}/V_*)$",
     isel={"law": 0},
-    title="Peaks of slip rate, event by event",
+    title="Peak slip rate of each event",
     overlays=[plot_peaks, set_abscissa(False)],
     condition=lambda dataset: bool(dataset["peak_spread"].notnull().any()),
 )
@@ -293,7 +293,7 @@ study = Study(
             id="S5",
             statement="k = 0.8531 k_cr: small perturbations grow on average, so the motion is "
             "chaotic",
-            source=f"{BECKER}, finds chaos; for this spring not known to be published",
+            source=f"{BECKER}, who found chaos; no published result is known for this stiffness",
             variable="lyapunov_exponent",
             where=spring_place(0.8531),
             published=0.1,
@@ -302,11 +302,11 @@ study = Study(
         Claim(
             id="S6",
             statement="k = 0.8567 k_cr: motions repeat themselves after four events",
-            source="not known to be published",
+            source="no published result is known",
             variable="period_events",
             where=spring_place(0.8567),
             published=4.0,
-            reason="a whole number",
+            reason="an integer",
         ),
     ],
     plot=figure,

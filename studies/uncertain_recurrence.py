@@ -91,8 +91,10 @@ CLAIMS = (
     Claim.below(
         id="U3",
         statement="the relative uncertainty of the interval is smaller than that of b - a",
-        source="contacts heal at rest by b ln t, so only a part of the drop is proportional to b "
-        "- a",
+        source=(
+            "contacts heal by b ln t between events, so only part of the drop is proportional to "
+            "b - a"
+        ),
         variable="relative_spread",
         where={},
         published=NET_WEAKENING_STDERR,
@@ -100,7 +102,9 @@ CLAIMS = (
     Claim(
         id="U4",
         statement="every sample has stick-slip",
-        source="b - a is five standard errors above zero, the machine several times too soft",
+        source=(
+            "b - a exceeds zero by five standard errors, and the stiffness is far below critical"
+        ),
         variable="share",
         where={"ended": "ok"},
         published=1.0,

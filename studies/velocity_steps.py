@@ -77,8 +77,10 @@ def rigid_limit_claim(law: str, ratio: float) -> Claim:
     expected = b * abs(peak_departure(law, ratio)) * a / (STIFFEST * (b - a))
     return Claim(
         id="P6",
-        statement=f"{law} law, {STEP_DESCRIPTIONS[ratio]}, k = {STIFFEST:g} k_cr: that of a rigid "
-        "slider, except for O(a/K)",
+        statement=(
+            f"{law} law, {STEP_DESCRIPTIONS[ratio]}, k = {STIFFEST:g} k_cr: the difference "
+            "from a rigid slider agrees with the first order in a/K"
+        ),
         source=f"closed form: {forms[law]}, and its first order in a/K",
         variable="closed_form_departure",
         where={"law": law, "velocity_ratio": ratio, "stiffness_ratio": STIFFEST},

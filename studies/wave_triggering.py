@@ -117,7 +117,7 @@ def linear_limit_claim(law: str, period: float, phase: float) -> Claim:
         id="W1",
         statement=f"{place_description(law, period, phase)}: clock advance of small waves divided "
         "by that of the linearised equations",
-        source="departures from the free cycle to first order in the amplitude",
+        source="first-order deviations from the cycle without waves",
         variable="linear_ratio",
         where=claim_place(law, period, SMALL, phase),
         published=1.0,
@@ -144,8 +144,10 @@ def coulomb_limit_claim(law: str, phase: float) -> Claim:
     """
     return Claim(
         id="W2",
-        statement=f"{place_description(law, SLOW_WAVES, phase)}: the event comes where "
-        "Coulomb stress reaches what it is at the onset of a free one",
+        statement=(
+            f"{place_description(law, SLOW_WAVES, phase)}: the event begins when Coulomb stress "
+            "reaches its value at the onset of an event without waves"
+        ),
         source="K V_0 (t - t_1) = mu dsigma/sigma_*",
         variable="coulomb_ratio",
         where=claim_place(law, SLOW_WAVES, LARGE, phase),
@@ -174,8 +176,10 @@ def strong_waves_claim(law: str) -> Claim:
     """
     return Claim(
         id="W3",
-        statement=f"{place_description(law, WAVES, 0.9)}, A = {LARGEST:g}: triggered where "
-        "Coulomb stress reaches its threshold, to within the time of nucleation",
+        statement=(
+            f"{place_description(law, WAVES, 0.9)}, A = {LARGEST:g}: the event is triggered when "
+            "Coulomb stress reaches its threshold, to within the nucleation time"
+        ),
         source="K V_0 (t - t_1) = mu dsigma/sigma_*",
         variable="coulomb_ratio",
         where=claim_place(law, WAVES, LARGEST, 0.9),
@@ -200,9 +204,14 @@ def early_train_claim(amplitude: float) -> Claim:
     """
     return Claim(
         id="W4",
-        statement=f"{place_description('slowness', FAST_WAVES, 0.5)}, A = {amplitude:g}: forgotten",
-        source="with the slowness law stress at a time t before the event counts by exp(-t/t_a), "
-        "t_a = a sigma/(k V_0): 42 D_c/V_* leave 1e-9",
+        statement=(
+            f"{place_description('slowness', FAST_WAVES, 0.5)}, A = {amplitude:g}: waves have no "
+            "effect"
+        ),
+        source=(
+            "under the slowness law, the effect of stress decreases as exp(-t/t_a) with the time "
+            "t before the event, t_a = a sigma/(k V_0): 1e-9 remains after 42 D_c/V_*"
+        ),
         variable="clock_advance",
         where=claim_place("slowness", FAST_WAVES, amplitude, 0.5),
         published=0.0,
@@ -226,8 +235,10 @@ def coulomb_error_claim(law: str) -> Claim:
     """
     return Claim.above(
         id="W5",
-        statement=f"{place_description(law, WAVES, 0.8)}, A = {LARGE:g}: the delay is larger than "
-        "a threshold predicts",
+        statement=(
+            f"{place_description(law, WAVES, 0.8)}, A = {LARGE:g}: the delay is larger than the "
+            "threshold predicts"
+        ),
         source="an inequality: nucleation averages over a sigma/(k V_0)",
         variable="coulomb_ratio",
         where=claim_place(law, WAVES, LARGE, 0.8),

@@ -135,7 +135,9 @@ def first_order_claim(of: str, name: str, share: float) -> Claim:
     return Claim(
         id="W3",
         statement=f"{of}: {name} explains {share:g} of the variance of its logarithm",
-        source="drops are 2 (b - a) sigma times a logarithm, intervals drops over k V_0",
+        source=(
+            "the drop is 2 (b - a) sigma times a logarithm, and the interval is the drop over k V_0"
+        ),
         variable=f"{of}_total",
         where={"input": name},
         published=share,
@@ -228,7 +230,9 @@ study = Study(
         ),
         Claim(
             id="W2",
-            statement="stiffness does not show in a boundary at the critical stiffness",
+            statement=(
+                "stiffness has no influence on the critical displacement at critical stiffness"
+            ),
             source="D_c a/(b - a)",
             variable="displacement_total",
             where={"input": "ln_stiffness"},

@@ -272,6 +272,28 @@ MOTIONS: dict[str, Motion | Track] = {
     "slowness, thermal, damped": frozen_motion(
         "slowness", VARIABLE, SHEAR_HEATING, DAMPING, STEP_UP, fluid="thermal"
     ),
+    # Noise of the loading.
+    "slip, white noise, damped": frozen_motion(
+        "slip",
+        IMPOSED,
+        DAMPING,
+        STEP_UP,
+        loading_noise="white",
+        stress_noise=1e-4,
+        normal_stress_noise=1e-4,
+        noise_interval=0.25,
+        noise_seed=3,
+    ),
+    "slowness, correlated noise, damped": frozen_motion(
+        "slowness",
+        CONSTANT,
+        DAMPING,
+        STEP_UP,
+        loading_noise="correlated",
+        stress_noise=1e-4,
+        noise_interval=0.25,
+        noise_seed=3,
+    ),
     # Radiation damping, for each law.
     "slip, damped": frozen_motion("slip", CONSTANT, DAMPING, UNSTABLE_STEP_UP),
     "slowness, damped, dilatant": frozen_motion("slowness", IMPOSED, DILATANT, DAMPING, STEP_UP),

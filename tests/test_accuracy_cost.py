@@ -10,8 +10,8 @@ import math
 import numpy as np
 import pytest
 import xarray as xr
-from conftest import STEP_END_EVENT
 from extended_precision import critical_velocity, make_slider
+from motion_helpers import STEP_END_EVENT
 from rsfstudy.named_studies._cheapest_integrator import CheapestIntegrator
 from rsfstudy.named_studies._known_problems import Problem
 from rsfstudy.named_studies.accuracy_cost import WorkPrecision

@@ -295,7 +295,7 @@ def test_ctrl_c_ends_all_studies(catalogued, tmp_path):
     )
     ran = call_main("run", "--all", "--serial", "--output", tmp_path)
     assert ran.returncode == 1
-    assert "cells are finished and kept" in ran.stderr
+    assert "cells are finished and stored" in ran.stderr
     assert list(rows(ran.stdout)) == ["before"]
     assert not (tmp_path / "after.cells.sqlite").exists()
 

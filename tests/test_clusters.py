@@ -172,7 +172,7 @@ def test_a_scheduler_lost_in_mid_run(separate, held):
     assert code == 1
     assert "the connection to the Dask scheduler is lost" in said
     assert "distributed." not in said  # Dask does not print the error again.
-    assert "of 30 cells are finished and kept" in said
+    assert "of 30 cells are finished and stored" in said
     assert (output / "faulty.partial.nc").exists()
     resumed = run(faulty_study(cells=30), output=output)
     have_same_numbers(resumed, run(faulty_study(cells=30)))
@@ -181,7 +181,7 @@ def test_a_scheduler_lost_in_mid_run(separate, held):
 def test_a_worker_of_another_version_is_refused(cluster, monkeypatch):
     other = {**provenance.code_fingerprint(), "scipy": "0.1"}
     monkeypatch.setattr(provenance, "code_fingerprint", lambda *_used: other)
-    with pytest.raises(RunError, match=r"a worker has scipy .*, this run 0\.1"):
+    with pytest.raises(RunError, match=r"a worker has scipy .*, but this run has 0\.1"):
         run(client=cluster)
 
 

@@ -201,7 +201,7 @@ def test_cells_of_other_code_are_not_mixed(tmp_path):
     longer = study_in(tmp_path).with_(b_over_a=[2.0, 3.0, 4.0])
     assert rsfstudy.run(longer, **options).total.values[:2].tolist() == first.total.values.tolist()
     edited = HELPER.replace("return 2.0 * x", "return 200.0 * x")
-    with pytest.raises(DataError, match="own_code: .* there, .* now"):
+    with pytest.raises(DataError, match="own_code: .* in the journal, .* in this run"):
         rsfstudy.run(study_in(tmp_path, helper=edited), **options)
 
 

@@ -104,7 +104,7 @@ def test_points_of_one_name_must_hold_the_same(two):
     first = first.assign_coords(alpha=values)
     rounded = first.assign_coords(alpha=first["alpha"] * (1.0 + 1e-15))
     assert rsfstudy.compare(first, rounded).agrees
-    with pytest.raises(InvalidValue, match="other values of alpha") as caught:
+    with pytest.raises(InvalidValue, match="different values of alpha") as caught:
         rsfstudy.compare(first, second.assign_coords(alpha=first["alpha"] + 0.1))
     assert caught.value.name == "axis"
 
@@ -133,7 +133,7 @@ def test_an_axis_that_the_other_lacks_is_matched_by_its_fixed_value(computed):
         assert sorted(found.finished_cell_counts) == [0, 4, 4]
         assert row(found)["identical"] == 4
     named = study(Axis("case", {"one": {"law": "slip"}, "two": {"law": "slowness"}}))
-    with pytest.raises(InvalidValue, match="axis = 'case': is an axis of one of the two"):
+    with pytest.raises(InvalidValue, match="axis = 'case': is an axis of only one of the datasets"):
         rsfstudy.compare(fixed, run(named))
 
 

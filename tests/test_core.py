@@ -9,9 +9,9 @@ import math
 
 import numpy as np
 import pytest
-from conftest import follow_until
 from hypothesis import given
 from hypothesis import strategies as st
+from motion_helpers import follow_until
 
 from rsfstudy import Scene
 from rsfstudy.limit_cycles.limit_cycle import LimitCycle

@@ -8,9 +8,9 @@ import math
 
 import numpy as np
 import pytest
-from conftest import cot_phi, reaches_instability_norm
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from motion_helpers import cot_phi, reaches_instability_norm
 from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 from time_domain_reference import TimeDomainMotion

@@ -107,7 +107,9 @@ def test_a_number_that_another_program_changed_is_refused_with_the_remedy(writte
     dataset = xr.load_dataset(written)
     dataset["critical_stiffness"][0, 0] += 1e-9
     dataset.to_netcdf(tmp_path / "mine.nc")
-    with pytest.raises(DataError, match="critical_stiffness is not what .*delete the attribute"):
+    with pytest.raises(
+        DataError, match="critical_stiffness does not match its digest.*delete the attribute"
+    ):
         rsfstudy.open(tmp_path / "mine.nc")
     del dataset.attrs["content_digest"]
     dataset.to_netcdf(tmp_path / "mine.nc")
@@ -131,7 +133,7 @@ def test_a_damaged_motion_is_refused(tmp_path):
     place = content.index(motion["slip"].values[-3:].tobytes())
     content[place + 3] ^= 1
     (tmp_path / "motion.nc").write_bytes(content)
-    with pytest.raises(DataError, match=r"slip is not what was written"):
+    with pytest.raises(DataError, match=r"slip does not match its digest"):
         dataset_files.read_dataset(tmp_path / "motion.nc")
     shutil.copy(tmp_path / "whole.nc", tmp_path / "motion.nc")
     again = dataset_files.read_dataset(tmp_path / "motion.nc")

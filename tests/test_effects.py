@@ -5,9 +5,9 @@ import math
 import types
 
 import pytest
-from conftest import cot_phi
 from hypothesis import given
 from hypothesis import strategies as st
+from motion_helpers import cot_phi
 from rsfstudy.named_studies import effects
 
 from rsfstudy import Scene

@@ -215,7 +215,7 @@ def test_a_run_says_which_cells_failed(tmp_path, capsys):
     """Python warns about failed cells, and the command prints a table."""
     study = faulty_study("nan", at=(2.5, 3.0))
     with pytest.warns(
-        IncompleteWarning, match=r"^2 of 4 cells failed: not_finite 2; dataset\.rsf\."
+        IncompleteWarning, match=r"^2 of 4 cells failed: not_finite 2; use dataset\.rsf\."
     ):
         dataset = run(study)
     assert len(dataset.rsf.failures()) == 2

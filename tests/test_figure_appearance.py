@@ -85,8 +85,8 @@ def test_panels_are_below_each_other_in_a_narrow_figure(results):
     [
         ("20 mm", "width = '20 mm': must be from 60 mm to 600 mm. For example, pass '85 mm'"),
         (85, "must be from 60 mm to 600 mm"),
-        ("3 s", "has units of another kind than m"),
-        ("wide", "is no quantity"),
+        ("3 s", "has units that are incompatible with m"),
+        ("wide", "is not a quantity"),
     ],
 )
 def test_widths_are_checked(motion, width, message):

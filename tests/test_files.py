@@ -194,7 +194,7 @@ def test_what_another_program_saved_is_read_and_told(small, tmp_path):
     mine["log"] = np.log(mine.critical_velocity_ratio)
     mine.attrs["comment"] = "with logarithms"
     mine.to_netcdf(tmp_path / "mine.nc")
-    with pytest.warns(UserWarning, match="mine.nc has no digest: another program saved it"):
+    with pytest.warns(UserWarning, match="mine.nc has no digest, because another program saved"):
         assert "log" in rsfstudy.open(tmp_path / "mine.nc")
 
 

@@ -48,7 +48,7 @@ def test_a_wrong_number_is_unverified():
 def test_a_wrong_status_is_unverified():
     wrong = outcome("a slider that locks", status=Status.NO_LIMIT_CYCLE)
     assert wrong.status is Status.UNVERIFIED
-    assert "ended as locked, not no_limit_cycle" in wrong.message
+    assert "status locked instead of no_limit_cycle" in wrong.message
 
 
 #: Cases that need more than five times the usual work, with the reasons.

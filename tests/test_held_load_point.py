@@ -7,7 +7,7 @@ import math
 
 import numpy as np
 import pytest
-from conftest import reaches_instability_norm
+from motion_helpers import reaches_instability_norm
 
 from rsfstudy import Scene, simulate
 from rsfstudy.critical_steps.critical_step import CriticalStep

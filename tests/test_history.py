@@ -162,7 +162,7 @@ def test_a_motion_holds_its_samples(tmp_path):
     assert motion.history_samples.dims == ("history_sample", "history_column")
     assert motion.rsf.scene == scene
     motion["history_samples"] = 2.0 * motion.history_samples
-    with pytest.raises(DataError, match="history_samples are not those of the scene"):
+    with pytest.raises(DataError, match="history_samples do not match the digest of the scene"):
         _ = motion.rsf.scene
 
 

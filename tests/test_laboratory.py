@@ -66,6 +66,8 @@ CALLS: dict[str, dict] = {
     "load_velocity_ratio": {},
     **{name: {"fluid": "dilatant"} for name in ("dilatancy", "drainage", "porosity_length")},
     "weakening_velocity_ratio": {"law": "flash_heating"},
+    "noise_interval": {"loading_noise": "white", "stress_noise": 1e-4},
+    "noise_correlation_time": {"loading_noise": "correlated", "stress_noise": 1e-4},
     "cooling": {"temperature": "shear_heating"},
     "pressurisation": {"temperature": "shear_heating", "fluid": "thermal"},
 }
@@ -80,7 +82,9 @@ def test_every_field_with_a_scale_takes_units(about):
     scene = rig.scene(**CALLS.get(about.name, {}), **{about.name: text})
     assert getattr(scene, about.name) == pytest.approx(value, rel=1e-12)
     assert scene.reference_rate == V / D_C
-    with pytest.raises(InvalidValue, match=rf"{about.name} = '1 kg': has units of another kind"):
+    with pytest.raises(
+        InvalidValue, match=rf"{about.name} = '1 kg': has units that are incompatible with"
+    ):
         rig.scene(**{about.name: "1 kg"})
 
 
@@ -119,7 +123,7 @@ def test_mass_and_radiation():
 
 
 def test_a_scale_that_is_unusual_is_told():
-    with pytest.warns(UserWarning, match="slip_distance is 1 m: unusual for a rig. Is the unit"):
+    with pytest.warns(UserWarning, match="slip_distance is 1 m: this value is unusual for a rig"):
         Rig(**{**THREE, "slip_distance": 1.0})
 
 

@@ -120,6 +120,7 @@ MADE = {
         Scene(stiffness_ratio=0.5, load_velocity_ratio=30.0), duration=100.0, **QUICK
     ),
     "to_si": lambda _: rsfstudy.to_si(motion(), **SCALES),
+    "DatasetAccessor.simplify": lambda _: motion().rsf.simplify(),
     "DatasetAccessor.to_si": lambda _: cycle().rsf.to_si(**SCALES),
     "Rig.in_units": lambda _: rig_motion(stress="MPa", length="um"),
     "Rig.in_units in h": lambda _: rig_motion(time="h"),

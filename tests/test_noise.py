@@ -26,7 +26,7 @@ BASE = Scene(
     stiffness=0.001,
     radiation_damping=1e-4,
 )
-NOISY = BASE.with_(noise="white", stress_noise=1e-4, noise_interval=0.25, noise_seed=1)
+NOISY = BASE.with_(loading_noise="white", stress_noise=1e-4, noise_interval=0.25, noise_seed=1)
 
 
 def final_point(scene: Scene, until: float, engine: str = "python", rtol: float = 1e-9):
@@ -130,7 +130,7 @@ def test_engines_agree_on_a_path():
 
 def test_noise_of_zero_amplitude_changes_nothing():
     still = NOISY.with_(stress_noise=0.0, displacement_step=0.1, load_velocity_ratio=1.0)
-    smooth = still.with_(noise="none")
+    smooth = still.with_(loading_noise="none")
     ends = [final_point(scene, 20.0) for scene in (still, smooth)]
     assert ends[0].point.log_slip_rate == pytest.approx(ends[1].point.log_slip_rate, abs=1e-7)
     assert ends[0].slip == pytest.approx(ends[1].slip, abs=1e-8)
@@ -190,7 +190,7 @@ def test_noise_of_normal_stress(kind):
     scene = BASE.with_(
         normal_stress="imposed",
         alpha=0.3,
-        noise=kind,
+        loading_noise=kind,
         normal_stress_noise=1e-3,
         noise_interval=0.25,
         noise_seed=5,
@@ -208,7 +208,7 @@ def test_noise_of_normal_stress(kind):
 
 def test_lost_normal_stress_ends_the_motion():
     scene = BASE.with_(
-        normal_stress="imposed", noise="white", normal_stress_noise=1.0, noise_interval=0.25
+        normal_stress="imposed", loading_noise="white", normal_stress_noise=1.0, noise_interval=0.25
     )
     with pytest.warns(rsfstudy.errors.IncompleteWarning):
         motion = rsfstudy.simulate(scene, duration=500.0, engine="python")
@@ -217,7 +217,9 @@ def test_lost_normal_stress_ends_the_motion():
 
 def test_noise_with_mass_agrees_with_radiation_damping_of_slow_slip():
     """At slow slip, neither mass nor its regimes matter."""
-    slow = BASE.with_(radiation_damping=0.0, noise="white", stress_noise=1e-4, noise_interval=0.25)
+    slow = BASE.with_(
+        radiation_damping=0.0, loading_noise="white", stress_noise=1e-4, noise_interval=0.25
+    )
     massive = slow.with_(inertia=True, period=1.0)
     ends = [final_point(scene, 6.0) for scene in (slow, massive)]
     assert ends[0].point.log_slip_rate == pytest.approx(ends[1].point.log_slip_rate, abs=1e-6)
@@ -230,7 +232,7 @@ def test_noise_in_ruptures_with_mass():
         inertia=True,
         period=200.0,
         reference_rate=1e-3,
-        noise="white",
+        loading_noise="white",
         stress_noise=1e-4,
         noise_interval=0.25,
         displacement_step=3.0,
@@ -338,7 +340,7 @@ def test_wrong_fields_of_the_measure(wrong):
 
 @pytest.mark.parametrize("measure", [LimitCycle(), CriticalStep(of="load_velocity_ratio")])
 def test_measures_of_smooth_loading_refuse_noise(measure):
-    with pytest.raises(InvalidValue, match=r"noise = 'white': changes stress at random"):
+    with pytest.raises(InvalidValue, match=r"loading_noise = 'white': changes stress at random"):
         measure(NOISY, Accuracy())
 
 
@@ -354,11 +356,11 @@ def test_stability_ignores_noise():
         ({"noise_seed": 0.5}, "whole number"),
         ({"stress_noise": -1.0}, "must be 0 or greater"),
         ({"normal_stress_noise": 1e-3}, "cannot be combined with a loading or noise"),
-        ({"noise": "none", "stress_noise": 1e-4}, "has no meaning without noise"),
+        ({"loading_noise": "none", "stress_noise": 1e-4}, "has no meaning without noise"),
     ],
 )
 def test_wrong_noise(fields, text):
-    known = {"normal_stress": "constant", "noise": "white", "stress_noise": 1e-4}
+    known = {"normal_stress": "constant", "loading_noise": "white", "stress_noise": 1e-4}
     with pytest.raises(InvalidValue, match=text):
         Scene(**{**known, **fields})
 

@@ -127,7 +127,9 @@ def test_a_measure_states_its_outputs_once(tmp_path):
     ids=named,
 )  # fmt: skip
 def test_inner_coordinates_that_are_none(values):
-    with pytest.raises(InvalidValue, match="x = |measure = 'Own': declares what no lattice can"):
+    with pytest.raises(
+        InvalidValue, match="x = |measure = 'Own': declares outputs that a lattice cannot"
+    ):
         study(along(values))
 
 

@@ -68,7 +68,7 @@ def test_a_segment_may_be_as_short_as_time_can_tell(engine, begins):
 
     pulse = {"velocity": 1e4, "duration": short}
     assert ends_with(pulse) == pytest.approx(ends_with(), abs=1e-7)
-    with pytest.raises(InvalidValue, match="must be 1e-16 D_c/V_"):
+    with pytest.raises(InvalidValue, match="must be at least 1e-16 D_c/V_"):
         ends_with({**pulse, "duration": 0.4 * short})
 
 

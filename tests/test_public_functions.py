@@ -384,7 +384,7 @@ def test_a_store_with_a_link_is_refused(tmp_path):
     array = tmp_path / "small.zarr" / "critical_velocity_ratio"
     array.rename(tmp_path / "elsewhere")
     array.symlink_to(tmp_path / "elsewhere")
-    with pytest.raises(DataError, match="critical_velocity_ratio is no file, but .* a link"):
+    with pytest.raises(DataError, match="critical_velocity_ratio is a pipe, a device or a link"):
         rsfstudy.open(tmp_path / "small.zarr")
 
 

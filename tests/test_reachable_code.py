@@ -64,7 +64,7 @@ def test_limit_cycles_do_not_affect_critical_steps(tmp_path, monkeypatch):
     after = resume(study, tmp_path, monkeypatch)
     assert after.critical_velocity_ratio.values == before.critical_velocity_ratio.values
     edit(monkeypatch, "slider/friction_relation.py")
-    told = r"differently: physics \(slider.friction_relation\): \w{16} there, \w{16} now\. Mixing"
+    told = r"physics \(slider.friction_relation\): \w{16} in the journal, \w{16} in this run"
     with pytest.raises(DataError, match=told):
         rsfstudy.run(study, output=tmp_path, **OPTIONS)
 

@@ -138,7 +138,9 @@ def test_the_command_line_makes_the_same_fit(record, tmp_path, monkeypatch):
     assert ran.returncode == 0, ran.stderr
     values = json.loads(ran.stdout)["fits"][0]["parameters"]
     calls = []
-    fits = rsfstudy.fit(window, progress=lambda done, total: calls.append((done, total)), **fitting)
+    fits = rsfstudy.fit(
+        window, progress=lambda done, total, _remaining: calls.append((done, total)), **fitting
+    )
     assert {each["name"]: each["value"] for each in values} == {
         each["name"]: fits[each["name"]].item() for each in values
     }

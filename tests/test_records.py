@@ -117,7 +117,9 @@ def test_types_of_arrays_tell_what_they_are() -> None:
     masked = np.ma.masked_where(np.arange(len(MOVED)) == 3, MOVED)
     with pytest.raises(InvalidValue, match="sample 4: displacement = nan: must be a finite number"):
         rsfstudy.read_record({**plain, "LP (um)": masked})
-    with pytest.raises(InvalidValue, match="displacement = '1 s': has units of another kind"):
+    with pytest.raises(
+        InvalidValue, match="displacement = '1 s': has units that are incompatible with"
+    ):
         rsfstudy.read_record({**plain, "LP (um)": intervals})
     with pytest.raises(InvalidValue, match="friction = 'complex128': must be real numbers"):
         rsfstudy.read_record({**plain, "mu": FRICTION + 0j})

@@ -145,7 +145,7 @@ def test_numbers_that_failures_leave_behind_reach_no_result(failure, place):
 
 @pytest.mark.parametrize("name", ["critical_velocity_ratio", "status", "b_over_a"])
 def test_a_reduction_replaces_nothing(name):
-    with pytest.raises(InvalidValue, match=f"would replace '{name}'"):
+    with pytest.raises(InvalidValue, match=f"would replace the variable '{name}'"):
         apply_reductions(lattice(1.0 + X), (Range(name, "critical_velocity_ratio", "b_over_a"),))
 
 

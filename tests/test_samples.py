@@ -411,10 +411,10 @@ def test_samples_are_drawn_as_histograms_and_scatters():
     laws = Axis("law", ["slip", "slowness"])
     found = run(study(laws, Axis.samples(LOGS, 256, 3, fields=FIELDS)), engine="compiled")
     drawn = plots.draw_figure(found)
-    names = ("critical_stiffness", "a", "b_over_a")
-    assert len(drawn.axes) == len(names) ** 2
-    for place, axes in enumerate(drawn.axes):
-        x, y = names[place % 3], names[place // 3]
+    names = ("a", "b_over_a", "critical_stiffness")
+    places = [(column, row) for row in range(3) for column in range(row + 1)]
+    for (column, row), axes in zip(places, drawn.axes, strict=True):
+        x, y = names[column], names[row]
         assert max(len(axes.get_xticks()), len(axes.get_yticks())) < 8
         if x == y:
             bars = sum(bar.get_height() for bar in axes.patches)

@@ -112,7 +112,7 @@ def test_reductions_and_claims_of_a_zarr_store(tmp_path, monkeypatch):
 
 def test_a_store_that_is_there_is_not_replaced(tmp_path):
     run(SMALL_STUDY, output=tmp_path, format="zarr")
-    with pytest.raises(DataError, match=r"small\.zarr is there already"):
+    with pytest.raises(DataError, match=r"small\.zarr already exists"):
         run(SMALL_STUDY, output=tmp_path, format="zarr")
 
 
@@ -155,7 +155,7 @@ def test_a_file_and_a_store_of_one_name_are_told_apart(tmp_path):
     run(SMALL_STUDY, output=tmp_path, format="zarr")
     assert rsfstudy.open("small", tmp_path).encoding["source"].endswith("small.zarr")
     run(SMALL_STUDY, output=tmp_path)
-    with pytest.raises(DataError, match=r"small\.nc and .*small\.zarr are both there"):
+    with pytest.raises(DataError, match=r"small\.nc and .*small\.zarr exist"):
         rsfstudy.open("small", tmp_path)
     have_same_numbers(rsfstudy.open(tmp_path / "small.nc"), in_memory())
 

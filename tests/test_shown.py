@@ -248,9 +248,11 @@ def test_indices_that_are_refused_say_why(tmp_path, monkeypatch):
     axis = Axis.samples(uncertain, 2, seed=1, method="saltelli")
     indices = SobolIndices("explained", "critical_velocity_ratio")
     study = study_of("refused", CriticalStep(), axis, reductions=[indices])
-    with pytest.warns(IncompleteWarning, match="^no explained: . of 8 cells have no number, and"):
+    with pytest.warns(
+        IncompleteWarning, match="^no explained: . of 8 cells have no value, but the indices"
+    ):
         done = run(study, rtol=1e-4)
-    why = "[1-7] of 8 cells have no number, and the indices need all: narrower"
+    why = "[1-7] of 8 cells have no value, but the indices require all cells. Use narrower"
     said = " ".join(told_of(done, tmp_path, monkeypatch).split())
     assert re.search(f"no explained {why}", said)
     assert re.search(f"<dt>no explained</dt><dd>{why}", done.rsf._repr_html_())

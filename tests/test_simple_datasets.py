@@ -66,5 +66,5 @@ def test_units_of_a_rig_are_kept():
 
 
 def test_other_datasets_are_rejected(results):
-    with pytest.raises(DataError, match="is not of rsfstudy"):
+    with pytest.raises(DataError, match="was not created by rsfstudy"):
         results.rsf.simplify().drop_attrs().rsf.simplify()

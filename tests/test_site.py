@@ -26,9 +26,7 @@ import rsfstudy
 from rsfstudy import measures, reductions
 from rsfstudy.api.accessor import DatasetAccessor
 from rsfstudy.cli.command_line import cli
-from rsfstudy.fitting.fit_measure import Fit
 from rsfstudy.limit_cycles.limit_cycle import LimitCycle
-from rsfstudy.measure_base.elasticities import Elasticities
 from rsfstudy.slider import part_registry
 from rsfstudy.status import Status
 from rsfstudy.vocabulary import QUANTITY_BY_NAME
@@ -140,7 +138,7 @@ def test_examples_make_what_they_stand_beside(examples):
 
 
 def test_examples_that_no_study_states_can_be_called(examples):
-    known = {"Elasticities": Elasticities, "Fit": Fit, "LimitCycle": LimitCycle}
+    known = {name: getattr(measures, name) for name in measures.__all__}
     record = rsfstudy.read_record(ROOT / "studies/pages/step.csv", normal_stress="20 MPa")
     for name, call in examples["CALLS"].items():
         made = eval(call, {**vars(reductions), **known, "record": record})

@@ -7,9 +7,9 @@ import math
 
 import numpy as np
 import pytest
-from conftest import cot_phi
 from hypothesis import assume, given
 from hypothesis import strategies as st
+from motion_helpers import cot_phi
 
 from rsfstudy import Scene
 from rsfstudy.responses.linear_stability import compute_jacobian, max_growth_rate

@@ -12,7 +12,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from conftest import STEP_END_EVENT
+from motion_helpers import STEP_END_EVENT
 from scipy.integrate import DOP853, RK45, Radau, solve_ivp
 
 from rsfstudy import Scene

@@ -6,9 +6,9 @@ The stress dependence can be combined with any law.
 import math
 
 import pytest
-from conftest import cot_phi
 from hypothesis import given
 from hypothesis import strategies as st
+from motion_helpers import cot_phi
 from test_steady import PLAIN, WITH_ONE_B
 
 from rsfstudy import Scene

@@ -75,7 +75,9 @@ def test_an_override_that_other_points_take_from_the_base_is_refused():
     """
     points = {"two laws": {"law": "slip"}, "neutral": {"law": "slowness", "b_over_a": 1.0}}
     laws = declared(base=Scene(stiffness=0.01), axes=[Axis("case", points)])
-    with pytest.raises(InvalidValue, match="some points of case alone .neutral.*two laws is 2"):
+    with pytest.raises(
+        InvalidValue, match="only at some points of case .neutral.*two laws, which is 2"
+    ):
         laws.with_(b_over_a=1.6)
     for given in ({"b_over_a": 1.6, "case": "two laws"}, {"case": "two laws", "b_over_a": 1.6}):
         (scene,) = laws.with_(**given).scenes()

@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 import pytest
-from conftest import cot_phi
+from motion_helpers import cot_phi
 
 import rsfstudy
 from rsfstudy import Scene

@@ -509,9 +509,9 @@ class DatasetAccessor:
         -------
         pandas.DataFrame
             Table with one row per fit. The columns are the fitted parameters and their standard
-            errors (``a``, ``a_stderr``, ``b``, ``b_stderr``, ``Dc``, ``Dc_stderr`` and so on), the load
-            point velocities ``V0`` before and ``V1`` after the step, ``law``, ``window``, ``R2``,
-            ``p_value``, ``status`` and others. Lengths are in um and velocities in um/s.
+            errors (``a``, ``a_stderr``, ``b``, ``b_stderr``, ``Dc``, ``Dc_stderr`` and so on), the
+            load point velocities ``V0`` before and ``V1`` after the step, ``law``, ``window``,
+            ``R2``, ``p_value``, ``status`` and others. Lengths are in um and velocities in um/s.
 
         Raises
         ------

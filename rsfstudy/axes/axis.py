@@ -25,7 +25,7 @@ AxisRow = Mapping[str, Any]
 
 
 def fields_of_axis_point(axis_point: Any) -> Any:
-    """Return the field values that an object, such as a rig, sets on an axis.
+    """Return the field values of an axis point, which may be a mapping or a rig.
 
     Parameters
     ----------
@@ -121,7 +121,7 @@ class Axis:
         numbered points, pass a mapping from field names to lists of values. See also `samples` and
         `cases`.
     units : mapping of str to str, optional
-        Units of the fields, in a study of a rig. See `Rig.axis`.
+        Units of the fields, for a study that is based on a `Rig`. See `Rig.axis`.
     sampling_info : mapping, optional
         Description of the sampling method and its arguments, as numbers and strings.
 
@@ -129,7 +129,7 @@ class Axis:
     ------
     InvalidValue
         If the axis is empty, or if the axis contains repeated or non-finite values. Numbered points
-        may be equal, because random samples may be equal.
+        may occur more than once, because random samples may be equal.
 
     Examples
     --------
@@ -214,8 +214,8 @@ class Axis:
         n : int
             Number of samples. The methods "sobol" and "saltelli" require a power of two. If you
             increase n and keep the seed, the existing samples do not change, so a larger study only
-            computes the additional samples. With the method "latin_hypercube", an increase of n
-            changes all samples.
+            computes the additional samples. However, if the method is "latin_hypercube", all
+            samples change when n increases.
         seed : int, default: 0
             Seed of the random number generator.
         method : {"sobol", "latin_hypercube", "random", "saltelli"}
@@ -234,7 +234,7 @@ class Axis:
             ``{"a": lambda d: np.exp(d["ln_a"])}``. By default, each sampled quantity sets the field
             of the same name.
         units : mapping of str to str, optional
-            Units of the fields, in a study of a rig. The default is SI units.
+            Units of the fields, for a study that is based on a `Rig`. The default is SI units.
         dimension : str, default: "sample"
             Name of the dimension.
 
@@ -277,16 +277,16 @@ class Axis:
         Parameters
         ----------
         table : mapping of str to sequence, DataFrame or Dataset
-            Columns by name, or the output of `rsfstudy.read_table`. The units of a column are the
-            units in the CSV file, the attribute ``units`` of a variable, or the units in the name
-            of a column such as ``slip_distance (um)``. The attribute ``units`` of a data frame maps
+            Columns by name, or the output of `rsfstudy.read_table`. The units of a column are read
+            from the CSV file, from the attribute ``units`` of a variable, or from the name of a
+            column such as ``slip_distance (um)``. The attribute ``units`` of a data frame maps
             columns to units.
         fields : mapping of str to str or callable, optional
             Fields that the axis sets, in the format that `samples` accepts. By default, each column
             sets the field of the same name.
         units : mapping of str to str, optional
-            Units of the fields, in a study of a rig. By default, the units of the table are used,
-            or SI units if the table has no units.
+            Units of the fields, for a study that is based on a `Rig`. By default, the units of the
+            table are used, or SI units if the table has no units.
         dimension : str, default: "case"
             Name of the dimension.
 
@@ -351,12 +351,12 @@ class Axis:
 
     @property
     def has_numbered_points(self) -> bool:
-        """True if the points are numbered, as for samples and cases."""
+        """True if the points are numbered, for example in axes of samples or cases."""
         return self.labels is None and self.dimension not in self.rows[0]
 
     @property
     def is_single_field(self) -> bool:
-        """True if the axis varies a single field and has the name of this field."""
+        """True if the axis varies a single field, whose name is the dimension name."""
         return self.labels is None and not self.has_numbered_points
 
     def with_rows(
@@ -484,7 +484,7 @@ def _rows_from_columns(
 
 
 def rows_to_field_columns(rows: Sequence[AxisRow]) -> dict[str, list[Any]]:
-    """Convert rows that set the same fields to columns.
+    """Convert rows with identical fields to one list of values per field.
 
     Parameters
     ----------

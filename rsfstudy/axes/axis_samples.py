@@ -1,7 +1,7 @@
-"""Random samples and tables of cases, from which axes are created.
+"""Random samples and tables of cases for the creation of axes.
 
-The samples are computed from points in the unit cube by the quantile functions of the
-distributions. See `Axis.samples` and `Axis.cases`.
+The quantile functions of the distributions convert points in the unit cube to samples. See
+`Axis.samples` and `Axis.cases`.
 """
 
 from __future__ import annotations
@@ -206,7 +206,7 @@ def _compute_quantiles(
     """Compute the quantiles of a distribution, and check that they are finite."""
     try:
         found = np.asarray(_quantile_function(distribution)(probabilities), dtype=float)
-    except ValueError:  # The parameters are arrays.
+    except ValueError:  # The parameters of the distribution are arrays.
         found = np.empty(0)
     if found.shape != probabilities.shape or not np.isfinite(found).all():
         raise InvalidValue(

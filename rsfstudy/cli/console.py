@@ -26,7 +26,7 @@ class PlainConsole(Console):
 
     @property
     def size(self) -> ConsoleDimensions:
-        """Size of the terminal. The width is limited to a fixed range.
+        """Size of the terminal, with a width that is limited to a fixed range.
 
         The environment variable ``COLUMNS`` overrides the width of the terminal.
         """

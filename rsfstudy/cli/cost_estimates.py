@@ -20,8 +20,8 @@ from rsfstudy.motion import Engine
 from rsfstudy.storage import CellTimings
 
 #: Typical speed-up of the compiled engine relative to the SciPy engine, by name of the measure. We
-#: measured speed-ups by factors from 7 to 12 for critical steps, and from 31 to 72 for limit
-#: cycles. The speed-up is larger at higher accuracy.
+#: measured speed-ups by factors of 7 to 12 for critical steps, and of 31 to 72 for limit cycles.
+#: The speed-up is larger at higher accuracy.
 _COMPILED_SPEEDUP_BY_MEASURE = {"critical_step": 10, "limit_cycle": 30}
 #: Name of the measure that compares the integrators of SciPy. Studies with this measure can only
 #: use the SciPy engine.
@@ -77,7 +77,7 @@ def estimate_study_cost(cell_plan: CellPlan, output_directory: Path) -> CostEsti
         Estimated work and computing time.
     """
     work, guess = cell_plan.estimate_evaluations_and_time()
-    work = round(work, 2 - len(str(work)))  # more digits would not be significant
+    work = round(work, 2 - len(str(work)))  # More digits would not be significant.
     journal = output_directory / f"{cell_plan.study.name}.cells.sqlite"
     took, cells = CellTimings.read(journal), len(cell_plan.unique_cell_numbers)
     if (

@@ -184,7 +184,7 @@ class CriticalStep(Measure):
     def work_by_digits(self) -> Mapping[float, float]:
         """Relative cost of the computation for each requested number of digits.
 
-        The numbers of evaluations were measured for velocity steps in the study ``accuracy_cost``.
+        The relative costs were measured for velocity steps in the study ``accuracy_cost``.
         """
         return {3.0: 0.59, 5.0: 0.74, 7.0: 1.0, 8.0: 1.21, 9.0: 1.58, 10.0: 1.89}
 
@@ -349,7 +349,7 @@ class CriticalStep(Measure):
         stable_value: float = math.nan,
         unstable_value: float = math.nan,
     ) -> dict[str, float]:
-        """Return the results by name, with NaN for missing results."""
+        """Return the results by name. The values of missing results are NaN."""
         of = self.primary_output
         return {
             of: step_family.step_size_to_field_value(step_size),

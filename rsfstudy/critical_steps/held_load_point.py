@@ -4,8 +4,8 @@ The main function is ``compute_peak_excess_over_instability_norm``. Spring stres
 while the load point is held. With one state variable, ln V has only one peak, because the weakening
 of friction with slip becomes slower and slower after the first peak.
 
-With several state variables, friction may weaken repeatedly. State variables with b < 0 weaken
-friction when the slip rate decreases. Pore pressure also weakens friction when the slip rate
+If the law has several state variables, friction may weaken repeatedly. State variables with b < 0
+weaken friction when the slip rate decreases. Pore pressure also weakens friction when the slip rate
 decreases, if dilatancy has lowered the pore pressure before. If the dilatancy is negative, pore
 pressure weakens friction when the slip rate increases again. The motion is therefore integrated
 until no state can weaken friction enough for another peak above the instability norm.

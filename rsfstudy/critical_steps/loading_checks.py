@@ -1,4 +1,4 @@
-"""Checks of the loading and of the instability norm before a critical step is computed."""
+"""Checks of the loading and the instability norm for critical step measures."""
 
 from __future__ import annotations
 
@@ -9,8 +9,8 @@ from rsfstudy.measure_base import Outcome, check_loading_changes_stress_only_in_
 from rsfstudy.slider import Scene, SliderParameters
 from rsfstudy.status import Status
 
-#: Minimum ratio of the instability norm to the load point velocity. The slip rate may reach a lower
-#: norm without an instability.
+#: Minimum ratio of the slip rate at the instability norm to the load point velocity. If the ratio
+#: is lower, the slip rate may reach the instability norm without an instability.
 _MIN_NORM_OVER_LOAD_VELOCITY = 1e3
 #: Beginning of the warning that the instability norm is a slow slip rate.
 SLOW_INSTABILITY_NORM_WARNING_PREFIX = "the instability norm "
@@ -40,7 +40,7 @@ def check_loading_is_single_step(scene: Scene) -> None:
 
 
 def outcome_if_norm_is_below_load_velocity(scene: Scene, load_velocity: float = 0.0) -> Outcome:
-    """Return the outcome if the loading itself reaches the instability norm.
+    """Return the outcome for a loading that is faster than the instability norm.
 
     Steady sliding before the step, or the load point after the step, may already be faster than the
     instability norm.
@@ -70,9 +70,10 @@ def outcome_if_norm_is_below_load_velocity(scene: Scene, load_velocity: float = 
 def build_slow_instability_norm_warning(scene: Scene, load_velocity: float) -> str:
     """Return a warning if the instability norm is a slow slip rate.
 
-    The norm is slow if it is less than a thousand times the load point velocity. A motion may reach
-    a slow norm without an instability. There is no warning for scenes with the default reference
-    rate, because such scenes represent published studies and not a laboratory apparatus.
+    The instability norm is considered slow if the corresponding slip rate is less than a thousand
+    times the load point velocity. A motion may reach such a slip rate without an instability. If
+    the scene has the default reference rate, there is no warning, because the scene then represents
+    a published study rather than a laboratory apparatus.
 
     Parameters
     ----------

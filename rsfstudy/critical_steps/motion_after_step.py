@@ -119,16 +119,17 @@ def compute_excess_over_instability_norm(scene: Scene, integrator: Integrator) -
 
     Notes
     -----
-    Without inertia, the motion is planar and autonomous, so trajectories in the phase plane cannot
-    cross. If a peak is not higher than the previous peak, no later peak is higher. If peaks of the
-    slip rate grow, they grow until the motion reaches the instability norm or a limit cycle.
+    If the scene has no inertia, the motion is planar and autonomous, so trajectories in the phase
+    plane cannot cross. If a peak is not higher than the previous peak, no later peak is higher. If
+    peaks of the slip rate grow, they grow until the motion reaches the instability norm or a limit
+    cycle.
 
     If oscillations grow slowly, the computation continues with a somewhat larger orbit, and does
     not compute the large number of orbits between the two. If all larger orbits grow up to the
-    instability norm, the inner orbit also grows up to the norm. The same rules apply with inertia,
-    because inertia acts only during ruptures. With several states, the integration ends only if the
-    slip rate reaches the instability norm, if the motion settles to steady sliding, or if a cycle
-    repeats. The module ``held_load_point`` handles held load points.
+    instability norm, the inner orbit also grows up to the norm. The same rules apply to scenes with
+    inertia, because inertia acts only during ruptures. If the scene has several states, the
+    integration ends only if the slip rate reaches the instability norm, if the motion settles to
+    steady sliding, or if a cycle repeats. The module ``held_load_point`` handles held load points.
     """
     if scene.log_load_velocity == -math.inf:
         return compute_peak_excess_over_instability_norm(scene, integrator)

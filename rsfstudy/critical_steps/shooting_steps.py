@@ -21,8 +21,8 @@ from rsfstudy.critical_steps.stability_after_step import is_linearly_stable
 from rsfstudy.motion import Integrator
 from rsfstudy.slider import Scene
 
-#: Smallest step size of the search. The second number is the largest ratio of the smallest to the
-#: largest step size.
+#: Two constants: the smallest step size of the search, and the largest ratio of the smallest step
+#: size to the largest step size.
 MIN_STEP_SIZE, _MIN_SIZE_FRACTION = 1e-3, 0.1
 #: Increase of the largest step, in units of ln V, if inertia delays the rise of slip rate.
 LOG_RATE_EXTENSION_OF_MAX_STEP_FOR_INERTIA = 5.0
@@ -218,7 +218,8 @@ class StepFamily:
     def inertia_shifts_critical_size(self, step_size: float, tolerance: float) -> bool:
         """Return True if inertia changes the critical size significantly.
 
-        With inertia, the motion after the step reaches the critical path only after a delay.
+        If the scene has inertia, the motion after the step reaches the critical path only after a
+        delay.
 
         Parameters
         ----------

@@ -7,7 +7,7 @@ from rsfstudy.slider import Scene
 
 
 def inertia_matters_below_norm(scene: Scene, integrator: Integrator) -> bool:
-    """Return True if the slow manifold is not accurate enough up to the instability norm.
+    """Return True if inertia makes the slow manifold inaccurate below the norm.
 
     Parameters
     ----------

@@ -38,7 +38,7 @@ class SteadySlidingWithMargin(SteadySliding):
         """Stability margin of steady sliding. See the function ``stability_margin``.
 
         The margin is computed at the first access, because the outcome of most motions does not
-        depend on it.
+        depend on the margin.
         """
         scene, law = self.scene, self.scene.parts.law
         at_every_rate = may_have_closed_orbits(scene) and law.scale_free and not law.regularised

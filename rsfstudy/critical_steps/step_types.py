@@ -105,9 +105,9 @@ class LoadVelocityStepFamily(ShootingStepFamily):
     def _compute_max_size(self) -> float:
         """Return the largest size of the search.
 
-        After the largest upward step, the load point velocity equals the instability norm. After
-        the largest downward step, the load point has the smallest velocity at which sliding can be
-        steady.
+        After the largest upward step, the load point velocity corresponds to the instability norm.
+        After the largest downward step, the load point has the smallest velocity at which sliding
+        can be steady.
         """
         if self.sign > 0:
             return self.scene.log_instability_rate
@@ -156,10 +156,10 @@ class DisplacementStepFamily(StepFamily):
     def inertia_shifts_critical_size(self, step_size: float, tolerance: float) -> bool:
         """Return True if inertia changes the critical size significantly.
 
-        With inertia, the slider follows the critical path with a delay, which changes the critical
-        step size in two ways. The load point moves during the delay, and the state evolves less
-        because the slip rate is lower. The effect on the state is b/2 times the slip by which the
-        slider is delayed. See ``StepFamily.inertia_shifts_critical_size``.
+        If the scene has inertia, the slider follows the critical path with a delay, which changes
+        the critical step size in two ways. The load point moves during the delay, and the state
+        evolves less because the slip rate is lower. The effect on the state is b/2 times the slip
+        by which the slider is delayed. See ``StepFamily.inertia_shifts_critical_size``.
         """
         scene = self.scene
         if not scene.has_mass:
@@ -221,10 +221,10 @@ class DisplacementStepFamily(StepFamily):
     def _compute_max_size(self) -> float:
         """Return the largest size of the search.
 
-        The largest upward step raises the slip rate to the instability norm immediately. With
-        inertia, the range of step sizes is extended, because the slip rate rises with a delay while
-        stress relaxes. After the largest downward step, the shear stress or the normal stress is
-        zero.
+        The largest upward step raises the slip rate to the instability norm immediately. If the
+        scene has inertia, the range of step sizes is extended, because the slip rate rises with a
+        delay while stress relaxes. After the largest downward step, the shear stress or the normal
+        stress is zero.
         """
         scene = self.scene
         if max(0.0, scene.log_load_velocity) >= scene.log_instability_rate:
@@ -283,8 +283,8 @@ class NormalStressStepFamily(ShootingStepFamily):
     def inertia_shifts_critical_size(self, step_size: float, tolerance: float) -> bool:
         """Return True if inertia changes the critical size significantly.
 
-        With inertia, the slip rate rises with a delay after the step. The effect of inertia on the
-        critical step size depends on the slip rate immediately after the step. See
+        If the scene has inertia, the slip rate rises with a delay after the step. The effect of
+        inertia on the critical step size depends on the slip rate immediately after the step. See
         ``StepFamily.inertia_shifts_critical_size``.
         """
         scene = self.scene
@@ -421,6 +421,6 @@ class NormalStressStepFamily(ShootingStepFamily):
 
 
 def _reaches_norm_at_loose_tolerance(scene: Scene, integrator: Integrator) -> bool:
-    """Return True if a motion that is integrated with a loose tolerance reaches the norm."""
+    """Return True if a motion with a loose tolerance reaches the norm."""
     loose = replace(integrator.accuracy, rtol=LOCAL_TOLERANCE_OF_FIRST_ROOT, refinement=1.0)
     return motion_reaches_norm(scene, integrator.with_accuracy(loose))

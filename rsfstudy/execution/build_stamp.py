@@ -20,7 +20,7 @@ class BuildWithCommit(build_py):  # type: ignore[misc]  # Setuptools has no type
     """
 
     def run(self) -> None:
-        """Build the modules, and write the commit."""
+        """Build the modules, and write the commit to a file."""
         super().run()
         if self.editable_mode:  # An editable installation reads the commit from the checkout.
             return

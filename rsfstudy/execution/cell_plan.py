@@ -75,7 +75,7 @@ def _digest_cell_fields(
 
 
 class CellPlan:
-    """Plan of a study: keys of all cells, in row-major order.
+    """Plan of a study, with the keys of all cells in row-major order.
 
     A plan does not store the scenes of all cells, so that the plan of a large lattice fits in
     memory.

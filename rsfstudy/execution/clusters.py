@@ -22,7 +22,7 @@ from rsfstudy.errors import InvalidValue, RunError, shorten_text
 
 #: Timeout in s for connections between processes on this machine.
 _CLUSTER_CONNECT_TIMEOUT = 600
-#: Signals after which a run ends in an orderly way. A handler for these signals must be installed.
+#: Signals that end a run in an orderly way if a handler for the signals is installed.
 _SIGNALS_THAT_END_RUN = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 
 
@@ -156,7 +156,7 @@ def start_local_cluster(worker_count: int, log_path: Path) -> Iterator[Any]:
 
     quiet = {
         "distributed.scheduler.allowed-failures": 0,
-        # Only the time limit ends a worker that is slow or busy with its cell.
+        # Dask must not end a slow or busy worker. Only the time limit of a cell ends such a worker.
         "distributed.scheduler.worker-ttl": None,
         # Dask would permanently close a worker that has died and not restarted within this time.
         "distributed.deploy.lost-worker-timeout": "1000 days",
@@ -170,14 +170,16 @@ def start_local_cluster(worker_count: int, log_path: Path) -> Iterator[Any]:
     }
     with dask.config.set(quiet), contextlib.ExitStack() as stack:
         _tolerate_lost_resource_tracker()
-        resource_tracker.ensure_running()  # It unblocks signals.
+        # Starting the tracker unblocks signals, so it is started first.
+        resource_tracker.ensure_running()
         with _delay_interrupts():
             try:
                 cluster = LocalCluster(
                     n_workers=worker_count,
                     threads_per_worker=1,
                     processes=True,
-                    dashboard_address="127.0.0.1:0",  # The server also runs without pages.
+                    # The HTTP server runs even without dashboard pages.
+                    dashboard_address="127.0.0.1:0",
                     scheduler_kwargs={"dashboard": False},
                     silence_logs=logging.ERROR,
                     plugins=(worker_log.RedirectStderrPlugin(log_path.resolve()),),
@@ -193,7 +195,8 @@ def start_local_cluster(worker_count: int, log_path: Path) -> Iterator[Any]:
         yield stack.enter_context(Client(cluster))
         said = log_path.stat().st_size
         stack.close()
-        os.truncate(log_path, said)  # Heartbeats log that the scheduler has closed.
+        # The truncation removes heartbeat errors that were logged after the scheduler had closed.
+        os.truncate(log_path, said)
 
 
 async def _check_scheduler_answers(scheduler_address: str) -> None:

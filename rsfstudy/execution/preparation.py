@@ -42,5 +42,5 @@ def prepare_study_run(study: Study, options: OutputOptions, workers: WorkerPool)
         code_fingerprint=provenance.code_fingerprint(study.accuracy.engine, study.user_classes),
     )
     if workers.make_cell_batch_mapper() is not compute_serially:
-        serialize_task(task)  # This raises an error before any cell is computed.
+        serialize_task(task)  # Serialisation errors are raised here, before any cell is computed.
     return StudyRun(study, options, task, workers.count_concurrent_cells())

@@ -88,7 +88,8 @@ def code_fingerprint(
     return {
         "physics": _modules_at_import.combined_digest,
         "own_code": code_digest.digest_user_classes(*user_classes),
-        "python": f"{sys.version_info.major}.{sys.version_info.minor}",  # It affects the byte code.
+        # The Python version affects the byte code.
+        "python": f"{sys.version_info.major}.{sys.version_info.minor}",
         "numpy": version("numpy"),
         "scipy": version("scipy"),
         **package_versions(engine),
@@ -231,10 +232,10 @@ _PACKAGES_WITH_RECORDED_VERSION = (
 
 
 def read_git_commit_and_state(checkout_directory: Path) -> str:
-    """Return the commit of a Git checkout, and whether files have been changed.
+    """Return the commit of a Git checkout and its state (clean or changed).
 
-    The function only checks the package, the named studies and ``pyproject.toml``, because changes
-    of other files do not affect the results.
+    The function checks for changes only in the package, the named studies and ``pyproject.toml``,
+    because changes in other files do not affect the results.
 
     Parameters
     ----------
@@ -266,7 +267,8 @@ def read_git_commit_and_state(checkout_directory: Path) -> str:
             )
             state = "with uncommitted changes" if changed else "clean"
             return f"{run_git('rev-parse', 'HEAD')} {state}"
-    stamp = _PACKAGE_DIRECTORY / "commit.txt"  # The build_stamp module writes this file.
+    # The build command in the module ``build_stamp`` writes this file.
+    stamp = _PACKAGE_DIRECTORY / "commit.txt"
     return stamp.read_text().strip() if stamp.exists() else "none"
 
 

@@ -36,8 +36,7 @@ from rsfstudy.study import Study
 #: Status names of cells whose worker process ended before the cell was finished.
 _STATUSES_OF_LOST_CELLS = (Status.WORKER_LOST.name, Status.TIME_LIMIT_SPENT.name)
 _NAMES_OF_ANSWER_STATUSES = frozenset(status.name for status in Status if status.is_answer)
-#: Number of failed cells after which a run ends early. A run ends early only if no cell has
-#: succeeded.
+#: Number of failed cells after which a run ends early, provided that no cell has succeeded.
 _MAX_FAILURES_WITHOUT_SUCCESS = 10
 
 #: Function of the number of finished cells, the number of all cells, and the estimated remaining
@@ -69,8 +68,8 @@ class OutputOptions:
     Raises
     ------
     InvalidValue
-        If the format is unknown. If the format is "zarr", also if there is no output directory or
-        if the package zarr is not installed.
+        If the format is unknown. The error is also raised if the format is "zarr" and there is no
+        output directory or the package zarr is not installed.
     """
 
     output: Path | None = None
@@ -230,7 +229,7 @@ class StudyRun:
         done, failed, total = int(answered.sum()), 0, len(cells)
         progress_callback(done, total, None)
         if self.worker_log_path is not None:
-            self.worker_log_path.unlink(missing_ok=True)  # An earlier run may have left it.
+            self.worker_log_path.unlink(missing_ok=True)  # An earlier run may have left this file.
         if not len(missing):
             return
         batches = CellBatchIterator(self.plan, missing, self.workers)

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import math
 
-#: Minimum number of timed cells, and maximum relative standard error of their mean time. Both must
-#: hold before the remaining time is estimated, so that the estimate is correct to a factor of two.
+#: Minimum number of timed cells, and maximum relative standard error of their mean time. The
+#: remaining time is estimated only if both conditions are met, so that the estimate is correct to a
+#: factor of two.
 _MIN_TIMED_CELLS, _MAX_RELATIVE_STDERR = 12, 0.2
 
 

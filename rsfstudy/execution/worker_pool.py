@@ -46,8 +46,8 @@ _MAX_TIME_LIMIT = 1e8
 #: Maximum number of worker processes per core, and maximum number of worker processes on a machine
 #: with one or two cores.
 _MAX_WORKERS_PER_CORE, _MAX_WORKERS_ON_SMALL_MACHINES = 4, 8
-#: If a run has had no worker for the first of these times in s, the run issues a warning. If the
-#: run has had no worker for the second of these times, the run ends.
+#: Times in s that a run waits for a worker. After the first time without a worker, the run issues a
+#: warning. After the second time, the run ends.
 WARN_AFTER_SECONDS_WITHOUT_WORKER, GIVE_UP_AFTER_SECONDS_WITHOUT_WORKER = 30.0, 600.0
 _POLL_INTERVAL = 2.0
 #: Number of workers that a cell may kill. After this number of workers, the cell is recorded as
@@ -203,7 +203,8 @@ def make_dask_batch_mapper(
 
     def map_cells(task: CellTask, batches: CellBatchIterator) -> Generator[StoredCellRows]:
         sent, plan = serialize_task(task), batches.plan
-        left: list[np.ndarray] = []  # remainders of batches that a worker returned early
+        # These cells are the remainders of batches that a worker returned early.
+        left: list[np.ndarray] = []
         running: dict[Any, np.ndarray] = {}
         suspects: list[np.ndarray] = []
 
@@ -223,7 +224,7 @@ def make_dask_batch_mapper(
             for _ in range(_MAX_WORKER_DEATHS_PER_CELL):
                 _wait_for_finished_futures(
                     dask_client, [dask_client.submit(abs, 0, pure=False)]
-                )  # This waits until a worker is available.
+                )  # The call blocks until a worker is available.
                 began = time.monotonic()
                 _wait_for_finished_futures(dask_client, [future := submit(cell)])
                 del running[future]
@@ -308,7 +309,7 @@ def count_worker_threads(dask_client: Any) -> int:
     RunError
         If the client has lost its scheduler, or is not running.
     """
-    if dask_client.status == "connecting":  # The client has lost the connection.
+    if dask_client.status == "connecting":  # The client has lost the connection to the scheduler.
         raise RunError(_SCHEDULER_LOST_MESSAGE)
     if dask_client.status != "running":
         raise RunError(f"the Dask client is {dask_client.status}. Connect a client to a cluster")

@@ -311,7 +311,8 @@ class _WindowMeanDifferences:
         self.excess_decrease = change - max(0.0, self.typical_decrease)
         lag = estimate_mean_and_sd_of_mode(stress[window_samples:] - stress[:-window_samples])[1]
         self.noise_sd = max(lag / math.sqrt(2.0), rounding_quantum / math.sqrt(12.0))
-        # The limits correspond to white noise, and to noise that is constant within a window.
+        # The lower limit is correct for white noise, and the upper limit for noise that is constant
+        # within a window.
         ratio = (
             self.decrease_standard_deviation
             / (self.noise_sd or 1.0)
@@ -362,7 +363,7 @@ class _WindowMeanDifferences:
             For each drop, the index of the first sample after its start, and the index of the first
             sample after its end.
         """
-        # The padding allows for peaks at the ends.
+        # The values are padded because a peak may be at an end of the record.
         padded = np.concatenate([[0.0], self.excess_decrease, [0.0]])
         peaks, about = find_peaks(padded, height=self.detection_threshold, prominence=0.0)
         peaks = peaks[about["prominences"] > _MIN_RELATIVE_PROMINENCE * padded[peaks]]

@@ -37,8 +37,8 @@ _MAX_SAMPLES_IN_FIT = 300
 #: Longest time between a detected drop and the fitted start or end of the drop, in durations of the
 #: averaging window.
 _SEARCH_MARGIN_IN_WINDOWS = 2.0
-#: Number of start times in each search grid, which is also the number of end times, and number of
-#: refinements of the search grid.
+#: Number of start times (and of end times) in each search grid, and number of refinements of the
+#: search grid.
 _SEARCH_GRID_SIZE, _SEARCH_GRID_REFINEMENTS = 16, 3
 #: Largest rate of stress decrease before and after a drop, relative to the rate during the drop.
 _MAX_SLOPE_BESIDE_DROP_OVER_DROP_SLOPE = 0.3
@@ -81,7 +81,8 @@ class FittedStressDrop(NamedTuple):
     residual_sd : float
         Standard deviation of the residuals.
     starts_before_record, ends_after_record : bool
-        True if the record has too few samples before the drop, or after the drop.
+        ``starts_before_record`` is True if the record has too few samples before the drop.
+        ``ends_after_record`` is True if the record has too few samples after the drop.
     """
 
     start_time: float

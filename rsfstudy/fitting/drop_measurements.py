@@ -58,8 +58,9 @@ class DropMeasurements(NamedTuple):
     detection : Detection
         Result of the detection.
     displacement_shows_slip : bool
-        False if a check found that the displacement is not faster during the drops than before and
-        after the drops. True if the displacement is faster, or if it was not checked.
+        False if a check found that the displacement rate is not higher during the drops than before
+        and after the drops. True if the rate is higher during the drops, or if the rate was not
+        checked.
     """
 
     event_rows: list[EventNumbers]
@@ -177,7 +178,7 @@ def find_sample_indices_of_drop(
 
     Returns
     -------
-    DropIndices
+    DropSampleIndices
         Indices of the samples in the drop, and number of samples to average.
     """
     drop, candidate = fitted_candidate

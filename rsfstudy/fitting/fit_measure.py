@@ -104,13 +104,13 @@ class Fit(Measure):
         Three parameters have a separate value for each step: the friction before the step
         (``mu_star_1``, ``mu_star_2``, ...), the trend, and the step time.
     before, after : float, default: 0.0
-        Load point displacements in um to fit before and after the step. If ``before`` is 0, the
-        window begins halfway between the previous step and this step, or at the beginning of the
-        record if there is no previous step. If ``after`` is 0, the window ends at the next step or
-        at the end of the record. In a joint fit, the window of a step ends where the window of the
-        next step begins.
+        Load point displacements in um before and after the step that the fit includes. If
+        ``before`` is 0, the window begins halfway between the previous step and this step, or at
+        the beginning of the record if there is no previous step. If ``after`` is 0, the window ends
+        at the next step or at the end of the record. In a joint fit, the window of a step ends
+        where the window of the next step begins.
     part : float, default: 1.0
-        Fraction of the displacement after the step to fit.
+        Fraction of the displacement after the step that is fitted.
     noise : str, default: "ar"
         Noise model: "white" for the usual formula of standard errors, "ar" for an autoregressive
         process with an automatic order, or "ar1", "ar2" and so on.
@@ -466,9 +466,9 @@ class Fit(Measure):
 
         Returns
         -------
-        search : FitProblem
+        problem : FitProblem
             Least-squares problem for the model of all windows.
-        found : FitSolution
+        solution : FitSolution
             Solution of the problem.
 
         Raises

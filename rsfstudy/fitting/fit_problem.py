@@ -1,7 +1,7 @@
 r"""Estimation of friction parameters by generalised least squares.
 
-The class ``FitProblem`` minimises :math:`|W (y - f(p))|^2` with respect to the parameters
-:math:`p`, where :math:`y` is the recorded friction and :math:`f` is the model [1]_. The matrix
+The class ``FitProblem`` minimises :math:`|W (y - f(\theta))|^2` with respect to the parameters
+:math:`\theta`, where :math:`y` is the recorded friction and :math:`f` is the model [1]_. The matrix
 :math:`W` whitens the noise, so that :math:`W^T W` is the inverse of the correlation matrix
 :math:`R` of the noise. The algorithm estimates the parameters and the noise in turn. The covariance
 matrix of the parameters is
@@ -342,7 +342,7 @@ class FitProblem:
 
         Returns
         -------
-        initial_coordinates : ndarray, shape (parameters,)
+        coordinates : ndarray, shape (parameters,)
             Coordinates at the minimum.
         jacobian : ndarray, shape (rows, parameters)
             Derivatives of the model at the minimum.

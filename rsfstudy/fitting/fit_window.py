@@ -29,8 +29,9 @@ from rsfstudy.motion import Integrator, MotionStopped
 from rsfstudy.slider import Scene
 from rsfstudy.status import Status
 
-#: By default, the window of a step begins at this fraction of the interval between the previous
-#: step and the step. The second value is the smallest number of rows per free parameter.
+#: The first value is the default start of the window of a step, as a fraction of the interval
+#: between the previous step and the step. The second value is the smallest number of rows per free
+#: parameter.
 _WINDOW_START_BEFORE_STEP_FRACTION, _MIN_ROWS_PER_PARAMETER = 0.5, 3
 #: Largest delay of the loading, relative to the time between the start of the window and the step.
 _MAX_LOADING_DELAY_FRACTION = 0.2
@@ -136,7 +137,7 @@ class FitWindow:
 
     @property
     def window_properties(self) -> dict[str, float]:
-        """Step velocities, limits, normal stress and noise of the window."""
+        """Velocities, ends of the window in um, normal stress and load point noise."""
         record, rows = self.record, self.record_row_indices
         moved, time = record.columns["displacement"][rows], record.time[rows]
         return {

@@ -29,9 +29,10 @@ def select_steady_rows(
     time, friction : ndarray, shape (rows,)
         Times in s and friction.
     start_time, end_time : float
-        Limits of the rows in s. ``start_time`` is the end of the previous step, or the start of the
-        record if there is no previous step. ``end_time`` is the start of the step. If there is a
-        previous step, rows in the first half of the interval are not selected.
+        Times in s between which the rows are selected. ``start_time`` is the end of the previous
+        step, or the start of the record if there is no previous step. ``end_time`` is the start of
+        the step. If there is a previous step, rows in the first half of the interval are not
+        selected.
 
     Returns
     -------

@@ -5,11 +5,11 @@ A hold is an interval in which the load point is at rest between sliding and rel
 and :math:`\mu_p` the peak friction after reloading. As in the measure ``Healing``, relaxation is
 :math:`\mu_h - \mu_0`, and healing is :math:`\mu_p - \mu_0`.
 
-The three frictions are estimated jointly by generalised least squares with correlated noise.
-:math:`\mu_0` is the mean friction of the linear portion before the hold. :math:`\mu_h` is the value
-of a polynomial in the logarithm of the hold time at the end of the hold. :math:`\mu_p` is the
-maximum of a polynomial in time. The common linear trend of friction with load point displacement is
-subtracted.
+The three friction values are estimated jointly by generalised least squares with correlated noise.
+:math:`\mu_0` is the mean friction of the linear portion before the hold. :math:`\mu_h` is obtained
+from a polynomial in the logarithm of the hold time, which is evaluated at the end of the hold.
+:math:`\mu_p` is the maximum of a polynomial in time. The common linear trend of friction with load
+point displacement is subtracted.
 """
 
 from __future__ import annotations
@@ -348,7 +348,7 @@ class HoldFit:
         of_slope = powers * np.append(0.0, of_value[:-1])
         curvature = -float(polynomial.polyval(at, polynomial.polyder(coefficients, 2)))
         value = float(of_value @ coefficients)
-        # The position of the maximum has an error, so the maximum is too high by this difference.
+        # Because of the error of its position, the maximum is too high by this difference.
         excess = 0.5 * float(of_slope @ covariance @ of_slope) / curvature
         misfit = 0.0
         if not is_adequate:

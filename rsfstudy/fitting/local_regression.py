@@ -1,12 +1,12 @@
 r"""Generalised least squares, and local polynomials with data-driven windows.
 
 The maximum of noisy samples overestimates a peak, and the last sample before a change is a noisy
-estimate of a limit. The functions of this module therefore fit a polynomial to the samples in a
-window. A window that is too long biases the polynomial, and a window that is too short increases
-its variance. The function ``choose_polynomial_window`` selects the longest window in which a
-polynomial describes the samples within their noise. The estimate then uses a polynomial of higher
-degree in the same window, so that the bias of the estimate is small compared with its standard
-error [1]_.
+estimate of the limit before the change. The functions of this module therefore fit a polynomial to
+the samples in a window. A window that is too long biases the polynomial, and a window that is too
+short increases its variance. The function ``choose_polynomial_window`` selects the longest window
+in which a polynomial describes the samples within their noise. The estimate then uses a polynomial
+of higher degree in the same window, so that the bias of the estimate is small compared with its
+standard error [1]_.
 
 References
 ----------

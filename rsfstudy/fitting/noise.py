@@ -59,8 +59,8 @@ from rsfstudy.fitting.whiteness_test import ljung_box_p_value as ljung_box_p_val
 WHITE_NOISE_NAME, AUTOREGRESSIVE_NOISE_NAME = "white", "ar"
 #: Highest order of the autoregressive process, and smallest number of rows per coefficient.
 MAX_AUTOREGRESSIVE_ORDER, _MIN_SAMPLES_PER_COEFFICIENT = 12, 10
-#: Largest absolute value of a partial autocorrelation. The search ends if the gradient of the REML
-#: objective is less than the second value.
+#: The first value is the largest absolute value of a partial autocorrelation. The search ends if
+#: the gradient of the REML objective is less than the second value.
 _MAX_PARTIAL_AUTOCORRELATION, _REML_GRADIENT_TOLERANCE = 0.999, 0.02
 #: Largest number of iterations. Each iteration estimates the noise levels and the autoregressive
 #: process.
@@ -115,7 +115,7 @@ class NoiseModel:
         Noise levels relative to the first noise level.
     non_outlier_mask : ndarray of bool, shape (rows,), optional
         Mask that is False for outliers. By default, no rows are outliers.
-    averaging_correlation : AveragingCorrelation, optional
+    averaging_correlation : AveragedNoiseCorrelation, optional
         Correlation due to averaging by a data logger. This correlation is removed before the
         autoregressive correlation.
     """
@@ -276,8 +276,7 @@ def build_white_noise_model(time: np.ndarray) -> NoiseModel:
     Returns
     -------
     NoiseModel
-        White noise model. The standard deviation of the noise is the same for all sampling
-        intervals.
+        White noise model. All noise levels are equal to 1.
     """
     runs = find_sampling_runs(time)
     return NoiseModel(

@@ -89,7 +89,7 @@ def sample_posterior_coordinates(
 
     Returns
     -------
-    draw_count : ndarray, shape (draws, parameters)
+    draws : ndarray, shape (draws, parameters)
         Coordinates of the free parameters.
     autocorrelation_time : float
         Longest autocorrelation time of the chain in steps.

@@ -45,7 +45,7 @@ from rsfstudy.fitting.noise import (
 from rsfstudy.fitting.velocity_steps import CumulativeLineFitSums, LoadingStep, noise_variance
 from rsfstudy.netcdf_encoding import copy_with_cf_encoding
 
-#: Kinds of portions.
+#: Kinds of locked portions of a record.
 RELOADING, UNLOADING, INITIAL_LOADING = "reloading", "unloading", "initial loading"
 #: A portion ends where the slope falls below this fraction of its largest value. During unloading,
 #: the fault slips forward at first, and the slope is up to twice the stiffness.
@@ -367,7 +367,7 @@ def _friction_while_locked(x: np.ndarray, parameters: np.ndarray, unloads: bool)
     z = np.minimum(k * x / a, 600.0)
     if unloads:
         rate = -math.exp(log_rate)
-    else:  # The ratio refers to the last row.
+    else:  # The slip rate ratio belongs to the last row.
         end = math.exp(-min(k * x[-1] / a, 600.0))
         rate = 1.0 / max(math.exp(-log_rate) / end + g * (1.0 / end - 1.0), 1e-300)
     loss = rate * np.expm1(z)

@@ -85,8 +85,8 @@ LOADING_STEP_SHIFT_OVER_STANDARD_ERROR = 0.01
 #: Domains of bounded parameters. Near the ends of a domain, one-sided finite differences are used.
 _PARAMETER_DOMAINS = {"law_exponent": (0.0, 1.0), "alpha": (0.0, math.inf)}
 #: Scales of some parameters. The step size of a finite difference is proportional to the scale of
-#: the parameter. The method ``WindowModel._parameter_scale`` computes the scales of all other
-#: parameters.
+#: the parameter. The method ``WindowModel._typical_parameter_size`` computes the scales of all
+#: other parameters.
 _TYPICAL_PARAMETER_SIZES = {"mu_star": 0.6, "alpha": 0.5, "law_exponent": 1.0}
 #: The largest number of right-hand-side evaluations of a simulation is the sum of three terms: a
 #: constant, a number for each loading segment, and a number for a stiff spring, which has an upper
@@ -311,7 +311,7 @@ class WindowModel:
         Raises
         ------
         MotionStopped
-            If the work budget of the meter is exhausted.
+            If the work budget is exhausted.
         """
         budget, nothing = self.integrator.work_meter.budget, np.full(len(self.time), math.nan)
         stiff = 4.0 * values["stiffness"] * float(np.ptp(self.displacement)) / values["a"]

@@ -133,7 +133,7 @@ class EventStatistics(Measure):
     ...     normal_stress="constant",
     ...     stiffness_ratio=0.5,
     ...     radiation_damping=1e-4,
-    ...     noise="white",
+    ...     loading_noise="white",
     ...     stress_noise=1e-5,
     ...     noise_interval=2.0,
     ... )
@@ -199,7 +199,7 @@ class EventStatistics(Measure):
         if len(events) <= self.cycles:
             return Outcome(Status.NO_LIMIT_CYCLE, message="the motion settles to steady sliding")
         refined, halved = self._events(scene, integrator.refined(), checked), events
-        noise = scene.parts.noise
+        noise = scene.parts.loading_noise
         if noise.is_active:
             finer = scene.with_(noise_interval=0.5 * scene.noise_interval)
             halved = self._events(finer, integrator, checked)
@@ -237,7 +237,7 @@ class EventStatistics(Measure):
         """
         events = (
             self._iterate_noisy_events(scene, integrator)
-            if scene.parts.noise.is_active
+            if scene.parts.loading_noise.is_active
             else _iterate_smooth_events(scene, integrator)
         )
         return list(islice(events, self.discarded_cycles, self.discarded_cycles + cycles + 1))

@@ -6,8 +6,9 @@ spring stress and the states at a maximum of spring stress from the values at th
 The limit cycle is the fixed point of the return map.
 
 The motion is first integrated with a low accuracy until it approaches the limit cycle. The orbit is
-then refined until all unknowns repeat, first with the requested accuracy and then with smaller
-tolerances. The first cycle after the loading step is never accepted as the limit cycle.
+then refined until all unknowns have the same values at both ends of the orbit. The refinement is
+done twice, first with the requested accuracy and then with smaller tolerances. The first cycle
+after the step is never accepted as the limit cycle.
 
 If the law or the fluid has several states, the motion may repeat only after 2, 4 or more cycles, or
 never. If the motion repeats after several cycles or never, the results describe the cycle with the
@@ -193,7 +194,7 @@ class LimitCycle(RecordingMeasure):
             raise InvalidValue("events", self.events, "must be a whole number, 1 or more")
 
     def compute(self, scene: Scene, integrator: Integrator) -> Outcome:
-        """Compute the limit cycle, with error estimates.
+        """Compute the limit cycle and its error estimates.
 
         The motion is integrated until it approaches the limit cycle. The cycle is then computed
         twice, with the requested accuracy and with smaller tolerances.
@@ -214,7 +215,8 @@ class LimitCycle(RecordingMeasure):
         if scene.log_load_velocity == -math.inf:
             return Outcome(Status.NO_LIMIT_CYCLE, message="the load point is held")
         if not scene.is_perturbed:
-            # Without a step, the slider would remain in steady sliding, even if it is unstable.
+            # Without a step, the slider would remain in steady sliding, even if steady sliding is
+            # unstable.
             scene = scene.with_segment(Segment(1.0, INITIAL_PERTURBATION_DISPLACEMENT))
         if scene.state_count > 1:
             return self._find_multi_state_cycle(scene, integrator)
@@ -223,7 +225,8 @@ class LimitCycle(RecordingMeasure):
             try:
                 found = approach.follow_until_converged(self.events)
             except MotionStopped:
-                # The search may fail with the low accuracy and succeed with the requested accuracy.
+                # A search with the requested accuracy may succeed even if the search with low
+                # accuracy fails.
                 if own is integrator or integrator.is_budget_exceeded:
                     raise
                 continue

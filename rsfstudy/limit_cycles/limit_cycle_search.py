@@ -1,4 +1,4 @@
-r"""Convergence of a motion to its limit cycle.
+r"""Search for the limit cycle that a motion approaches.
 
 If a scene has one state, use ``LimitCycleSearch``. The spring stress at a rise of V through V_0
 determines the subsequent motion. Two successive cycles are therefore sufficient to compute the
@@ -184,7 +184,7 @@ class LimitCycleSearch:
 
     @property
     def orbit(self) -> PeriodicOrbit:
-        """Last cycle as a periodic orbit, with a correction to the limit cycle."""
+        """Last cycle as a periodic orbit, with the remaining correction to the limit cycle."""
         last, slopes = self.cycles[-1:], np.array(self._derivatives).T
         return PeriodicOrbit(
             tuple(last),

@@ -11,7 +11,8 @@ cycles is a fixed point of the n-th power of the return map.
 
 The eigenvalues of the derivative of the return map are the Floquet multipliers, the factors by
 which small perturbations grow during one orbit. The orbit repels if the absolute value of a
-multiplier exceeds 1. At a multiplier of -1, an orbit with twice the number of cycles branches off.
+multiplier exceeds 1. When a multiplier passes through -1, an orbit with twice the number of cycles
+branches off (period doubling).
 
 If the effect of inertia is small, a perturbation along the motion only shifts the time. The number
 of independent perturbations is therefore one less than the number of unknowns of a section. A
@@ -379,7 +380,7 @@ class ReturnMap:
         Parameters
         ----------
         point : MotionPoint
-            Point of the slider at the section.
+            Point of the motion at the section.
 
         Returns
         -------
@@ -506,7 +507,7 @@ class ReturnMap:
     ) -> PeriodicOrbit | None:
         r"""Solve for a periodic orbit with a given number of cycles.
 
-        The number of cycles is the number of arrays in ``cycle_derivatives``.
+        The length of ``cycle_derivatives`` defines the number of cycles.
 
         Returns
         -------

@@ -34,8 +34,8 @@ from rsfstudy.slider import MotionPoint, Scene
 LN10 = math.log(10.0)
 #: Number of main results of a cycle.
 PRIMARY_OUTPUT_COUNT_PER_CYCLE = 5
-#: Kinds of events. Module variables avoid attribute lookups, which would take as long as all other
-#: operations for each event.
+#: Kinds of events. They are module variables because attribute lookups would take as long as all
+#: other operations on an event.
 _START, _RISE, _FALL = EventKind.START, EventKind.RISE, EventKind.FALL
 _SEGMENT, _SETTLED = EventKind.SEGMENT, EventKind.SETTLED
 _get_log_slip_rate, _get_spring_stress = attrgetter("log_slip_rate"), attrgetter("spring_stress")
@@ -72,8 +72,8 @@ class Cycle(NamedTuple):
         Largest value of ln(V/V_*) during the cycle.
     slip_arrest_point : MotionPoint
         First point after the rupture at which V is below V_0 and friction balances the spring. If
-        friction never balances the spring after the rupture, ``slip_arrest_point`` is the point
-        with the lowest slip rate.
+        friction never balances the spring after the rupture, the attribute contains the point with
+        the lowest slip rate.
     slowest_point : MotionPoint
         Point with the lowest slip rate.
     start_point : MotionPoint
@@ -181,7 +181,7 @@ def iterate_cycles(
 
 
 def suggest_raising_event_limit(event_count: int, option_name: str = "events") -> str:
-    """Return advice to allow more events, for use in a message.
+    """Return the part of a message that advises the user to allow more events.
 
     Parameters
     ----------
@@ -220,9 +220,9 @@ def recorded_rows_of_cycles(
 
     Notes
     -----
-    The slip during the cycles is the load point displacement minus the increase of the spring
-    elongation, :math:`V_0 T - (f_1 - f_0)/K`, with the duration :math:`T` of the cycles and the
-    spring stresses :math:`f_0` and :math:`f_1` at the beginning and at the end.
+    The slip during the cycles is the load point displacement minus the increase in spring
+    elongation, :math:`V_0 T - (f_1 - f_0)/K`. Here :math:`T` is the duration of the cycles, and
+    :math:`f_0` and :math:`f_1` are the spring stresses at the beginning and at the end.
     """
     begin, end = cycles[0].start_point, cycles[-1].end_point
     passed = math.fsum(cycle.recurrence_interval for cycle in cycles)

@@ -2,7 +2,7 @@
 
 A ``Measure`` computes named results of one scene, with a status, error estimates and the cost of
 the computation. The base class checks the results. The package never contains measures of critical
-steps, limit cycles, responses or fits, which are in separate packages. The module
+steps, limit cycles, responses or fits. These measures are in separate packages. The module
 ``rsfstudy.measures`` exports all measures.
 """
 

@@ -19,13 +19,14 @@ def check_loading_changes_stress_only_in_steps(scene: Scene) -> None:
     Raises
     ------
     InvalidValue
-        If the load point velocity or the normal stress changes continuously, or if there is noise.
+        If the load point velocity or the normal stress changes continuously, or if the scene has
+        noise.
     """
-    loading, noise = scene.parts.loading, scene.parts.noise
+    loading, noise = scene.parts.loading, scene.parts.loading_noise
     if noise.is_active:
         rule = "changes stress at random, so that no motion settles or repeats"
-        remedy = "Set noise='none', or use EventStatistics or simulate."
-        raise InvalidValue("noise", noise.name, rule, remedy=remedy)
+        remedy = "Set loading_noise='none', or use EventStatistics or simulate."
+        raise InvalidValue("loading_noise", noise.name, rule, remedy=remedy)
     if loading.unknowns:
         what = "load point velocity" if loading.has_load_point_unknown else "normal stress"
         rule = f"changes {what} continuously, so the motion neither settles nor repeats itself"

@@ -45,7 +45,7 @@ def create_outputs_along_phase(*names: str) -> tuple[Output, ...]:
 @wrap_methods_in_error_boundary
 @dataclass(frozen=True)
 class RecordingMeasure(Measure):
-    """Base class of measures that store a record along ``phase``.
+    """Base class of measures whose results include a record along ``phase``.
 
     A subclass defines the field ``phases``, which sets the number of points of the record.
     """
@@ -57,7 +57,7 @@ class RecordingMeasure(Measure):
 
     @property
     def recorded_point_count(self) -> int:
-        """Number of points of the record that are stored."""
+        """Number of record points that are stored."""
         return int(self.plain_fields["phases"])
 
     @cached_attribute

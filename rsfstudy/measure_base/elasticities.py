@@ -23,8 +23,9 @@ from rsfstudy.status import Status
 NUMERIC_SCENE_FIELDS = tuple(
     name for name, kind in SceneFields.TYPES.items() if kind in (float, float | None)
 )
-#: Fields of heat. The default parameters do not contain these fields, so that the results for
-#: scenes without heat do not change.
+#: Scene fields of shear heating, thermal pressurisation and flash heating. By default,
+#: ``parameters`` does not contain these fields, so that the results of scenes without heating do
+#: not change.
 _FIELDS_OF_HEAT = frozenset(
     {
         "heating", "cooling", "direct_activation", "evolution_activation", "pressurisation",
@@ -85,15 +86,15 @@ class Elasticities(Measure):
     r"""Elasticities of the main result of a measure.
 
     An elasticity is the relative change of a result divided by the relative change of a scene
-    parameter. If a result is proportional to the square of a parameter, for example, the elasticity
-    is 2. All other parameters remain fixed. The elasticities and their errors are dimensionless and
-    have the shape (parameters,).
+    parameter. For example, the elasticity is 2 if a result is proportional to the square of a
+    parameter. All other parameters remain fixed. The elasticities and their errors are
+    dimensionless and have the shape (parameters,).
 
     The elasticities are finite differences, so the measure is evaluated four times per parameter
     and once for the scene itself. If the result does not exist for a smaller or for a larger
-    parameter value, for example near a stability boundary, up to three smaller changes of the
-    parameter are tried. If the scene is exactly at a stability boundary, such as the critical
-    stiffness, the derivative is a one-sided difference.
+    parameter value, for example near a stability boundary, the computation is repeated with up to
+    three smaller changes of the parameter. If the scene is exactly at a stability boundary, such as
+    the critical stiffness, the derivative is a one-sided difference.
 
     Parameters
     ----------
@@ -101,13 +102,14 @@ class Elasticities(Measure):
         A measure whose main result is a single number.
     parameters : tuple of str, optional
         Scene parameters, along the dimension ``parameter``. By default, the tuple contains all
-        parameters that the measure does not solve for. If the scene does not have a parameter, or
-        if the parameter is zero, the elasticity is NaN.
+        parameters that the measure does not solve for. The elasticity is NaN if the scene does not
+        have the parameter, or if the parameter is zero.
 
     Raises
     ------
     InvalidValue
-        If the main result is not a single number, or if a parameter is not a number of the scene.
+        If the main result is not a single number, or if a parameter is not a numeric field of the
+        scene.
 
     Notes
     -----
@@ -317,7 +319,7 @@ class Elasticities(Measure):
             except MotionStopped:
                 if not found:
                     raise
-                break  # Near the end of the solution branch, some evaluations exceed the budget.
+                break  # Some evaluations near the end of a solution branch exceed the budget.
             slope, error, of_levels = _central_difference(central_value, sides, size)
             if found and not all(sides):
                 # The truncation error of the previous step is eight times as large.

@@ -105,8 +105,8 @@ class Measure(ConstructorKeywordCheckMixin):
     exceeds the work budget. To compute a motion, pass the integrator to ``rsfstudy.simulate``:
     ``rsfstudy.simulate(scene, integrator=integrator)``. The functions ``rsfstudy.critical_step``
     and ``rsfstudy.limit_cycle`` also take ``integrator=integrator``. To use the outcome of another
-    measure, call the ``run_nested`` method of that measure. The results of
-    ``integrator.refined()``, whose tolerances are ten times smaller, are used to estimate errors.
+    measure, call the ``run_nested`` method of that measure. To estimate errors, repeat the
+    computation with ``integrator.refined()``, whose tolerances are ten times smaller.
 
     Override ``error_scales`` to set the status to ``unverified`` if the error estimates are far too
     large::
@@ -139,9 +139,9 @@ class Measure(ConstructorKeywordCheckMixin):
     name: ClassVar[str]
     #: Meanings of inner dimensions and fields that are not in the common vocabulary.
     dimensions: ClassVar[Sequence[Quantity]] = ()
-    #: Variants of the equations that are compiled before the first cell is computed: True for
-    #: motions with time, False for motions without time. The value is empty if the measure does not
-    #: integrate motions.
+    #: Variants of the equations of motion that are compiled before the first cell is computed. True
+    #: stands for the equations in which time is an unknown, and False for the equations without
+    #: time. The tuple is empty if the measure does not integrate motions.
     needs_time: ClassVar[tuple[bool, ...]] = (True,)
 
     def __init_subclass__(cls) -> None:
@@ -164,13 +164,13 @@ class Measure(ConstructorKeywordCheckMixin):
     def variables(self) -> Mapping[str, tuple[str, ...]]:
         """Inner dimensions of each result and error estimate, by name.
 
-        The dimensions of a scalar result are an empty tuple.
+        For a scalar result, the tuple of dimensions is empty.
         """
         return {name: about.dims for about in self.outputs for name in about.variable_names}
 
     @cached_attribute
     def optional_outputs(self) -> Sequence[str]:
-        """Names of the results that a successful outcome may omit.
+        """Names of the results that may be missing from a successful outcome.
 
         If an optional result is missing, the message of the outcome contains the reason.
         """
@@ -216,13 +216,13 @@ class Measure(ConstructorKeywordCheckMixin):
     def typical_work(self) -> int:
         """Typical number of right-hand-side evaluations per cell.
 
-        The typical number is valid for the default accuracy.
+        The number applies to the default accuracy.
         """
         raise TypeError(f"{type(self).__name__} does not define typical_work")
 
     @property
     def work_by_digits(self) -> Mapping[float, float]:
-        """Relative cost of the computation for each requested number of digits.
+        """Relative cost of the computation, by requested number of digits.
 
         The number of digits is ``-log10(rtol)``, and the work is relative to the work at the
         default accuracy. The default values were measured for limit cycles, the most demanding
@@ -294,10 +294,11 @@ class Measure(ConstructorKeywordCheckMixin):
     def error_scales(self, scene: Scene, values: Mapping[str, Any]) -> Mapping[str, float]:
         """Return the scale of the numerical error of each result.
 
-        The requested accuracy is relative to the scale of each result. If the error estimate of a
-        result is more than a hundred times the requested error, the status of the cell becomes
-        ``unverified``. Results without a scale are not checked. An override should omit statistical
-        results, and results whose resolution is an option of the measure.
+        The requested error of each result is the relative accuracy multiplied by the scale of the
+        result. If the error estimate of a result is more than a hundred times the requested error,
+        the status of the cell becomes ``unverified``. Results without a scale are not checked. An
+        override should omit statistical results, and results whose resolution is an option of the
+        measure.
 
         Parameters
         ----------
@@ -403,7 +404,8 @@ class Measure(ConstructorKeywordCheckMixin):
         Returns
         -------
         Outcome
-            Outcome of ``__call__``, without the advice on a larger budget.
+            Outcome as returned by ``__call__``, except that the message does not suggest a larger
+            budget.
         """
         outcome, own = self.run_metered(scene, integrator.accuracy)
         for regime, spent in own.evaluations_by_regime.items():
@@ -464,7 +466,7 @@ class Measure(ConstructorKeywordCheckMixin):
         declared, inner = self.variables, self.inner_coordinates
         given = outcome.values.items()
         values = {
-            # Most results are plain floats, for which the full check would take too long.
+            # The full check is slow and is not necessary for plain floats, the most common results.
             name: value
             if isinstance(value, float) and declared.get(name) == ()
             else _declaration_checks.check_output_value(declared, inner, name, value)
@@ -524,7 +526,7 @@ class Measure(ConstructorKeywordCheckMixin):
 
     @classmethod
     def fields_from_description(cls, described: dict[str, Any], path: str) -> dict[str, Any]:
-        """Rebuild the fields that are not plain data from a description.
+        """Create the field values that are not plain data from a description.
 
         Parameters
         ----------

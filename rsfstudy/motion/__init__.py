@@ -1,12 +1,12 @@
 """Integration of the equations of motion of a scene in time.
 
 ``Accuracy`` defines the tolerances, the work budget and the engine. An ``Integrator`` integrates
-scenes to an accuracy and counts the work: ``Integrator.follow`` integrates a scene through its
-loading segments and regimes, and yields events. A ``Recording`` also stores the samples of the
-motion. To read the implementation, start with ``integrator``, followed by ``motion_driver`` and
-``motion_loop``. The engines are SciPy, Python and the compiled engine. The
-package never interprets a motion. The measures in ``rsfstudy.measures`` compute results from
-motions.
+scenes to the requested accuracy and counts right-hand side evaluations. The method
+``Integrator.follow`` integrates a scene through its loading segments and regimes, and yields
+events. A ``Recording`` also stores the samples of the motion. To read the implementation, start
+with ``integrator``, followed by ``motion_driver`` and ``motion_loop``. The engines are SciPy,
+Python and the compiled engine. The package only integrates motions, and never computes results from
+a motion. The measures in ``rsfstudy.measures`` compute the results.
 """
 
 from __future__ import annotations
@@ -70,7 +70,7 @@ else:
             ),
             "motion.former_arguments": ("accept_accuracy_and_meter",),
             "motion.integrator": ("Integrator",),
-            # Former export, which the method of ``Scene`` replaces.
+            # Former export. ``Scene`` has a method that replaces this function.
             "slider.equations": ("slow_manifold_point",),
             "motion.work_meter": (
                 "MotionStopped",

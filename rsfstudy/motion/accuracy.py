@@ -41,10 +41,11 @@ class Accuracy:
     ----------
     rtol : float, default: 1e-7
         Relative error tolerance of the main results. If the result is a slip rate V, the tolerance
-        applies to ln V. If the result is a rate step, the tolerance applies to V_0/V_* - 1.
+        applies to ln V. If the result is the velocity ratio V_0/V_* of a step, the tolerance
+        applies to V_0/V_* - 1.
     budget : int, default: 500_000
-        Maximum number of right-hand side evaluations of one measurement. A measurement that exceeds
-        the budget has the status ``work_budget_spent``.
+        Maximum number of right-hand side evaluations when a measure is evaluated at one scene. If
+        the budget is exceeded, the status of the outcome is ``work_budget_spent``.
     methods : tuple of (str, str), default: ()
         Pairs of a regime and the SciPy solver for this regime. The default solver is DOP853.
     engine : {"scipy", "python", "compiled"} or type, default: "scipy"

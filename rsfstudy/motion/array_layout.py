@@ -109,8 +109,8 @@ MOTION_STATE_DTYPE = np.dtype(
         ("noise_rate_index", "i8"),  # index of the rate of noise in the parameters, or 0
     ]
 )
-#: Byte formats of two groups of fields of the motion state: the arguments and the counters. Packing
-#: bytes is much faster than assigning record fields.
+#: Byte formats of two groups of motion state fields: the arguments and the counters. Packing these
+#: fields into bytes is much faster than assigning them one by one.
 CALL_FORMAT, COUNTER_FORMAT = struct.Struct("=7d4q"), struct.Struct("=6q")
 MOTION_STATE_FIELDS_SET_BY_CALLER = (MOTION_STATE_DTYPE.names or ())[:11]
 #: Row indices of the function table. The first row contains functions for the slow manifold, and

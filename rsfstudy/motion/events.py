@@ -18,16 +18,16 @@ event. A measure can request the following events:
 
 A requested event ends the motion if it is specified with ``terminal=True``. The available
 quantities are the attributes of a ``MotionPoint``. The attribute ``apparent_friction`` is the
-friction coefficient that a rig measures. Extrema are available for ``log_slip_rate``,
+friction coefficient that a rig measures. You can request extrema of ``log_slip_rate``,
 ``spring_stress`` and ``apparent_friction``.
 
-In addition to the requested events, the table lists the start and the end of the motion, each
-change of regime, and the beginning of each loading segment. The table also lists the end of the
-step in which the last requested sample was recorded. An event at the transition between two regimes
-or segments is reported at the beginning of the later regime or segment. With inertia, a rupture
-begins and ends with a change of regime (``EventKind.REGIME``), unless a loading segment begins or
-ends at the same time. If a motion cannot continue, the integration raises ``MotionStopped`` with
-the reason.
+In addition to the requested events, the table lists the start of the motion, each change of regime,
+the beginning of each loading segment, the end of the motion, and the end of the step in which the
+last requested sample was recorded. If an event occurs at the transition between two regimes or
+segments, it is reported at the beginning of the later regime or segment. If the scene has inertia,
+a rupture begins and ends with a change of regime (``EventKind.REGIME``), unless a loading segment
+begins or ends at the same time. If a motion cannot continue, the integration raises
+``MotionStopped`` with the reason.
 """
 
 from __future__ import annotations
@@ -244,9 +244,11 @@ class Event(NamedTuple):
     specification : EventSpecification or None
         Specification of the event if it was requested, and otherwise None.
     time : float
-        Time since the start, in D_c/V_*. The value is NaN if time is not an unknown of the motion.
+        Time since the start of the motion, in D_c/V_*. The value is NaN if time is not an unknown
+        of the motion.
     slip : float
-        Slip since the start, in D_c. For most sliders, the slip is NaN if time is not an unknown.
+        Slip since the start of the motion, in D_c. For most sliders, the slip is NaN if time is not
+        an unknown.
     point : MotionPoint
         Point of the motion (slip rate, stresses, states and their derivatives) at the event.
     regime : str

@@ -20,7 +20,7 @@ from rsfstudy.slider import Equations, Function, Numbers
 
 
 class InPlaceFunctions(NamedTuple):
-    """Functions of a system of equations, in the order of the function table.
+    """Functions of a system of equations, ordered as in the function table.
 
     Each function has the arguments ``(y, rates, p, result)``, and fills the array ``result``. Only
     the function ``attempt_step`` has other arguments: ``(y, stages, p, step)``.

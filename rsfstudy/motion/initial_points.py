@@ -23,9 +23,9 @@ def initial_point(scene: Scene) -> MotionPoint:
     """Return the initial point of a motion, immediately after the loading step.
 
     Before the loading step, the slider slides steadily at V_*, or has the initial stress and state
-    of the scene. The loading step changes the spring stress and the imposed normal stress. With
-    inertia, the loading step does not change the slip rate immediately. The slip rate adjusts to
-    the loading step within the inertial time.
+    of the scene. The loading step changes the spring stress and the imposed normal stress. If the
+    scene has inertia, the loading step does not change the slip rate immediately. Instead, the slip
+    rate adjusts to the loading step within the inertial time.
 
     Parameters
     ----------
@@ -169,7 +169,8 @@ def point_after_loading_jump(scene: Scene, point: MotionPoint) -> MotionPoint:
 
     A jump in the loading is a step of the load point, a step of imposed normal stress, or the
     beginning or end of an oscillation. A jump in the loading does not change the states of the
-    friction law. With inertia, a jump in the loading does not change the slip rate either.
+    friction law. If the scene has inertia, a jump in the loading does not change the slip rate
+    either.
 
     Parameters
     ----------

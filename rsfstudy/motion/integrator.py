@@ -1,4 +1,4 @@
-"""Integrator of the motions of a measurement.
+"""Integrator of the motions from which a measure computes its results.
 
 An ``Integrator`` stores the requested accuracy and counts right-hand side evaluations. The method
 ``Integrator.follow`` integrates a scene through its loading segments and yields events. A chain is
@@ -43,9 +43,9 @@ from rsfstudy.slider import Equations, MotionPoint, Numbers, Scene
 class Integrator:
     """Integrator of motions with a requested accuracy and a work counter.
 
-    A measure receives the integrator of its cell. The attribute ``work_meter`` counts the
-    right-hand side evaluations of all motions that the integrator and its copies integrate. The
-    integrator and its copies share one work budget.
+    A measure receives an integrator together with the scene to evaluate. The attribute
+    ``work_meter`` counts the right-hand side evaluations of all motions that the integrator and its
+    copies integrate. The integrator and its copies share one work budget.
 
     Parameters
     ----------
@@ -109,7 +109,7 @@ class Integrator:
         Parameters
         ----------
         work_meter : WorkMeter
-            Counter of the copy. The counter also defines the work budget.
+            Work counter of the copy, which also defines the work budget.
 
         Returns
         -------
@@ -352,7 +352,7 @@ class Integrator:
         """
         chains = list_segment_chains(scene, only_last_segment=start is not None)
         with_time = with_time or until < math.inf or len(chains) > 1 or len(chains[0][1]) > 1
-        with_time = with_time or scene.parts.noise.is_active
+        with_time = with_time or scene.parts.loading_noise.is_active
         time, slip, before, told = 0.0, 0.0, None, scene.parts.loading.reported_segment_count
         if resume_from is not None:
             chains, start = find_remaining_segment_chains(scene, resume_from)
@@ -366,7 +366,7 @@ class Integrator:
             asked = select_event_specs(scene, acting, event_specs, is_last_chain=is_last)
             table = truncate_segments_at(table, until)
             end, further, parameters = float(table[-1, SEGMENT_END]), None, None
-            if scene.parts.noise.is_active:
+            if scene.parts.loading_noise.is_active:
                 start, parameters, table, further = begin_noise(acting, start, table)
                 told = 0  # Every loading segment starts a chain, which reports its start.
             motion = get_motion_driver(

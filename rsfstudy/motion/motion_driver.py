@@ -44,7 +44,7 @@ from rsfstudy.status import Status
 
 #: Minimum number of rows of the event table, and number of rows of the recording table.
 _MIN_EVENT_ROWS, _RECORDING_ROWS = 64, 4096
-#: Constructor of named tuples that takes half the time of a normal constructor call.
+#: Constructor of named tuples, which is twice as fast as a normal constructor call.
 _make_named_tuple_without_checks = tuple.__new__
 _STEP_TOO_SHORT_TEXT = (
     "the required step size is smaller than the spacing of floating-point numbers"
@@ -63,7 +63,7 @@ class MotionDriver:
     Parameters
     ----------
     slow_equations : Equations
-        Equations of the slow manifold, for the motion between ruptures.
+        Equations of the slow manifold, which describe the motion between ruptures.
     fast_equations : Equations, optional
         Inertial equations of motion in ruptures. Omit these equations if the scene has no inertia.
     engine : str
@@ -150,7 +150,7 @@ class MotionDriver:
         parameters : tuple of float, optional
             Parameters that replace the parameters of the equations.
         switch_thresholds : SwitchThresholds, optional
-            Thresholds for changes between the regimes. A motion without inertia does not need
+            Thresholds for changes between the regimes. Motions without inertia do not require
             thresholds.
         evaluation_budget : float, default: inf
             Maximum number of right-hand side evaluations. The remaining budget of the work meter is
@@ -158,8 +158,8 @@ class MotionDriver:
         recording : Recording, optional
             Object that receives the recorded rows.
         kinks_and_reported_count : tuple of (ndarray, int), optional
-            Two items: the rows of the segment table for all loading segments after the first, and a
-            number n. The starts of the last n loading segments are reported as events.
+            Rows of the segment table for all loading segments after the first, and the number n of
+            segments whose starts are reported as events. These are the last n segments.
         initial_imposed_stress : float, optional
             Initial value of the last unknown, if the load point oscillates. The imposed shear
             stress is the last unknown minus its initial value. The unknown ``spring_stress`` does
@@ -309,7 +309,9 @@ def get_motion_driver(
         if scene.parts.loading.unknowns
         else 0,
         may_reverse=scene.parts.law.regularised,
-        noise_rate_index=len(scene.parameter_values) - 1 if scene.parts.noise.is_active else 0,
+        noise_rate_index=len(scene.parameter_values) - 1
+        if scene.parts.loading_noise.is_active
+        else 0,
         starts_at_point=1,
         may_terminate=1,
         has_clock=with_time,

@@ -27,8 +27,8 @@ step, end a step, record samples and detect events are in ``step_integration``, 
 
 The header of ``array_layout`` lists the functions that write each field of ``motion``. The class
 ``Workspace`` describes the arrays of a regime, and the header of ``workspace`` lists the functions
-that write these arrays. Steppers only take integration steps. With all steppers, the event loop
-detects and locates the events.
+that write these arrays. Steppers only take integration steps. The event loop detects and locates
+the events in the same way for all steppers.
 
 The code of these modules is limited to Python features that Numba can compile. To debug a rupture,
 simulate a scene with ``inertia=True`` and ``engine="scipy"``. To debug the stages of an integration
@@ -146,8 +146,8 @@ def advance_motion(
     -------
     int
         Return code, for example ``PAUSED`` or ``MOTION_ENDED``. After ``PAUSED``, the caller reads
-        the tables and calls the function again. With noise, the loop pauses at the start of the
-        last segment, so that the caller can append the next segments.
+        the tables and calls the function again. If the scene has noise, the loop also pauses at the
+        start of the last segment, so that the caller can append the next segments.
     """
     motion = motion_memory[0]
     motion.event_rows = motion.recorded_rows = 0

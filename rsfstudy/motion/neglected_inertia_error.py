@@ -75,8 +75,8 @@ def estimate_neglected_inertia_error(
       local error :math:`e` of ln V. The resulting change in spring stress and state is at most the
       integral of :math:`e` over :math:`(1 + K/a) \, d\delta + |d\Psi|/a`. Errors decay along the
       motion, so the largest :math:`e` is another upper bound.
-    - The neglected slip in D_c when the motion returns to the slow manifold and ln V jumps. The
-      state does not evolve over the neglected slip.
+    - The slip in D_c that is neglected when the motion returns to the slow manifold, because ln V
+      jumps at the return. The state does not evolve over this slip.
     """
     if not scene.has_mass:
         return np.zeros(len(recorded_rows))
@@ -97,7 +97,8 @@ def estimate_neglected_inertia_error(
     left = np.maximum.accumulate(
         _bound_log_rate_changes_by_residuals(scene, recorded_rows[used], norms[1:][used])
     )
-    # Other rows get the estimate of the next evaluated row, because residuals may rise steeply.
+    # All other rows are assigned the estimate of the next evaluated row, because residuals may rise
+    # steeply.
     numbers = np.arange(len(recorded_rows))
     number = np.minimum(np.searchsorted(used, numbers), used.size - 1)
     number -= (np.abs(used[number] - numbers) >= SAMPLES_PER_STEP // 2) & (number > 0)

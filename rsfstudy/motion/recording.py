@@ -40,8 +40,8 @@ RECORDED_VARIABLES = (*MOTION_VARIABLES, "friction_coefficient")
 REGIME_COLUMN, SAMPLE_COLUMN, FIRST_STATE_COLUMN = range(
     len(RECORDED_VARIABLES), len(RECORDED_VARIABLES) + 3
 )
-#: Number of samples per integration step. In plots, the interpolating polynomial through the
-#: samples looks smooth.
+#: Number of samples per integration step. With this number of samples, the interpolating polynomial
+#: looks smooth in plots.
 SAMPLES_PER_STEP = 6
 
 
@@ -56,7 +56,7 @@ class Recording:
     sample_times : ndarray, optional
         Requested times in D_c/V_* in increasing order. For a rigid slider, requested slips in D_c.
         If a loading segment begins at a requested time, the end of the previous segment is
-        recorded. By default, the motion is recorded at even intervals within each step.
+        recorded. By default, samples are recorded at even intervals within each step.
     """
 
     #: Names of the first columns of a recorded motion, and of all recorded variables.
@@ -249,7 +249,7 @@ class Recording:
 
 
 def convert_to_recorded_units(scene: Scene, rows: np.ndarray) -> np.ndarray:
-    """Convert recorded rows from event loop units to output units, in place.
+    """Convert recorded rows in place from event loop units to output units.
 
     Natural logarithms of slip rates are converted to decimal logarithms, and stress deviations are
     converted to total stresses.

@@ -1,12 +1,13 @@
 """Criteria for changes between regimes and for the termination of motions.
 
-With inertia, a motion alternates between two regimes: the slow manifold, and the inertial equations
-of motion. The slow manifold approximates the effect of inertia by a series in the inertia weight
-:math:`(K/a) w^2`, where :math:`w` is the dimensionless slip rate norm. The event loop integrates
-the inertial equations of motion in ruptures. The function ``starts_on_slow_manifold`` chooses the
-regime at the beginning of a motion or loading segment. A rupture begins if
-``compute_inertia_effect_over_limit`` reaches 1, and ends if ``should_switch_back_to_slow_manifold``
-returns True. Most criteria are functions of floats, so all engines can call them.
+If the scene has inertia, a motion alternates between two regimes: the slow manifold, and the
+inertial equations of motion. The slow manifold approximates the effect of inertia by a series in
+the inertia weight :math:`(K/a) w^2`, where :math:`w` is the dimensionless slip rate norm. The event
+loop integrates the inertial equations of motion in ruptures. The function
+``starts_on_slow_manifold`` chooses the regime at the beginning of a motion or loading segment. A
+rupture begins if ``compute_inertia_effect_over_limit`` reaches 1, and ends if
+``should_switch_back_to_slow_manifold`` returns True. Most criteria are functions of floats, so all
+engines can call them.
 """
 
 from __future__ import annotations
@@ -30,7 +31,7 @@ MIN_NORMAL_STRESS, MAX_NORMAL_STRESS = 1e-9, 1e6
 MIN_POSITIVE_NORMAL_STRESS = 1e-300
 #: Upper limit of ln(V/V_*) without inertia. The slip rate is unbounded above 10^120 V_*.
 MAX_LOG_SLIP_RATE_WITHOUT_INERTIA = 120.0 * math.log(10.0)
-#: Limits of ln(V/V_*) as constants of this module, because compiled functions read them.
+#: Limits of ln(V/V_*). They are constants of this module because compiled functions read them.
 LARGEST_LOG_SLIP_RATE = Scene.LARGEST_LOG_SLIP_RATE
 STOPPED_LOG_SLIP_RATE = Scene.STOPPED_LOG_SLIP_RATE
 #: Codes for the termination status of a motion.
@@ -164,8 +165,8 @@ def inertia_matters_at(scene: Scene, accuracy: Accuracy, point: MotionPoint) -> 
     Returns
     -------
     bool
-        True if the effect of inertia exceeds its limit on the slow manifold. Without inertia the
-        result is False.
+        True if the effect of inertia exceeds its limit on the slow manifold. The result is False if
+        the scene has no inertia.
     """
     if not scene.has_mass:
         return False

@@ -1,4 +1,4 @@
-"""Brent's method for roots of functions, in Python that Numba can compile."""
+"""Implementation of Brent's root-finding method that Numba can compile."""
 
 from __future__ import annotations
 

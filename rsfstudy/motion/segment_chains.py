@@ -129,11 +129,11 @@ def begin_noise(
         Further blocks of the segment table.
     """
     begin, end = (float(segment_table[0, column]) for column in (SEGMENT_START, SEGMENT_END))
-    tables = scene.parts.noise.iterate_segments(begin, end, scene.load_velocity)
+    tables = scene.parts.loading_noise.iterate_segments(begin, end, scene.load_velocity)
     table = next(tables)
     parameters = list(scene.parameter_values)
     parameters[-1] = float(table[0, SEGMENT_NOISE_RATE])
-    if scene.parts.noise.unknowns:
+    if scene.parts.loading_noise.unknowns:
         parameters[LOADING] = float(table[0, SEGMENT_STRESS_RATE])
         start = start._replace(psis=(*start.psis[:-1], float(table[0, SEGMENT_STRESS_FALL])))
     return start, tuple(parameters), table, tables
@@ -206,7 +206,7 @@ def select_event_specs(
     """
     settling = [spec for spec in event_specs if spec.kind is EventKind.SETTLED]
     may_settle = is_last_chain and not chain_scene.parts.loading.unknowns
-    may_settle = may_settle and not chain_scene.parts.noise.is_active
+    may_settle = may_settle and not chain_scene.parts.loading_noise.is_active
     if may_settle and any(spec.terminal for spec in settling):
         may_settle = not _is_steady_sliding_unstable(scene)
     if may_settle or not settling:
@@ -215,7 +215,7 @@ def select_event_specs(
 
 
 def drop_settling_if_unstable(scene: Scene, motion: Iterator[Event]) -> Iterator[Event]:
-    """Yield the events of a motion, without settling events at unstable steady sliding.
+    """Yield the events of a motion, except settling at unstable steady sliding.
 
     The stability is computed only if the motion has a settling event. Most motions do not have
     settling events.
@@ -238,7 +238,7 @@ def drop_settling_if_unstable(scene: Scene, motion: Iterator[Event]) -> Iterator
 
 
 def _is_steady_sliding_unstable(scene: Scene) -> bool:
-    """Return True if perturbations of steady sliding grow in the last loading segment."""
+    """Return True if steady sliding is unstable in the last loading segment."""
     if scene.log_load_velocity == -math.inf:
         return False
     growth = scene.segment_scene(-1).largest_linear_growth_rate(scene.log_load_velocity)

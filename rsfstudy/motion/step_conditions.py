@@ -172,7 +172,7 @@ def has_event_occurred(event_spec, quantity_before, quantity_after, clock_direct
 
 
 def evaluate_condition_at_clock(clock, condition_context):
-    """Evaluate a condition within the step, for the root finder.
+    """Evaluate a condition within the step. The root finder calls this function.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Steps that end with a regime, with a loading segment or with the motion."""
+"""Truncation of steps at the end of a regime, segment or motion."""
 
 from __future__ import annotations
 
@@ -127,9 +127,9 @@ def truncate_step_at_end_of_regime_or_segment(motion, workspace):
 def end_step_at_end_time(motion, workspace, clock):
     """Repeat the step so that it ends at the end time of the segment.
 
-    If stability limits the step size, dense output is much less accurate than the end of the step.
-    The function therefore uses the time between the end of the step and the end of the segment to
-    correct its estimate, and repeats the step.
+    If numerical stability limits the step size, the dense output is much less accurate than the
+    solution at the end of the step. The function therefore uses the time between the end of the
+    step and the end of the segment to correct its estimate, and repeats the step.
 
     Parameters
     ----------

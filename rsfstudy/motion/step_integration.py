@@ -202,8 +202,8 @@ def take_step_to_next_loading_kink(motion, workspace, max_length):
 def halve_step_until_dense_output_is_accurate(motion, workspace):
     """Halve the step until its dense output is accurate.
 
-    The event loop calls this function for steps that are recorded. If stability limits the step
-    size, dense output is much less accurate than the end of the step.
+    The event loop calls this function for steps that are recorded. If numerical stability limits
+    the step size, the dense output is much less accurate than the solution at the end of the step.
 
     Parameters
     ----------

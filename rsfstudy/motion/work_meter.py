@@ -24,7 +24,7 @@ class MotionStopped(RsfStudyError):
     Parameters
     ----------
     status : Status
-        Reason of the termination.
+        Reason for the termination.
     message : str
         Error message.
     """
@@ -37,7 +37,7 @@ class MotionStopped(RsfStudyError):
 @add_former_member_names
 @dataclass
 class WorkMeter:
-    """Counter of right-hand side evaluations of a measurement, with a budget.
+    """Counter of the right-hand side evaluations of a measure, with a budget.
 
     Parameters
     ----------
@@ -94,7 +94,7 @@ class WorkMeter:
 
     @property
     def budget_advice(self) -> str:
-        """End of a message that suggests a budget four times as large."""
+        """Last sentence of a message, which suggests a budget four times as large."""
         return (
             f". To continue, increase the budget to {4 * self.budget}: --budget "
             f"{4 * self.budget} (budget=)"

@@ -73,7 +73,8 @@ class Workspace(NamedTuple):
         Header, final unknowns, scales and dense output of an order-eight step. See
         ``steppers.unrolled_step``.
     scales : array of shape (unknown_count,)
-        Scales of the unknowns, for the error tolerance.
+        Scales of the unknowns. The allowed error of an unknown is the tolerance multiplied by the
+        sum of its scale and its magnitude.
     dense_output_rows : array
         Coefficients of the dense output of an order-eight step.
     y_within, rates_within : array of shape (unknown_count,)

@@ -131,7 +131,7 @@ def _list_results(dataset: xr.Dataset) -> list[dict[str, Any]]:
     """Return name, description and dimensions of each result in a dataset."""
     return [
         {
-            "name": str(name),  # users may add variables without long_name
+            "name": str(name),  # Users may add variables without the attribute ``long_name``.
             "description": str(values.attrs.get("long_name", "")),
             "dimensions": list(map(str, values.dims)),
         }

@@ -130,7 +130,8 @@ def find_refusal_reasons_of_reductions(dataset: xr.Dataset) -> dict[str, str]:
         Reasons by reduction name.
     """
     named = [str(reduction["name"]) for reduction in StoredDataset(dataset).declaration.reductions]
-    named.sort(key=len, reverse=True)  # A name may begin with another name.
+    # The name of one reduction may begin with the name of another reduction.
+    named.sort(key=len, reverse=True)
     found: dict[str, str] = {}
     for result, values in dataset.data_vars.items():
         name = next((n for n in named if f"{result}_".startswith(f"{n}_")), "")

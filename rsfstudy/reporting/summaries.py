@@ -235,7 +235,7 @@ def note_on_default_friction(scene: Scene) -> list[str]:
 
 
 def build_events_table(event_catalogue: xr.Dataset) -> TextTable | str:
-    """Build a table of the events of a motion. The table has no error estimates.
+    """Build a table of the events of a motion, without error estimates.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Quantities at points and events of a motion, for the measures of responses."""
+"""Quantities at points and events of a motion, used by the response measures."""
 
 from __future__ import annotations
 
@@ -81,7 +81,7 @@ def growth_rate_along_path(scene: Scene, event: Event, load_velocity: float) -> 
 
 
 def choose_friction_quantity_for_events(scene: Scene) -> tuple[str, float]:
-    """Return the quantity that replaces the friction coefficient in events.
+    """Return the quantity whose events replace those of the friction coefficient.
 
     If normal stress is constant and the law is not regularised, events of the friction coefficient
     coincide with events of the spring stress.

@@ -1,4 +1,4 @@
-"""Recorded motions, and errors of results that are read at single instants."""
+"""Recorded motions, and errors of results that depend on a single instant."""
 
 from __future__ import annotations
 
@@ -37,10 +37,10 @@ class RecordedMotion(NamedTuple):
     segment_start_events : list of Event
         Events at the beginning of the first recorded loading segment and of all later segments.
     friction_before_segments : list of float
-        Friction coefficient immediately before the beginning of each segment. With inertia, the
-        motion approaches the slow manifold within the inertial time after the beginning of a
-        segment. The friction coefficient immediately after the beginning of a segment is the value
-        on the slow manifold.
+        Friction coefficient immediately before the beginning of each segment. If the scene has
+        inertia, the motion approaches the slow manifold within the inertial time after the
+        beginning of a segment. The friction coefficient immediately after the beginning of a
+        segment is the value on the slow manifold.
     peak_event : Event or None
         Requested extremum, or None if the motion has no extremum.
     last_event : Event
@@ -194,9 +194,9 @@ def estimate_error_at_instant(
 ) -> float:
     r"""Estimate the error of a result that is read at a single instant.
 
-    If the machine is stiff, stability limits the time steps, so the errors of two runs may agree by
-    chance at a single instant. The error estimate therefore includes a fraction of the result, and
-    a fraction of the friction coefficient from which the result is read.
+    If the machine is stiff, numerical stability limits the time steps, and two runs may have the
+    same error at a single instant by chance. The error estimate therefore includes a fraction of
+    the result, and a fraction of the friction coefficient from which the result is read.
 
     Parameters
     ----------

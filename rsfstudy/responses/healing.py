@@ -105,9 +105,9 @@ class Healing(RecordingMeasure):
     .. math:: \Delta\mu_c = \mu_h - \mu_0, \qquad \Delta\mu = \mu_p - \mu_0.
 
     Under the slowness law with :math:`b > a`, healing after long holds increases by :math:`b` if
-    the logarithm of the hold time increases by 1, and does not depend on the stiffness. Under the
-    slip law, healing decreases with increasing stiffness. The increase of static friction with the
-    logarithm of time was first measured by Dieterich [2]_.
+    the natural logarithm of the hold time increases by 1. This healing does not depend on the
+    stiffness. Under the slip law, healing decreases with increasing stiffness. The increase of
+    static friction with the logarithm of time was first measured by Dieterich [2]_.
 
     References
     ----------
@@ -162,7 +162,7 @@ class Healing(RecordingMeasure):
         return {name: abs(values[name]) + scale for name, scale in least.items()}
 
     def compute(self, scene: Scene, integrator: Integrator) -> Outcome:
-        """Compute relaxation and healing, with error estimates.
+        """Compute relaxation and healing, and their error estimates.
 
         The motion is computed twice, with the requested accuracy and with smaller tolerances. The
         difference between the two runs determines the error estimates.
@@ -217,8 +217,9 @@ class Healing(RecordingMeasure):
         by_friction = {"healing": 1.0, "relaxation": 1.0, "peak_displacement": turning}
         neglected = dict.fromkeys(values, first.neglected_error_until(first.peak_event.time))
         neglected["relaxation"] = first.neglected_error_until(first.segment_start_events[1].time)
-        # The displacement depends on the growth of friction at the peak, and the error of the
-        # growth rises earlier.
+        # The peak displacement depends on the growth rate of ln V at the peak. The error of the
+        # growth rate rises earlier than the error of ln V, so the error at the end of the record is
+        # used.
         neglected["peak_displacement"] = first.neglected_error_until(math.inf)
         errors = estimate_errors_at_instants(
             values, refined, by_friction, scene, integrator, neglected

@@ -51,8 +51,8 @@ _OUTPUTS = (
 class LinearStability(Measure):
     r"""Critical stiffness of steady sliding at the load point velocity.
 
-    The critical stiffness is computed in three ways, which verify each other. The first result
-    follows from the friction relation. The second result is the stiffness at which small
+    The critical stiffness is computed by three methods, whose results are compared. The first
+    result follows from the friction relation. The second result is the stiffness at which small
     perturbations neither grow nor decay according to the equations of motion. The third result is
     the quasi-static closed form, corrected for inertia and radiation damping.
 
@@ -72,8 +72,8 @@ class LinearStability(Measure):
 
     .. math:: K = \frac{b - a}{1 - (\mu_* - \alpha) \cot\varphi},
 
-    which is eq. 7 of [2]_. Eq. 8 of [2]_ is the critical stiffness at other slip rates. If normal
-    stress is constant, the term with :math:`\cot\varphi` is absent.
+    which is eq. 7 of [2]_. Eq. 8 of [2]_ gives the critical stiffness at other slip rates. If
+    normal stress is constant, the term with :math:`\cot\varphi` is absent.
 
     References
     ----------
@@ -223,7 +223,8 @@ def _find_stiffness_at_zero_growth(
         integrator.work_meter.charge(equations.regime, 2 * len(state))
         return max_growth_rate(compute_jacobian(equations, state))
 
-    # With several states, sliding may be stable again below the next smaller critical stiffness.
+    # If the scene has several states, sliding may be stable again below the next smaller critical
+    # stiffness.
     before = [
         k for k in scene.all_critical_stiffnesses(steady_state.log_slip_rate) if k < stiffness_guess
     ]

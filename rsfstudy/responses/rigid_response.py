@@ -68,10 +68,10 @@ class RigidResponse(Measure):
     ``load_velocity_ratio`` of the scene. The direct effect changes the stress by ``a sigma
     ln(V/V_*)`` at the step. The stress then evolves with slip towards steady sliding at V.
 
-    ``evolution_distance`` is the slip at which 1/e of the evolution of stress towards steady
-    sliding remains. Under the slip law, ``evolution_distance`` is D_c. The outputs
-    ``shear_stress``, ``normal_stress_ratio`` and ``state_variable`` have the shape (points,), along
-    ``slip``. Slip is in units of D_c, and stresses are in units of sigma_*.
+    ``evolution_distance`` is the slip after which the difference between the stress and its steady
+    value has decreased to 1/e of the initial difference. Under the slip law, ``evolution_distance``
+    is D_c. The outputs ``shear_stress``, ``normal_stress_ratio`` and ``state_variable`` have the
+    shape (points,), along ``slip``. Slip is in units of D_c, and stresses are in units of sigma_*.
 
     Parameters
     ----------
@@ -140,8 +140,8 @@ class RigidResponse(Measure):
     def error_scales(self, scene: Scene, values: Mapping[str, Any]) -> Mapping[str, float]:
         """Return the scale of the numerical error of the evolution distance.
 
-        The scale is the sum of the evolution distance and of the change of the evolution distance
-        that results from a change of friction by ``a``, the parameter of the direct effect.
+        The scale is the sum of two terms: the evolution distance, and the change in evolution
+        distance if friction changes by the direct effect parameter ``a``.
 
         Parameters
         ----------
@@ -160,7 +160,7 @@ class RigidResponse(Measure):
         return {"evolution_distance": part * abs(values["evolution_distance"])}
 
     def compute(self, scene: Scene, integrator: Integrator) -> Outcome:
-        """Compute the response of the slider, with an error estimate.
+        """Compute the response of the slider and its error estimate.
 
         The response is computed twice, with the requested accuracy and with smaller tolerances. The
         difference between the two runs determines the error estimate.

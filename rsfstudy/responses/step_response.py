@@ -1,4 +1,4 @@
-"""Oscillations of slip rate after a step, with the recorded path."""
+"""Oscillations of slip rate after a step, and the path of the motion."""
 
 from __future__ import annotations
 
@@ -57,10 +57,10 @@ class StepResponse(RecordingMeasure):
     """Peaks of slip rate after a step, and the path of the motion.
 
     The motion is integrated until it has the requested number of peaks, or until it settles. A
-    motion has settled if the distance of ln V and of the states from steady sliding is less than a
-    thousandth of the largest distance from steady sliding during the motion. The results include
-    the peaks of log10(V/V_*), with NaN for missing peaks. ``peak_log10_slip_rate`` has the shape
-    (peaks,).
+    motion is considered settled if its distance from steady sliding (in ln V and the states) is
+    less than a thousandth of the largest such distance during the motion. The results include the
+    peaks of log10(V/V_*). The values of missing peaks are NaN. ``peak_log10_slip_rate`` has the
+    shape (peaks,).
 
     ``peak_ratio`` is the height of the second peak divided by the height of the first peak. The
     height of a peak is ln V at the peak minus the logarithm of the load point velocity.
@@ -130,7 +130,8 @@ class StepResponse(RecordingMeasure):
     def error_scales(self, scene: Scene, values: Mapping[str, Any]) -> Mapping[str, float]:
         """Return the scale of the numerical error of the highest peak.
 
-        The scale is the absolute value plus one e-fold of slip rate, because the logarithm of V/V_*
+        The scale is the absolute value plus log10(e), which corresponds to an increase of the slip
+        rate by a factor of e. The absolute value is not sufficient, because the logarithm of V/V_*
         may be zero.
 
         Parameters
@@ -148,7 +149,7 @@ class StepResponse(RecordingMeasure):
         return {"max_log10_slip_rate": abs(values["max_log10_slip_rate"]) + 1.0 / LN10}
 
     def compute(self, scene: Scene, integrator: Integrator) -> Outcome:
-        """Compute the peaks and the path of the motion, with error estimates.
+        """Compute the peaks and the path of the motion, and error estimates.
 
         The motion is computed twice, with the requested accuracy and with smaller tolerances. The
         difference between the two runs determines the error estimate.
@@ -219,8 +220,8 @@ class StepResponse(RecordingMeasure):
 def _slip_rate_peaks_at_start(scene: Scene, event: Event) -> bool:
     """Return True if the motion starts with a maximum of slip rate.
 
-    With inertia, the slip rate may rise within the inertial time after the step. If the initial
-    rise is not integrated, the start of the motion is a maximum of slip rate.
+    If the scene has inertia, the slip rate may rise within the inertial time after the step. If the
+    initial rise is not integrated, the start of the motion is a maximum of slip rate.
     """
     return (
         _does_inertia_delay_initial_slip_rate_rise(scene)

@@ -119,9 +119,10 @@ class VelocityStep(RecordingMeasure):
     The definitions are the same as in laboratory studies. The parameter ``a`` follows from the
     extremum of friction after the step, and ``a - b`` follows from friction at the end of the
     record. The slip distance is the displacement from the extremum of friction to the point at
-    which 1/e of the evolution of friction remains. The slip distance is reported as load point
-    displacement and as slip, which excludes the elongation of the spring. The results are not
-    corrected for the stiffness of the machine, and therefore show the effect of a soft machine.
+    which the difference from the final friction has decreased to 1/e of the difference at the
+    extremum. The slip distance is reported as load point displacement and as slip, which excludes
+    the elongation of the spring. The results are not corrected for the stiffness of the machine,
+    and therefore show the effect of a soft machine.
 
     ``settled`` is 1 if friction varies by less than a hundredth of the direct effect over the last
     tenth of the record, and if small perturbations of steady sliding do not grow. Otherwise
@@ -183,7 +184,7 @@ class VelocityStep(RecordingMeasure):
     >>> round(scene.a - scene.b, 4), round(outcome.values["apparent_a_minus_b"], 4)
     (-0.0145, -0.0145)
 
-    The machine is soft, so the direct effect appears smaller than it is:
+    The machine is soft, so the apparent direct effect is smaller than the true direct effect:
 
     >>> round(scene.a, 4), round(outcome.values["apparent_a"], 4)
     (0.0145, 0.0116)
@@ -233,8 +234,8 @@ class VelocityStep(RecordingMeasure):
     ) -> dict[str, float]:
         """Return the derivatives of the results with respect to friction.
 
-        The derivative is 1/ln r for a, b and a - b. For slip distances, the evolution of friction
-        is approximated by an exponential. When 1/e of the evolution b ln r remains, friction
+        The derivative is 1/ln r for a, b and a - b. The derivatives of slip distances are computed
+        for an exponential evolution of friction. When 1/e of the evolution b ln r remains, friction
         changes by b ln r/(e D_c) per unit of slip.
         """
         evolved = values["apparent_b"] * log_velocity_ratio
@@ -249,7 +250,7 @@ class VelocityStep(RecordingMeasure):
         }
 
     def compute(self, scene: Scene, integrator: Integrator) -> Outcome:
-        """Compute the response to the step, with error estimates.
+        """Compute the response to the step, and error estimates.
 
         The motion is computed twice, with the requested accuracy and with smaller tolerances. The
         difference between the two runs determines the error estimates. Each run also integrates the
@@ -361,12 +362,13 @@ class VelocityStep(RecordingMeasure):
         recorded_motion: RecordedMotion,
         integrator: Integrator,
     ) -> Event | None:
-        """Return the event at which 1/e of the evolution of friction remains.
+        """Return the event at which the friction change has decayed to 1/e.
 
-        The time and slip of the event are measured from the extremum of friction. A separate
-        integration starts at the extremum of friction, because the recorded integration step that
-        contains the extremum may cross the friction level of the event both before and after the
-        extremum.
+        At this event, the difference between friction and its final value is 1/e of the difference
+        at the extremum of friction. The time and slip of the event are measured from this extremum.
+        A separate integration starts at the extremum of friction, because friction may cross the
+        level of the event both before and after the extremum within a single recorded integration
+        step.
         """
         peak = recorded_motion.peak_event
         if peak is None or not peak.time < recorded_motion.last_event.time:

@@ -27,7 +27,7 @@ _STRESS_COLUMNS = ("shear_stress", "normal_stress")
 
 @dataclass(frozen=True)
 class ReadingOptions(RowSelection):
-    """Reading options that all functions for records share.
+    """Reading options that all record-reading functions share.
 
     The class `RowSelection` describes the options that are not listed here.
 

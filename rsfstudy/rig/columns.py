@@ -38,7 +38,7 @@ class ColumnSpec(NamedTuple):
     units : str, default: ""
         Units of the column.
     scale : float, default: 1.0
-        Factor by which raw numbers are multiplied.
+        Factor by which the numbers in the file are multiplied.
     offset : float, default: 0.0
         Number to add to each value after the multiplication by ``scale``.
     """

@@ -27,8 +27,9 @@ _DIMENSIONAL_NAME_BY_RATIO_NAME = {
     "velocity_ratio": "velocity",
     "normal_stress_ratio": "effective_normal_stress",
 }
-#: The first pattern matches the variable names of logarithms of slip rates. The second pattern
-#: matches words that are removed from the start and the end of variable descriptions.
+#: The first pattern matches the names of variables that contain logarithms of slip rates. The
+#: second pattern matches words that are removed from the start and the end of variable
+#: descriptions.
 _LOG_SLIP_RATE_PATTERN = re.compile(r"(\w+_)?log10_slip_rate")
 _LOG_SLIP_RATE_DESCRIPTION_PATTERN = re.compile(r"^decimal logarithm of (the )?| over V_star")
 
@@ -177,7 +178,7 @@ def convert_dataset_units(
     Returns
     -------
     xarray.Dataset
-        Dataset in physical units. See `apply_scales_to_dataset` for details.
+        Dataset in physical units. See `convert_dataset_by_unit_scales` for details.
     """
     units = {
         "sigma_*": stress, "D_c": length, "D_c/V_*": time, "V_*/D_c": f"{time}-1",

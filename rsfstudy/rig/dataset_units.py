@@ -111,5 +111,5 @@ class DatasetUnits:
 
     @property
     def are_unexpected_by_figures(self) -> bool:
-        """True if the units of the results differ from the units in study figures."""
+        """True if the units of the results differ from the units in figures of studies."""
         return dataset_scales.has_units_unexpected_by_its_figures(self._dataset)

@@ -13,14 +13,15 @@ We suggest reading the other modules in the following order:
 - ``scene`` combines the parts of a slider.
 - ``friction_relation`` defines the relation between stress, slip rate and states, and
   ``state_functions`` defines functions of the state variables. ``temperature_functions`` adds the
-  effects of a temperature that changes.
+  effects of a changing temperature.
 - ``rate_functions`` and ``point_functions`` build the equations of motion from friction and from
   the dynamics. ``path_length`` defines the independent variable.
 - ``steady_state`` and ``stability`` compute steady sliding and its linear stability from the
   friction relation.
 - ``closed_forms`` contains published closed-form solutions.
 
-Five containers lead from a scene to the right-hand side that an integrator evaluates:
+The right-hand side that an integrator evaluates is built from a scene in five stages. Each stage
+has its own data structure:
 
 1. Parts: ``scene_assembly.SceneParts`` holds one part per slot, and each part defines plain
    functions of floats, for example the ``evolution`` of a law.
@@ -31,7 +32,7 @@ Five containers lead from a scene to the right-hand side that an integrator eval
    regime. The rates and the points are built from friction and from the functions of the dynamics,
    and the SciPy integrators call ``Equations.rate_function`` directly.
 4. In-place functions: ``motion.in_place_functions.InPlaceFunctions`` converts the functions of
-   equations, which take and return tuples, to functions that fill arrays.
+   ``Equations``, which take and return tuples, to functions that fill arrays.
 5. Table: ``MotionDriver`` passes a table to the event loop, with one row of in-place functions, or
    of their compiled addresses, per regime.
 

@@ -11,8 +11,8 @@ from dataclasses import dataclass
 
 from scipy.optimize import brentq
 
-#: Grid of values of sigma_*/sigma - 1 for the search of the critical normal stress step: the number
-#: of values, the smallest value and the largest value.
+#: Grid of values of sigma_*/sigma - 1 for the search for the critical normal stress step: the
+#: number of values, the smallest value and the largest value.
 _STRESS_FALL_COUNT, _MIN_STRESS_FALL, _MAX_STRESS_FALL = 400, 1e-9, 1e3
 
 

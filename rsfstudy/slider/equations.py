@@ -255,7 +255,7 @@ def _build_rupture_equations(
 
 
 def build_equations_against_displacement(scene: SceneView) -> Equations:
-    """Return the equations between ruptures with displacement as variable.
+    """Return the equations between ruptures as functions of displacement.
 
     The independent variable is the sum of slip and load point displacement. Close to steady
     sliding, the derivatives of the unknowns are nearly linear functions of the unknowns. The
@@ -276,7 +276,7 @@ def build_equations_against_displacement(scene: SceneView) -> Equations:
 
 
 def build_equations_against_inertial_time(scene: SceneView) -> Equations:
-    r"""Return the equations of a scene with inertia, with time as variable.
+    r"""Return the equations with inertia and time as the independent variable.
 
     Parameters
     ----------
@@ -366,7 +366,7 @@ def slow_manifold_point(scene: SceneView, spring_stress: float, states: Numbers)
     Returns
     -------
     MotionPoint
-        Point with all fields.
+        Point with values of all fields.
     """
     return equations_between_ruptures(scene, with_time=False).evaluate_point(
         (spring_stress, *states)

@@ -190,7 +190,7 @@ def _finite_difference_scales(
 ) -> list[float]:
     """Return the finite-difference scales of ln V, the shift and each state."""
     size = _STATE_SCALE_OVER_B * scene.a * scene.parts.law.state_change_over_a
-    # With several states, the sum of all b may be close to zero even if b of each state is large.
+    # If the law has several states, the sum of all b may be close to zero even if each b is large.
     of_shift = (
         size if scene.parts.law.state_count > 1 else _STATE_SCALE_OVER_B * abs(scene.b) or size
     )

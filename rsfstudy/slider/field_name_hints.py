@@ -24,7 +24,7 @@ _DURATION_HINT = "Pass duration to rsfstudy.simulate(scene, duration=...)."
 
 
 def _rig_quantity_hint(symbol: str, name: str) -> str:
-    """Return an error hint for a quantity that rigs have but scenes do not have."""
+    """Return an error hint for a rig quantity that is not a scene field."""
     return (
         f"{symbol} is the quantity {name} of a rig. Pass Rig({name}=...), or use an axis or an "
         "override of a study with a rig."

@@ -6,8 +6,8 @@ stress g, the slip rate and the states. The module ``state_functions`` defines t
 states. The friction functions include only the effects that are active in the scene.
 
 The pore pressure :math:`P`, divided by :math:`\sigma_*`, reduces the effective normal stress, so
-:math:`s = \sigma/\sigma_* - P`. Friction depends on :math:`\sigma` and :math:`P` only through the
-effective normal stress, and so do the effects of stress on the state. In the tuple of states, the
+:math:`s = \sigma/\sigma_* - P`. Friction, and the effects of stress on the state, depend on
+:math:`\sigma` and :math:`P` only through the effective normal stress. In the tuple of states, the
 states of the law come first, and the pressure :math:`P` is the last element. A loading that imposes
 normal stress adds an unknown that acts like a pore pressure. If a scene has such a loading and also
 a fluid, the first element after the states of the law is the pressure around the fault.
@@ -165,7 +165,7 @@ def build_friction_functions(scene: SceneView) -> FrictionFunctions:
         state_count=scene.state_count,
         indices_of_states_in_distance=(*range(law_states), *compared),
         spring_stress_rate=path_length.spring_stress_rate_with_noise
-        if scene.parts.noise.is_active
+        if scene.parts.loading_noise.is_active
         else path_length.spring_stress_rate,
     )
     if not scene.parts.temperature.unknowns:
@@ -238,7 +238,7 @@ def build_friction_relation(
         Scene with friction parameters.
     states : tuple of float, optional
         States of the scene, from which the pore pressure and the temperature are read. By default,
-        the function uses those of steady sliding at :math:`V_*`.
+        the function uses the states of steady sliding at :math:`V_*`.
 
     Returns
     -------

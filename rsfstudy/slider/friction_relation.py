@@ -133,7 +133,7 @@ def zero_state_effect(
     normal_stress_derivative: float,
     p: Numbers,
 ) -> tuple[float, float]:
-    """Return a zero shift and a zero slope. Stress does not change the state."""
+    """Return a shift and slope of zero, because stress does not change the state."""
     return 0.0, 0.0
 
 
@@ -274,14 +274,14 @@ def zero_load_point_stress(states: Numbers, p: Numbers) -> float:
 def load_point_stress(states: Numbers, p: Numbers) -> float:
     r"""Compute the shear stress :math:`K D` due to an oscillation of the load point.
 
-    The last element of the states is the unknown of the loading. The stress is zero at the start of
-    the oscillation.
+    The unknown of the loading is the last element of the tuple of states. The stress is zero at the
+    start of the oscillation.
     """
     return states[-1] - p[LOADING + 2]
 
 
 def wrap_with_load_point_stress(friction_function: Function) -> Function:
-    """Return a friction function that adds the stress of the load point.
+    """Return a friction function that includes the load point stress.
 
     The argument g of ``friction_function`` is the total frictional stress. The argument g of the
     returned function does not include the load point stress :math:`K D`.

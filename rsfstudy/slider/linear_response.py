@@ -12,11 +12,11 @@ Here :math:`D` and :math:`S` are the derivatives of strength and of the shift wi
 frictional stress. The matrix :math:`M` and the vectors :math:`E_x` and :math:`E_s` contain the
 derivatives of the state evolution with respect to the states, to :math:`x = \ln V` and to the
 shift. The sum of the states of the law acts on friction, so the vector of weights is :math:`1^T`.
-If the scene has a fluid, the weight of the pore pressure :math:`P`, the last state, is minus the
-derivative of strength with respect to :math:`P`, and the weight of porosity is 0. Because the
-pressure also changes the shift, the last column of :math:`M` includes the product of :math:`E_s`
-and the derivative of the shift with respect to :math:`P`. The same applies to a temperature that
-changes.
+If the scene has a fluid, the pore pressure :math:`P` is the last state. The weight of :math:`P` is
+the negative derivative of strength with respect to :math:`P`, and the weight of porosity is 0.
+Because the pressure also changes the shift, the last column of :math:`M` includes the product of
+:math:`E_s` and the derivative of the shift with respect to :math:`P`. A changing temperature is
+treated in the same way.
 
 If the loading changes the normal stress by :math:`-dP`, the frictional stress changes by the
 additional term
@@ -94,8 +94,8 @@ def linear_friction_response(
     Returns
     -------
     above, below : list of float
-        Coefficients of the numerator polynomial and of the denominator polynomial of the response,
-        in ascending order.
+        Coefficients of the numerator and denominator polynomials of the response, in ascending
+        order of the powers.
 
     Notes
     -----

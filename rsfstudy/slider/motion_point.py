@@ -11,8 +11,8 @@ from rsfstudy._deprecation import add_former_member_names
 class MotionPoint(NamedTuple):
     r"""Stress, slip rate and states of a motion at a point in time.
 
-    A motion has the same attributes for all equations of motion, although the unknowns of the
-    equations differ.
+    The attributes are the same for all equations of motion, although the equations have different
+    unknowns.
 
     Parameters
     ----------
@@ -26,10 +26,10 @@ class MotionPoint(NamedTuple):
     frictional_stress : float
         Deviation :math:`g` of the frictional stress from :math:`\tau_*`, in :math:`\sigma_*`.
     psi : float
-        Sum of the states :math:`\Psi_i` of the law. The effect of stress is removed from these
-        states.
+        Sum of the states :math:`\Psi_i` of the law. These states exclude the effect of stress.
     state : float
-        State variable :math:`\Theta`. If the law has several states, ``state`` is their sum.
+        State variable :math:`\Theta`. If the law has several states, ``state`` is the sum of the
+        states.
     steady_state_offset : float
         Difference between the state variable and the value of the state variable in steady sliding
         at the same slip rate. For most laws, the steady-state offset is

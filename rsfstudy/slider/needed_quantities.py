@@ -148,8 +148,8 @@ def _causes_of_unknown_quantities(scene: SceneView) -> list[_CauseOfUnknownQuant
 def _causes_of_unknown_friction(scene: SceneView) -> list[_CauseOfUnknownQuantity]:
     """Return the reasons why a law cannot compute the friction coefficient.
 
-    The friction coefficient of forward slip is not valid if slip reverses. The state that a law
-    receives contains a part of the effect of temperature.
+    The friction coefficient of forward slip is not valid if slip reverses. If friction depends on
+    temperature, the state that a law receives includes part of the temperature effect.
     """
     causes, temperature = [], scene.parts.temperature
     if scene.parts.law.regularised:

@@ -120,7 +120,7 @@ def pack_friction_parameter_values(scene: SceneView) -> Numbers:
     )
     last = collect_parameter_values(law, scene), temperature_parameter_values(scene)
     # The last parameter of a scene with noise is the rate at which noise changes the spring stress.
-    noise = (scene.inertial_time, 0.0) if parts.noise.is_active else ()
+    noise = (scene.inertial_time, 0.0) if parts.loading_noise.is_active else ()
     return (*common, *own, *last[0], *last[1], *noise)
 
 

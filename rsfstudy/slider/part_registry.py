@@ -3,8 +3,8 @@
 The registry lists the parts that can fill each slot, and the fields that the parts add to a scene.
 A user-defined part is a class that is derived from the base class of a slot. A user-defined part is
 registered by its name when the part is first used in a process. If a notebook cell with the class
-is run again, the new class replaces the old class. The registry rejects a name that belongs to
-another part.
+is run again, the new class replaces the old class. The registry rejects a class whose name belongs
+to another part.
 """
 
 from __future__ import annotations
@@ -50,7 +50,8 @@ class Slot:
         User-defined parts by name that have been used in this process.
     omit_if_default : bool, default: False
         If True, the keys of cells and stored scenes omit the name of the default part. Use True for
-        slots that are added to rsfstudy later, so that existing journals and files stay valid.
+        every slot that is added in a later version of rsfstudy, so that existing journals and files
+        stay valid.
     """
 
     name: str
@@ -99,7 +100,7 @@ SLOTS: tuple[Slot, ...] = (
         omit_if_default=True,
     ),
     Slot(
-        "noise",
+        "loading_noise",
         noise.Noise,
         noise.BUILT_IN_PARTS,
         "none",
@@ -129,8 +130,8 @@ SCENE_FIELD_QUANTITIES: tuple[Quantity, ...] = (
 SCENE_FIELD_NAMES: tuple[str, ...] = tuple(
     dict.fromkeys(about.name for about in SCENE_FIELD_QUANTITIES)
 )
-#: Fields that were added to rsfstudy later, with their default values. Scenes list such a field
-#: only if it has a value. The keys of cells and stored scenes also omit the default value.
+#: Fields that were added in later versions of rsfstudy, with their default values. Scenes list such
+#: a field only if it has a value. The keys of cells and stored scenes also omit the default value.
 OMITTED_DEFAULTS: dict[str, Any] = {
     **{slot.name: slot.default_part_name for slot in SLOTS if slot.omit_if_default},
     **{
@@ -365,7 +366,7 @@ def _check_part_fields(slot: Slot, part: type[Part]) -> None:
             raise InvalidValue(what, name, rule)
         if owner is None:
             taken = name in RESERVED_NAMES | SLOT_NAMES
-        else:  # Another part of the slot may have the same field with another rule.
+        else:  # Another part of the slot may declare the field with a different rule.
             known = owner.__dataclass_fields__[name].metadata["about"]
             taken = about != known or owner not in slot.built_in_parts.values()
         if taken:

@@ -77,7 +77,8 @@ class Part:
 
     #: Name of the part.
     name: ClassVar[str]
-    #: Name of the field whose value selects the part. Empty if the part is selected by its name.
+    #: Name of the field whose value selects the part. The string is empty if the part is selected
+    #: by its name.
     selected_by: ClassVar[str] = ""
     #: Names of class members that are derived from the equations of the part, such as closed-form
     #: solutions.
@@ -108,8 +109,8 @@ class Part:
         """Reset the derived properties if the subclass changes the equations.
 
         The derived properties of a part follow from its equations. A subclass that overrides a
-        member of ``defining_methods`` therefore does not inherit the derived properties of another
-        part.
+        member of ``defining_methods`` therefore does not inherit the derived properties of its base
+        class.
         """
         super().__init_subclass__()
         add_new_names_for_former_members(cls)
@@ -244,9 +245,9 @@ def number(
         Last sentence of the error message if a value violates the rule.
     omit_if_default : bool, default: False
         If True, scenes of parts without the field do not list the field, and the keys of cells and
-        stored scenes omit the default value. Use True for every field that is added to rsfstudy
-        later, so that existing journals and files stay valid. The default value of such a field
-        must never change.
+        stored scenes omit the default value. Use True for every field that is added in a later
+        version of rsfstudy, so that existing journals and files stay valid. The default value of
+        such a field must never change.
 
     Returns
     -------

@@ -2,8 +2,9 @@ r"""Functions for the stress, slip rate and states at a point of a motion.
 
 The module builds functions ``(state, rates, p) -> MotionPoint`` from the friction functions of a
 scene. The argument ``state`` contains the unknowns of the equations of motion, ``rates`` contains
-the derivatives of the unknowns, and ``p`` contains the parameters of the scene. The unknowns are
-different between ruptures, in ruptures and for a rigid slider.
+the derivatives of the unknowns, and ``p`` contains the parameters of the scene. The equations
+between ruptures, the equations in ruptures and the equations of a rigid slider have different
+unknowns.
 """
 
 from __future__ import annotations

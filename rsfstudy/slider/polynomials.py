@@ -1,4 +1,7 @@
-"""Polynomials for stability analyses, with coefficients in ascending order."""
+"""Operations on polynomials for the stability analysis of steady sliding.
+
+The coefficients of all polynomials are in ascending order of the powers.
+"""
 
 from __future__ import annotations
 

@@ -174,7 +174,7 @@ def build_rate_functions_in_rupture(
 
 
 def _add_noise_to_rupture_rates(rupture_rate_function: Function) -> Function:
-    """Add the noise of the spring stress to the derivatives with respect to inertial time.
+    """Add the noise of the spring stress to the rates per inertial time.
 
     The last two parameters of a scene with noise are the inertial time and the rate of the noise.
     """

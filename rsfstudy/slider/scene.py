@@ -77,7 +77,7 @@ class Scene(SceneFunctions, SceneQuantities):
     temperature : str or type, default: "isothermal"
         Temperature. With "isothermal", temperature is constant. With "shear_heating", the work of
         the shear stress heats the fault. A user-defined class is also accepted.
-    noise : str or type, default: "none"
+    loading_noise : str or type, default: "none"
         Noise that is added to the loading. With "white", the noise of the stresses is a Wiener
         process. With "correlated", the noise is bounded and has a correlation time.
     a : float, default: 0.0145
@@ -86,9 +86,10 @@ class Scene(SceneFunctions, SceneQuantities):
         Steady-state friction coefficient at :math:`V_*`.
     stiffness_ratio : float, optional
         Ratio of the stiffness to the critical stiffness at :math:`V_*` without radiation damping.
-        Steady sliding is stable at stiffness ratios above 1. With radiation damping, steady sliding
-        is also stable at stiffness ratios slightly below 1. With several states, steady sliding may
-        also be stable at lower stiffness ratios. The default is 1 if ``stiffness`` is not given.
+        Steady sliding is stable at stiffness ratios above 1. If the scene has radiation damping,
+        steady sliding is also stable at stiffness ratios slightly below 1. If the law has several
+        states, steady sliding may also be stable at lower stiffness ratios. The default is 1 if
+        ``stiffness`` is not given.
     stiffness : float, optional
         Stiffness :math:`k D_c/\sigma_*`, as an alternative to ``stiffness_ratio``.
     period : float, default: 5.0
@@ -112,8 +113,8 @@ class Scene(SceneFunctions, SceneQuantities):
         form of the friction law). Only quasi-static motions support reversed slip.
     b_over_a : float, default: 2.0
         Ratio :math:`b/a` of the evolution effect to the direct effect. Rate weakening requires
-        :math:`b > a`. Without rate weakening, there is no critical stiffness, and ``stiffness``
-        must be given.
+        :math:`b > a`. If friction is not rate weakening, there is no critical stiffness, and
+        ``stiffness`` must be given.
     cutoff_velocity_ratio : float, default: 100.0
         Cut-off velocity :math:`V_c/V_*` of the composite law and of the law with a cut-off. Above
         this velocity, the composite law has no healing, and the law with a cut-off has no evolution
@@ -125,8 +126,8 @@ class Scene(SceneFunctions, SceneQuantities):
     weakened_friction : float, default: 0.2
         Friction coefficient at slip rates far above the weakening velocity.
     weakening_exponent : float, default: 8.0
-        Exponent :math:`n` of the law with flash heating. With a larger exponent, the transition at
-        the weakening velocity is sharper.
+        Exponent :math:`n` of the law with flash heating. The transition at the weakening velocity
+        is sharper if the exponent is larger.
     b1_over_a : float, default: 1.0
         Ratio :math:`b_1/a` of the first state, for laws with two states. Laws with two states do
         not have the field ``b_over_a``. Negative values are allowed.
@@ -157,8 +158,8 @@ class Scene(SceneFunctions, SceneQuantities):
         If True, the slider has mass.
     radiation_damping : float, default: 0.0
         Damping coefficient :math:`\eta V_*/\sigma_*`, which is the damping stress due to seismic
-        waves at :math:`V_*`. A scene has either inertia or radiation damping. A slider with inertia
-        corresponds to a damping coefficient of the stiffness, multiplied by
+        waves at :math:`V_*`. A scene has either inertia or radiation damping. The damping
+        coefficient that corresponds to a slider with inertia is the stiffness multiplied by
         :math:`T V_*/(2 \pi D_c)`.
     oscillation_amplitude : float, default: 0.0
         Amplitude of an oscillation of imposed normal stress in :math:`\sigma_*`. If the driving
@@ -234,8 +235,8 @@ class Scene(SceneFunctions, SceneQuantities):
     ----------
     parts : SceneParts
         Parts of the scene: ``slider``, ``law``, ``normal_stress``, ``fluid``, ``dynamics``,
-        ``loading``, ``temperature`` and ``noise``. Each field of the scene belongs to one of the
-        parts.
+        ``loading``, ``temperature`` and ``loading_noise``. Each field of the scene belongs to one
+        of the parts.
 
     Raises
     ------
@@ -318,12 +319,13 @@ class Scene(SceneFunctions, SceneQuantities):
         """Scene with a steadily moving load point, for stability analyses.
 
         If the loading has unknowns or noise, the load point of the returned scene moves at the
-        velocity of the last segment, without noise. Otherwise the property is the scene itself.
+        velocity of the last segment, without noise. Otherwise the property returns the scene
+        itself.
         """
-        if not self.stress_loading.unknowns and not self.parts.noise.is_active:
+        if not self.stress_loading.unknowns and not self.parts.loading_noise.is_active:
             return self
         steady = self.with_segment(loading.Segment(self.load_velocity))
-        return Scene(steady.parts._replace(noise=NoNoise()))
+        return Scene(steady.parts._replace(loading_noise=NoNoise()))
 
     def segment_scene(self, segment_index: int) -> Scene:
         """Return the scene during one segment of its loading.
@@ -362,7 +364,7 @@ class Scene(SceneFunctions, SceneQuantities):
         )
         if self.parts.law.regularised:  # After reversed slip, a hold may have no solution.
             breaks = breaks | (table[:, parameter_layout.SEGMENT_VELOCITY] == 0.0)
-        breaks = breaks | self.parts.noise.is_active
+        breaks = breaks | self.parts.loading_noise.is_active
         first = np.flatnonzero(breaks[1:]) + 1
         acting = map(self.segment_scene, (0, *first.tolist()))
         return tuple(zip(acting, np.split(table, first), strict=True))

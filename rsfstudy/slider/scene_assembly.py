@@ -60,7 +60,7 @@ class SceneParts(NamedTuple):
         Loading history.
     temperature : Temperature
         Temperature of the fault.
-    noise : Noise
+    loading_noise : Noise
         Noise that is added to the loading.
     """
 
@@ -71,7 +71,7 @@ class SceneParts(NamedTuple):
     dynamics: dynamics.Dynamics
     loading: loading.Loading
     temperature: temperature.Temperature = Isothermal()
-    noise: noise.Noise = NoNoise()
+    loading_noise: noise.Noise = NoNoise()
 
 
 def build_parts(field_values: Mapping[str, Any]) -> SceneParts:

@@ -46,12 +46,15 @@ class SceneQuantities(SceneBase):
 
         The part is the noise if the noise changes normal stress, and otherwise the loading.
         """
-        return self.parts.noise if self.parts.noise.unknowns else self.parts.loading
+        return self.parts.loading_noise if self.parts.loading_noise.unknowns else self.parts.loading
 
     @property
     def changes_normal_stress(self) -> bool:
         """True if the loading or the noise changes normal stress."""
-        return self.parts.loading.changes_normal_stress or self.parts.noise.changes_normal_stress
+        return (
+            self.parts.loading.changes_normal_stress
+            or self.parts.loading_noise.changes_normal_stress
+        )
 
     @cached_attribute
     def pressure_source(self) -> Fluid | Loading | Noise | FluidWithBoundaryPressure:
@@ -163,7 +166,7 @@ class SceneQuantities(SceneBase):
     @property
     def is_perturbed(self) -> bool:
         """True if the motion deviates from steady sliding at V_*."""
-        loaded = self.parts.loading.perturbs_steady_sliding or self.parts.noise.is_active
+        loaded = self.parts.loading.perturbs_steady_sliding or self.parts.loading_noise.is_active
         return self.starts_unsteady or loaded
 
     @property

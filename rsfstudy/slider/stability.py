@@ -88,8 +88,8 @@ def critical_stiffness(
     around = linearise_force_balance(scene, steady, quasi_static=quasi_static)
     crossings = _find_critical_stiffnesses(around, _MIN_CRITICAL_STIFFNESS_OVER_A * scene.a)
     critical = crossings[-1] if crossings else 0.0
-    # With one state and constant pore pressure, no perturbation grows above the only critical
-    # stiffness.
+    # A scene with one state and constant pore pressure has a single critical stiffness, above which
+    # no perturbation grows.
     if scene.state_count == 1 or critical == math.inf:
         return critical
     return math.inf if _is_unstable_at_stiffness(around, 2.0 * critical or scene.a) else critical

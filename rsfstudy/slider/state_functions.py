@@ -251,7 +251,8 @@ def build_state_contribution_function(
         Number of states of the law.
     pressure_derivatives : callable or None
         Function ``(g, psis, p)`` that returns the derivative of the strength with respect to the
-        last unknown as its first value. None if the scene has only the states of the law.
+        last unknown as its first value. The value is None if the scene has only the states of the
+        law.
 
     Returns
     -------

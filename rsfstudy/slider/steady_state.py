@@ -42,7 +42,7 @@ class SteadySliding:
     spring_stress : float
         Deviation of spring stress from :math:`\tau_*`, in units of :math:`\sigma_*`.
     states : tuple of float
-        States :math:`\Psi_i`. The effect of stress is removed from these states.
+        States :math:`\Psi_i`. These states exclude the effect of stress.
     """
 
     log_slip_rate: float
@@ -65,8 +65,8 @@ def steady_sliding(scene: SceneView, log_slip_rate: float) -> SteadySliding | No
     Returns
     -------
     SteadySliding or None
-        Stresses and states. None if no frictional stress satisfies the friction relation, or if
-        the steady temperature is unknown.
+        Stresses and states. The result is None if no frictional stress satisfies the friction
+        relation, or if the steady temperature is unknown.
 
     Notes
     -----
@@ -132,8 +132,8 @@ def frictional_stress_for_friction(
     Returns
     -------
     float or None
-        Deviation of frictional stress from :math:`\tau_*`, in units of :math:`\sigma_*`. None if no
-        frictional stress corresponds to the friction coefficient.
+        Deviation of frictional stress from :math:`\tau_*`, in units of :math:`\sigma_*`. The result
+        is None if no frictional stress corresponds to the friction coefficient.
 
     Notes
     -----
@@ -170,8 +170,8 @@ def frictional_stress_after_jump(
     Returns
     -------
     float or None
-        Deviation of frictional stress from :math:`\tau_*`, in units of :math:`\sigma_*`. None if no
-        frictional stress corresponds to `strength`.
+        Deviation of frictional stress from :math:`\tau_*`, in units of :math:`\sigma_*`. The result
+        is None if no frictional stress corresponds to `strength`.
 
     Notes
     -----
@@ -191,7 +191,8 @@ def _min_frictional_stress(scene: SceneView) -> float:
     Normal stress is positive if the frictional stress exceeds the returned stress.
     """
     weakest = scene.parts.normal_stress.min_frictional_stress(scene)
-    # If slip may reverse, strength increases with the magnitude of positive and negative stress.
+    # If slip may reverse, strength increases with the magnitude of the stress, whose sign may be
+    # positive or negative.
     return max(weakest, -scene.mu_star) if scene.parts.law.regularised else weakest
 
 
@@ -258,7 +259,7 @@ def min_steady_log_slip_rate(scene: SceneView) -> float:
 
     def excess(log_slip_rate: float) -> float:
         change = steady_friction_minus_reference(scene, log_slip_rate)
-        # Without a steady temperature, the slip rate is too small.
+        # If there is no steady temperature, the slip rate is treated as too small.
         return 1.0 if math.isnan(change) else change - strongest
 
     slower = -1.0

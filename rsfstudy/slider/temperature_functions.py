@@ -47,8 +47,9 @@ _NORMAL_STRESS_ITERATION_COUNT = 30
 _MAX_LOG_SLIP_RATE_CHANGE = 0.25
 #: Value of ln(V/V_*) below which slip does not heat the fault, to double precision.
 _MIN_HEATING_LOG_SLIP_RATE = -60.0
-#: Maximum number of secants in the search of a steady temperature, its relative tolerance, and the
-#: largest last step if rounding errors prevent that the tolerance is reached.
+#: Maximum number of secant iterations in the search for a steady temperature, relative tolerance of
+#: the search, and largest last step that is accepted if rounding errors prevent convergence to this
+#: tolerance.
 _MAX_SECANT_COUNT, _ROOT_TOLERANCE, _STAGNATION_TOLERANCE = 30, 1e-14, 1e-10
 
 
@@ -227,7 +228,7 @@ def _build_normal_stress_function(
 def _build_warming_function(
     temperature_rate: Function, normal_stress: Function, law_state_count: int, places: _Places
 ) -> Function:
-    r"""Return a function ``(x, psis, shift, fraction, p)`` for the rate of temperature.
+    r"""Return a function ``(x, psis, shift, fraction, p)`` for the temperature rate.
 
     The friction coefficient is
     :math:`\mu = \mu_* + a \ln V + \Psi - \mathrm{shift} - (b q_b - a q_a) \Lambda`.
@@ -323,8 +324,8 @@ def steady_temperature_rise(scene: SceneView, log_slip_rate: float) -> float:
     Returns
     -------
     float
-        Temperature rise :math:`\vartheta`. The result is NaN if the steady temperature cannot be
-        followed to the slip rate.
+        Temperature rise :math:`\vartheta`. The result is NaN if the temperature cannot be followed
+        continuously to the given slip rate.
     """
     functions, p = scene.friction_functions, scene.friction_parameter_values
     place, activated = scene.parts.law.state_count, temperature_parameter_values(scene)[1]

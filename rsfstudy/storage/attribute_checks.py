@@ -1,6 +1,6 @@
 """Checks of variables and their attributes in results files.
 
-The checks are needed because the files may have been written by other programs.
+The checks are needed because other programs may have written or changed the files.
 """
 
 from __future__ import annotations

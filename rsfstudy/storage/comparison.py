@@ -90,7 +90,7 @@ def _compare_motions(first: xr.Dataset, second: xr.Dataset) -> pd.DataFrame:
 def _agreement_table(
     variable_rows: Sequence[dict[str, Any]], first: Mapping[str, Any], second: Mapping[str, Any]
 ) -> pd.DataFrame:
-    """Build the table of compared variables. Store fingerprint differences in attrs."""
+    """Build the table of compared variables, with fingerprint differences in attrs."""
     frame = pd.DataFrame(variable_rows, columns=_AGREEMENT_COLUMNS)
     frame.attrs["differs"] = find_fingerprint_differences(first, second)
     return frame
@@ -123,9 +123,10 @@ def _variable_agreement(
     errors = [d[f"{variable_name}_error"] for d in (first, second) if f"{variable_name}_error" in d]
     if [error.shape for error in errors] == [a.shape, a.shape]:
         allowed = errors[0].values[common_cell_mask] + errors[1].values[common_cell_mask]
-        # NaN compares as False, so a missing number or a missing error exceeds the estimates.
+        # Comparisons with NaN are False, so a missing value or a missing error estimate counts as a
+        # difference beyond the errors.
         found["beyond_errors"] = int((~same & ~(gap <= allowed)).sum())
-    elif "flag_values" in a.attrs:  # Codes have no error estimates.
+    elif "flag_values" in a.attrs:  # Status codes and other flag values have no error estimates.
         found["beyond_errors"] = int((~same).sum())
     return found
 
@@ -178,7 +179,7 @@ class Comparison:
 
     @property
     def beyond_errors(self) -> list[str]:
-        """Names of variables that differ by more than both error estimates together."""
+        """Names of variables that differ by more than the sum of both error estimates."""
         return list(self.agreement_table["variable"][self.agreement_table["beyond_errors"] > 0])
 
     @property

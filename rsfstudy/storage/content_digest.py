@@ -4,9 +4,9 @@ The digest is computed from the numbers, the strings and the declaration of the 
 file stores this digest in an attribute, so the digest is preserved if another program saves the
 file. A second digest, which is stored at the end of the file, is computed from all bytes of the
 file. The digest at the end is lost if the file is truncated or if another program saves the file.
-The digest of the contents is needed because HDF5 does not store checksums of the data, nor of
-attributes larger than 4 kB, such as a long declaration. HDF5 only stores checksums of small
-attributes, names and shapes.
+The digest of the contents is needed because HDF5 stores no checksums of the data or of attributes
+larger than 4 kB, such as a long declaration. HDF5 only stores checksums of small attributes, names
+and shapes.
 """
 
 from __future__ import annotations

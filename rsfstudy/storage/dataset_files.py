@@ -109,7 +109,8 @@ def write_dataset(dataset: xr.Dataset, path: Path) -> xr.Dataset:
             "another --output."
         ) from error
     finally:
-        with contextlib.suppress(OSError):  # The error above reports an invalid directory.
+        # The error above has already reported an invalid directory.
+        with contextlib.suppress(OSError):
             beside.unlink(missing_ok=True)
     clean.encoding["source"] = str(path)
     return clean

@@ -366,7 +366,7 @@ def _find_class(
     class with this name, the function also searches the modules of the named studies.
     """
     for exported in exporting_package.__all__:
-        getattr(exporting_package, exported)  # This loads the module of the class.
+        getattr(exporting_package, exported)  # The attribute access loads the module of the class.
     if declared_name not in _named_subclasses(base_class):
         for study in study_names():
             load_study(study)

@@ -194,7 +194,7 @@ def variable_attributes(
     about = find_quantity(variable_name, study_quantities)
     attrs: dict[str, Any] = {"long_name": about.long_name}
     if variable_name in study_quantities and about.symbol:
-        attrs["symbol"] = about.symbol  # Symbols of studies are not in the vocabulary.
+        attrs["symbol"] = about.symbol  # Symbols that a study defines are not in the vocabulary.
     if about.units and not isinstance(example_value, str | bool):
         attrs["units"] = about.units
     if about.scale:

@@ -132,8 +132,8 @@ def study_of_dataset(results: xr.Dataset) -> Study:
 def depends_on_user_code(results: xr.Dataset) -> bool:
     """Return True if user-defined code affected the results.
 
-    User-defined loadings are not code, because the results contain the samples or segments of the
-    loadings. If the results contain user-defined loadings, the function searches the axes and the
+    User-defined loadings do not count as code, because the results contain their samples or
+    segments. If the results contain user-defined loadings, the function searches the axes and the
     base scene for other user-defined parts.
 
     Parameters

@@ -165,7 +165,7 @@ def is_of_single_scene(dataset: xr.Dataset) -> bool:
     Returns
     -------
     bool
-        True for a motion, a limit cycle or a critical step. False for the results of a study.
+        True for a motion, a limit cycle or a critical step, and False for the results of a study.
     """
     return "scene" in dataset.attrs and "declaration" not in dataset.attrs
 

@@ -1,4 +1,4 @@
-"""Object that reads the declaration, provenance and scenes of a dataset."""
+"""Declaration, provenance and scenes of a dataset that rsfstudy has written."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ class StoredDataset:
 
     @property
     def is_of_single_scene(self) -> bool:
-        """True if the dataset belongs to a single scene, and not to a study."""
+        """True if the dataset belongs to a single scene rather than to a study."""
         return schema.is_of_single_scene(self.dataset)
 
     @property
@@ -57,7 +57,7 @@ class StoredDataset:
 
     @property
     def primary_output(self) -> str | None:
-        """Name of the main numeric output, or None if there is none."""
+        """Name of the primary output, or None if no output is numeric."""
         return rebuild_from_file.find_primary_output(self.dataset)
 
     def rebuild_study(self, study_file: str | Path | None = None) -> Study:
@@ -91,7 +91,7 @@ class StoredDataset:
         return dataset_scenes.scene_of_dataset(self.dataset, study)
 
     def read_json(self, attribute_name: str) -> Any:
-        """Decode an attribute that contains JSON.
+        """Decode a root attribute that contains JSON.
 
         Parameters
         ----------

@@ -15,7 +15,7 @@ from rsfstudy.parts import Segment
 from rsfstudy.slider import Protocol, SampledHistory, UserLoading, UserPart, protocol
 from rsfstudy.storage.plain_data import invalid_part_error
 
-#: Name of the rows and description of the columns, for each kind of loading table.
+#: Dimension name of the rows, and description of the columns, for each kind of loading table.
 _DESCRIPTION_OF_SAMPLE_ROWS = (
     "sample",
     "time, load point velocity, decrease of normal stress, and rate of normal stress",

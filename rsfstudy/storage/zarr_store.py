@@ -48,7 +48,7 @@ class ZarrStore:
     Parameters
     ----------
     path : Path
-        Directory of the store. A store that exists is never replaced.
+        Directory of the store. An existing store is never replaced.
     """
 
     path: Path
@@ -160,7 +160,7 @@ def _write_lattice(
         0,
     )
     length, *within = study.shape
-    row = math.prod(within)  # number of cells
+    row = math.prod(within)  # number of cells per point of the first axis
     rows = min(length, max(1, _MAX_VALUES_PER_SLAB // (width * row)))
     coords = _convert_strings_to_object_dtype(xr.Dataset(coords=coordinates))
     # The fill values are the values of pending cells. If a chunk is lost, its cells are therefore

@@ -25,8 +25,8 @@ def select_axis_points(axis: Axis, labels_or_numbers: Sequence[Any]) -> Axis:
     Returns
     -------
     Axis
-        Axis with the selected points. If the selection contains the first ``n`` samples in order,
-        the axis keeps the information about the sampling method.
+        Axis with the selected points. The axis keeps the information about the sampling method only
+        if the selection consists of the first ``n`` samples in order.
 
     Raises
     ------

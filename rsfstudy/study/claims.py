@@ -35,7 +35,7 @@ _VERDICT_TABLE_COLUMNS = (
     *("id", "claim", "source", "relation", "published", "computed"),
     *("tolerance", "reason", "verdict", "expected", "difference_reason", "verdict_changed"),
 )
-#: Default reason for the tolerance of a claim. The default is accepted only for inequalities.
+#: Default reason for the tolerance of a claim. An equality requires another reason.
 TOLERANCE_REASON_OF_INEQUALITY = "an inequality"
 _EXPECTED_VERDICTS = (REPRODUCED_VERDICT, DIFFERS_VERDICT)
 _TEXT_FIELDS = (
@@ -73,8 +73,8 @@ class Claim:
     relation : {"equals", "below", "above"}, default: "equals"
         Expected relation of the result to the published value.
     baseline : mapping of str to object, optional
-        Coordinate values that select a second value. If ``baseline`` is given, the second value is
-        subtracted from the first value, and the difference is compared with the published value.
+        Coordinate values that select a second value. If you pass ``baseline``, the difference
+        between the first value and the second value is compared with the published value.
     baseline_variable : str, optional
         Name of the variable of the second value. The default is ``variable``.
     expected : {"reproduced", "differs"}, default: "reproduced"

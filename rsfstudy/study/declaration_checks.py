@@ -342,7 +342,8 @@ def unknown_name_error(
 def _describe_measure_outputs(measure: Measure) -> str:
     """Describe the results of a measure and the fields that the measure solves for.
 
-    The description is a string, because two NaN values are equal only as strings.
+    The description is a string, because two NaN values compare equal only after conversion to
+    strings.
     """
     inner = {name: np.asarray(at).tolist() for name, at in measure.inner_coordinates.items()}
     return repr((measure.primary_output, dict(measure.variables), inner, measure.solved_fields))

@@ -48,7 +48,8 @@ class Panel:
     """Panel of a figure, or one panel for each point of the axes in ``facet``.
 
     Functions that receive a dataset are called with the part of the dataset that the panel shows.
-    The data of one curve are the part of the dataset that the curve shows.
+    Functions that receive the data of one curve are called with the part of the dataset that the
+    curve shows.
 
     Parameters
     ----------
@@ -64,9 +65,9 @@ class Panel:
     facet : sequence of str, optional
         Axes whose points are shown in separate panels.
     isel : mapping of str to int, list of int, slice or callable, optional
-        Indices of the selected points on each axis, by axis name. A function such as ``min``
-        receives the list of coordinate values and returns one value or a list of values. A scalar
-        coordinate with the index 0 is shown in the title.
+        Indices of the selected points on each axis, by axis name. If a value is a function such as
+        ``min``, the function receives the list of coordinate values and returns one value or a list
+        of values. A scalar coordinate with the index 0 is shown in the title.
     markers_only : bool, default: False
         If True, draw markers without lines.
     style : mapping or callable, optional

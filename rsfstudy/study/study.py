@@ -39,7 +39,7 @@ from rsfstudy.study.user_parts import find_named_user_parts, user_field_quantiti
 #: Maximum length of the name of a study in bytes. Most file systems allow file names of at most 255
 #: bytes, and the names of files have suffixes.
 _MAX_NAME_BYTES = 200
-#: Scene fields that select a part of the slider, such as the friction law.
+#: Scene fields that select the type of a part of the slider, for example the friction law.
 _SLOT_AND_PART_SELECTING_FIELDS = frozenset(
     {*SceneFields.SLOT_NAMES, *SceneFields.SELECTING_A_PART}
 )
@@ -92,7 +92,7 @@ class Study:
         Rig of the base scene. In a study with a rig, axes may have units and may vary quantities of
         the rig. If the study has a rig, numbers without units are interpreted in SI units.
     version : int, default: 1
-        Version of the study. Increase the version if the meaning of the results changes.
+        Version of the study. Increase the version number if the meaning of the results changes.
     overrides : mapping of str to object, optional
         Overrides that `with_` has applied to the declaration.
     source_file : str, optional

@@ -65,7 +65,7 @@ def _html_details(caption: str, content: HtmlMarkup) -> HtmlMarkup:
 def _describe_axis_quantity(axis: Axis, known_quantities: Mapping[str, Quantity]) -> Quantity:
     """Return the quantity that an axis varies.
 
-    If the axis has units, the quantity has no symbol and no scale.
+    If the axis has units, the returned quantity has no symbol and no scale.
     """
     about, units = find_quantity(axis.dimension, known_quantities), axis.units.get(axis.dimension)
     return about if units is None else replace(about, symbol="", units=units, scale="")

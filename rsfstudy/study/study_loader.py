@@ -129,7 +129,8 @@ def _describe_error_line(error: BaseException, study_file: Path) -> str:
 
 def _study_in_module(module: ModuleType, study_name: str) -> Study:
     """Return the study that a module declares."""
-    from rsfstudy.study.study import Study  # slow import, not needed for names
+    # This import is slow and is not needed to list the names of studies.
+    from rsfstudy.study.study import Study
 
     study = getattr(module, "study", None)
     if not isinstance(study, Study):

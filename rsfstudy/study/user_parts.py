@@ -12,7 +12,7 @@ from rsfstudy.slider import SceneFields, UserPart
 def find_named_user_parts(
     names: Iterable[str], rows: Iterable[Mapping[str, Any]]
 ) -> dict[str, UserPart]:
-    """Find the user-defined parts whose names occur among field values.
+    """Find the user-defined parts that are named in field values.
 
     Parameters
     ----------

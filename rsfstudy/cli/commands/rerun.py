@@ -94,7 +94,7 @@ def _recompute_cell(given: options.CommandOptions) -> int:
             scene, outcome = rsfstudy.recompute_cell(given.file, place, study=given.study)
     except RsfStudyError:
         raise
-    except Exception:  # the traceback helps to debug the cell
+    except Exception:  # The traceback helps to debug the cell.
         traceback.print_exc()
         return EXIT_STATUS_FAILED
     results = rsfstudy.open(given.file)

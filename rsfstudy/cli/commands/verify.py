@@ -110,7 +110,7 @@ def verify(given: options.CommandOptions) -> int:
 
     if given.figure is None and (given.style, given.width) != (None, None):
         raise click.UsageError("--style and --width apply to a figure. Add --figure FILE.")
-    if math.isnan(given.digits):  # click accepts NaN for any range
+    if math.isnan(given.digits):  # Click accepts NaN for any range.
         raise InvalidValue("--digits", given.digits, "must be a number, from 1 to 12")
     columns = assignment_parsing.parse_column_assignments(given.columns)
     found = [

@@ -95,7 +95,7 @@ def compilation_error(error: Exception) -> InvalidValue:
 
 
 def _describe_parts_defined_in_file(source_file: str) -> str:
-    """Describe the scene parts defined in a source file, for error messages."""
+    """Return a phrase for error messages that names the parts in a source file."""
     names = [
         part.name
         for part in _iterate_named_part_subclasses()
@@ -113,10 +113,10 @@ def _iterate_named_part_subclasses(base_class: type[Part] = Part) -> Iterator[ty
 
 
 def _source_file_of_part(part_class: type[Part]) -> Path | None:
-    """Return the source file of a part class, or None for a notebook."""
+    """Return the source file of a part class, or None for a notebook class."""
     try:
         return _resolve_path(inspect.getfile(part_class))
-    except (OSError, TypeError):  # Classes of a notebook have no source file.
+    except (OSError, TypeError):  # Classes that are defined in a notebook have no source file.
         return None
 
 

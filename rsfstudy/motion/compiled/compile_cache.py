@@ -5,9 +5,9 @@ copy a Python function together with all functions that it calls, replace the fu
 ``COMPILED_REPLACEMENT_BY_PYTHON_FUNCTION``, and compile the copy.
 
 Each compiled function is stored in a folder whose name contains a digest of the source functions,
-the compiler and the processor. The folder is written under a temporary name, renamed when it is
-complete, and never changed. The cache contains machine code that this process executes. Folders
-that other users can write to are therefore neither read nor written.
+the compiler and the processor. The folder is first written under a temporary name and is renamed
+when it is complete. The renamed folder is never changed. The cache contains machine code that this
+process executes. Folders that other users can write to are therefore neither read nor written.
 """
 
 from __future__ import annotations
@@ -97,7 +97,7 @@ def compute_code_digest(signature: Any, *functions: Callable[..., Any]) -> str:
 
 
 def _digest_functions(*functions: Callable[..., Any]) -> ObjectDigest:
-    """Digest functions, with the compiled replacements of the functions that they call."""
+    """Digest functions and the compiled replacements of their callees."""
     return ObjectDigest(_is_module_digested, _compiled_replacement_of).add(functions)
 
 
@@ -159,7 +159,7 @@ def compile_cfunc_addresses(functions: Sequence[Callable[..., Any]]) -> tuple[in
 
 
 class _ContentKeyedCache(FunctionCache):  # type: ignore[misc]
-    """Numba cache of a function, with a content digest in the file name.
+    """Numba cache of a function. The file name contains a digest of the content.
 
     By default, Numba includes the closure values of a function in the cache key. Closure values
     include compiled functions, which differ between processes, so Numba would never find a cached
@@ -172,7 +172,7 @@ class _ContentKeyedCache(FunctionCache):  # type: ignore[misc]
 
 
 def _compile_cfunc(function: Any, *, use_cache: bool) -> Any:
-    """Compile a function with pointer arguments, with or without the cache."""
+    """Compile a function with pointer arguments, and optionally use the cache."""
     compiled = CFunc(
         function, normalize_signature(_CFUNC_SIGNATURE), locals={}, options=dict(_COMPILER_OPTIONS)
     )
@@ -299,7 +299,7 @@ def _is_function(value: Any) -> bool:
 
 
 def _compiled_replacement_of(value: Any) -> Any:
-    """Return the compiled function if the value is a function, or else the value."""
+    """Return the compiled version of a function, or any other value unchanged."""
     return (
         COMPILED_REPLACEMENT_BY_PYTHON_FUNCTION.get(value, value) if _is_function(value) else value
     )
@@ -315,6 +315,6 @@ def _jit_compile_callee(function: Any) -> Any:
 
 @functools.cache
 def _jit_compile_callee_cached(function: Any) -> Any:
-    """Compile a function without wrappers for Python and C."""
+    """Compile a function without the wrappers for calls from Python or C."""
     inner = {"no_cpython_wrapper": True, "no_cfunc_wrapper": True}
     return numba.njit(_copy_with_compiled_globals(function), **_COMPILER_OPTIONS, **inner)

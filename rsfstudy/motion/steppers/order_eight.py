@@ -1,4 +1,4 @@
-"""Explicit Runge-Kutta stepper of order eight, for plain Python and Numba.
+"""Explicit Runge-Kutta stepper of order eight. Numba can compile the code.
 
 The tableau, the error estimate and the step size control are equal to those of
 ``scipy.integrate.DOP853``. The Python engine calls the functions as methods of
@@ -170,7 +170,7 @@ def step_to_segment_end(motion, workspace, approximate_length):
 
 
 def take_step_with_time_as_clock(motion, workspace):
-    """Take one step in time, and return the error divided by the tolerance.
+    """Take one step with time as independent variable, and return its error ratio.
 
     Parameters
     ----------

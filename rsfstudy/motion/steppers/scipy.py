@@ -33,7 +33,7 @@ DEFAULT_METHOD = "DOP853"
 
 
 class _BudgetExceeded(Exception):
-    """Exception raised within a step if the evaluation budget is exceeded."""
+    """Exception raised if a step exceeds the evaluation budget."""
 
 
 def _build_interpolant_of_unknowns(dense_output: Any) -> Callable[[float], Iterable[float]]:

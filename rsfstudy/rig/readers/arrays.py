@@ -36,7 +36,7 @@ def is_arrays(source: Source) -> bool:
 
 
 def read_arrays(source: Source) -> Table:
-    """Build a table of a mapping of arrays or of a DataFrame.
+    """Build a table from a mapping of arrays or from a DataFrame.
 
     Parameters
     ----------
@@ -73,7 +73,7 @@ def is_dataset(source: Source) -> bool:
 
 
 def read_dataset(source: Source) -> Table:
-    """Build a table of the variables and coordinates of an xarray Dataset.
+    """Build a table from the variables and coordinates of an xarray Dataset.
 
     Parameters
     ----------
@@ -127,7 +127,7 @@ def read_netcdf(source: Source) -> Table:
     try:
         with xr.open_dataset(source.path, engine="netcdf4", decode_times=False) as dataset:
             loaded = dataset.load()
-    except Exception as error:  # The library raises errors of many types.
+    except Exception as error:  # The NetCDF library raises errors of many types.
         raise DataError(f"{source.origin}: cannot be read as NetCDF ({error})") from error
     return _build_table_of_dataset(loaded)
 
@@ -149,7 +149,7 @@ def is_record(source: Source) -> bool:
 
 
 def read_columns_of_record(source: Source) -> Table:
-    """Build a table of the columns of a ``Record``.
+    """Build a table from the columns of a ``Record``.
 
     Parameters
     ----------

@@ -60,7 +60,7 @@ def decompress(source: Source) -> Source:
     Raises
     ------
     DataError
-        If the file is damaged, or if the decompressed content exceeds the limits of size.
+        If the file is damaged, or if the decompressed content is too large.
     """
     data = source.read_bytes()
     opener = next(of for mark, of in _OPENERS.items() if data.startswith(mark))

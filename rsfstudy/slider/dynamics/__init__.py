@@ -23,8 +23,8 @@ class Dynamics(Part):
     r"""Base class of the dynamics.
 
     The dynamics are defined by functions that receive the friction of a scene and return functions
-    of floats. The friction of a scene is an instance of ``rsfstudy.slider.FrictionFunctions``. The
-    dynamics have the following functions:
+    of floats. The friction of a scene is passed as an instance of
+    ``rsfstudy.slider.FrictionFunctions``. The dynamics have the following functions:
 
     - ``build_slip_rate_functions(friction)`` returns two functions. The function ``balance(spring,
       psis, p)`` returns :math:`\ln(V/V_*)`, the frictional stress g and the decrease in the state

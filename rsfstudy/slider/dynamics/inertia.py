@@ -93,7 +93,7 @@ def build_slip_rate_functions(friction_functions: FrictionFunctions) -> tuple[Fu
     - ``growth`` returns :math:`dx_2/ds`, the sum of :math:`G` along the motion and a difference
       quotient of ``log_slip_rate_offset``.
 
-    With pore pressure, ``state_contribution`` replaces :math:`d\Psi/ds` in :math:`G`.
+    If the scene has pore pressure, ``state_contribution`` replaces :math:`d\Psi/ds` in :math:`G`.
     """
     strength, state_sum, evolutions = (
         friction_functions.strength,
@@ -115,7 +115,7 @@ def build_slip_rate_functions(friction_functions: FrictionFunctions) -> tuple[Fu
         return (value - state_sum(psis)) / p[A], g, shift
 
     def inertial_stress(spring_stress: float, psis: Numbers, alone: Numbers, p: Numbers) -> float:
-        """Compute the stress that accelerates the mass, in sigma_*.
+        """Compute the stress in sigma_* that accelerates the mass.
 
         The quasi-static motion is passed as the tuple that ``quasi_static_values`` returns.
         """

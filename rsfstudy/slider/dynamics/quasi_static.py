@@ -1,4 +1,4 @@
-"""Quasi-static motion, in which only friction balances the spring."""
+"""Quasi-static motion, in which only friction balances the force of the spring."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ def build_slip_rate_functions(friction_functions: FrictionFunctions) -> tuple[Fu
 
 @dataclass(frozen=True, kw_only=True)
 class QuasiStatic(Dynamics):
-    """Quasi-static dynamics without inertia and radiation damping."""
+    """Quasi-static dynamics, without inertia or radiation damping."""
 
     name = "quasi_static"
     regime = "quasi_static"

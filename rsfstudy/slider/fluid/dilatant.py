@@ -163,8 +163,8 @@ class DilatantFluid(Fluid):
 
     References
     ----------
-    Segall and Rice (1995), J. Geophys. Res. 100, 22155-22171, and, for compaction with a slip
-    distance of its own, Gualandi et al. (2023), Earth Planet. Sci. Lett. 604, 117995.
+    Segall and Rice (1995), J. Geophys. Res. 100, 22155-22171, and, for compaction with a separate
+    slip distance, Gualandi et al. (2023), Earth Planet. Sci. Lett. 604, 117995.
     """
 
     dilatancy: float = declare_dilatancy_field(0.01)
@@ -191,7 +191,7 @@ class DilatantFluid(Fluid):
             object.__setattr__(self, "auxiliary_rates", rates_with_porosity_length)
 
     def check(self, scene: SceneView) -> None:
-        """Check the porosity length, and that the stiffness ratio is defined.
+        """Check the porosity length, and check that the stiffness ratio is defined.
 
         See ``Part.check``.
         """

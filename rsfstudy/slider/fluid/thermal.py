@@ -1,4 +1,4 @@
-"""Thermal pressurisation with drainage, and optionally with dilatancy (Rice 2006).
+"""Thermal pressurisation with drainage and optional dilatancy (Rice 2006).
 
 When the fault heats up, the pore fluid expands more than the pore space. The pore pressure
 therefore rises, and fluid flows out to the surroundings.
@@ -88,11 +88,11 @@ class ThermalFluid(Fluid):
     drainage : float, default: 1.0
         Drainage rate :math:`c^* D_c/V_*`.
     dilatancy : float, default: 0.0
-        Dilatancy :math:`\epsilon/(\beta \sigma_*)` (see ``DilatantFluid``). Without dilatancy, the
-        porosity is not an unknown.
+        Dilatancy :math:`\epsilon/(\beta \sigma_*)` (see ``DilatantFluid``). If the dilatancy is
+        zero, the porosity is not an unknown.
     porosity_length : float, default: 1.0
         Slip distance :math:`L_\varphi/D_c` over which the porosity evolves (see ``DilatantFluid``).
-        Without dilatancy, the slip distance has no effect.
+        If the dilatancy is zero, the slip distance has no effect.
 
     Notes
     -----
@@ -164,8 +164,8 @@ class ThermalFluid(Fluid):
     def parameter_values(self, scene: SceneView) -> Numbers:
         """Return the same parameters as for a dilatant fluid.
 
-        See ``Part.parameter_values``. The pressurisation factor is a parameter of the part
-        ``temperature``.
+        See ``Part.parameter_values``. The pressurisation factor is stored with the parameters of
+        the part ``temperature``.
         """
         return DilatantFluid.parameter_values(self, scene)  # type: ignore[arg-type]
 

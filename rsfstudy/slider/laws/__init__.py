@@ -370,8 +370,8 @@ class Law(LawBase):
         """Check ``b_over_a`` against the other fields of the scene.
 
         If the stiffness is given relative to the critical stiffness, the friction must be rate
-        weakening. If ``b_over_a`` is zero, the state variable has no effect, so stress effects on
-        the state and an initial state are not allowed.
+        weakening. If ``b_over_a`` is zero, the state variable has no effect. In this case, stress
+        effects on the state and an initial state are rejected.
 
         Parameters
         ----------

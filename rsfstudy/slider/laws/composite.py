@@ -104,7 +104,7 @@ def clamp_exponent(exponent: float) -> float:
     Returns
     -------
     float
-        Exponent or limit, whichever is smaller.
+        Smaller of the exponent and the limit.
     """
     return min(exponent, LARGEST_EVOLUTION_EXPONENT)
 

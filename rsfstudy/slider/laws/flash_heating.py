@@ -97,8 +97,8 @@ def steady_states(log_slip_rate: float, state_shift: float, p: Numbers) -> Numbe
 class FlashHeatingLaw(Law):
     r"""Slip law with flash heating at high slip rates.
 
-    In a scene without inertia and radiation damping, the slip rate of a rupture is unbounded. Use
-    this law in scenes with inertia or radiation damping.
+    If a scene has neither inertia nor radiation damping, the slip rate of a rupture is unbounded.
+    Use this law in scenes with inertia or radiation damping.
 
     Parameters
     ----------
@@ -109,7 +109,7 @@ class FlashHeatingLaw(Law):
     weakened_friction : float, default: 0.2
         Friction coefficient :math:`f_w` of weakened contacts, which is less than :math:`\mu_*`.
     weakening_exponent : float, default: 8.0
-        Exponent :math:`n`. With a larger exponent, the transition at :math:`V_w` is sharper.
+        Exponent :math:`n`. The transition at :math:`V_w` is sharper if the exponent is larger.
 
     Notes
     -----
@@ -165,7 +165,7 @@ class FlashHeatingLaw(Law):
         return ("flash_heating", *super().effects)
 
     def check(self, scene: SceneView) -> None:
-        """Check that weakened contacts have less friction than mu_*.
+        """Check that the friction coefficient of weakened contacts is below mu_*.
 
         See ``Part.check``.
         """

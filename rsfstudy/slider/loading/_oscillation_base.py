@@ -123,8 +123,8 @@ class OscillationBase(LoadingWithFinalLoadVelocity):
     def check(self, scene: SceneView) -> None:
         """Check that the scene has inertia if the oscillation is fast.
 
-        See ``Part.check``. Without inertia, the oscillation period must not be shorter than the
-        period of free oscillation of the slider.
+        See ``Part.check``. If the scene has no inertia, the oscillation period must not be shorter
+        than the period of free oscillation of the slider.
         """
         super().check(scene)
         free = 2.0 * math.pi * scene.inertial_time

@@ -59,8 +59,8 @@ class StepLoading(LoadingWithFinalLoadVelocity):
     def load_velocity(self) -> float:
         """Load point velocity after the step, in units of V_*.
 
-        By default, the load point stops after a step of displacement or normal stress. Without a
-        step of displacement or normal stress, the load point continues at the reference velocity.
+        By default, the load point stops after a step of displacement or normal stress. If there is
+        no such step, the load point continues at the reference velocity.
         """
         if self.load_velocity_ratio is None and (self.displacement_step or self.normal_stress_step):
             return 0.0

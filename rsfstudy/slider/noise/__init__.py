@@ -31,10 +31,10 @@ class Noise(Part):
     Examples
     --------
     >>> from rsfstudy import Scene
-    >>> Scene().parts.noise.name
+    >>> Scene().parts.loading_noise.name
     'none'
-    >>> scene = Scene(noise="white", stress_noise=1e-4, noise_interval=0.05, noise_seed=3)
-    >>> scene.parts.noise.is_active
+    >>> scene = Scene(loading_noise="white", stress_noise=1e-4, noise_interval=0.05, noise_seed=3)
+    >>> scene.parts.loading_noise.is_active
     True
     """
 

@@ -12,4 +12,4 @@ class NoNoise(Noise):
     """Loading without noise."""
 
     name = "none"
-    rejection_hint = "without noise", "set noise='white' or noise='correlated'"
+    rejection_hint = "without noise", "set loading_noise='white' or loading_noise='correlated'"

@@ -116,7 +116,7 @@ class WhiteNoise(Noise):
         if loading.unknowns or loading.reported_segment_count < len(loading.segments) - 1:
             rule = f"cannot be added to the loading {loading.name!r}"
             remedy = "Noise is added to steady loading, steps and protocols."
-            raise InvalidValue("noise", self.name, rule, remedy=remedy)
+            raise InvalidValue("loading_noise", self.name, rule, remedy=remedy)
         if self.unknowns and fluid.unknowns:
             rule = f"has no meaning for fluid={fluid.name!r}"
             rule += ", whose pore pressure changes normal stress"

@@ -28,8 +28,9 @@ DatasetOrArray = TypeVar("DatasetOrArray", xr.Dataset, xr.DataArray)
 #: some cells. The second item contains coordinates of these cells along some dimensions.
 DerivativesByVariable = Sequence[tuple[xr.DataArray, Mapping[str, Any]]]
 
-#: Names of reduction fields, by the suffix of the result name. The fields contain the names of
-#: variables. The units of a result are derived from the units of these variables.
+#: Names of the reduction fields that determine the units of a result, by the suffix of the result
+#: name. Each field contains the name of a variable, and the units of the result are derived from
+#: the units of these variables.
 UnitFieldsByResultSuffix = Mapping[str, Sequence[str]]
 
 #: Value of the attribute ``comment`` of propagated errors.

@@ -340,7 +340,8 @@ def _crossing_position_derivatives(
     # The values are changed one at a time. The interpolant is a smooth function of the values,
     # except at isolated kinks.
     moved = PchipInterpolator(x, y + _LOG_STEP_OF_DERIVATIVES * np.eye(x.size), axis=1)(fine)
-    rise = float(PchipInterpolator(x, y)(fine, 1)) or np.nan  # a zero slope means unbounded errors
+    # If the slope is zero, the errors are unbounded.
+    rise = float(PchipInterpolator(x, y)(fine, 1)) or np.nan
     slopes[places] = (
         (moved - np.log(level)) / _LOG_STEP_OF_DERIVATIVES / rise * np.exp(fine) / values[places]
     )

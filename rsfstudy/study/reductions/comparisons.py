@@ -322,9 +322,9 @@ class Range(Reduction):
     def derivatives(self, dataset: xr.Dataset) -> DerivativesByVariable:
         """Compute the derivatives of the range.
 
-        The derivative is 1 for two cells: the cell with the largest sum of value and error, and the
-        cell with the smallest difference of value and error. The sign of a derivative has no
-        influence on the propagated error.
+        The derivative is 1 for two cells: the cell with the largest value plus error, and the cell
+        with the smallest value minus error. The sign of a derivative has no influence on the
+        propagated error.
 
         Parameters
         ----------

@@ -67,11 +67,12 @@ def describe_reduction_results(
             reduction_results[name].attrs["comment"] = (
                 reduction_results[name].attrs.get("comment", "") + why
             )
-        # A fit with a fixed dimensionless intercept applies to dimensionless values.
+        # A fit with a nonzero intercept treats its variable as dimensionless.
         scale = "" if varied or scale == "1" or vars(reduction).get("intercept") else scale
         about = find_quantity(name, found)
         if not end and name not in stated and (about.units, about.scale) != (units, scale):
-            about = Quantity(name, "", units, name.replace("_", " "))  # same name, other quantity
+            # The result has the name of a vocabulary entry, but is a different quantity.
+            about = Quantity(name, "", units, name.replace("_", " "))
         found[name] = replace(about, units=units, scale=scale)
     return found
 

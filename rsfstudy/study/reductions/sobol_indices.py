@@ -167,8 +167,8 @@ def _indices_with_intervals(sample_values: np.ndarray) -> np.ndarray:
     Returns
     -------
     ndarray, shape (2, 3, inputs)
-        First-order and total indices. The second dimension contains the estimate and the two
-        bounds.
+        First-order and total indices. The entries along the second dimension are the estimate, the
+        lower bound and the upper bound.
     """
     random, count = np.random.default_rng(_RESAMPLING_SEED), sample_values.shape[1]
     resampled = []

@@ -145,7 +145,7 @@ def standard_deviation(
         Standard deviation. NaN if the number of samples does not exceed
         ``degrees_of_freedom_lost``.
     """
-    with warnings.catch_warnings():  # raised by older versions of xarray
+    with warnings.catch_warnings():  # Older versions of xarray raise this warning.
         warnings.filterwarnings("ignore", "Degrees of freedom", RuntimeWarning)
         return values.std(sample_dimension, ddof=degrees_of_freedom_lost)
 
@@ -457,7 +457,7 @@ def _interpolated_quantile(
 @wrap_methods_in_error_boundary
 @dataclass(frozen=True)
 class StatusShares(Reduction):
-    """Share of the samples that ended with each status, including failures.
+    """Shares of the samples with each status, including failures.
 
     The standard error of a share is the standard deviation of the posterior beta distribution for a
     uniform prior. Therefore, the standard error is positive even if the share is 0 or 1.

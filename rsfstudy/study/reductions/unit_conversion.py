@@ -18,7 +18,7 @@ from rsfstudy.study.reductions.base import DerivativesByVariable, Reduction
 @wrap_methods_in_error_boundary
 @dataclass(frozen=True)
 class InUnits(Reduction):
-    """Conversion of a variable to units of a rig. Each cell has its own scales.
+    """Conversion of a variable to units of a rig, with separate scales for each cell.
 
     Convert a variable before you compute its mean over samples with different scales. A mean of the
     dimensionless values would combine values in different units.
