@@ -71,7 +71,7 @@ def test_a_map_finds_the_cell_at_a_position(results):
 
 
 def test_a_cell_of_a_part_of_the_results_is_refused(results):
-    with pytest.raises(DataError, match="law has 2 points in the declaration, but 1 points in the file"):
+    with pytest.raises(DataError, match="law has 2 points in the declaration, but 1"):
         recompute(results.isel(law=[1]), 1, lambda *_progress: None)
 
 
