@@ -238,7 +238,7 @@ def test_commands_and_options_exist():
 def test_the_table_of_promises_names_tests_that_exist():
     """The table names existing test modules, and no module is missing."""
     table = (
-        find_page("| promise | tests |").partition("| promise | tests |")[2].partition("\n\n")[0]
+        find_page("| property | tests |").partition("| property | tests |")[2].partition("\n\n")[0]
     )
     named = set(re.findall(r"`(test_\w+\.py)`", table))
     here = Path(__file__).parent

@@ -312,6 +312,7 @@ header_option = click.option(
     is_flag=True,
     default=True,
     flag_value=False,
+    show_default=False,
     help="Omit the header of the figure, for example the list of overrides.",
 )
 #: Options for the format and the appearance of figures.

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import sys
+
 import click
 
 from rsfstudy.cli import options
@@ -49,3 +51,4 @@ def explore(given: options.CommandOptions) -> int:
 def _announce(url: str) -> None:
     """Print the first address of the page."""
     print_line(f"{url}\nThe page is open until you press Ctrl-C.", soft_wrap=True)
+    sys.stdout.flush()
