@@ -84,7 +84,7 @@ class Output(Quantity):
     r"""Number or array that a measure computes.
 
     If only a name is passed, the symbol, units and description of the output are taken from the
-    shared vocabulary. If the vocabulary does not contain the output, the description is the name.
+    shared vocabulary. If the output is not in the vocabulary, its name is used as the description.
 
     Parameters
     ----------

@@ -208,7 +208,7 @@ class RecordView(View):
         self._change_choices()
 
     def _change_stiffness(self) -> None:
-        """Use another stiffness, which may also be needed to read the record."""
+        """Apply a new stiffness, and read the record again if necessary."""
         if self._record is None or "stiffness" in self._reading:
             self._read()
         else:

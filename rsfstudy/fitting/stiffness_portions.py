@@ -261,7 +261,7 @@ def _find_end_of_step(
 
 
 def _cut_at_slip(portion: Portion) -> Portion | None:
-    """Remove the rows of a portion after the fault begins to slip.
+    """Remove the rows that were recorded after the fault began to slip.
 
     The result is None if friction does not change considerably at the beginning of the portion.
     """

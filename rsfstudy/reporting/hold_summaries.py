@@ -1,4 +1,4 @@
-"""Tables of frictional healing that commands print."""
+"""Tables of frictional healing, printed by the commands."""
 
 from __future__ import annotations
 

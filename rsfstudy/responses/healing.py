@@ -252,7 +252,7 @@ class Healing(RecordingMeasure):
     def _compute_outputs_along_record(
         self, scene: Scene, record: RecordedMotion
     ) -> dict[str, np.ndarray]:
-        """Return the recorded quantities along ``phase``, from the hold onwards."""
+        """Return the quantities recorded since the beginning of the hold, by phase."""
         path = resample_motion_along_path(record.recorded_rows, self.phases, Recording.VARIABLES)
         moved = Recording.load_point_displacement(scene, np.column_stack([*path.values()]))
         return {

@@ -53,7 +53,7 @@ _PATTERNS_OF_USUAL_HEADINGS = {
 
 
 class UsableColumns(NamedTuple):
-    """Columns that a function for records can use.
+    """Columns that are accepted by a function that reads records.
 
     Parameters
     ----------

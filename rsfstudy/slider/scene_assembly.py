@@ -140,7 +140,7 @@ def replace_field_values(
 def _group_values_by_part_index(
     field_values: Mapping[str, Any], field_index: FieldIndex
 ) -> dict[int, dict[str, Any]]:
-    """Validate field values and group them by the index of their part.
+    """Validate the field values, and group the values of each part.
 
     Fields with the value None are omitted.
     """

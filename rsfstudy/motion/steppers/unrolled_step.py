@@ -5,9 +5,9 @@ stages and unknowns would take as much time as the equations of a simple scene. 
 unrolled and the equations are inlined, the compiler can also share expressions between the stages.
 ``build_step_attempt_function`` is the main function.
 
-The results of a step are stored in two arrays. The first array contains the derivatives in all
-stages, and the second array is called the block. The block contains a header, the unknowns at the
-end of the step, the scales of the unknowns, and the coefficients of the dense output.
+The results of a step are stored in two arrays. The first array contains the derivatives at all
+stages. The second array, called the block, contains a header, the unknowns at the end of the step,
+the scales of the unknowns, and the coefficients of the dense output.
 """
 
 from __future__ import annotations
