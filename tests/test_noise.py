@@ -3,16 +3,19 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from rsfstudy.named_studies._bifurcation import Bifurcation
+from study_runs import record_computed_cells
 
 import rsfstudy
-from rsfstudy import Accuracy, Axis, Integrator, Scene, Study
+from rsfstudy import Accuracy, Axis, Integrator, Scene, Study, measures
 from rsfstudy.errors import InvalidValue
-from rsfstudy.measures import CriticalStep, EventStatistics, LimitCycle
+from rsfstudy.measures import EventStatistics, LimitCycle, Measure
 from rsfstudy.motion import rise
 from rsfstudy.motion.events import EventKind
 from rsfstudy.slider.noise_paths import Path
@@ -338,10 +341,28 @@ def test_wrong_fields_of_the_measure(wrong):
         EventStatistics(**wrong)
 
 
-@pytest.mark.parametrize("measure", [LimitCycle(), CriticalStep(of="load_velocity_ratio")])
+#: Fields that the scene of a measure needs.
+FIELDS_BY_MEASURE = {"healing": {"hold_time": 10.0, "stiffness": 0.02}}
+#: Measures that serve scenes with noise, or do not follow a motion. Fits refuse all such loadings.
+SERVE_NOISE = {"event_statistics", "peak_statistics", "linear_stability", "fit", "synthetic_fit"}
+
+
+def measures_of_motions() -> list[Measure]:
+    """Return the measures that follow a motion until it settles or repeats."""
+    public = [getattr(measures, name) for name in measures.__all__]
+    made = [
+        kind() for kind in public if isinstance(kind, type) and issubclass(kind, Measure)
+        if kind not in (Measure, measures.Elasticities, measures.Fit)
+    ]  # fmt: skip
+    made += [measures.Elasticities(LimitCycle(), parameters=("a",)), Bifurcation()]
+    return [measure for measure in made if measure.name not in SERVE_NOISE]
+
+
+@pytest.mark.parametrize("measure", measures_of_motions(), ids=lambda measure: measure.name)
 def test_measures_of_smooth_loading_refuse_noise(measure):
+    scene = NOISY.with_(load_velocity_ratio=2.0, **FIELDS_BY_MEASURE.get(measure.name, {}))
     with pytest.raises(InvalidValue, match=r"loading_noise = 'white': changes stress at random"):
-        measure(NOISY, Accuracy())
+        measure(scene, Accuracy())
 
 
 def test_stability_ignores_noise():
@@ -380,7 +401,12 @@ def test_results_do_not_depend_on_the_workers(tmp_path):
     shared = rsfstudy.run(study, workers=2, **options)
     np.testing.assert_array_equal(alone.recurrence_interval_mean, shared.recurrence_interval_mean)
     assert len(set(alone.recurrence_interval_mean.values.tolist())) == 3
-    rsfstudy.run(study, workers=0, output=tmp_path, progress=False)
+    # A run of some seeds is extended by the other seeds, as a resumed run is.
+    first = replace(study, axes=[Axis("sample", {"noise_seed": [2]})])
+    rsfstudy.run(first, workers=0, output=tmp_path, progress=False)
+    with record_computed_cells() as computed:
+        rsfstudy.run(study, workers=0, output=tmp_path, progress=False)
+    assert len(computed) == 2
     reopened = rsfstudy.open(tmp_path / "noise_of_workers.nc")
     assert reopened.noise_interval.item() == 2.0
     assert not any("path" in name and "error" not in name for name in reopened.variables)

@@ -14,7 +14,10 @@ from rsfstudy._lazy_exports import build_lazy_export_functions
 
 if TYPE_CHECKING:
     from rsfstudy.measure_base._declaration_checks import OutputValue
-    from rsfstudy.measure_base._loading_checks import check_loading_changes_stress_only_in_steps
+    from rsfstudy.measure_base._loading_checks import (
+        check_loading_changes_stress_only_in_steps,
+        refuse_noise,
+    )
     from rsfstudy.measure_base._recorded_motion import RecordingMeasure, create_outputs_along_phase
     from rsfstudy.measure_base.elasticities import Elasticities
     from rsfstudy.measure_base.measure import Measure, Outcome
@@ -24,7 +27,10 @@ else:
         __name__,
         {
             "measure_base._declaration_checks": ("OutputValue",),
-            "measure_base._loading_checks": ("check_loading_changes_stress_only_in_steps",),
+            "measure_base._loading_checks": (
+                "check_loading_changes_stress_only_in_steps",
+                "refuse_noise",
+            ),
             "measure_base._recorded_motion": ("RecordingMeasure", "create_outputs_along_phase"),
             "measure_base.elasticities": ("Elasticities",),
             "measure_base.measure": ("Measure", "Outcome"),
@@ -40,5 +46,6 @@ __all__ = [
     "RecordingMeasure",
     "check_loading_changes_stress_only_in_steps",
     "create_outputs_along_phase",
+    "refuse_noise",
     "steady_sliding_is_linearly_stable",
 ]

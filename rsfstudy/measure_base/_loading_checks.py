@@ -6,6 +6,26 @@ from rsfstudy.errors import InvalidValue
 from rsfstudy.slider import Scene
 
 
+def refuse_noise(scene: Scene) -> None:
+    """Check that the loading of a scene has no noise.
+
+    Parameters
+    ----------
+    scene : Scene
+        Scene to check.
+
+    Raises
+    ------
+    InvalidValue
+        If the scene has noise.
+    """
+    noise = scene.parts.loading_noise
+    if noise.is_active:
+        rule = "changes stress at random, so that no motion settles or repeats"
+        remedy = "Set loading_noise='none', or use EventStatistics or simulate."
+        raise InvalidValue("loading_noise", noise.name, rule, remedy=remedy)
+
+
 def check_loading_changes_stress_only_in_steps(scene: Scene) -> None:
     """Check that the loading changes stress only in sudden steps.
 
@@ -22,11 +42,8 @@ def check_loading_changes_stress_only_in_steps(scene: Scene) -> None:
         If the load point velocity or the normal stress changes continuously, or if the scene has
         noise.
     """
-    loading, noise = scene.parts.loading, scene.parts.loading_noise
-    if noise.is_active:
-        rule = "changes stress at random, so that no motion settles or repeats"
-        remedy = "Set loading_noise='none', or use EventStatistics or simulate."
-        raise InvalidValue("loading_noise", noise.name, rule, remedy=remedy)
+    refuse_noise(scene)
+    loading = scene.parts.loading
     if loading.unknowns:
         what = "load point velocity" if loading.has_load_point_unknown else "normal stress"
         rule = f"changes {what} continuously, so the motion neither settles nor repeats itself"

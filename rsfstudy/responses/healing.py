@@ -15,6 +15,7 @@ from rsfstudy.measure_base import (
     Outcome,
     RecordingMeasure,
     create_outputs_along_phase,
+    refuse_noise,
     steady_sliding_is_linearly_stable,
 )
 from rsfstudy.motion import (
@@ -179,6 +180,7 @@ class Healing(RecordingMeasure):
         Outcome
             Status, results and message.
         """
+        refuse_noise(scene)
         hold = _find_first_hold_segment(scene)
         first = _record_hold_and_reloading(scene, hold, integrator)
         said = _describe_unsteady_start_of_hold(

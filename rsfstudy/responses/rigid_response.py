@@ -11,7 +11,7 @@ import numpy as np
 
 from rsfstudy.error_boundary import wrap_methods_in_error_boundary
 from rsfstudy.errors import InvalidValue
-from rsfstudy.measure_base import Measure, Outcome
+from rsfstudy.measure_base import Measure, Outcome, refuse_noise
 from rsfstudy.motion import EventKind, Integrator, MotionStopped, Recording, fall, rise
 from rsfstudy.quantities import Output
 from rsfstudy.responses._recorded_motion import estimate_error_at_instant
@@ -177,6 +177,7 @@ class RigidResponse(Measure):
         Outcome
             Status, results and message.
         """
+        refuse_noise(scene)
         log_slip_rate = scene.log_load_velocity
         if log_slip_rate == 0.0:
             return Outcome(Status.NO_STEP, message="the slip rate is V_*, so there is no step")
