@@ -40,7 +40,7 @@ def check_loading_is_single_step(scene: Scene) -> None:
 
 
 def outcome_if_norm_is_below_load_velocity(scene: Scene, load_velocity: float = 0.0) -> Outcome:
-    """Return the outcome for a loading that is faster than the instability norm.
+    """Return the outcome if the load point velocity exceeds the instability norm.
 
     Steady sliding before the step, or the load point after the step, may already be faster than the
     instability norm.

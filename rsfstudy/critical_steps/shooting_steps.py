@@ -117,7 +117,7 @@ class StepFamily:
         raise TypeError(f"{type(self).__name__} does not define this method")
 
     def compute_field_value_error(self, step_size: float, relative_error: float) -> float:
-        """Return the error of the step value that results from an error of the size.
+        """Return the error in the step value caused by an error in the step size.
 
         Parameters
         ----------

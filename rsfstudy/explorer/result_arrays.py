@@ -95,8 +95,8 @@ def error_name(dataset: xr.Dataset, variable: str) -> str:
 def part_names(dataset: xr.Dataset, selection: Selection) -> list[str]:
     """Return the names of the variables that a selection shows.
 
-    The names are the variable, its error estimate, the variable along x, the status and the
-    message.
+    The list contains the plotted variable, its error estimate, the variable on the x axis, the
+    status and the message.
     """
     names = [selection.variable, error_name(dataset, selection.variable), selection.x]
     if shows_cells(dataset, selection.variable):

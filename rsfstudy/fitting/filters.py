@@ -108,7 +108,7 @@ class Filter:
         return cls(kind, number)
 
     def sample_times(self, time: np.ndarray) -> np.ndarray:
-        """Return the times at which the filter needs unfiltered friction.
+        """Return the times at which the filter uses values of the unfiltered friction.
 
         Parameters
         ----------

@@ -1,4 +1,4 @@
-"""Checks of the results and options declared by a measure.
+"""Checks of the results and options that a measure declares.
 
 The checks ensure that a lattice and a NetCDF file can store all values.
 """

@@ -374,7 +374,7 @@ class Elasticities(Measure):
         return self._log_of_primary_output(outcome)
 
     def _log_of_primary_output(self, outcome: Outcome) -> _LogValueWithError | None:
-        """Return ``ln|y|`` of an outcome with an error that includes rounding.
+        """Return ``ln|y|`` of an outcome, and its error including the rounding error.
 
         Returns
         -------

@@ -40,7 +40,7 @@ _OPTIONS_PASSED_TO_FIT = (
 
 @dataclass(frozen=True)
 class RecordFits(CommandResult):
-    """Result of the command ``fit``: records and their fits.
+    """Output of the ``fit`` command: records and their fits.
 
     Parameters
     ----------

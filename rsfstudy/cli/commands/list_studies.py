@@ -16,7 +16,7 @@ from rsfstudy.study import study_titles
 
 @dataclass(frozen=True)
 class StudyList(CommandResult):
-    """Result of the command ``list``: names and titles of the named studies."""
+    """Output of the ``list`` command: names and titles of the named studies."""
 
     titles: Mapping[str, str]
     exit_status = EXIT_STATUS_OK

@@ -85,7 +85,7 @@ class StudyRun:
 
 @dataclass(frozen=True)
 class Runs(CommandResult):
-    """Result of the command ``run``: outcomes of one or more studies."""
+    """Output of the ``run`` command: outcomes of one or more studies."""
 
     studies: Sequence[StudyRun]
 

@@ -47,7 +47,7 @@ class CorrelatedNoise(WhiteNoise):
     name = "correlated"
 
     def parameter_values(self, scene: SceneView) -> Numbers:
-        """Return the initial rate of normal stress.
+        """Return the initial rate of change of the normal stress.
 
         See ``WhiteNoise.parameter_values``.
         """

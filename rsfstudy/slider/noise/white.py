@@ -123,7 +123,7 @@ class WhiteNoise(Noise):
             raise self.field_error("normal_stress_noise", rule, "Leave one of them out.")
 
     def parameter_values(self, scene: SceneView) -> Numbers:
-        """Return the initial rate of normal stress.
+        """Return the initial rate of change of the normal stress.
 
         See ``Part.parameter_values``. The event loop replaces the value at each sample.
         """
