@@ -81,7 +81,7 @@ def test_a_motion_that_differs_is_told(place, tmp_path):
 @pytest.mark.parametrize(
     ("name", "why", "call"),
     [
-        ("asked", "told at times that were asked for", "simulate(dataset.rsf.scene, times=..., "),
+        ("asked", "output at requested times", "simulate(dataset.rsf.scene, times=..., "),
         ("cycle", "Limit cycle of a spring-slider, slip law", "limit_cycle(dataset.rsf.scene, "),
     ],
 )

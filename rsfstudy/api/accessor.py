@@ -447,8 +447,9 @@ class DatasetAccessor:
         xarray.Dataset
             Dataset without constant coordinates. The attribute ``constants`` contains the values of
             these coordinates as JSON. The attribute ``units`` of a dimensionless variable is its
-            scale, such as "D_c/V_*", or is omitted if the variable is a pure number. The other
-            methods of the accessor need the original dataset.
+            scale, such as "D_c/V_*", or is omitted if the variable is a pure number. Store the
+            original dataset, because files that follow the CF conventions cannot contain such
+            units. The other methods of the accessor need the original dataset, too.
 
         Raises
         ------
