@@ -1,6 +1,6 @@
 """Cost of each physical effect in a limit cycle, and error if it is neglected.
 
-The study combines all normal stress couplings with all kinds of dynamics for both laws at k = 0.8
+The study combines all normal stress conditions with all types of dynamics, for both laws at k = 0.8
 k_cr. Without inertia and radiation damping, the slip rate is unbounded, except under the slowness
 law at variable normal stress, where it reaches 10^13 to 10^19 V_*. A cycle with radiation damping
 needs half as many right-hand-side evaluations as a cycle with inertia. However, a cycle with

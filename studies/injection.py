@@ -6,9 +6,9 @@ spring is slightly softer than critical. The critical stiffness decreases with e
 stress. Small perturbations therefore stop growing when k exceeds the critical stiffness at the
 current pressure in the fault, and start to grow again when k falls below the critical stiffness.
 For both laws, this rule predicts the pore pressure at which perturbations stop or start to grow.
-The error of the predicted pressure is about the change in pressure in one or two times D_c/V_*.
-While the pressure rises, slip is faster, so the ratio of drainage rate to slip rate is lower. On a
-dilatant fault, instability therefore ends at a lower pressure than the pressure at which it begins.
+The error of the predicted pressure is about the change of pressure within one or two D_c/V_*. While
+pressure rises, slip is faster, and the ratio of drainage to slip rate is smaller. On a dilatant
+fault, instability therefore ends at a lower pressure than the pressure at which it begins.
 """
 
 import math

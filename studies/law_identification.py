@@ -4,8 +4,8 @@ The records contain tenfold velocity steps with white noise, which has a standar
 Each window has separate values of initial friction and trend. The exponent is 0 for the slip law
 and 1 for the slowness law. A single step up determines the exponent poorly, because a change of the
 slip distance has a similar effect on friction. A second step up reduces the standard error only as
-much as a repetition of the first step. A step up followed by a step back determines the exponent
-ten times more accurately.
+much as repeating the first step. A step up followed by a step back determines the exponent ten
+times more accurately.
 """
 
 import math

@@ -6,8 +6,8 @@ linear perturbation theory. Under the slowness law, waves have no effect if they
 nucleation times a sigma/(k V_0) before the event. Slow waves and strong waves trigger the event
 when Coulomb stress reaches the threshold of an event without waves. For slow waves with a period of
 a hundred nucleation times, the clock advance from this threshold of Coulomb stress is accurate to a
-few percent. For strong waves, which raise Coulomb stress faster than the load point does, this
-clock advance is accurate to one nucleation time. In all other cases, the clock advance from the
+few percent. For strong waves, which raise Coulomb stress faster than the load point does, the error
+of this clock advance is at most one nucleation time. In all other cases, the clock advance from the
 threshold is wrong by a factor of two to ten.
 """
 
