@@ -34,8 +34,8 @@ REFERENCES = [
     "Segall and Rice (1995), J. Geophys. Res. 100, 22155-22171",
 ]
 
-# The values of the constants below are those of the Julia program that accompanies the paper. The
-# comments contain the symbols of the program.
+# The constants below have the values of the Julia program that accompanies the paper. The comments
+# contain the symbols of the program.
 
 #: Normal stresses of the 12 experiments in MPa (sigma_n0).
 NORMAL_STRESSES = (

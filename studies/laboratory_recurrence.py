@@ -45,7 +45,7 @@ def experiment_fields(normal_stress: float, noise: str) -> dict[str, Any]:
     normal_stress : float
         Applied normal stress in MPa.
     noise : str
-        Kind of noise: "none" or "white".
+        Name of the noise: "none" or "white".
 
     Returns
     -------

@@ -50,8 +50,8 @@ def cycle_place(law: str, normal_stress: str) -> dict[str, str]:
 #: Values of log10(V/V_*) at which the lines of constant state intersect the line of steady sliding.
 #: The state of a line is -b ln(V/V_*).
 CONSTANT_STATE_LOG_RATES = (-8.0, -4.0, 0.0, 4.0, 8.0)
-#: Largest number of couplings of normal stress and shear stress for each of which a panel shows the
-#: lines of constant state.
+#: Maximum number of couplings between normal stress and shear stress for which a panel shows
+#: separate lines of constant state. With more couplings, it only shows the lines of the first.
 MAX_COUPLINGS_WITH_STATE_LINES = 2
 
 

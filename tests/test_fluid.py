@@ -146,7 +146,7 @@ def test_critical_stiffness_with_a_porosity_length(dilatancy, rate, drainage, st
 
 
 def test_a_porosity_length_of_one_changes_no_bit():
-    """With the slip distance of friction, the rates are those of Segall and Rice."""
+    """If the porosity length is D_c, the rates agree with Segall and Rice (1995)."""
     plain, longer = dilatant(0.004, 0.3), dilatant(0.004, 0.3, porosity_length=2.0)
     assert dilatant(0.004, 0.3, porosity_length=1.0) == plain
     assert math.isnan(plain.parameter_values[FLUID + 2])

@@ -24,8 +24,8 @@ EXAMPLE_VALUES_OF_RIG_OPTIONS = {
 }
 
 
-#: Meanings of the rig options. The meanings are those of ``Rig.QUANTITIES``, which is not imported
-#: because the import would delay the start of every command.
+#: Meanings of the rig options. The texts repeat the descriptions in ``Rig.QUANTITIES``. The class
+#: is not imported, because the import would delay the start of every command.
 MEANINGS_OF_RIG_OPTIONS = {
     "normal_stress": "normal stress",
     "slip_distance": "slip distance",

@@ -6,6 +6,7 @@ so the browser does not have to build the figure again.
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from collections.abc import Callable, Sequence
 from typing import Any
 
@@ -64,7 +65,8 @@ OnCell = Callable[[int], None]
 #: Number of points of a curve above which its markers are small, and maximum number of points that
 #: the pointer can select.
 _MAX_POINTS_WITH_MARKERS, _MAX_SELECTABLE_POINTS = 60, 6000
-#: Maximum number of cells of which an image shows each one, and number of pixels of other images.
+#: Maximum number of cells in an image with one pixel per cell, and number of pixels of the image of
+#: a larger lattice.
 _MAX_CELLS_OF_IMAGE, _PIXELS = 2**21, (1000, 1400)
 #: Number of rows of status symbols at the bottom of a figure.
 _STATUS_ROWS = 8
@@ -80,7 +82,7 @@ _STATUS_SYMBOLS = (
 _FAILURE_COLOUR, _ANSWER_COLOUR, _EMPTY_COLOUR = "#D55E00", "#444444", "#e4e4e4"
 
 
-class Plot:
+class Plot(ABC):
     """Base class of plots with symbols for the statuses of cells.
 
     Parameters
@@ -128,13 +130,13 @@ class Plot:
             )
         self.update(dataset, panel)
 
+    @abstractmethod
     def choose_y_type(self, dataset: xr.Dataset, panel: Selection) -> str:
         """Return "log" or "linear"."""
-        raise NotImplementedError
 
+    @abstractmethod
     def draw(self, dataset: xr.Dataset, panel: Selection) -> None:
         """Add the glyphs and tools to the figure."""
-        raise NotImplementedError
 
     def update(self, dataset: xr.Dataset, panel: Selection) -> None:
         """Replace the data of the plot.

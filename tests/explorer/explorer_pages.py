@@ -2,7 +2,7 @@
 
 from pathlib import Path
 
-#: Time in ms after which a page that does not show what a test waits for fails the test.
+#: Maximum time in ms that a test waits for a change of the page.
 PATIENCE = 60_000
 #: Record with steps at 100 s and 140 s.
 STEP = str(Path(__file__).parents[2] / "studies" / "pages" / "step.csv")
