@@ -83,7 +83,8 @@ class InvalidValue(RsfStudyError, ValueError):
     value : object
         Invalid value.
     rule : str
-        Rule that the value breaks, for example "must be positive".
+        Rule that the value breaks, for example "must be positive". The rule continues the sentence
+        that begins with the name and the value.
     choices : iterable of str, optional
         Valid values. The message suggests up to three similar choices. If there are many choices,
         the message lists only the similar choices.
@@ -103,7 +104,9 @@ class InvalidValue(RsfStudyError, ValueError):
         """Build the message from the value, the rule and the choices."""
         choices = list(choices)
         shown = _short_value_repr.repr(value)
-        text = f"{shorten_text(name)} = {shown}: {rule}."
+        is_absent = value is None and rule.startswith(("is required", "is missing"))
+        subject = shorten_text(name) if is_absent else f"{shorten_text(name)} = {shown}"
+        text = f"{subject} {rule}."
         compared = [
             c
             for c in choices[:_MAX_COMPARED_CHOICES]

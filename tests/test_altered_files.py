@@ -272,7 +272,7 @@ def test_an_error_keeps_both_ends_of_what_is_long():
     error = InvalidValue("name", "begin" + "x" * 10_000 + "end", "must be short")
     assert len(str(error)) < 200
     assert str(error).startswith("name = 'begin")
-    assert str(error).endswith("end': must be short.")
+    assert str(error).endswith("end' must be short.")
     many = InvalidValue("name", "25", "is unknown", choices=map(str, range(300)), remedy="Choose.")
     assert "Did you mean '25'" in str(many)
     assert len(str(many)) < 1000

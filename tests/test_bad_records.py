@@ -68,12 +68,12 @@ def test_filters_of_a_record_are_filters_of_its_fit() -> None:
     record = rsfstudy.read_record(GOOD, filter="mean 1 s")
     with pytest.raises(
         InvalidValue,
-        match="filter = 'mean 2.0': cannot be applied, because the "
+        match="filter = 'mean 2.0' cannot be applied, because the "
         "record was read with filter=. Leave",
     ):
         fitted(record, averaging="2 s")
     other = rsfstudy.read_record(GOOD, name="other")
-    with pytest.raises(InvalidValue, match="filter = ..mean 1.0..: differs between the records"):
+    with pytest.raises(InvalidValue, match="filter = ..mean 1.0.. differs between the records"):
         rsfstudy.fit([record, other], stiffness=3e-3, laws=["slip"])
 
 

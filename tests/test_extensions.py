@@ -248,13 +248,13 @@ def test_without_the_study_file(outside, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     drawn = call_main("plot", figure)
     assert drawn.returncode == 0
-    assert "plot = 'stiffness_map': is not a figure of" in " ".join(drawn.stderr.split())
+    assert "plot = 'stiffness_map' is not a figure of" in " ".join(drawn.stderr.split())
     assert "--study" in drawn.stderr
     as_lines = Path(figure).with_suffix(".png").read_bytes()
     assert call_main("plot", figure, "--study", outside["own_figure"].study).stderr == ""
     assert Path(figure).with_suffix(".png").read_bytes() != as_lines
     assert call_main("plot", figure, "--study", gone).stderr.startswith("error: study = ")
-    with pytest.raises(InvalidValue, match="'saturating': is user-defined.*--study FILE.*mine.py"):
+    with pytest.raises(InvalidValue, match="'saturating' is user-defined.*--study FILE.*mine.py"):
         rsfstudy.recompute_cell(saturating, PLACES["saturating_law"])
     with pytest.raises(InvalidValue, match="declares the study 'stiffness_map'"):
         rsfstudy.recompute_cell(
@@ -270,7 +270,7 @@ def test_a_process_that_does_not_know_the_parts_opens_their_results(outside, mon
     dataset = rsfstudy.open(outside["saturating_law"].file)
     assert dataset.attrs["id"] == "saturating_laws"
     assert rsfstudy.check(dataset).empty
-    with pytest.raises(InvalidValue, match="law = 'saturating': is unknown"):
+    with pytest.raises(InvalidValue, match="law = 'saturating' is unknown"):
         Scene(law="saturating")
 
 
@@ -322,15 +322,15 @@ def test_a_scene_of_ones_own_parts():
 @pytest.mark.parametrize(
     ("given", "rule"),
     [
-        ({"law": "slip", "factor": 2.0}, "factor = 2.0: has no meaning for law='slip'.*'doubled'"),
-        ({"law": Doubled, "factor": -1.0}, "factor = -1.0: must be 0 or greater"),
-        ({"law": "doubeld"}, "law = 'doubeld': is unknown. Did you mean 'doubled'"),
-        ({"dynamics": Sticky, "inertia": True}, "inertia = True: has no meaning for sticky"),
+        ({"law": "slip", "factor": 2.0}, "factor = 2.0 has no meaning for law='slip'.*'doubled'"),
+        ({"law": Doubled, "factor": -1.0}, "factor = -1.0 must be 0 or greater"),
+        ({"law": "doubeld"}, "law = 'doubeld' is unknown. Did you mean 'doubled'"),
+        ({"dynamics": Sticky, "inertia": True}, "inertia = True has no meaning for sticky"),
         (
             {"law": Sticky},
             "law = .*is not a class that defines the law of a scene. Derive a class from",
         ),
-        ({"law": int}, "law = <class 'int'>: is not a class that defines the"),
+        ({"law": int}, "law = <class 'int'> is not a class that defines the"),
     ],
 )
 def test_scenes_that_are_refused(given, rule):
@@ -419,7 +419,7 @@ def test_a_part_has_as_many_numbers_as_there_are_places():
         normal_stress=made(Unvaried, name="numerous", parameter_values=numbers), stiffness=0.01
     )
     with pytest.raises(
-        InvalidValue, match="'numerous': has 3 parameters, but at most 2 are allowed"
+        InvalidValue, match="'numerous' has 3 parameters, but at most 2 are allowed"
     ):
         _asked = scene.parameter_values
 
@@ -449,7 +449,7 @@ def test_a_cell_of_a_notebook_that_is_run_twice():
 def test_two_parts_of_one_scene_share_no_field():
     other = made(name="gripping", grip=number(1.0, "", "1", "another"))
     with pytest.raises(
-        InvalidValue, match="parts = 'gripping, sticky': have fields with the same name"
+        InvalidValue, match="parts = 'gripping, sticky' have fields with the same name"
     ):
         Scene(law=other, dynamics=Sticky)
 
@@ -458,7 +458,7 @@ def test_two_parts_of_one_scene_share_no_field():
 def test_a_field_that_would_be_mistaken_in_a_file(name):
     part = made(name="mistaken", **{name: number(1.0, "", "1", "another")})
     with pytest.raises(
-        InvalidValue, match=f"field = '{name}': is already used for another quantity"
+        InvalidValue, match=f"field = '{name}' is already used for another quantity"
     ):
         study_of("n", LinearStability(), Axis("phi", [60]), base=Scene(law=part))
 
@@ -516,7 +516,7 @@ def test_overrides_by_class_whatever_their_order():
                   study.with_(law=[Doubled]).with_(factor=[1.0, 2.0])):  # fmt: skip
         assert {cell.scene.factor for cell in other.cells()} == {1.0, 2.0}
         assert other.describe()["overrides"]["law"] in ("doubled", ["doubled"])
-    with pytest.raises(InvalidValue, match="override = 'factor': is neither an axis nor a field"):
+    with pytest.raises(InvalidValue, match="override = 'factor' is neither an axis nor a field"):
         study.with_(factor=[1.0])
 
 

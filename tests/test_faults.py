@@ -57,7 +57,7 @@ WRONG = {
         ("spends", "work_budget_spent", "--budget 2000000 (budget=)"),
         ("nan", "not_finite", "total = nan"),
         ("no outcome", "cell_raised", "must be an Outcome with a Status"),
-        ("undeclared", "cell_raised", "'totla': is not declared. Did you mean 'total'?"),
+        ("undeclared", "cell_raised", "'totla' is not declared. Did you mean 'total'?"),
         ("too many", "cell_raised", "has the shape (3,), but must have the shape ()"),
         ("text", "cell_raised", "must be a real number"),
         ("masked", "cell_raised", "must be a real number"),

@@ -282,7 +282,7 @@ def test_any_variable_on_request():
     dataset = lattice(ANGLES, RATES)
     drawn = rsfstudy.plot(dataset, "steady_friction")
     assert any("friction coefficient" in text.replace("\n", " ") for text in texts(drawn))
-    with pytest.raises(InvalidValue, match="variable = 'friction': is not a numeric variable"):
+    with pytest.raises(InvalidValue, match="variable = 'friction' is not a numeric variable"):
         rsfstudy.plot(dataset, "friction")
     with pytest.raises(InvalidValue, match="variable = 'message'"):
         rsfstudy.plot(dataset, "message")
@@ -301,7 +301,7 @@ def test_a_style_of_the_users_own(tmp_path):
     assert ours.axes[0].lines[0].get_color() != theirs.axes[0].lines[0].get_color()
     larger = rsfstudy.plot(dataset, style=[sheet, {"font.size": 11.0, "xtick.labelsize": 11.0}])
     assert larger.axes[0].xaxis.get_ticklabels()[0].get_size() == 11.0
-    with pytest.raises(InvalidValue, match="style = 'nothing': is neither a style sheet"):
+    with pytest.raises(InvalidValue, match="style = 'nothing' is neither a style sheet"):
         rsfstudy.plot(dataset, style="nothing")
 
 
@@ -313,10 +313,10 @@ def test_a_style_of_the_users_own(tmp_path):
         ("plain.txt", "is neither a style sheet"),
         (Path("plain.txt"), "is neither a style sheet"),
         (5, "is neither a style sheet"),
-        ({"font.sise": 9}, "'font.sise': is not a setting of matplotlib. Did you mean 'font.size'"),
-        ({"font.size": "large-ish"}, "'large-ish': is not a valid value of font.size: Could not"),
-        ("unknown.mplstyle", "unknown.mplstyle, line 2: style = 'font.sise': is not a setting"),
-        ("text.mplstyle", "text.mplstyle, line 1: style = 'root': is not"),
+        ({"font.sise": 9}, "'font.sise' is not a setting of matplotlib. Did you mean 'font.size'"),
+        ({"font.size": "large-ish"}, "'large-ish' is not a valid value of font.size: Could not"),
+        ("unknown.mplstyle", "unknown.mplstyle, line 2: style = 'font.sise' is not a setting"),
+        ("text.mplstyle", "text.mplstyle, line 1: style = 'root' is not"),
         ("latin.mplstyle", "cannot be read: the file is not encoded in UTF-8"),
         (["ggplot", "folder.mplstyle"], "is a directory"),
     ],
@@ -346,7 +346,7 @@ def test_styles_are_checked_and_never_imported(style, message, tmp_path, monkeyp
     ],
 )
 def test_a_style_in_which_nothing_can_be_drawn_is_named(settings, tmp_path):
-    message = r"^style = \{.*: a figure cannot be drawn in this style: .* Draw the figure without"
+    message = r"^style = \{.* cannot be used to draw a figure: .* Draw the figure without"
     with pytest.raises(InvalidValue, match=message):
         plots.save_figure(lattice(RATES), tmp_path / "figure.png", style=settings)
     assert not list(tmp_path.iterdir())

@@ -83,7 +83,7 @@ def test_every_field_with_a_scale_takes_units(about):
     assert getattr(scene, about.name) == pytest.approx(value, rel=1e-12)
     assert scene.reference_rate == V / D_C
     with pytest.raises(
-        InvalidValue, match=rf"{about.name} = '1 kg': has units that are incompatible with"
+        InvalidValue, match=rf"{about.name} = '1 kg' has units that are incompatible with"
     ):
         rig.scene(**{about.name: "1 kg"})
 

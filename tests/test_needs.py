@@ -58,7 +58,7 @@ def test_a_scene_refuses_a_law_whose_stress_it_does_not_provide(fields, cause, r
     with pytest.raises(InvalidValue) as refused:
         Scene(law=Heated, **fields)
     text = str(refused.value)
-    assert text.startswith("law = 'heated_by_work': requires shear_stress, but")
+    assert text.startswith("law = 'heated_by_work' requires shear_stress, but")
     assert cause in text
     assert remedy in text
     if not fields.get("regularised"):

@@ -131,7 +131,7 @@ def test_decimal_commas_are_named(text: str, tmp_path: Path) -> None:
     for read in (rsfstudy.read_record, rsfstudy.events, rsfstudy.history):
         with pytest.raises(InvalidValue, match=r"run.csv: number = '12,1': .*Pass decimal=','"):
             read(tmp_path / "run.csv")
-    with pytest.raises(InvalidValue, match="decimal = ';': is unknown"):
+    with pytest.raises(InvalidValue, match="decimal = ';' is unknown"):
         rsfstudy.read_record(tmp_path / "run.csv", decimal=";")
 
 
@@ -146,7 +146,7 @@ def test_a_file_without_header_asks_for_numbers(tmp_path: Path) -> None:
     (tmp_path / "run.txt").write_text(lines_of("\t"))
     with pytest.raises(InvalidValue, match=r"has no headings.* 'time=1 \(s\),displacement=2"):
         rsfstudy.read_record(tmp_path / "run.txt")
-    with pytest.raises(InvalidValue, match="column = '5': is not in the table"):
+    with pytest.raises(InvalidValue, match="column = '5' is not in the table"):
         rsfstudy.read_record(tmp_path / "run.txt", {**BY_NUMBER, "time": "5 (s)"})
 
 
@@ -172,13 +172,13 @@ def test_workbooks(library: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
         InvalidValue, match="sheet 'other', line 1: header = .* no recognised heading for fric"
     ):
         rsfstudy.read_record(path, sheet="other")
-    with pytest.raises(InvalidValue, match="sheet = 'x': is not in the workbook. Choices: notes"):
+    with pytest.raises(InvalidValue, match="sheet = 'x' is not in the workbook. Choices: notes"):
         rsfstudy.read_record(path, sheet="x")
     frame = frame.astype(object)
     frame.loc[3, HEADINGS[1]] = "off"
     frame.to_excel(path, index=False)
     with pytest.raises(
-        InvalidValue, match="line 5, column 2: displacement = 'off': is not a number"
+        InvalidValue, match="line 5, column 2: displacement = 'off' is not a number"
     ):
         rsfstudy.read_record(path)
 
@@ -229,7 +229,7 @@ def test_tdms_files(tmp_path: Path) -> None:
     check(path)
     check(path, sheet="plain")
     with pytest.raises(
-        InvalidValue, match="sheet = 'x': is not a group with channels. Choices: wave"
+        InvalidValue, match="sheet = 'x' is not a group with channels. Choices: wave"
     ):
         rsfstudy.read_record(path, sheet="x")
 
@@ -342,14 +342,14 @@ def test_rows_are_selected(options: dict[str, Any], kept: slice, tmp_path: Path)
 @pytest.mark.parametrize(
     ("options", "told"),
     [
-        ({"rows": (0, 5)}, "rows = .0, 5.: must be the numbers of the first and the last row"),
-        ({"rows": (5, 3)}, "rows = .5, 3.: must be"),
+        ({"rows": (0, 5)}, "rows = .0, 5. must be the numbers of the first and the last row"),
+        ({"rows": (5, 3)}, "rows = .5, 3. must be"),
         ({"rows": (500, 600)}, "selects no row, because the record has 40 rows"),
-        ({"begin": "2 MPa"}, "begin = '2 MPa': is neither a time nor a displacement"),
-        ({"begin": "x"}, "begin = 'x': is neither a time nor a displacement"),
-        ({"begin": "1 h"}, "begin = '1 h': is outside the record, which covers 0 to 9.75 s"),
-        ({"thin": 0}, "thin = 0: must be a whole number, 1 or more"),
-        ({"filter": "median 1 s"}, "filter = 'median 1 s': is unknown. .*mean, trailing_mean"),
+        ({"begin": "2 MPa"}, "begin = '2 MPa' is neither a time nor a displacement"),
+        ({"begin": "x"}, "begin = 'x' is neither a time nor a displacement"),
+        ({"begin": "1 h"}, "begin = '1 h' is outside the record, which covers 0 to 9.75 s"),
+        ({"thin": 0}, "thin = 0 must be a whole number, 1 or more"),
+        ({"filter": "median 1 s"}, "filter = 'median 1 s' is unknown. .*mean, trailing_mean"),
         ({"filter": "mean 20 s"}, "averages over a time that is longer than the record, 9.75 s"),
         ({"filter": "first_order 3 Hz"}, "only contains frequencies below 2 Hz"),
         ({"filter": "first_order 3 s"}, "has units that are incompatible"),
@@ -406,11 +406,11 @@ def test_a_force_needs_the_area(tmp_path: Path) -> None:
     header = HEADER.replace("Shear stress (MPa)", "Force (kN)")
     (tmp_path / "run.csv").write_text(lines_of(",", header))
     for read in (rsfstudy.read_record, rsfstudy.events):
-        with pytest.raises(InvalidValue, match=r"in kN': is a force, .*area='25 cm2'"):
+        with pytest.raises(InvalidValue, match=r"in kN' is a force, .*area='25 cm2'"):
             read(tmp_path / "run.csv")
     record = rsfstudy.read_record(tmp_path / "run.csv", area="5 cm2")
     np.testing.assert_allclose(record.columns["friction"], 2.0 * FRICTION, rtol=1e-11)
-    with pytest.raises(InvalidValue, match="area = '0 cm2': must be positive"):
+    with pytest.raises(InvalidValue, match="area = '0 cm2' must be positive"):
         rsfstudy.read_record(tmp_path / "run.csv", area="0 cm2")
 
 

@@ -114,7 +114,7 @@ def test_a_script_that_workers_would_run_again_is_told_what_to_write(call, tmp_p
     line = len(script.read_text().splitlines())
     assert ran.returncode == 1
     assert (
-        f"worker processes import script.py, so line {line} would run again in each" in ran.stderr
+        f"cannot be used at line {line} of script.py, because each worker process" in ran.stderr
     )
     assert 'below `if __name__ == "__main__":`' in ran.stderr
     assert ran.stderr.count("Traceback") == 1

@@ -319,9 +319,9 @@ def test_too_few_samples_for_a_quantile():
     assert np.isnan(found["q"])
     assert found["q"].attrs["refused"] == "requires at least 19 samples with a value"
     for level in (1.0, "half"):
-        with pytest.raises(InvalidValue, match=f"level = .*{level}.*: must be between 0 and 1"):
+        with pytest.raises(InvalidValue, match=f"level = .*{level}.* must be between 0 and 1"):
             Quantile("q", "y", level=level)
-    with pytest.raises(InvalidValue, match="over = 'draw': is not a dimension of y"):
+    with pytest.raises(InvalidValue, match="over = 'draw' is not a dimension of y"):
         apply_reductions(measured(np.arange(18.0)), (Mean("m", "y", over="draw"),))
 
 
@@ -396,7 +396,7 @@ def test_sobol_indices_are_refused():
         with pytest.raises(InvalidValue, match="over = 'draw': was not drawn for Sobol indices"):
             apply_reductions(part, of)
     apply_reductions(whole.isel(draw=slice(0, 160)), of)  # 32 points are a valid sample.
-    with pytest.raises(InvalidValue, match="over = 'sample': is not a dimension of y"):
+    with pytest.raises(InvalidValue, match="over = 'sample' is not a dimension of y"):
         apply_reductions(whole, (SobolIndices("share", "y"),))
 
 

@@ -54,7 +54,7 @@ def test_a_reduction_needs_no_more_than_a_call(tmp_path):
     assert dataset.largest == dataset.critical_stiffness.max()
     kinds = [one["kind"] for one in declaration_of(dataset)["reductions"]]
     assert kinds == ["Largest", "HalfSlope"]
-    with pytest.raises(InvalidValue, match="reduction = .Largest.: is not part of rsfstudy"):
+    with pytest.raises(InvalidValue, match="reduction = .Largest. is not part of rsfstudy"):
         _ = rsfstudy.open(tmp_path / "reducing.nc").rsf.study
 
 

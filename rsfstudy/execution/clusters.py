@@ -55,7 +55,8 @@ def check_script_has_main_guard(worker_count: int) -> None:
     if not tree.body or any(n.lineno <= line <= (n.end_lineno or line) for n in conditions):
         return
     rule = (
-        f"worker processes import {Path(file).name}, so line {line} would run again in each of them"
+        f"cannot be used at line {line} of {Path(file).name}, because each worker process imports "
+        "this file and would run the line again"
     )
     remedy = (
         'Move the code that runs the study below `if __name__ == "__main__":`, or run the study '

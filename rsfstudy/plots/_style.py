@@ -88,7 +88,7 @@ def style_context(user_styles: Any = None, width: Any = None) -> Iterator[None]:
         except Exception as error:
             if not settings:
                 raise
-            rule = f"a figure cannot be drawn in this style: {shorten_text(error).rstrip('.')}"
+            rule = f"cannot be used to draw a figure: {shorten_text(error).rstrip('.')}"
             remedy = "Draw the figure without this style to check whether the style is the cause."
             raise InvalidValue(
                 "style", _format_style_for_message(user_styles), rule, remedy=remedy

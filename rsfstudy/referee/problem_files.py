@@ -451,7 +451,7 @@ def _check_declared_type(name: str, value: Any, expected_type: Any) -> None:
     except msgspec.ValidationError as error:
         found = _TYPE_ERROR_PATTERN.search(str(error))
         if found is None:
-            raise InvalidValue(name, value, str(error)) from error
+            raise InvalidValue(name, value, f"is invalid: {error}") from error
         wanted, actual = (
             _READABLE_NAME_BY_TYPE_NAME.get(kind, kind) for kind in found.groups()[:2]
         )

@@ -74,7 +74,7 @@ def test_nothing_listens_beyond_loopback(server):
 
 def test_a_port_in_use_is_refused(server):
     port = int(server.origin.rpartition(":")[2])
-    with pytest.raises(InvalidValue, match=f"--port = {port}: cannot be used"):
+    with pytest.raises(InvalidValue, match=f"--port = {port} cannot be used"):
         serve(port=port, open_browser=False)
 
 
