@@ -28,7 +28,7 @@ _MAX_COMPARED_CHOICES, _MAX_CHOICE_LENGTH_FOR_SUGGESTION = 1000, 100
 class _ShortValueRepr(reprlib.Repr):
     """Formatter that limits the length of formatted values.
 
-    NumPy scalars are formatted as Python numbers.
+    NumPy scalars are formatted as Python numbers, and tables and datasets as the name of their type.
     """
 
     def repr1(self, x: object, level: int) -> str:
@@ -46,7 +46,10 @@ class _ShortValueRepr(reprlib.Repr):
         str
             Formatted value.
         """
-        number = type(x).__module__ == "numpy" and not getattr(x, "ndim", 1)
+        package = type(x).__module__.partition(".")[0]
+        if package in ("pandas", "xarray"):
+            return f"<{type(x).__name__}>"
+        number = package == "numpy" and not getattr(x, "ndim", 1)
         return super().repr1(x.item() if number and hasattr(x, "item") else x, level)
 
 

@@ -48,7 +48,7 @@ def test_the_command_prints_what_the_function_finds(record: Path) -> None:
     ran = call_main("events", "run.csv", *words)
     assert ran.returncode == 0, ran.stderr
     lines = ran.stdout.splitlines()
-    assert "static drop (MPa)" in lines[0]
+    assert "static stress drop (MPa)" in lines[0]
     assert len(lines) >= found.sizes["event"] + 3
     assert f"{found.sizes['event']} drops of shear stress" in ran.stdout
     assert found.attrs["processing"] in ran.stdout

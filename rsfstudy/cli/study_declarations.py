@@ -125,7 +125,7 @@ def print_study_declaration(declared: StudyDeclaration) -> None:
             for axis in study.axes
         },
         **describe_scene_and_rig_fields(
-            "fixed", study.base.as_dict(), declared.rig_quantities, declared.varied_fields
+            "fixed fields", study.base.as_dict(), declared.rig_quantities, declared.varied_fields
         ),
         "measure": ", ".join(f"{n} = {v}" for n, v in measured.items()),
         "outputs": ", ".join(f"{n}{w}" for n, w in with_errors.items() if not n.endswith("_error")),

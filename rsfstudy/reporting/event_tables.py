@@ -16,11 +16,11 @@ _HEADINGS = {
     "displacement": "displacement",
     "duration": "duration",
     "interval": "interval",
-    "static_stress_drop": "static drop",
+    "static_stress_drop": "static stress drop",
     "static_stress_drop_error": "+-",
-    "dynamic_stress_drop": "dynamic drop",
+    "dynamic_stress_drop": "dynamic stress drop",
     "slip": "slip",
-    "peak_slip_rate": "peak rate",
+    "peak_slip_rate": "peak slip rate",
 }
 #: Maximum number of events that are printed.
 _MAX_LISTED_EVENTS = 50

@@ -45,8 +45,8 @@ def describe_scene_and_rig_fields(
     sizes = Rig.convert_quantities_for_display(rig_values, varied_names)
     told = {
         heading: format_nonempty_fields({n: v for n, v in scene_fields.items() if v}),
-        "zero": ", ".join(n for n, v in scene_fields.items() if not v and v is not None),
-        "laboratory": format_nonempty_fields(
+        "fields equal to 0": ", ".join(n for n, v in scene_fields.items() if not v and v is not None),
+        "rig": format_nonempty_fields(
             {n: f"{v:g} {units}" for n, (v, units) in sizes.items()}
         ),
     }
@@ -56,7 +56,7 @@ def describe_scene_and_rig_fields(
         # An instability norm below the reference velocity is not described, because the slip rate
         # of steady sliding would exceed this norm.
         if rate > sizes["reference_velocity"][0]:
-            told["instability threshold"] = f"a slip rate of {rate:.4g} um/s on"
+            told["instability threshold"] = f"slip rate of {rate:.4g} um/s"
     return {name: text for name, text in told.items() if text}
 
 
@@ -106,7 +106,7 @@ def describe_study_origin(dataset: xr.Dataset) -> dict[str, str]:
     versions = ", ".join(f"{name} {version}" for name, version in about["versions"].items())
     return {
         "lattice": " x ".join(f"{dataset.sizes[d]} {d}" for d in dims),
-        **describe_scene_and_rig_fields("fixed", scene, rig),
+        **describe_scene_and_rig_fields("fixed fields", scene, rig),
         "cells": f"{attrs['completeness']}; {format_status_counts(dataset)}",
         **({"reductions": reduced} if reduced else {}),
         "command": f"{about['command']}, {about['time']}",

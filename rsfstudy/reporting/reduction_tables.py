@@ -28,11 +28,11 @@ _COLUMNS_OF_SLOPE_TABLE = {
 }
 #: Columns of the comparison of integrators.
 _INTEGRATOR_COLUMNS = (
-    Column("cheapest", "cheapest_integrator", str, "integrator"),
-    Column("work", "cheapest_work", "{:,.0f}".format, "work"),
-    Column("work of the default", "cheapest_default_work", "{:,.0f}".format, "default_work"),
+    Column("cheapest integrator", "cheapest_integrator", str, "integrator"),
+    Column("its evaluations", "cheapest_work", "{:,.0f}".format, "work"),
+    Column("evaluations of the default", "cheapest_default_work", "{:,.0f}".format, "default_work"),
     Column(
-        "required rtol",
+        "rtol of the default",
         "cheapest_default_request",
         lambda digits: f"{10.0**-digits:.1g}",
         "default_request",

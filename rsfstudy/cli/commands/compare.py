@@ -151,7 +151,7 @@ def _differences_table(title: str, differences: Mapping[str, tuple[Any, Any]]) -
     from rsfstudy.formatting import format_value
     from rsfstudy.reporting import TextTable
 
-    headings = f"{title} differs", "A", "B"
+    headings = f"difference in {title}", "A", "B"
     rows = [
         (name, *(shorten_text(format_value(v), _MAX_VALUE_CHARACTERS) for v in pair))
         for name, pair in differences.items()
