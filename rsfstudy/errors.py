@@ -28,7 +28,8 @@ _MAX_COMPARED_CHOICES, _MAX_CHOICE_LENGTH_FOR_SUGGESTION = 1000, 100
 class _ShortValueRepr(reprlib.Repr):
     """Formatter that limits the length of formatted values.
 
-    NumPy scalars are formatted as Python numbers, and tables and datasets as the name of their type.
+    NumPy scalars are formatted as Python numbers. Tables and datasets are formatted as the name of
+    their type.
     """
 
     def repr1(self, x: object, level: int) -> str:
@@ -87,7 +88,7 @@ class InvalidValue(RsfStudyError, ValueError):
         Invalid value.
     rule : str
         Rule that the value breaks, for example "must be positive". The rule continues the sentence
-        that begins with the name and the value.
+        that begins with the name of the field.
     choices : iterable of str, optional
         Valid values. The message suggests up to three similar choices. If there are many choices,
         the message lists only the similar choices.
@@ -107,9 +108,7 @@ class InvalidValue(RsfStudyError, ValueError):
         """Build the message from the value, the rule and the choices."""
         choices = list(choices)
         shown = _short_value_repr.repr(value)
-        is_absent = value is None and rule.startswith(("is required", "is missing"))
-        subject = shorten_text(name) if is_absent else f"{shorten_text(name)} = {shown}"
-        text = f"{subject} {rule}."
+        text = _format_violation(shorten_text(name), value, shown, rule)
         compared = [
             c
             for c in choices[:_MAX_COMPARED_CHOICES]
@@ -218,6 +217,16 @@ class NoResultWarning(RsfStudyWarning):
 
 class IncompleteWarning(RsfStudyWarning):
     """Warning issued if a motion ended early or if cells of a run failed."""
+
+
+def _format_violation(name: str, value: object, shown_value: str, rule: str) -> str:
+    """Write a sentence that contains a name, its invalid value and the violated rule."""
+    if value is None and rule.startswith(("is required", "is missing")):
+        return f"{name} {rule}."
+    if rule.startswith("must ") and "(got " not in rule:
+        requirement, conjunction, reason = rule.partition(", because")
+        return f"{name} {requirement} (got {shown_value}){conjunction}{reason}."
+    return f"{name} = {shown_value} {rule}."
 
 
 def shorten_text(text: object, max_length: int = _MAX_CHARACTERS_OF_VALUE) -> str:

@@ -60,7 +60,7 @@ def test_wrong_options_of_reading_are_refused(record: Path) -> None:
     assert "has a decimal comma. Pass decimal" in " ".join(ran.stderr.split())
     ran = call_main("events", "run.csv", "--decimal", ",", "--rows", "1-200")
     assert ran.returncode == 2
-    assert "--rows = '1-200' must be the numbers of the first and the last row" in ran.stderr
+    assert "--rows must be the numbers of the first and the last row" in ran.stderr
     assert call_main("events", "absent.csv").returncode == 1
 
 

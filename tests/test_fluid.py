@@ -163,7 +163,7 @@ def test_a_porosity_length_needs_a_constant_pressure_around_the_fault():
     pressure = rsfstudy.history({"time": [0.0, 1.0, 2.0], "pore_pressure": [0.0, 0.01, 0.02]})
     imposed = {"normal_stress": "imposed", "loading": pressure}
     assert dilatant(**imposed).state_count == 4
-    with pytest.raises(InvalidValue, match=r"porosity_length = 2.0 must be 1 if the loading"):
+    with pytest.raises(InvalidValue, match=r"porosity_length must be 1 if the loading"):
         dilatant(**imposed, porosity_length=2.0)
 
 
@@ -192,7 +192,7 @@ def test_a_derived_fluid_keeps_the_places_of_its_parameters():
 
 @pytest.mark.parametrize("length", [0.0, -1.0])
 def test_a_porosity_length_must_be_positive(length):
-    with pytest.raises(InvalidValue, match="porosity_length = .* must be greater than 0"):
+    with pytest.raises(InvalidValue, match="porosity_length must be greater than 0"):
         dilatant(porosity_length=length)
 
 

@@ -377,7 +377,7 @@ def test_stability_ignores_noise():
         ({"noise_seed": 0.5}, "whole number"),
         ({"stress_noise": -1.0}, "must be 0 or greater"),
         ({"normal_stress_noise": 1e-3}, "cannot be combined with a loading or noise"),
-        ({"loading_noise": "none", "stress_noise": 1e-4}, "has no meaning without noise"),
+        ({"loading_noise": "none", "stress_noise": 1e-4}, "does not apply without noise"),
     ],
 )
 def test_wrong_noise(fields, text):

@@ -342,13 +342,13 @@ def test_rows_are_selected(options: dict[str, Any], kept: slice, tmp_path: Path)
 @pytest.mark.parametrize(
     ("options", "told"),
     [
-        ({"rows": (0, 5)}, "rows = .0, 5. must be the numbers of the first and the last row"),
-        ({"rows": (5, 3)}, "rows = .5, 3. must be"),
+        ({"rows": (0, 5)}, "rows must be the numbers of the first and the last row"),
+        ({"rows": (5, 3)}, "rows must be"),
         ({"rows": (500, 600)}, "selects no row, because the record has 40 rows"),
         ({"begin": "2 MPa"}, "begin = '2 MPa' is neither a time nor a displacement"),
         ({"begin": "x"}, "begin = 'x' is neither a time nor a displacement"),
         ({"begin": "1 h"}, "begin = '1 h' is outside the record, which covers 0 to 9.75 s"),
-        ({"thin": 0}, "thin = 0 must be a whole number, 1 or more"),
+        ({"thin": 0}, "thin must be a whole number, 1 or more"),
         ({"filter": "median 1 s"}, "filter = 'median 1 s' is unknown. .*mean, trailing_mean"),
         ({"filter": "mean 20 s"}, "averages over a time that is longer than the record, 9.75 s"),
         ({"filter": "first_order 3 Hz"}, "only contains frequencies below 2 Hz"),
@@ -410,7 +410,7 @@ def test_a_force_needs_the_area(tmp_path: Path) -> None:
             read(tmp_path / "run.csv")
     record = rsfstudy.read_record(tmp_path / "run.csv", area="5 cm2")
     np.testing.assert_allclose(record.columns["friction"], 2.0 * FRICTION, rtol=1e-11)
-    with pytest.raises(InvalidValue, match="area = '0 cm2' must be positive"):
+    with pytest.raises(InvalidValue, match="area must be positive"):
         rsfstudy.read_record(tmp_path / "run.csv", area="0 cm2")
 
 

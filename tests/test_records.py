@@ -115,13 +115,13 @@ def test_types_of_arrays_tell_what_they_are() -> None:
         record = rsfstudy.read_record(pd.DataFrame({**plain, "Time (min)": times}))
         np.testing.assert_allclose(record.time, TIME, atol=1e-9)
     masked = np.ma.masked_where(np.arange(len(MOVED)) == 3, MOVED)
-    with pytest.raises(InvalidValue, match="sample 4: displacement = nan must be a finite number"):
+    with pytest.raises(InvalidValue, match="sample 4: displacement must be a finite number"):
         rsfstudy.read_record({**plain, "LP (um)": masked})
     with pytest.raises(
         InvalidValue, match="displacement = '1 s' has units that are incompatible with"
     ):
         rsfstudy.read_record({**plain, "LP (um)": intervals})
-    with pytest.raises(InvalidValue, match="friction = 'complex128' must be real numbers"):
+    with pytest.raises(InvalidValue, match="friction must be real numbers"):
         rsfstudy.read_record({**plain, "mu": FRICTION + 0j})
 
 

@@ -266,7 +266,7 @@ def test_the_number_of_rows_is_checked_before_columns_are_converted(tmp_path):
     ran = call_main("verify", write(tmp_path / "15.csv", header, columns))
     count = len(told["time"])
     said = " ".join(ran.stderr.split())
-    assert (ran.returncode, f"number of rows = {count - 1} must be {count}." in said) == (2, True)
+    assert (ran.returncode, f"number of rows must be {count}." in said) == (2, True)
 
 
 def test_where_they_part_is_told(tmp_path):
@@ -338,7 +338,7 @@ def test_zeros_agree_in_nothing_and_overflows_are_refused(tmp_path):
     huge = filed(tmp_path / "01.csv", 1, slip_rate=zeros + 400.0)
     huge.write_text(huge.read_text().replace("slip_rate (m/s)", "log10_slip_rate (1)"))
     ran = call_main("verify", huge)
-    said = "line 2, column 3: log10_slip_rate = 400.0 must be a number of at most 100"
+    said = "line 2, column 3: log10_slip_rate must be a number of at most 100"
     assert (ran.returncode, said in " ".join(ran.stderr.split())) == (2, True)
     ran = call_main("verify", huge, "--digits", "nan")
     assert (ran.returncode, "--digits = nan" in ran.stderr) == (2, True)
@@ -351,7 +351,7 @@ def test_zeros_agree_in_nothing_and_overflows_are_refused(tmp_path):
         (lambda h, c: ([h[0], h[1], "slip_rate (MPa)", *h[3:]], c), "slip_rate"),
         (lambda h, c: ([h[0], h[1], "slip_rate (1)", *h[3:]], c), "has no units"),
         (lambda h, c: (h, [x[:-1] for x in c]), "number of rows = 40"),
-        (lambda h, c: (h, [c[0] + 0.5, *c[1:]]), "time = 0.5 must be 0 s"),
+        (lambda h, c: (h, [c[0] + 0.5, *c[1:]]), "time must be 0 s"),
         (lambda h, c: (h, [c[0], ["", *c[1][1:]], *c[2:]]), "line 2, column 2: friction = nan"),
     ],
 )
@@ -450,14 +450,14 @@ def test_a_problem_of_ones_own(text, tmp_path):
         ('"slowness"', '"sloth"', "is unknown"),
         ("[1, 2, 5,", "[2, 1, 5,", "must increase"),
         ("[1, 2, 5,", '["one", 2, 5,', "must be a number (got a string)"),
-        ('"slowness"', "5", "law = 5 must be a string (got a whole number)"),
+        ('"slowness"', "5", "law must be a string, not a whole number (got 5)"),
         ('["friction", "slip_rate", "theta"]', "[]", "must list at least one quantity"),
-        ("a = 0.01", "a = 0", "a = 0 must be positive"),
-        ("times =", "digits = 99\ntimes =", "digits = 99 must lie between 1 and 15"),
+        ("a = 0.01", "a = 0", "a must be positive"),
+        ("times =", "digits = 99\ntimes =", "digits must lie between 1 and 15"),
         ("times =", "number = 1\ntimes =", "key = 'number' is unknown"),
         ("[[loading]]", "[loading]", "must be a list (got a table)"),
         ('"slowness"', '"two_slip_states"', "must contain b_2"),
-        ("mu_star", "phi = 60.0\nmu_star", "has no meaning with phi"),
+        ("mu_star", "phi = 60.0\nmu_star", "cannot be combined with phi"),
     ],
 )
 def test_what_is_no_problem_is_refused(old, new, error, tmp_path):
@@ -480,7 +480,7 @@ def test_the_number_of_peaks_is_bounded(tmp_path):
         STEP.replace('"friction", ', "").replace(', "theta"]', "]").replace("times = [1, 2, 5,", "")
     )
     path.write_text(re.sub(r"( 10, 20, 50\])", 'report = "peaks"\ncount = 1000000000000', text))
-    with pytest.raises(InvalidValue, match="count = 1000000000000 must lie between 1 and 10,000"):
+    with pytest.raises(InvalidValue, match="count must lie between 1 and 10,000"):
         read_problem(path)
 
 

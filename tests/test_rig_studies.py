@@ -285,7 +285,9 @@ def test_results_say_what_they_are_of(cycles):
     of = summaries.describe_dataset_origin(cycles)
     assert {"a = 0.01", "b_over_a = 1.4"} <= set(of["fixed fields"].split(", "))
     # In units of the slider, the stiffness depends on D_c and sigma_*.
-    assert not {"stiffness", "load_velocity_ratio"} & set(of["fixed fields"].replace(",", "").split())
+    assert not {"stiffness", "load_velocity_ratio"} & set(
+        of["fixed fields"].replace(",", "").split()
+    )
     assert of["laboratory"].split(", ")[0] == "reference_velocity = 1 um/s"
     assert "slip_distance" not in of["laboratory"]
     scene = RIG.scene(**LAW, hold_time="10 s")

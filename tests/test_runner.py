@@ -113,9 +113,7 @@ def test_a_script_that_workers_would_run_again_is_told_what_to_write(call, tmp_p
     ran = subprocess.run(words, capture_output=True, text=True, check=False, timeout=HANG_TIMEOUT)
     line = len(script.read_text().splitlines())
     assert ran.returncode == 1
-    assert (
-        f"cannot be used at line {line} of script.py, because each worker process" in ran.stderr
-    )
+    assert f"cannot be used at line {line} of script.py, because each worker process" in ran.stderr
     assert 'below `if __name__ == "__main__":`' in ran.stderr
     assert ran.stderr.count("Traceback") == 1
 

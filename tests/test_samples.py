@@ -319,7 +319,7 @@ def test_too_few_samples_for_a_quantile():
     assert np.isnan(found["q"])
     assert found["q"].attrs["refused"] == "requires at least 19 samples with a value"
     for level in (1.0, "half"):
-        with pytest.raises(InvalidValue, match=f"level = .*{level}.* must be between 0 and 1"):
+        with pytest.raises(InvalidValue, match="level must be between 0 and 1"):
             Quantile("q", "y", level=level)
     with pytest.raises(InvalidValue, match="over = 'draw' is not a dimension of y"):
         apply_reductions(measured(np.arange(18.0)), (Mean("m", "y", over="draw"),))

@@ -200,7 +200,10 @@ def simulate(
     if extra_positional_arguments:
         remedy = f"Write duration={shorten_text(extra_positional_arguments[0])}, in D_c/V_*."
         raise InvalidValue(
-            "simulate", extra_positional_arguments[0], "must be passed by name", remedy=remedy
+            "optional arguments of simulate",
+            extra_positional_arguments[0],
+            "must be passed by name",
+            remedy=remedy,
         )
     check_scene(scene)
     since = None if start is None else _read_end_of_motion(start, scene)

@@ -184,7 +184,7 @@ class BenchmarkProblem:
             raise InvalidValue("initial", [*self.initial], rule)
         if self.initial and "phi" in self.parameters:
             rule = (
-                "has no meaning with phi, because the motion starts from steady sliding at "
+                "cannot be combined with phi, because the motion starts from steady sliding at "
                 "normal_stress"
             )
             raise InvalidValue("initial", [*self.initial], rule)
@@ -456,7 +456,7 @@ def _check_declared_type(name: str, value: Any, expected_type: Any) -> None:
             _READABLE_NAME_BY_TYPE_NAME.get(kind, kind) for kind in found.groups()[:2]
         )
         place = f"{name}{found[3] or ''}"
-        raise InvalidValue(place, value, f"must be {wanted} (got {actual})") from error
+        raise InvalidValue(place, value, f"must be {wanted}, not {actual}") from error
 
 
 def shipped_problem_files() -> dict[int, Path]:

@@ -45,10 +45,10 @@ def describe_scene_and_rig_fields(
     sizes = Rig.convert_quantities_for_display(rig_values, varied_names)
     told = {
         heading: format_nonempty_fields({n: v for n, v in scene_fields.items() if v}),
-        "fields equal to 0": ", ".join(n for n, v in scene_fields.items() if not v and v is not None),
-        "rig": format_nonempty_fields(
-            {n: f"{v:g} {units}" for n, (v, units) in sizes.items()}
+        "fields equal to 0": ", ".join(
+            n for n, v in scene_fields.items() if not v and v is not None
         ),
+        "rig": format_nonempty_fields({n: f"{v:g} {units}" for n, (v, units) in sizes.items()}),
     }
     norm, period = scene_fields.get("instability_norm"), scene_fields.get("period")
     if norm and period and {"slip_distance", "reference_velocity"} <= set(sizes):

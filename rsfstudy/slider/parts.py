@@ -102,7 +102,7 @@ class Part:
     auxiliary_rates: ClassVar[Function | None] = None
     auxiliary_steady_states: ClassVar[Function | None] = None
     #: Texts for error messages about a field that belongs to another part: the condition under
-    #: which the field has no meaning, and a remedy.
+    #: which the field does not apply, and a remedy.
     rejection_hint: ClassVar[tuple[str, str]] = ("", "")
 
     def __init_subclass__(cls) -> None:
@@ -186,10 +186,10 @@ class Part:
         Returns
         -------
         InvalidValue
-            Error whose message explains that the field has no meaning for this part.
+            Error whose message explains that the field does not apply to this part.
         """
         where, instead = cls.rejection_hint
-        rule = f"has no meaning {where or f'for {cls.name}'}"
+        rule = f"does not apply {where or f'to {cls.name}'}"
         remedy = f"Leave {name} out, or {instead}." if instead else "Leave it out."
         return InvalidValue(name, value, rule, remedy=remedy)
 

@@ -241,7 +241,7 @@ class Scene(SceneFunctions, SceneQuantities):
     Raises
     ------
     InvalidValue
-        If a value violates its rule or has no meaning in the scene. The error message contains the
+        If a value violates its rule or does not apply in the scene. The error message contains the
         rule and a remedy.
 
     Examples

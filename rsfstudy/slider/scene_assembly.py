@@ -90,7 +90,7 @@ def build_parts(field_values: Mapping[str, Any]) -> SceneParts:
     Raises
     ------
     InvalidValue
-        If a name is not a field, or if a value violates its rule or has no meaning in this scene.
+        If a name is not a field, or if a value violates its rule or does not apply in this scene.
     """
     chosen = tuple(_select_part(slot, field_values) for slot in SLOTS)
     layout = build_field_index(tuple(map(class_of_part, chosen)))
@@ -330,7 +330,7 @@ def _unknown_field_error(name: str, value: Any, field_index: FieldIndex) -> Inva
         known = map(class_of_part, slot.user_parts.values())
         owner = next((other for other in known if name in field_names(other)), None)
         if owner is not None:
-            rule = f"has no meaning for {slot.name}={part.name!r}"
+            rule = f"does not apply to {slot.name}={part.name!r}"
             remedy = f"Leave it out, or set {slot.name}={owner.name!r}."
             return InvalidValue(name, value, rule, remedy=remedy)
     remedy, rule = hint_for_unknown_field(name), "is not a field of a scene"

@@ -232,4 +232,4 @@ def value_without_field_name_error(value: Any) -> InvalidValue:
     remedy = hint_for_positional_argument(
         value, {slot.name: slot.built_in_parts for slot in SLOTS_WITH_PART_CHOSEN_BY_NAME}
     )
-    return InvalidValue("Scene", value, "must be passed by name", remedy=remedy)
+    return InvalidValue("arguments of Scene", value, "must be passed by name", remedy=remedy)

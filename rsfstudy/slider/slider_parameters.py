@@ -92,7 +92,7 @@ class SliderParameters(Part):
             )
             raise self.field_error("initial_stress", rule)
         if self.initial_state and scene.parts.law.state_count > 1:
-            rule = f"has no meaning for {scene.parts.law.name}, because the law has several states"
+            rule = f"does not apply to {scene.parts.law.name}, because the law has several states"
             remedy = "Leave it out, and reach the initial state by a loading protocol."
             raise self.field_error("initial_state", rule, remedy)
 

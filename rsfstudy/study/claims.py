@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 import sys
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import asdict, dataclass, field
 from typing import Any, ClassVar
 
@@ -128,13 +128,13 @@ class Claim:
         """Check the arguments."""
         for name in _TEXT_FIELDS:
             if not isinstance(getattr(self, name), str):
-                rule = f"must be a string, in claim {self.id}"
-                raise InvalidValue(name, getattr(self, name), rule)
+                rule = "must be a string"
+                raise self._invalid(name, getattr(self, name), rule)
         if self.relation not in CLAIM_RELATIONS:
             raise InvalidValue("relation", self.relation, "is unknown", choices=CLAIM_RELATIONS)
         if self.relation == "equals" and self.reason == TOLERANCE_REASON_OF_INEQUALITY:
-            rule = f"must give the reason for the tolerance {self.tolerance}, in claim {self.id}"
-            raise InvalidValue("reason", self.reason, rule)
+            rule = f"must give the reason for the tolerance {self.tolerance}"
+            raise self._invalid("reason", self.reason, rule)
         if self.expected not in _EXPECTED_VERDICTS:
             raise InvalidValue(
                 "expected", self.expected, "is not an expected verdict", choices=_EXPECTED_VERDICTS
@@ -142,15 +142,21 @@ class Claim:
         for name in ("published", "tolerance"):
             value = getattr(self, name)
             if not _is_number(value) or not math.isfinite(value):
-                raise InvalidValue(name, value, f"must be a number, in claim {self.id}")
+                raise self._invalid(name, value, "must be a number")
         for name in ("where", "baseline"):
             if not isinstance(getattr(self, name), Mapping):
-                rule = f"must map coordinates to values, in claim {self.id}"
-                raise InvalidValue(name, getattr(self, name), rule)
+                rule = "must map coordinates to values"
+                raise self._invalid(name, getattr(self, name), rule)
             for value in getattr(self, name).values():
                 if not isinstance(value, str) and not _is_number(value):
-                    rule = f"must be a string or a number, in claim {self.id}"
-                    raise InvalidValue(name, value, rule)
+                    rule = "must be a string or a number"
+                    raise self._invalid(name, value, rule)
+
+    def _invalid(
+        self, name: str, value: object, rule: str, *, choices: Iterable[str] = ()
+    ) -> InvalidValue:
+        """Build an error whose message begins with the identifier of the claim."""
+        return InvalidValue(name, value, rule, choices=choices).with_location(f"claim {self.id}")
 
     @classmethod
     def below(cls, **claim_fields: Any) -> Claim:
@@ -211,15 +217,15 @@ class Claim:
         variables, coordinates = map(str, dataset.data_vars), [str(n) for n in dataset.coords]
         for variable in filter(None, (self.variable, self.baseline_variable)):
             if variable not in dataset:
-                rule = f"is not a variable of the results, in claim {self.id}"
-                raise InvalidValue("variable", variable, rule, choices=sorted(variables))
+                rule = "is not a variable of the results"
+                raise self._invalid("variable", variable, rule, choices=sorted(variables))
         for name in [*self.where, *self.baseline]:
             if name not in coordinates:
-                rule = f"is not a coordinate of the results, in claim {self.id}"
-                raise InvalidValue("where", name, rule, choices=sorted(coordinates))
+                rule = "is not a coordinate of the results"
+                raise self._invalid("where", name, rule, choices=sorted(coordinates))
         if self.verdict(dataset)[1] == NOT_APPLICABLE_VERDICT:
-            rule = f"is not a point of the lattice, in claim {self.id}"
-            raise InvalidValue("where", {**self.where, **self.baseline}, rule)
+            rule = "is not a point of the lattice"
+            raise self._invalid("where", {**self.where, **self.baseline}, rule)
 
     def verdict(self, dataset: xr.Dataset) -> tuple[float, str]:
         """Compare the result with the published value.

@@ -94,7 +94,9 @@ def _import_study_file(study_file: Path) -> ModuleType:
         raise error.with_location(f"{path}{_describe_error_line(error, path)}") from error
     except SyntaxError as error:
         place = f"{error.filename or path}, line {error.lineno}"
-        raise InvalidValue("study", str(path), f"has a syntax error in {place}: {error.msg}") from error
+        raise InvalidValue(
+            "study", str(path), f"has a syntax error in {place}: {error.msg}"
+        ) from error
     except (Exception, SystemExit) as error:
         rule = f"raises {type(error).__name__}{_describe_error_line(error, path)}: {error}"
         raise InvalidValue("study", str(path), rule) from error

@@ -23,7 +23,7 @@ class DrainedFluid(Fluid):
     """
 
     name = "drained"
-    rejection_hint = "while the fault is drained", "set fluid='dilatant'"
+    rejection_hint = "when the fault is drained", "set fluid='dilatant'"
 
     @classmethod
     def rejection_error(cls, name: str, value: Any) -> InvalidValue:
@@ -34,4 +34,4 @@ class DrainedFluid(Fluid):
         if name != "pressurisation":
             return super().rejection_error(name, value)
         remedy = "Leave it out, or set fluid='thermal'."
-        return InvalidValue(name, value, "has no meaning while the fault is drained", remedy=remedy)
+        return InvalidValue(name, value, "does not apply when the fault is drained", remedy=remedy)

@@ -175,7 +175,7 @@ class ThermalFluid(Fluid):
         See ``Part.check``.
         """
         if not scene.parts.temperature.unknowns:
-            rule = f"has no meaning for temperature={scene.parts.temperature.name!r}"
+            rule = f"does not apply to temperature={scene.parts.temperature.name!r}"
             remedy = "Set temperature='shear_heating', or choose another fluid."
             raise InvalidValue("fluid", self.name, rule, remedy=remedy)
         if self.dilatancy:

@@ -277,8 +277,8 @@ class LawBase(Part):
         )
         if self.regularised and one_way:
             rule = (
-                f"has no meaning for {one_way.name}, because its equations contain ln V, which "
-                "requires forward slip"
+                f"cannot be combined with {one_way.name}, because its equations contain ln V, "
+                "which requires forward slip"
             )
             raise self.field_error("regularised", rule, "Omit one of the two.")
 
@@ -386,7 +386,7 @@ class Law(LawBase):
         super().check(scene)
         if not self.b_over_a and (self.depends_on_stress or scene.parts.normal_stress.state_effect):
             rule = (
-                "has no meaning if stress acts on the state variable, because its effects are "
+                "cannot be used if stress acts on the state variable, because its effects are "
                 "alpha/b and c/b"
             )
             remedy = "Leave alpha and stress_dependence out, or pass another value of b_over_a."
@@ -416,8 +416,8 @@ B_OVER_A_STANDING_FOR_ZERO = 1e-60
 MIN_B_OVER_A = 1e-30
 #: Advice to the user in error messages about a missing critical stiffness.
 MISSING_CRITICAL_STIFFNESS_REMEDY = (
-    "Sliding is then stable at every stiffness or unstable at every stiffness. Pass stiffness "
-    "instead of stiffness_ratio."
+    "Without a critical stiffness, sliding is stable at all stiffnesses or unstable at all "
+    "stiffnesses. Pass stiffness instead of stiffness_ratio."
 )
 
 

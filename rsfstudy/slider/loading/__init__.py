@@ -156,7 +156,7 @@ class Loading(Part):
             self._check_segment_durations()
         fluid, name = scene.parts.fluid, self.selected_by
         if self.unknowns and fluid.unknowns and not self.of_pressure:
-            rule = f"has no meaning for fluid={fluid.name!r}"
+            rule = f"does not apply to fluid={fluid.name!r}"
             rule += ", whose pore pressure changes normal stress"
             value = getattr(self, name or "name")
             remedy = "Omit one of the two."
@@ -281,7 +281,7 @@ class Loading(Part):
         remedy = f"Leave it out, or also set {wanted}." if wanted else "Leave it out."
         # The name of a protocol is an attribute of the instance, not of the class.
         of = getattr(cls, "name", cls.__name__)
-        return InvalidValue(name, value, f"has no meaning for the loading {of!r}", remedy=remedy)
+        return InvalidValue(name, value, f"does not apply to the loading {of!r}", remedy=remedy)
 
 
 def declare_load_velocity_field() -> Any:

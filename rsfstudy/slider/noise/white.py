@@ -118,7 +118,7 @@ class WhiteNoise(Noise):
             remedy = "Noise is added to steady loading, steps and protocols."
             raise InvalidValue("loading_noise", self.name, rule, remedy=remedy)
         if self.unknowns and fluid.unknowns:
-            rule = f"has no meaning for fluid={fluid.name!r}"
+            rule = f"does not apply to fluid={fluid.name!r}"
             rule += ", whose pore pressure changes normal stress"
             raise self.field_error("normal_stress_noise", rule, "Leave one of them out.")
 

@@ -43,7 +43,7 @@ class ImposedNormalStress(NormalStressWithStateEffect):
 
     name = "imposed"
     rejection_hint = (
-        "while normal stress does not depend on shear stress",
+        "when normal stress does not depend on shear stress",
         "set normal_stress='variable'",
     )
     normal_stress = staticmethod(imposed_normal_stress_excess)
