@@ -178,68 +178,74 @@ def make_output_option(
 
 
 json_option = click.option(
-    "--json", "as_json", is_flag=True, help="Print the result as JSON on the standard output."
+    "--json", "as_json", is_flag=True, help="Print the result as JSON to standard output."
 )
 study_name_or_all_argument = combine_option_decorators(
     click.argument("name", required=False),
-    click.option("--all", "every", is_flag=True, help="Process all named studies."),
+    click.option(
+        "--all", "every", is_flag=True, help="Process all studies that the command list shows."
+    ),
 )
-output_option = make_output_option(
-    "Directory of the results.", Defaults.OUTPUT_DIRECTORY, file_okay=False
-)
+output_option = make_output_option("Results directory.", Defaults.OUTPUT_DIRECTORY, file_okay=False)
 set_values_option = click.option(
     "--set",
     "settings",
     multiple=True,
     metavar="AXIS=VALUES",
-    help="Override an axis or a field with a comma-separated list, start:stop:count or "
-    "start:stop:count:log. With a rig, values can have units, for example "
-    "hold_time='10 s,100 s'. Values of loading can be CSV files of protocols or records.",
+    help="Override an axis or a field. VALUES is a comma-separated list or a range "
+    "(start:stop:count, or start:stop:count:log for logarithmic spacing). Values can have "
+    "units if the study has a rig. Values of the field loading can be paths of CSV files "
+    "with protocols or records. Example: --set hold_time='10 s,100 s'.",
 )
 rtol_option = click.option(
     "--rtol",
     type=float,
     metavar="RTOL",
-    help="Relative tolerance of each cell, from 1e-11 to 0.01.  "
-    "[default: value of the study, 1e-07]",
+    help="Relative tolerance of each cell, from 1e-11 to 0.01.  [default: tolerance set by the "
+    "study, otherwise 1e-07]",
 )
 engine_option = click.option(
     "--engine",
     type=click.Choice(Engine.NAMES),
-    help="Integration engine. The engine compiled requires Numba and is much faster.  "
-    "[default: engine of the study, scipy]",
+    help="Integration engine. The compiled engine is much faster, but requires Numba.  "
+    "[default: engine set by the study, otherwise scipy]",
 )
 
 budget_option = make_count_option(
     "--budget",
     None,
-    "Maximum number of right-hand-side evaluations per cell. If you increase it, cells with an "
-    "answer are not recomputed.  [default: value of the study, 500000]",
+    "Maximum number of right-hand-side evaluations per cell. If you increase the maximum, "
+    "cells that already have a result are not recomputed.  [default: maximum set by the study, "
+    "otherwise 500000]",
 )
 quiet_option = click.option("--quiet", is_flag=True, help="Do not show progress.")
 #: Options of the worker pool that computes the cells.
 worker_options = combine_option_decorators(
-    make_count_option("--workers", 2, "Number of worker processes on this machine."),
+    make_count_option("--workers", 2, "Number of worker processes on this computer."),
     click.option(
         "--serial",
         is_flag=True,
-        help="Compute all cells in this process, without worker processes.",
+        help="Compute all cells in the main process, without worker processes.",
     ),
-    click.option("--scheduler", metavar="ADDRESS", help="Use an existing Dask cluster."),
+    click.option(
+        "--scheduler",
+        metavar="ADDRESS",
+        help="Compute the cells on an existing Dask cluster. Example: tcp://localhost:8786.",
+    ),
     click.option(
         "--time-limit",
         type=float,
         metavar="SECONDS",
         default=Defaults.CELL_TIME_LIMIT,
-        help="CPU time limit for each cell on a worker.",
+        help="Maximum CPU time of a worker process for each cell, in seconds.",
     ),
     quiet_option,
 )
 study_file_option = click.option(
     "--study",
     type=FilePath(),
-    help="Python file of the study. Required if the study defines a measure, a part or a figure "
-    "itself.",
+    help="Python file that declares the study. The file is required if the study defines its "
+    "own measures, scene parts or figures.",
 )
 
 #: Names of variables by their names on the command line. The mapping contains only abscissae that
@@ -249,8 +255,8 @@ abscissa_option = click.option(
     "--against",
     type=click.Choice(["displacement", "slip", "time"]),
     callback=lambda _context, _option, value: _ABSCISSA_VARIABLES.get(value, value),
-    help="Abscissa of the figure of a motion. The choice displacement refers to the load point.  "
-    "[default: displacement, or slip if the load point is held fixed]",
+    help="Horizontal axis of motion figures: load point displacement, slip or time.  [default: "
+    "slip if the load point is held fixed, otherwise displacement]",
 )
 
 
@@ -296,14 +302,15 @@ style_options = combine_option_decorators(
         "--style",
         metavar="STYLE",
         callback=_check_style_option,
-        help="Matplotlib style sheet (FILE.mplstyle) or name of a style, applied after the default "
-        "style.",
+        help="Matplotlib style sheet (FILE.mplstyle) or style name. The style modifies the "
+        "default style of rsfstudy.",
     ),
     click.option(
         "--width",
         metavar="WIDTH",
         callback=_check_width_option,
-        help="Width of the figure, for example '85 mm'.  [default: 84 mm or 174 mm]",
+        help="Figure width. Example: '85 mm'.  [default: 84 mm for a single column of panels, "
+        "174 mm for several columns]",
     ),
 )
 header_option = click.option(
@@ -313,7 +320,7 @@ header_option = click.option(
     default=True,
     flag_value=False,
     show_default=False,
-    help="Omit the header of the figure, for example the list of overrides.",
+    help="Omit the figure header, which lists overrides as well as missing and failed cells.",
 )
 #: Options for the format and the appearance of figures.
 figure_options = combine_option_decorators(
@@ -321,7 +328,7 @@ figure_options = combine_option_decorators(
         "--figure",
         "form",
         type=click.Choice(Defaults.FIGURE_FORMATS),
-        help="File format of figures.  [default: png]",
+        help="Figure format.  [default: png]",
     ),
     style_options,
     header_option,
@@ -393,7 +400,9 @@ def make_set_scene_fields_option(
 #: Options that define a rig.
 rig_options = combine_option_decorators(
     *(
-        click.option(f"--{name.replace('_', '-')}", help=describe_rig_option(name))
+        click.option(
+            f"--{name.replace('_', '-')}", metavar="QUANTITY", help=describe_rig_option(name)
+        )
         for name in EXAMPLE_VALUES_OF_RIG_OPTIONS
     )
 )
@@ -401,12 +410,15 @@ rig_options = combine_option_decorators(
 columns_option = click.option(
     "--columns",
     metavar="NAME=HEADING,...",
-    help="Columns of the record, for example 'time=t (s),displacement=lp (um),friction=mu'. Other "
-    "quantities are slip, shear_stress and normal_stress. Columns can be selected by number, "
-    "for example 'time=1 (s)'. Raw values can be scaled, for example "
-    "'lp (um) * 0.1 + 5'.  [default: recognised headings]",
+    help="Columns of the record. NAME is time, displacement, slip, friction, shear_stress or "
+    "normal_stress. HEADING is a column heading or a column number, with units in "
+    "parentheses and an optional scale and offset. Examples: 'time=t (s),displacement=lp "
+    "(um),friction=mu', 'time=1 (s)' or 'displacement=lp (um) * 0.1 + 5'.  [default: all "
+    "columns with recognised headings]",
 )
 normal_stress_option = click.option(
     "--normal-stress",
-    help="Normal stress, for example '20 MPa', if the record has no such column.",
+    metavar="QUANTITY",
+    help="Normal stress. This option is required if the record contains shear stress but no "
+    "normal stress. Example: '20 MPa'.",
 )

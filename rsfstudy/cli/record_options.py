@@ -48,7 +48,12 @@ def make_quantity_option(
     callable
         Decorator for a command.
     """
-    about: dict[str, Any] = {"default": default, "show_default": False, "help": help_text}
+    about: dict[str, Any] = {
+        "metavar": "QUANTITY",
+        "default": default,
+        "show_default": False,
+        "help": help_text,
+    }
     return click.option(option_name, callback=_parse_number_or_text, **about)
 
 
@@ -59,42 +64,52 @@ reading_options = combine_option_decorators(
         "--decimal",
         type=click.Choice([".", ","]),
         default=".",
-        help="Decimal separator of a text file.",
+        help="Decimal separator in text files.",
     ),
     click.option(
         "--sheet",
+        metavar="NAME",
         default="",
         show_default=False,
-        help="Sheet of a workbook, or group of a TDMS file.  [default: first]",
+        help="Name of a workbook sheet or TDMS group.  [default: first sheet or group]",
     ),
     click.option(
-        "--area", help="Area of the fault, for example '25 cm2', by which forces are divided."
+        "--area",
+        metavar="QUANTITY",
+        help="Fault area. Pass the area if the record contains forces, which are divided by "
+        "the area to obtain stresses. Example: '25 cm2'.",
     ),
     click.option(
         "--rows",
         metavar="FIRST,LAST",
-        help="Numbers of the first and the last row to read, counted from 1.  [default: all]",
+        help="Numbers of the first and last rows to read, counted from 1. Example: 100,4000.  "
+        "[default: all rows]",
     ),
     make_quantity_option(
         "--begin",
-        "Time or load point displacement of the first row, for example '100 s' or '2 mm'.",
+        "Time or load point displacement at which reading begins. Examples: '100 s' or '2 mm'.",
     ),
-    make_quantity_option("--end", "Time or load point displacement of the last row."),
+    make_quantity_option(
+        "--end",
+        "Time or load point displacement at which reading ends. Examples: '100 s' or '2 mm'.",
+    ),
     click.option(
         "--thin",
         type=click.IntRange(1),
         metavar="N",
         default=1,
         show_default=False,
-        help="Keep one of every N rows, after the filter.  [default: all]",
+        help="Keep every Nth row. The filter is applied first.  [default: keep all rows]",
     ),
     click.option(
         "--filter",
+        metavar="FILTER",
         default="",
         show_default=False,
-        help="Filter that is applied to friction or stress: mean, trailing_mean, first_order, "
-        "butterworth_2 or butterworth_4 with its size, for example 'mean 1 s' or 'butterworth_2 2 "
-        "Hz'. A fit applies the same filter to the model.  [default: no filter]",
+        help="Filter for friction and stresses: mean, trailing_mean, first_order, "
+        "butterworth_2 or butterworth_4, followed by an averaging time or a corner "
+        "frequency. Fits apply the same filter to the model. Examples: 'mean 1 s' or "
+        "'butterworth_2 2 Hz'.  [default: no filter]",
     ),
 )
 

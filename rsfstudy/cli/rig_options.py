@@ -61,6 +61,4 @@ def describe_rig_option(name: str) -> str:
         Help text with the meaning and an example value.
     """
     meaning, example = MEANINGS_OF_RIG_OPTIONS[name], EXAMPLE_VALUES_OF_RIG_OPTIONS[name]
-    return (
-        f"Rig parameter: {meaning}, for example '{example}'. A number without units is in SI units."
-    )
+    return f"Rig parameter: {meaning}. Numbers without units are in SI units. Example: '{example}'."

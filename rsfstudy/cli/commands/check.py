@@ -81,7 +81,7 @@ class Check(CommandResult):
     "claims",
     multiple=True,
     metavar="ID",
-    help="Check only this claim, for example C6. The claim must apply to the results.",
+    help="Check only this claim. The claim must apply to the results. Example: C6.",
 )
 @options.json_option
 def check(given: options.CommandOptions) -> int:

@@ -57,22 +57,22 @@ class RecordEvents(CommandResult):
 @reading_options
 @make_quantity_option(
     "--stiffness",
-    "Stiffness between the fault and the point at which displacement is measured, for example "
-    "'0.05 MPa/um', or inf if displacement is the slip of the fault.",
+    "Stiffness between the fault and the displacement sensor. If the record contains fault "
+    "slip, pass inf. Example: '0.05 MPa/um'.",
 )
 @click.option(
     "--sign",
     type=click.Choice(["1", "-1"]),
-    help="Sign of shear stress in the direction of sliding.  [default: -1 if all samples are "
-    "negative, otherwise 1]",
+    help="Sign of the recorded shear stress if it acts in the direction of sliding.  [default: "
+    "-1 if all samples are negative, otherwise 1]",
 )
 @options.json_option
 def events(given: options.CommandOptions) -> int:
     """Detect drops of shear stress in RECORDS.
 
-    A record needs shear stress or friction, and time or displacement. The command prints a table of
-    the drops with their times, durations, intervals and sizes, and the smallest drop that can be
-    detected. If you pass --json, all quantities are printed with their errors.
+    A record must contain shear stress or friction, and time or displacement. The command prints the
+    smallest detectable drop, and a table with the times, durations, intervals and sizes of the
+    drops. With --json, the command prints all quantities with their errors.
     """
     reading = collect_reading_options(given)
     sign = None if given.sign is None else int(given.sign)

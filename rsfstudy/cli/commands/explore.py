@@ -15,21 +15,28 @@ from rsfstudy.errors import SignalInterrupt
 
 @click.command(cls=Command)
 @click.argument("file", required=False, type=options.FilePath(exists=True))
-@click.option("--state", metavar="TEXT", help="Settings of a view, as its tab Code shows them.")
+@click.option(
+    "--state",
+    metavar="SETTINGS",
+    help="Initial settings of the page. Copy the settings from the tab Code of the page.",
+)
 @click.option(
     "--port",
     type=click.IntRange(1, 65535),
-    help="Port of the server.  [default: 8067, or a free port]",
+    metavar="PORT",
+    help="Port of the server.  [default: 8067, or another free port if 8067 is in use]",
 )
-@click.option("--no-browser", is_flag=True, help="Print the address, and do not open a browser.")
+@click.option(
+    "--no-browser", is_flag=True, help="Print the address of the page without opening a browser."
+)
 def explore(given: options.CommandOptions) -> int:
     """Show a scene, results or a record in the browser.
 
     If FILE is omitted, the page shows a spring-slider model with sliders for its parameters. If
-    FILE contains the results of a study (.nc or .zarr), the page shows the results. Other files,
-    such as CSV files, are read as laboratory records, and you can fit them.
+    FILE contains the results of a study (.nc or .zarr), the page shows the results. If FILE is
+    another file, such as a CSV file, the page shows a laboratory record, which you can fit.
 
-    The server accepts connections only from this computer. Press Ctrl-C to stop it.
+    The server accepts connections only from this computer. To stop the server, press Ctrl-C.
     """
     from rsfstudy.explorer import serve
 

@@ -17,18 +17,20 @@ _UNIT_OPTION_NAMES = ("stress", "length", "time")
 
 @click.command(cls=Command)
 @click.argument("file", type=options.FilePath())
-@click.option("--csv", is_flag=True, help="Write a CSV table without constant columns.")
-@click.option("--mat", is_flag=True, help="Write a MATLAB file with all variables.")
+@click.option("--csv", is_flag=True, help="Write a CSV table. Constant columns are omitted.")
+@click.option("--mat", is_flag=True, help="Write all variables to a MATLAB file.")
 @click.option(
     "--units",
     nargs=3,
     metavar="STRESS LENGTH TIME",
-    help="Convert results of a rig to these units, for example MPa um s.",
+    help="Convert the values to these units. The results must belong to a rig. Example: "
+    "--units MPa um s.",
 )
 @click.option(
     "--output",
     type=options.FilePath(dir_okay=False),
-    help="Path of the output; the suffix is replaced by .csv or .mat.  [default: next to FILE]",
+    help="Output path. The suffix is replaced by .csv or .mat.  [default: path of FILE with "
+    "the new suffix]",
 )
 def export(given: options.CommandOptions) -> int:
     """Export results or a motion to other programs.

@@ -109,70 +109,86 @@ def _make_comma_list_option(
 @reading_options
 @make_quantity_option(
     "--stiffness",
-    "Stiffness divided by normal stress, for example '1.6e-3 /um', or stiffness, for example "
-    "'0.03 MPa/um', or 'from record' to measure the stiffness in the record.",
+    "Stiffness of the machine, optionally divided by the normal stress. To measure the "
+    "stiffness in the record, pass 'from record'. Examples: '0.03 MPa/um' or '1.6e-3 /um'.",
 )
-@make_quantity_option("--slip-distance", "Initial guess of D_c, for example '10 um'.")
+@make_quantity_option(
+    "--slip-distance", "Initial guess of the slip distance D_c. Example: '10 um'."
+)
 @_make_comma_list_option(
     "--law",
     "laws",
+    metavar="LAW,...",
     default="slip,slowness",
-    help_text="State evolution laws. One fit is computed for each law.",
+    help_text="State evolution laws, separated by commas. A separate fit is computed for each law.",
 )
 @_make_comma_list_option(
     "--free",
-    help_text="Free parameters. Parameters that a law does not have are ignored for this law. "
-    "Further choices are stiffness, step_time, trend2, alpha, and law_exponent for law=family.  "
-    "[default: a, b (b1 and b2 for two states), slip_distance (slip_distance_2), mu_star, trend1]",
+    metavar="NAME,...",
+    help_text="Parameters to fit, separated by commas. Other possible parameters are stiffness, "
+    "step_time, trend2, alpha and, for law=family, law_exponent. If a law does not "
+    "have one of the parameters, the parameter is ignored for this law.  [default: a, "
+    "b, slip_distance, mu_star and trend1; for laws with two state variables: a, b1, "
+    "b2, slip_distance, slip_distance_2, mu_star and trend1]",
 )
 @_make_comma_list_option(
-    "--step", "steps", metavar="N,...", help_text="Steps to fit.  [default: all]"
+    "--step",
+    "steps",
+    metavar="N,...",
+    help_text="Numbers of the steps to fit. Example: 1,3.  [default: all steps]",
 )
 @click.option(
     "--together",
     is_flag=True,
-    help="Fit the steps of all RECORDS jointly, with common values of a, b and D_c.",
+    help="Fit all steps in all RECORDS jointly, with common values of a, b and D_c.",
 )
 @make_quantity_option(
     "--before",
-    "Load point displacement of the fit window before a step.  [default: half the displacement "
-    "since the previous step]",
+    "Length of the fit window before each step, as a load point displacement. Example: '100 "
+    "um'.  [default: half the displacement since the previous step]",
     "0 um",
 )
 @make_quantity_option(
     "--after",
-    "Load point displacement of the fit window after a step, for example '250 um'.  [default: up "
-    "to the next step]",
+    "Length of the fit window after each step, as a load point displacement. Example: '250 "
+    "um'.  [default: displacement until the next step]",
     "0 um",
 )
 @options.make_count_option(
     "--windows",
     1,
-    "Number of fit windows. The windows contain between half and all of the data after a step, and "
-    "show the sensitivity of the parameters to the window.",
+    "Number of fit windows of different lengths. The windows contain from half to all of the "
+    "data after a step. The results show how sensitive the parameters are to the length of the "
+    "window.",
 )
 @click.option(
     "--noise",
+    metavar="MODEL",
     default="ar",
-    help="Noise model: white, ar (autoregressive with automatic order), or ar1, ar2, ...",
+    help="Noise model: white noise (white) or an autoregressive model, whose order is selected "
+    "automatically (ar) or fixed (ar1, ar2, ...).",
 )
 @click.option(
     "--loading",
     type=click.Choice(["steps", "recorded"]),
     default="steps",
-    help="Load point history: ideal velocity steps, or the recorded displacement.",
+    help="Load point history in the model: ideal velocity steps (steps) or the recorded "
+    "displacement (recorded).",
 )
 @make_quantity_option(
     "--averaging",
-    "Averaging time of the data logger, for example '1 s', or 'trailing 1 s' if the averaging "
-    "window ends at the time of the row.  [default: no averaging]",
+    "Averaging time of the data logger. If each averaging window ends at the recorded time, "
+    "write trailing before the averaging time. Examples: '1 s' or 'trailing 1 s'.  [default: "
+    "no averaging]",
 )
 @click.option(
     "--low-pass",
+    metavar="FILTER",
     default="",
     show_default=False,
-    help="Low-pass filter of the friction data: first_order, butterworth_2 or butterworth_4 with a "
-    "corner frequency, for example 'butterworth_2 2 Hz'.  [default: no filter]",
+    help="Low-pass filter that was applied to friction during recording: first_order, "
+    "butterworth_2 or butterworth_4, followed by the corner frequency. Example: "
+    "'butterworth_2 2 Hz'.  [default: no filter]",
 )
 @click.option(
     "--posterior",
@@ -180,11 +196,9 @@ def _make_comma_list_option(
     metavar="N",
     default=0,
     show_default=False,
-    help="Number of posterior samples, computed with emcee.  [default: 0]",
+    help="Number of samples to draw from the posterior distribution with emcee.  [default: 0]",
 )
-@options.make_set_scene_fields_option(
-    "Set a field of the scene that is not fitted, for example a=0.01."
-)
+@options.make_set_scene_fields_option("Set a scene field that is not fitted. Example: a=0.01.")
 @options.make_count_option(
     "--budget",
     Defaults.FIT_EVALUATION_BUDGET,
@@ -198,7 +212,7 @@ def _make_comma_list_option(
 @options.make_image_option(
     "--output",
     Path("fit.png"),
-    "Path of the figure. The data are written to a NetCDF file next to the figure.",
+    "Figure path. The data are written to a NetCDF file in the same directory.",
 )
 @options.style_options
 @options.header_option
@@ -209,7 +223,7 @@ def fit(given: options.CommandOptions) -> int:
 
     The command prints the detected steps and a table of a, b, D_c and their standard errors. The
     standard errors account for the correlation of the noise. The command also lists the parameters
-    that the record does not constrain. It writes a figure and a data file.
+    that the record does not constrain. The fits are written to a figure and a data file.
 
     The exit status is 1 if a fit has no values, if its values are not verified, or if its standard
     errors are not valid. The exit status is 2 if the command line is invalid. Otherwise the exit

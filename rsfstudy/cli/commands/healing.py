@@ -71,13 +71,13 @@ class HealingResult(CommandResult):
 @reading_options
 @click.option(
     "--stiffness",
-    help="Stiffness, for example '0.03 MPa/um', if the record has fault slip instead of load point "
-    "displacement.",
+    help="Stiffness of the machine. This option is required if the record contains fault slip "
+    "instead of load point displacement. Example: '0.03 MPa/um'.",
 )
 @options.make_image_option(
     "--output",
     Path("healing.png"),
-    "Path of the figure. The data are written to a NetCDF file next to the figure.",
+    "Figure path. The data are written to a NetCDF file in the same directory.",
 )
 @options.style_options
 @options.json_option
@@ -87,7 +87,7 @@ def healing(given: options.CommandOptions) -> int:
     The command prints one row per hold with its duration, the friction before the hold, the peak
     friction on reloading, healing and relaxation. The standard errors include the correlation of
     the noise. The healing rate is the increase in healing per decade of hold duration. The command
-    also prints the stiffness of the machine, and writes a figure and a data file.
+    also prints the stiffness of the machine. The holds are written to a figure and a data file.
 
     The exit status is 1 if no hold has a peak of friction on reloading, and 2 if the command line
     is invalid. Otherwise the exit status is 0.

@@ -29,7 +29,7 @@ class StudyList(CommandResult):
 @click.command("list", cls=Command)
 @options.json_option
 def list_studies(given: options.CommandOptions) -> int:
-    """List the named studies with their titles."""
+    """List all studies with their titles."""
     return output_result(StudyList(study_titles()), _print_titles, given.as_json)
 
 

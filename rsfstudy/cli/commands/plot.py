@@ -18,19 +18,24 @@ from rsfstudy.errors import InvalidValue
 @click.command(cls=Command)
 @options.study_name_or_all_argument
 @options.make_output_option(
-    "Directory of the results and the figure, or path of the figure, such as fig.pdf.  "
-    "[default: outputs, or the directory of FILE]"
+    "Directory that contains the results and receives the figure, or path of a single figure. "
+    "Example: fig.pdf.  [default: outputs if NAME is a study, the directory of the file if "
+    "NAME is a file]"
 )
 @options.figure_options
-@click.option("--variable", metavar="NAME", help="Draw this variable as maps or lines.")
+@click.option(
+    "--variable",
+    metavar="NAME",
+    help="Draw maps or lines of this variable instead of the default figure.",
+)
 @options.study_file_option
 @options.abscissa_option
 def plot(given: options.CommandOptions) -> int:
-    """Draw the figure of a results file or of a motion.
+    """Draw the figure of a study or of a motion.
 
     NAME is the name of a study, or a file that contains results or a motion. By default, the
     command writes the figure to the directory of the file. If the study defines its own figure,
-    pass the Python file of the study with --study. The command executes the Python file.
+    pass the Python file of the study with --study. The Python file is executed.
     """
     from rsfstudy.api import find_results
     from rsfstudy.cli.figure_files import default_figure_path

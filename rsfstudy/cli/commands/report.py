@@ -17,7 +17,7 @@ from rsfstudy.defaults import Defaults
     "--output",
     type=options.FilePath(dir_okay=False),
     metavar="FILE",
-    help="Path of the page.  [default: DIRECTORY/report.html]",
+    help="Path of the HTML page.  [default: DIRECTORY/report.html]",
 )
 def report(given: options.CommandOptions) -> int:
     """Write an HTML page that shows all results in a directory.

@@ -31,15 +31,16 @@ if TYPE_CHECKING:
     "place",
     multiple=True,
     metavar="AXIS=VALUE",
-    help="Compute only this cell, in this process, and show the traceback of any error.",
+    help="Recompute only one cell, in the main process. The traceback of any error is printed. "
+    "Repeat this option for each axis of the study.",
 )
 @options.study_file_option
 @options.make_output_option(
-    "Directory for the new results. By default, no file is written.", file_okay=False
+    "Directory for the recomputed results.  [default: write no file]", file_okay=False
 )
 @options.worker_options
 def rerun(given: options.CommandOptions) -> int:
-    """Recompute the results in a file, and compare all numbers.
+    """Recompute the results in a file, and compare both results.
 
     The command rebuilds the study from the results file. The exit status is 1 if a recomputed
     number differs from the number in the file.

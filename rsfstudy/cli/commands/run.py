@@ -110,15 +110,19 @@ class Runs(CommandResult):
 @options.worker_options
 @click.option("--fresh", is_flag=True, help="Recompute all cells, including finished cells.")
 @click.option(
-    "--keep-going", is_flag=True, help="Continue the run even if all of the first cells fail."
+    "--keep-going",
+    is_flag=True,
+    help="Continue the run even if the first 10 finished cells all failed.",
 )
-@click.option("--despite-failures", is_flag=True, help="Compute reductions even if cells failed.")
+@click.option(
+    "--despite-failures", is_flag=True, help="Compute the reductions even if some cells failed."
+)
 @click.option(
     "--format",
     type=click.Choice(Defaults.RESULT_FORMATS),
     default=Defaults.RESULT_FORMATS[0],
-    help="Format of the results: a single NetCDF file, or a chunked Zarr store. An existing Zarr "
-    "store is never overwritten.",
+    help="Results format: a single NetCDF file or a chunked Zarr store. Existing Zarr stores "
+    "are never overwritten.",
 )
 @options.figure_options
 @options.rig_options
@@ -128,8 +132,7 @@ def run(given: options.CommandOptions) -> int:
 
     NAME is the name of a study, or a Python file that declares a study. The command writes the
     results OUTPUT/NAME.nc and the figure OUTPUT/NAME.png, and prints the reductions and the claims.
-    If the run is interrupted, enter the same command again to continue the run. The finished cells
-    are not computed again.
+    To continue an interrupted run, enter the same command again. Finished cells are not recomputed.
     """
     from rsfstudy.api import prepare_run_with_progress
     from rsfstudy.cli.study_options import (

@@ -25,10 +25,10 @@ def show(given: options.CommandOptions) -> int:
     """Show a study before a run, or summarise a results file.
 
     If you pass the name or the Python file of a study, the command prints the axes, the fixed
-    fields, the measure and the expected cost. If OUTPUT contains cells of an earlier run, the cost
-    is based on their measured times. If you pass a results file, the command prints the results and
-    their provenance. For each failed cell, the command also prints a command line that recomputes
-    the cell.
+    fields, the measure and the expected cost. If the results directory contains cells of an earlier
+    run, the expected cost is based on the computing times of these cells. If you pass a results
+    file, the command prints the results and their provenance. For each failed cell, the command
+    also prints a command line that recomputes the cell.
     """
     from rsfstudy.cli import study_options
     from rsfstudy.cli.file_summaries import FileSummary, print_file_summary

@@ -28,24 +28,30 @@ _EXIT_STATUS_UNPHYSICAL_MOTION = 3
 
 @click.command(cls=Command)
 @options.make_set_scene_fields_option(
-    "Set a field of the scene, for example law=slowness. With a rig, values can have units, for "
-    "example hold_time='100 s'. A loading can be read from a CSV file, for example "
+    "Set a scene field. Values can have units if a rig is defined. The value of the field "
+    "loading can be the path of a CSV file. Examples: law=slowness, hold_time='100 s' or "
     "loading=record.csv."
 )
 @click.option(
     "--protocol",
     "protocol_file",
     type=options.FilePath(dir_okay=False),
-    help="CSV file with the load point history. The header is, for example, 'velocity (um/s), "
-    "duration (s)' for a protocol or 'time (s), displacement (um)' for a record. Equivalent to "
-    "--set loading=FILE.",
+    help="CSV file with the load point history. This option is equivalent to --set "
+    "loading=FILE. Examples of headers: 'velocity (um/s), duration (s)' for a protocol, "
+    "'time (s), displacement (um)' for a record.",
 )
 @click.option(
-    "--duration", help="Duration of the motion.  [default: duration of the protocol, or 50]"
+    "--duration",
+    metavar="QUANTITY",
+    help="Duration of the motion. Durations with units require a rig, and durations without "
+    "a rig are in D_c/V_*. Example: '100 s'.  [default: duration of the protocol if "
+    "there is one, otherwise 50]",
 )
 @options.abscissa_option
 @options.rig_options
-@click.option("--rtol", type=float, default=Accuracy.DEFAULT_RTOL, help="Relative tolerance.")
+@click.option(
+    "--rtol", type=float, metavar="RTOL", default=Accuracy.DEFAULT_RTOL, help="Relative tolerance."
+)
 @options.make_count_option(
     "--budget", Accuracy.DEFAULT_BUDGET, "Maximum number of right-hand-side evaluations."
 )
@@ -55,11 +61,11 @@ _EXIT_STATUS_UNPHYSICAL_MOTION = 3
 @options.make_image_option(
     "--output",
     Path("motion.png"),
-    "Path of the figure. The data are written to a NetCDF file next to the figure.",
+    "Figure path. The data are written to a NetCDF file in the same directory.",
 )
 @options.style_options
 @options.header_option
-@click.option("--quiet", is_flag=True, help="Print only the status, without peaks and events.")
+@click.option("--quiet", is_flag=True, help="Print only the status. Peaks and events are omitted.")
 def simulate(given: options.CommandOptions) -> int:
     """Compute a single motion, and write its figure and its data.
 

@@ -78,23 +78,27 @@ def _comparison_to_json(file: Path, comparison: AnswerComparison) -> dict[str, A
 @click.option(
     "--problem",
     metavar="N|TOML",
-    help="Number of the problem, or a TOML file that defines a problem.  [default: number at the "
-    "beginning of the name of FILE]",
+    help="Problem number, or a TOML file that defines a problem.  [default: number at the "
+    "beginning of the file name]",
 )
 @click.option(
     "--columns",
-    metavar="MAP",
-    help="Columns of the files, for example 'time=t (s), friction=mu, slip_rate=v (um/s)'.  "
-    "[default: headings of the file]",
+    metavar="NAME=HEADING,...",
+    help="Columns of the files, as a list of quantities and their column headings. Example: "
+    "'time=t (s), friction=mu, slip_rate=v (um/s)'.  [default: headings in the files]",
 )
 @click.option(
     "--digits",
     type=click.FloatRange(1.0, 12.0),
+    metavar="N",
     default=6.0,
-    help="Number of correct digits that is required to pass.",
+    help="Number of correct digits that a file must have to pass.",
 )
 @options.make_image_option(
-    "--figure", None, "Path of a figure of the agreement (.png, .pdf or .svg)."
+    "--figure",
+    None,
+    "Draw a figure of the agreement between the solutions. The suffix of FILE must be "
+    ".png, .pdf or .svg.",
 )
 @options.style_options
 @options.json_option
