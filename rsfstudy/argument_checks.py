@@ -174,7 +174,10 @@ def unusable_value_error(
         if isinstance(value, str) and value == _find_missing_name_in_error(error):
             return InvalidValue(name, value, "is unknown", remedy=remedy)
         if name != "self" and callable(value) and _was_raised_by(value, error):
-            rule = f"fails when it is called ({type(error).__name__}: {shorten_text(error)})"
+            rule = (
+                f"raised an error when it was called ({type(error).__name__}: "
+                f"{shorten_text(error)})"
+            )
             return InvalidValue(name, value, rule, remedy=remedy)
     return None
 

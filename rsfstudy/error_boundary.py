@@ -178,7 +178,7 @@ def _wrap_in_error_boundary(
             unknown = [keyword for keyword in options if keyword not in names]
             if unknown:
                 raise _unknown_keyword_error(name, unknown[0], names) from None
-            text = f"{name}() {shorten_text(error)}. It takes {', '.join(names) or 'nothing'}."
+            text = f"{name}() {shorten_text(error)}. Parameters: {', '.join(names) or 'none'}."
             raise CallError(text) from None
 
     @functools.wraps(function)
@@ -228,9 +228,9 @@ def _unknown_keyword_error(
     names = list(valid_keywords)
     close = difflib.get_close_matches(shorten_text(keyword), names, n=1)
     hint = "".join(f" Did you mean {each!r}?" for each in close)
-    takes = ", ".join(names) or "nothing"
+    takes = ", ".join(names) or "none"
     return CallError(
-        f"{callable_name}() has no parameter {shorten_text(keyword)!r}.{hint} It takes {takes}."
+        f"{callable_name}() has no parameter {shorten_text(keyword)!r}.{hint} Parameters: {takes}."
     )
 
 
@@ -269,12 +269,12 @@ def _failed_call_error(
         return DataError(f"{callable_name}: the dataset {rule}. {remedy}")
     if isinstance(error, MemoryError):
         return InvalidValue(
-            callable_name, "...", f"requires more memory than is available ({shorten_text(error)})"
+            callable_name, ..., f"requires more memory than is available ({shorten_text(error)})"
         )
     given = {key: value for key, value in arguments.items() if value is not None}
     remedy = f"See the documentation of {callable_name}."
     return InvalidValue(
-        callable_name, given, f"fails for these arguments ({reason})", remedy=remedy
+        callable_name, given, f"failed for these arguments ({reason})", remedy=remedy
     )
 
 

@@ -18,6 +18,11 @@ __getattr__ = build_getattr_for_former_names(__name__)
 #: Maximum number of characters of a value in a message, maximum number of listed choices, and
 #: maximum number of choices that are listed in addition to suggestions.
 _MAX_CHARACTERS_OF_VALUE, _MAX_CHOICES, _MAX_CHOICES_WITH_SUGGESTIONS = 200, 60, 20
+#: Kinds of objects that an error message identifies by name, as in "axis 'phi' is unknown".
+_KINDS_OF_NAMED_OBJECTS = frozenset(
+    {"axis", "column", "dimension", "field", "heading", "override", "reduction", "sheet", "study"}
+    | {"variable", "variable of a reduction"}
+)
 #: Maximum number of characters of a message.
 _MAX_MESSAGE_LENGTH = 5000
 #: Maximum number and maximum length of the valid choices that are compared with an invalid value to
@@ -85,7 +90,7 @@ class InvalidValue(RsfStudyError, ValueError):
     name : str
         Name of the field, option or axis.
     value : object
-        Invalid value.
+        Invalid value. If it is the ellipsis ``...``, the message does not contain a value.
     rule : str
         Rule that the value breaks, for example "must be positive". The rule continues the sentence
         that begins with the name of the field.
@@ -221,12 +226,15 @@ class IncompleteWarning(RsfStudyWarning):
 
 def _format_violation(name: str, value: object, shown_value: str, rule: str) -> str:
     """Write a sentence that contains a name, its invalid value and the violated rule."""
-    if value is None and rule.startswith(("is required", "is missing")):
+    if value is ... or (value is None and rule.startswith(("is required", "is missing"))):
         return f"{name} {rule}."
     if rule.startswith("must ") and "(got " not in rule:
         requirement, conjunction, reason = rule.partition(", because")
         return f"{name} {requirement} (got {shown_value}){conjunction}{reason}."
-    return f"{name} = {shown_value} {rule}."
+    if name == "field":
+        return f"{shown_value} {rule}."
+    relation = " " if name in _KINDS_OF_NAMED_OBJECTS else " = "
+    return f"{name}{relation}{shown_value} {rule}."
 
 
 def shorten_text(text: object, max_length: int = _MAX_CHARACTERS_OF_VALUE) -> str:

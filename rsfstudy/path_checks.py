@@ -33,7 +33,7 @@ def check_path(argument_name: str, path: str | Path) -> Path:
     """
     text = str(path)
     if not text:
-        remedy = 'Pass the path of a file or a directory. The current directory is ".".'
+        remedy = 'Pass the path of a file or a directory. To use the current directory, pass ".".'
         raise InvalidValue(argument_name, text, "is empty", remedy=remedy)
     try:
         parts = [len(part.encode()) for part in (text, *Path(text).parts)]

@@ -133,7 +133,10 @@ class Output(Quantity):
     def __post_init__(self) -> None:
         """Check that a description accompanies a symbol, units or a scale."""
         if not self.long_name and (self.symbol or self.scale or self.units != "1"):
-            rule = f"must describe {self.name}, because the quantity has a symbol, units or a scale"
+            rule = (
+                f"must contain a description of {self.name}, because {self.name} has a "
+                "symbol, units or a scale"
+            )
             raise InvalidValue("long_name", self.long_name, rule)
 
     @property

@@ -251,7 +251,7 @@ def events(
     moves = None if moved is None else _check_record_samples("displacement", moved)
     for name, samples in (("shear_stress", stress), ("displacement", moves)):
         if samples is not None and len(samples) != len(times):
-            rule = f"must have as many samples as time ({len(times)})"
+            rule = f"must have {len(times)} samples, as many as time"
             raise InvalidValue(name, len(samples), rule)
     if not (np.diff(times) > 0.0).all():
         late = int(np.argmax(np.diff(times) <= 0.0)) + 1
@@ -340,7 +340,10 @@ def _check_record_samples(variable_name: str, values: Any) -> np.ndarray:
     except (TypeError, ValueError) as error:
         raise InvalidValue(variable_name, values, "must be numbers") from error
     if samples.ndim != 1 or len(samples) < MIN_SAMPLES:
-        rule = f"must have at least {MIN_SAMPLES} samples, from which the noise is estimated"
+        rule = (
+            f"must have at least {MIN_SAMPLES} samples in one dimension, because the noise "
+            "is estimated from the samples"
+        )
         raise InvalidValue(variable_name, samples.shape, rule)
     if not np.isfinite(samples).all():
         late = int(np.argmin(np.isfinite(samples)))

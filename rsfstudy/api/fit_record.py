@@ -367,7 +367,7 @@ def _select_step_numbers(records: Sequence[Record], steps: Sequence[int]) -> tup
     numbers = tuple(steps) or tuple(range(1, count + 1))
     for number in numbers:
         if not 1 <= number <= count:
-            rule = f"is not the number of a step. The number of steps in the record is {count}"
+            rule = f"must be the number of a step, from 1 to {count}"
             raise InvalidValue("steps", number, rule)
         for record in records:
             for step in record.loading_steps[number - 1 : number]:

@@ -151,7 +151,9 @@ def fitted_rig(dataset: xr.Dataset) -> Rig:
         remedy = (
             "Read the record with normal_stress=, or create a rsfstudy.Rig with the normal stress."
         )
-        raise InvalidValue("normal_stress", None, "is missing from the record", remedy=remedy)
+        raise InvalidValue(
+            "normal_stress", None, "is required, but the record has no normal stress", remedy=remedy
+        )
     velocity = one["velocity_before"].item() * 1e-6
     distance = velocity / slider.reference_rate
     return Rig(

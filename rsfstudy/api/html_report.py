@@ -147,7 +147,7 @@ def write_report(
 
     place = output_directory(directory)
     if place is None or not place.is_dir():
-        raise InvalidValue("directory", str(directory), "is not a directory")
+        raise InvalidValue("directory", str(directory), "does not exist or is not a directory")
     page = place / "report.html" if output is None else output_directory(output)
     if page is None or page.suffix != ".html" or page.is_dir():
         raise InvalidValue("output", str(output), "must be a path with the suffix .html")

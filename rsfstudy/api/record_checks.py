@@ -93,13 +93,17 @@ def check_displacement_is_not_slip(
             rows = (record.time >= ends[number - 1]) & (record.time <= begins[number - 1])
             moved = record.columns["displacement"][rows]
             if displacement_is_slip(record.time[rows], moved, shortening[rows]):
-                rule = f"is the slip of the fault at step {number}, because displacement plus "
+                rule = (
+                    f"must be load point displacement, but is fault slip at step {number}, "
+                    "because displacement plus "
+                )
                 rule += (
                     "friction divided by stiffness increases at constant velocities, like a "
                     "load point"
                 )
                 remedy = (
-                    "Rename the column to slip: --columns 'slip=HEADING (um)' (columns=), and pass "
+                    "Assign the column to slip with --columns 'slip=HEADING (um)' (columns=), "
+                    "and pass "
                 )
                 remedy += "the stiffness to read_record."
                 raise InvalidValue("displacement", record.name, rule, remedy=remedy)

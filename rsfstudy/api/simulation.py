@@ -214,7 +214,9 @@ def simulate(
     duration = _loading_duration(scene) - began if duration is None else duration
     known = isinstance(duration, int | float | np.number) and not isinstance(duration, bool)
     if not (known and 0.0 < duration < math.inf):
-        remedy = "The unit is D_c/V_*. To convert from units of a rig, use rig.dimensionless."
+        remedy = (
+            "Pass the duration in D_c/V_*. To convert a duration with units, use rig.dimensionless."
+        )
         raise InvalidValue("duration", duration, "must be positive and finite", remedy=remedy)
     is_alone = integrator is None
     if integrator is None:
@@ -399,11 +401,11 @@ def _read_end_of_motion(motion: object, scene: Scene) -> Event:
     """Return the state of the slider at the end of a stored motion."""
     if not isinstance(motion, xr.Dataset) or MOTION_END_ATTRIBUTE_NAME not in motion.attrs:
         remedy = "Pass a motion from simulate that did not end early."
-        raise InvalidValue("start", motion, "is not a complete motion", remedy=remedy)
+        raise InvalidValue("start", motion, "must be a complete motion", remedy=remedy)
     if json.loads(motion.attrs["scene"]) != json.loads(json.dumps(scene.describe())):
         remedy = "Pass the scene of the motion, motion.rsf.scene."
         raise InvalidValue(
-            "start", motion.attrs["title"], "belongs to another scene", remedy=remedy
+            "start", motion.attrs["title"], "must be the scene of the motion", remedy=remedy
         )
     time, slip, numbers = json.loads(motion.attrs[MOTION_END_ATTRIBUTE_NAME])
     point = MotionPoint._make(tuple(x) if isinstance(x, list) else x for x in numbers)
@@ -470,7 +472,7 @@ def _check_requested_times(
         and at[-1] > start_time
     )
     if not right or not (np.diff(at) > 0.0).all():
-        rule = f"must increase from {start_time:g} or later, and be finite"
+        rule = f"must be finite and increasing, and must not begin before {start_time:g}"
         raise InvalidValue("times", times, rule)
     return at
 

@@ -63,7 +63,11 @@ def draw_samples(
         If an argument is invalid. See `Axis.samples`.
     """
     if not isinstance(distributions, Mapping) or not distributions:
-        raise InvalidValue("distribution", distributions, "must map names to distributions")
+        raise InvalidValue(
+            "distribution",
+            distributions,
+            "must be a mapping from names to distributions, with at least one name",
+        )
     _check_sampling_arguments(distributions, sample_count, seed, method)
     deviations, correlation = _compute_sds_and_correlation_matrix(distributions, covariance, method)
     scores = ndtri(
@@ -128,7 +132,10 @@ def _compute_sds_and_correlation_matrix(
     except (TypeError, ValueError):
         given = np.empty(0)
     if given.shape != (count, count) or not np.isfinite(given).all():
-        rule = f"must be {count} by {count} finite numbers, in the order {', '.join(distributions)}"
+        rule = (
+            f"must be a {count} by {count} matrix of finite numbers, whose rows and columns "
+            f"have the order {', '.join(distributions)}"
+        )
         raise InvalidValue("covariance", covariance, rule)
     variances = np.diag(given)
     if not np.allclose(given, given.T, rtol=1e-9, atol=0.0) or (variances <= 0.0).any():
@@ -212,7 +219,7 @@ def _compute_quantiles(
         raise InvalidValue(
             quantity_name,
             _describe_distribution(distribution),
-            "has quantiles that are not finite. Check its parameters",
+            "has quantiles that are not finite. Check the parameters of the distribution",
         )
     return found
 

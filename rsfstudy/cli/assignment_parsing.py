@@ -156,9 +156,7 @@ def parse_rig(option_texts: Mapping[str, str]) -> Rig:
         if field.default is MISSING and field.name not in stated:
             needed = "a normal stress, a slip distance and a reference velocity"
             option = f"--{field.name.replace('_', '-')}"
-            raise InvalidValue(
-                option, None, "is required", remedy=f"A rig requires at least {needed}."
-            )
+            raise InvalidValue(option, None, "is required", remedy=f"Every rig requires {needed}.")
     return Rig(**stated)
 
 

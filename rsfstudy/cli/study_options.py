@@ -39,7 +39,7 @@ def selected_study_names(options: CommandOptions) -> list[str]:
         If the user passed both a name and ``--all``, or neither of them.
     """
     if options.every == (options.name is not None):
-        raise click.UsageError("pass the name of a study, or --all")
+        raise click.UsageError("Pass the name of a study, or --all.")
     return list(study_names()) if options.every else [options.name]
 
 
@@ -107,7 +107,7 @@ def open_worker_pool(options: CommandOptions, log_path: Path | None = None) -> I
         If the options are contradictory.
     """
     if options.serial and options.scheduler:
-        raise click.UsageError("--serial and --scheduler cannot be combined")
+        raise click.UsageError("--serial and --scheduler cannot be combined. Omit one of them.")
     nowhere = contextlib.nullcontext()
     with nowhere if options.scheduler is None else connect_to_cluster(options.scheduler) as client:
         processes = 0 if options.serial else options.workers

@@ -231,8 +231,8 @@ class CriticalStep(Measure):
         if scene.starts_unsteady:
             rule = "differs from steady sliding, but critical steps start from steady sliding"
             remedy = (
-                "Use the measure triggered, which determines whether the step of a scene "
-                "triggers an instability."
+                "To determine whether the step of this scene triggers an instability, use the "
+                "measure triggered."
             )
             raise InvalidValue("initial_state", scene.initial_state, rule, remedy=remedy)
         sign = 1 if self.direction == "up" else -1

@@ -188,9 +188,9 @@ def start_local_cluster(worker_count: int, log_path: Path) -> Iterator[Any]:
             except Exception as error:
                 raise RunError(
                     f"a worker process could not be started ({str(error).rstrip('.')}). Worker "
-                    "processes import the script that starts them. Move the code that runs the "
-                    'study below `if __name__ == "__main__":`, or run the study in this process: '
-                    "--serial (workers=0)"
+                    "processes import the script that starts the run. Move the code that runs "
+                    'the study below `if __name__ == "__main__":`, or run the study in this '
+                    "process: --serial (workers=0)"
                 ) from error
             stack.enter_context(cluster)
         yield stack.enter_context(Client(cluster))
@@ -248,9 +248,9 @@ def connect_to_cluster(scheduler_address: str, *, timeout: float = 30.0) -> Iter
         except Exception as error:  # Dask raises errors of many types for a wrong address.
             raise RunError(
                 f"no Dask scheduler responds at {shorten_text(scheduler_address)!r}: "
-                f"{shorten_text(error) or 'the connection timed out'}. Start one with `dask "
-                "scheduler` (the certificates for tls:// are read from the Dask configuration), "
-                "or omit --scheduler."
+                f"{shorten_text(error) or 'the connection timed out'}. Start a scheduler with "
+                "`dask scheduler`, or omit --scheduler. The certificates for tls:// addresses "
+                "are read from the Dask configuration."
             ) from error
         with client:
             yield client

@@ -251,9 +251,9 @@ class StudyRun:
                 ):
                     _key, status, message, *_ = row
                     raise RunError(
-                        f"the first {done} cells all failed. The status of the last cell is "
-                        f"{Status[status].label}{': ' * bool(message)}{message}. Correct the "
-                        "cause, or continue with --keep-going (keep_going=True)"
+                        f"all of the first {done} cells failed. The last of these cells has the "
+                        f"status {Status[status].label}{': ' * bool(message)}{message}. Correct "
+                        "the cause, or continue with --keep-going (keep_going=True)"
                     )
 
     def _warn_of_lost_cells(self, finished_cells: StoredCellRows) -> None:
@@ -340,6 +340,6 @@ class StudyRun:
         known = int((journal.statuses(self.plan.keys) != int(Status.PENDING)).sum())
         text = f"{known} of {self.study.size} cells are finished"
         if self.options.output is None:
-            return f"{text}. They are lost, because the run has no output directory."
+            return f"{text}. The finished cells are lost, because the run has no output directory."
         where = self.output_path(".cells.sqlite")
-        return f"{text} and stored in {where}. Run the same command again to resume."
+        return f"{text} and stored in {where}. To resume the run, run the same command again."

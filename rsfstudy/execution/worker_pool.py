@@ -256,8 +256,8 @@ def make_dask_batch_mapper(
                             yield finished
                 elif suspects:
                     warnings.warn(
-                        f"a worker ended. Its {len(suspects)} cells are computed again, one at a "
-                        f"time (see {log_path})",
+                        f"a worker process ended unexpectedly. Its {len(suspects)} cells are "
+                        f"recomputed one at a time. See the log {log_path}",
                         stacklevel=2,
                     )
                     yield from map(run_isolated, suspects)
@@ -283,8 +283,8 @@ def _timeout_outcome(task: CellTask) -> Outcome:
 def _worker_lost_outcome() -> Outcome:
     """Build the outcome of a cell whose worker died."""
     text = (
-        f"its worker ended {_MAX_WORKER_DEATHS_PER_CELL} times while it computed only this cell, "
-        "because of a crash or insufficient memory"
+        f"the worker process ended {_MAX_WORKER_DEATHS_PER_CELL} times while computing only "
+        "this cell, because the process crashed or needed too much memory"
     )
     return Outcome(Status.WORKER_LOST, message=text)
 

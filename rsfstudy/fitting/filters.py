@@ -75,7 +75,7 @@ class Filter:
         if self.kind not in FILTER_KINDS:
             raise InvalidValue("filter", self.kind, "is unknown", choices=FILTER_KINDS)
         if not 0.0 < self.size < math.inf:
-            rule = "must be positive (an averaging time in s, or a corner frequency in Hz)"
+            rule = "must be a positive averaging time in s or a positive corner frequency in Hz"
             raise InvalidValue("filter", self.size, rule)
 
     @classmethod
@@ -103,7 +103,10 @@ class Filter:
         try:
             number = float(size)
         except ValueError:
-            rule = "must be a kind of filter and its size, such as 'mean 1.0' (in s or Hz)"
+            rule = (
+                "must be a filter type followed by an averaging time in s or a corner "
+                "frequency in Hz, such as 'mean 1.0'"
+            )
             raise InvalidValue("filter", text, rule, choices=FILTER_KINDS) from None
         return cls(kind, number)
 
@@ -174,7 +177,10 @@ class Filter:
         first = int(np.searchsorted(time, time[0] + before))
         last = int(np.searchsorted(time, time[-1] - after, side="right"))
         if first >= last:
-            rule = f"averages over a time that is longer than the record, {time[-1] - time[0]:g} s"
+            rule = (
+                "must have an averaging time that is shorter than the record, "
+                f"{time[-1] - time[0]:g} s"
+            )
             raise InvalidValue("filter", f"{self.kind} {self.size:g} s", rule)
         return slice(first, last)
 

@@ -237,7 +237,7 @@ class Fit(Measure):
         if self.loading not in LOADING_KINDS:
             raise InvalidValue("loading", self.loading, "is unknown", choices=LOADING_KINDS)
         if "step_time" in self.free and self.loading == "recorded":
-            rule = "is only defined for a loading by steps"
+            rule = "can only be used with loading='steps'"
             raise InvalidValue("free", "step_time", rule, remedy="Leave it out.")
         check_noise_name(self.noise)
         Filter.parse(self.filter)
@@ -365,7 +365,10 @@ class Fit(Measure):
             Always, because the description contains only hashes of the records.
         """
         rule = "are required for the fit, but the file contains only their digests"
-        remedy = "Fit the records again. The command show FILE prints the command of the fit."
+        remedy = (
+            "Fit the records again. To print the command that computed the fit, run "
+            "rsfstudy show FILE."
+        )
         raise InvalidValue("records", [*described["records"]], rule, remedy=remedy)
 
     @cached_property

@@ -204,7 +204,7 @@ class EventStatistics(Measure):
             finer = scene.with_(noise_interval=0.5 * scene.noise_interval)
             halved = self._events(finer, integrator, checked)
         if min(len(refined), len(halved)) <= checked:
-            why = "with other tolerances the motion settles: ask for a smaller rtol"
+            why = "the motion settles if it is computed with other tolerances. Use a smaller rtol"
             return Outcome(Status.UNVERIFIED, message=why)
         values = {
             "interval_count": float(self.cycles),

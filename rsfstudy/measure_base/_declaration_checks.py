@@ -43,7 +43,8 @@ def check_declared_work_estimates(
     for tolerance in (Accuracy.MIN_RTOL, Accuracy.DEFAULT_RTOL, Accuracy.MAX_RTOL):
         expected = expected_work(Accuracy(tolerance))
         if not 0 < expected < np.inf:
-            raise InvalidValue("expected_work", expected, f"must exceed 0, at rtol {tolerance:g}")
+            rule = f"must be finite and greater than 0 for rtol={tolerance:g}"
+            raise InvalidValue("expected_work", expected, rule)
 
 
 def check_measure_description(
@@ -67,10 +68,10 @@ def check_measure_description(
         name: object = json.loads(json.dumps(describe_measure()))["name"]
     except (TypeError, ValueError) as error:
         remedy = "Use Python numbers, strings, and tuples of numbers or strings."
-        rule = f"must consist of plain data ({error})"
+        rule = f"must consist of plain data, because it is stored as JSON ({error})"
         raise InvalidValue("measure", measure_name, rule, remedy=remedy) from error
     if not isinstance(name, str):
-        raise InvalidValue("name", name, "must be a string, in a measure")
+        raise InvalidValue("name", name, "must be a string").with_location("measure")
 
 
 def check_coordinate_values(name: str, values: Any) -> None:

@@ -48,7 +48,7 @@ def check_loading_changes_stress_only_in_steps(scene: Scene) -> None:
         what = "load point velocity" if loading.has_load_point_unknown else "normal stress"
         rule = f"changes {what} continuously, so the motion neither settles nor repeats itself"
         remedy = (
-            "Compute the motion with rsfstudy.simulate. For an oscillation, see the study "
-            "resonance."
+            "Compute the motion with rsfstudy.simulate. For an example with an oscillation, "
+            "see the study resonance."
         )
         raise InvalidValue("loading", loading.name, rule, remedy=remedy)

@@ -42,9 +42,10 @@ _RIG_QUANTITIES_THAT_ARE_NOT_SCENE_FIELDS = (
     "reference_velocity",
 )
 _REMEDY_FOR_RIG_QUANTITY_ELASTICITIES = (
-    "The elasticity with respect to b at constant a is that of b_over_a. For a time in s, the "
-    "elasticity with respect to D_c is 1 + stiffness - reference_rate, with respect to normal "
-    "stress it is -stiffness, and with respect to V_* it is reference_rate - 1."
+    "At constant a, the elasticities with respect to b and b_over_a are equal. For a time in "
+    "s, the elasticity with respect to D_c is e_k - e_r + 1, the elasticity with respect to "
+    "normal stress is -e_k, and the elasticity with respect to V_* is e_r - 1, where e_k and "
+    "e_r are the elasticities with respect to stiffness and reference_rate."
 )
 #: Largest finite-difference step of ln p for a parameter p. The finite-difference formula spans
 #: four steps.

@@ -361,9 +361,7 @@ class Measure(ConstructorKeywordCheckMixin):
         except InvalidValue:
             raise
         except Exception as error:
-            rule = (
-                f"declares outputs that a lattice cannot contain ({type(error).__name__}: {error})"
-            )
+            rule = f"declares outputs that cannot be stored ({type(error).__name__}: {error})"
             raise InvalidValue("measure", type(self).__name__, rule) from error
 
     def __call__(self, scene: Scene, accuracy: Accuracy) -> Outcome:
@@ -556,8 +554,8 @@ def _check_names_declared_by_measure(measure: Measure) -> None:
     names = [*(stated or variables), *measure.inner_coordinates]
     if not variables:
         raise InvalidValue(
-            "variables", {}, f"must name a numeric output, in the measure {measure.name}"
-        )
+            "variables", {}, "must contain at least one numeric output"
+        ).with_location(f"measure {measure.name}")
     if measure.primary_output not in variables:
         raise InvalidValue(
             "primary_output",
@@ -571,19 +569,19 @@ def _check_names_declared_by_measure(measure: Measure) -> None:
             or name in RESERVED_NAMES - {*measure.solved_fields}
             or names.count(name) > 1
         ):
-            rule = f"is reserved or is not a valid variable name, in the measure {measure.name}"
-            raise InvalidValue("variable", name, rule)
+            rule = "is reserved, is not unique or is not a valid variable name"
+            raise InvalidValue("variable", name, rule).with_location(f"measure {measure.name}")
     for name, dims in variables.items():
         if not isinstance(dims, tuple | list) or len(set(dims)) < len(dims):
             raise InvalidValue(
-                "dimensions", dims, f"must be names without repetition, for the output {name!r}"
-            )
+                "dimensions", dims, "must be names without repetition"
+            ).with_location(f"output {name}")
         for dim in dims:
             if dim not in measure.inner_coordinates:
                 raise InvalidValue(
                     "dimension",
                     dim,
-                    f"has no coordinate values, but the output {name!r} has this dimension",
+                    f"is a dimension of the output {name!r}, but has no coordinate values",
                 )
     known = {*names, *measure.plain_fields}
     for about in measure.quantities:

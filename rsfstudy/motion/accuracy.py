@@ -108,7 +108,7 @@ class Accuracy:
         object.__setattr__(self, "budget", int(self.budget))
         object.__setattr__(self, "engine", engine_name(self.engine))
         if self.methods and self.engine != SCIPY:
-            rule = f"are SciPy solvers, but the engine is {self.engine}"
+            rule = f"requires the engine 'scipy', but the engine is {self.engine!r}"
             raise InvalidValue(
                 "methods", self.methods, rule, remedy="Omit methods=, or use engine='scipy'."
             )

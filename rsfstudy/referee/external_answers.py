@@ -155,7 +155,8 @@ def _convert_column_to_si(
     one = "1" if column.units in ("", "1") else f"1 {column.units}"
     if units != "1" and one == "1":
         remedy = (
-            f"Write the units in the header, or pass --columns '{quantity_name}=... ({units})'."
+            "Add the units in parentheses to the heading, or pass --columns "
+            f"'{quantity_name}=... ({units})'."
         )
         raise InvalidValue(
             quantity_name, column.units, "has no units", remedy=remedy

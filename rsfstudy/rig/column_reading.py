@@ -145,9 +145,11 @@ def _convert_force(name: str, column: Column, area: Any) -> Column:
     if name not in _STRESS_COLUMNS or size is None or size[1] != _EXPONENTS_OF_FORCE:
         return column
     if area is None:
-        rule = "is a force, but stress is force divided by area"
-        remedy = "Pass the area of the fault: area='25 cm2' (--area '25 cm2')."
-        raise InvalidValue(name, f"in {column.units}", rule, remedy=remedy)
+        rule = "must contain a stress, but contains a force"
+        remedy = (
+            "Pass the fault area, by which the force is divided: area='25 cm2' (--area '25 cm2')."
+        )
+        raise InvalidValue(name, column.units, rule, remedy=remedy)
     square_metres = convert_to_si("area", area, "m2")
     if not square_metres > 0.0:
         raise InvalidValue("area", area, "must be positive")

@@ -65,7 +65,11 @@ def check_heading_length(heading: str) -> None:
     if len(heading) > _MAX_HEADING_LENGTH:
         rule = f"must have at most {_MAX_HEADING_LENGTH} characters (it has {len(heading):,})"
         raise InvalidValue(
-            "heading", heading, rule, remedy=f"Write it as in {EXAMPLE_OF_TABLE_HEADER}."
+            "heading",
+            heading,
+            rule,
+            remedy="Write a short heading, with the units in parentheses after the name, for "
+            f"example {EXAMPLE_OF_TABLE_HEADER}.",
         )
 
 

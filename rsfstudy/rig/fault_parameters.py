@@ -29,9 +29,9 @@ def replace_b_by_ratio(fields: Mapping[str, Any]) -> dict[str, Any]:
     """
     b, others = fields["b"], {name: value for name, value in fields.items() if name != "b"}
     if "b_over_a" in others:
-        raise InvalidValue("b", b, "give b or b_over_a, not both")
+        raise InvalidValue("b", b, "cannot be combined with b_over_a")
     if others.get("a") is None:
-        remedy = "Pass a as well, or pass b_over_a."
+        remedy = "Pass a as well, or replace b by b_over_a."
         raise InvalidValue("b", b, "requires a, because scenes contain b/a", remedy=remedy)
     ratio = convert_to_si("b", b, "1") / convert_to_si("a", others["a"], "1")
     return {**others, "b_over_a": ratio}

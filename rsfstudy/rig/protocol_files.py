@@ -120,23 +120,23 @@ def history(
     found = _read_history_columns(record, columns, rig, ReadingOptions.parse("history", reading))
     if "time" not in found or len(found) == 1:
         remedy = (
-            'Pass "time" and at least one sampled column, for example {"time": ..., '
-            '"displacement": ...}.'
+            'Pass the column "time" and at least one other column, for example '
+            '{"time": ..., "displacement": ...}.'
         )
         raise InvalidValue(
             "record",
             [*found],
-            "does not contain time and at least one sampled column",
+            "must contain the column time and at least one other column",
             remedy=remedy,
         )
     if "displacement" in found and "velocity" in found:
-        rule = "contains both displacement and velocity of the load point. Pass only one of them"
+        rule = "must not contain both displacement and velocity of the load point"
         raise InvalidValue("record", [*found], rule)
     sizes = {len(column.values) for column in found.values()}
     if len(sizes) > 1 or min(sizes) < 2:
         rule = (
-            f"has columns with {sorted(sizes)} samples, but all columns must have the same "
-            "number of samples, at least 2"
+            f"has columns with {' and '.join(map(str, sorted(sizes)))} samples, but all columns "
+            "must have the same number of samples, at least 2"
         )
         raise InvalidValue("record", [*found], rule)
     values = {

@@ -173,8 +173,8 @@ def _check_required_columns(found: ColumnsOfSource) -> None:
         rule = "has no recognised headings for time and displacement (or slip)"
         if rubbed and ("time" in names or moved):
             rule += (
-                ", which are required for a record. Without time or displacement, use "
-                "rsfstudy.events"
+                ", which every record must contain. If the record has no time or no "
+                "displacement, use rsfstudy.events"
             )
         raise missing_columns_error(table, rule)
     if not rubbed:
@@ -255,7 +255,7 @@ def _compute_load_point_displacement(
             "requires a stiffness, because the load point displacement is slip plus shear "
             "stress divided by stiffness"
         )
-        raise InvalidValue("slip", "no column displacement", rule, remedy=remedy)
+        raise InvalidValue("slip", ..., rule, remedy=remedy)
     friction, stress = record_values["friction"], record_values.get("normal_stress")
     is_number = isinstance(stiffness, int | float)
     over_stress = is_number or is_stiffness_over_normal_stress(stiffness)

@@ -143,12 +143,15 @@ def convert_rig_value_and_warn_if_unusual(
     found = convert_rig_value_to_si(quantity_name, value, units, normal_stress)
     if not found > 0.0:
         raise InvalidValue(
-            quantity_name, value, "must be positive", remedy=f"Pass a value in {units}."
+            quantity_name,
+            value,
+            "must be positive",
+            remedy=f"Pass a positive value in {units}, or a positive value with units.",
         )
     if not least <= found <= most:
         text = (
             f"{quantity_name} is {found:g} {units}: this value is unusual for a rig. Check the "
-            "unit."
+            "units."
         )
         warnings.warn(text, RsfStudyWarning, stacklevel=find_stacklevel_of_user_code())
     return found
@@ -229,11 +232,11 @@ def check_rig_quantities_are_consistent(rig_values: Mapping[str, Any]) -> None:
         rule = f"cannot be combined with period (got {rig_values['period']:g} s)"
         raise InvalidValue("mass", rig_values["mass"], rule)
     if "mass" in rig_values and "stiffness" not in rig_values:
-        remedy = "Pass stiffness= as well, or pass period= instead of mass=."
+        remedy = "Pass stiffness= as well, or replace mass= by period=."
         raise InvalidValue(
             "mass",
             rig_values["mass"],
-            "requires a stiffness, which determines the period of oscillation",
+            "requires a stiffness, because the period of free oscillation depends on both",
             remedy=remedy,
         )
     if ("shear_modulus" in rig_values) != ("density" in rig_values):

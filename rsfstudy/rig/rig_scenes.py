@@ -71,7 +71,7 @@ class LatticeScenesOnRig:
                 theirs.get(name), value
             ):
                 rule = f"differs from the value of the rig, {value:g}"
-                remedy = "Create the base scene of the study with rig.scene(...)."
+                remedy = "Create the base scene with rig.scene(...)."
                 raise InvalidValue(name, theirs.get(name), rule, remedy=remedy)
         for along in self.axes:
             for row in along.rows:

@@ -62,7 +62,7 @@ class RowSelection:
     def __post_init__(self) -> None:
         """Check the row numbers and the thinning."""
         if self.rows is not None and not _are_row_numbers(self.rows):
-            rule = "must be the numbers of the first and the last row. Rows are counted from 1"
+            rule = "must be the numbers of the first and the last row, counted from 1"
             raise InvalidValue("rows", self.rows, rule, remedy="Pass, for example, rows=(1, 5000).")
         if not isinstance(self.thin, int) or isinstance(self.thin, bool) or self.thin < 1:
             raise InvalidValue("thin", self.thin, "must be a whole number, 1 or more")

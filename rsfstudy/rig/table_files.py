@@ -95,12 +95,18 @@ def _choose_all_columns_of_header(
     """Select all columns of a file whose header contains names and units."""
     found: dict[str, ColumnSpec] = {}
     if not table.has_headings:
-        remedy = f"Write a first line such as {EXAMPLE_OF_TABLE_HEADER}."
+        remedy = (
+            "Add a first line with a heading for each column. In each heading, write the "
+            f"units in parentheses after the name, for example {EXAMPLE_OF_TABLE_HEADER}."
+        )
         raise InvalidValue("table", table.location, "has no header", remedy=remedy)
     for n, heading in enumerate(table.headings, start=1):
         stated = split_heading_into_name_and_units(heading)
         if stated is None:
-            remedy = f"Write a header such as {EXAMPLE_OF_TABLE_HEADER}."
+            remedy = (
+                "In each heading, write the units in parentheses after the name, for "
+                f"example {EXAMPLE_OF_TABLE_HEADER}."
+            )
             rule = "is not a column name with units"
             raise InvalidValue("header", heading, rule, remedy=remedy).with_location(
                 f"{table.location}, column {n}"

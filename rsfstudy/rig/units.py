@@ -256,7 +256,9 @@ def _parse_quantity(quantity_name: str, text: str, units: str) -> Fraction | flo
     powers = _parse_unit_powers(text.strip()[match.end() :].strip()) if match else None
     if match is None or powers is None:
         example = f"2.5 {units}".removesuffix(" 1")
-        remedy = f"Write a number with a decimal point, and its units, for example '{example}'."
+        remedy = (
+            f"Write a number with a decimal point, followed by its units, for example '{example}'."
+        )
         raise InvalidValue(quantity_name, text, "is not a quantity", remedy=remedy)
     number = float(match[0])
     if not math.isfinite(number):
@@ -268,16 +270,18 @@ def _parse_quantity(quantity_name: str, text: str, units: str) -> Fraction | flo
     scale, exponents = _multiply_known_units(powers)
     wanted = _multiply_known_units(_parse_unit_powers(units.removeprefix("1")) or [])[1]
     if exponents == (wanted[0], wanted[1] + 2, *wanted[2:]):
-        rule = "is a force, but stress is force divided by area"
-        raise InvalidValue(quantity_name, text, rule, remedy="Divide it by the area of the fault.")
+        rule = "must contain a stress, but contains a force"
+        raise InvalidValue(quantity_name, text, rule, remedy="Divide the force by the fault area.")
     if exponents != wanted:
         raise _incompatible_units_error(quantity_name, text, units)
     return stated * scale
 
 
 def _incompatible_units_error(quantity_name: str, value: Any, units: str) -> InvalidValue:
+    if units == "1":
+        return InvalidValue(quantity_name, value, "must be a number without units")
     rule = f"has units that are incompatible with {units}"
-    return InvalidValue(quantity_name, value, rule, remedy=f"Use {units} or a multiple of it.")
+    return InvalidValue(quantity_name, value, rule, remedy=f"Use {units} or multiples of {units}.")
 
 
 def _parse_unit_powers(unit_text: str) -> list[tuple[str, int]] | None:
@@ -324,7 +328,7 @@ def _compute_factor_with_pint(
             _suggest_unit_with_other_capitals(units_and_powers)
             or f"Write, for example, '2.5 {units}'."
         )
-        rule = f"has units that pint does not know ({error})"
+        rule = f"has units that are unknown to the library pint ({error})"
         raise InvalidValue(quantity_name, text, rule, remedy=remedy) from error
     # Zero does not convert to zero if the unit is logarithmic or has an offset.
     if _convert_pint_quantity(quantity_name, text, registry.Quantity(0.0, unit), units) != 0.0:
@@ -337,7 +341,7 @@ def _suggest_unit_with_other_capitals(units_and_powers: Iterable[tuple[str, int]
     for name, _power in units_and_powers:
         meant = [known for known in _KNOWN_UNITS if known.lower() == name.lower() and known != name]
         if meant:
-            return f"Did you mean {' or '.join(meant)}, instead of {name}?"
+            return f"Did you mean {' or '.join(meant)} instead of {name}?"
     return ""
 
 

@@ -168,8 +168,8 @@ def _read_column_with_units(
             return column
         whole = f"{spec.heading} ({_USUAL_UNITS.get(name, 'MPa')})"
         remedy = (
-            f"Write the units in the file, for example {whole}, or pass --columns "
-            f"'{name}={whole},...' "
+            f"In the file, add the units in parentheses to the heading, for example {whole}. "
+            f"Alternatively, pass --columns '{name}={whole},...' "
         )
         remedy += f"(columns={{'{name}': '{whole}', ...}})."
         raise InvalidValue("heading", selection, "has no units", remedy=remedy)

@@ -10,24 +10,24 @@ from collections.abc import Iterable, Mapping
 from typing import Any
 
 _STIFFNESS_HINT = (
-    "stiffness_ratio (over the critical stiffness) or stiffness (k D_c/sigma_*; with units for a "
-    "rig, for example '0.05 MPa/um')"
+    "stiffness_ratio (stiffness divided by the critical stiffness) or stiffness (k "
+    "D_c/sigma_*, or a value with units if you use a rig, for example '0.05 MPa/um')"
 )
 _INERTIA_HINT = (
     "Write inertia=True, and pass the period of free oscillation in s as period. Alternatively, "
     "create the scene from a rig."
 )
 _LOAD_VELOCITY_HINT = (
-    "Write load_velocity_ratio, which is V_0/V_*, or load_velocity with units for a rig."
+    "Write load_velocity_ratio, which is V_0/V_*. If you use a rig, write load_velocity with units."
 )
-_DURATION_HINT = "Pass duration to rsfstudy.simulate(scene, duration=...)."
+_DURATION_HINT = "Pass the duration to rsfstudy.simulate(scene, duration=...)."
 
 
 def _rig_quantity_hint(symbol: str, name: str) -> str:
     """Return an error hint for a rig quantity that is not a scene field."""
     return (
-        f"{symbol} is the quantity {name} of a rig. Pass Rig({name}=...), or use an axis or an "
-        "override of a study with a rig."
+        f"The quantity {symbol} belongs to a rig. Pass Rig({name}=...). In a study with a rig, "
+        f"{name} can also be an axis or an override."
     )
 
 

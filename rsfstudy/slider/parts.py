@@ -189,8 +189,8 @@ class Part:
             Error whose message explains that the field does not apply to this part.
         """
         where, instead = cls.rejection_hint
-        rule = f"does not apply {where or f'to {cls.name}'}"
-        remedy = f"Leave {name} out, or {instead}." if instead else "Leave it out."
+        rule = f"does not apply {where or f'to {cls.name!r}'}"
+        remedy = f"Omit {name}, or {instead}." if instead else f"Omit {name}."
         return InvalidValue(name, value, rule, remedy=remedy)
 
     def field_error(self, name: str, rule: str, remedy: str = "") -> InvalidValue:
@@ -456,7 +456,7 @@ def validate_field_value(part_class: type[Part], field_name: str, value: Any) ->
     if flagged or not isinstance(value, Real):
         has_units = isinstance(value, str) and value.strip()[:1].isdigit()
         remedy = (
-            "Values with units require a rig. Create the scene with rsfstudy.Rig(...).scene(...)."
+            "To use values with units, create the scene with rsfstudy.Rig(...).scene(...)."
         ) * has_units
         raise InvalidValue(field_name, value, "must be a number", remedy=remedy)
     try:

@@ -183,7 +183,7 @@ def _select_part(slot: Slot, field_values: Mapping[str, Any]) -> UserPart:
         return slot.built_in_parts[name]
     if value is not None:
         others = ", ".join(slot.part_class_by_selecting_field) or "the other fields"
-        remedy = f"To select a loading of rsfstudy, set one of the fields {others}."
+        remedy = f"Built-in loadings are not selected by name. Set one of the fields {others}."
         raise InvalidValue(slot.name, value, "is unknown", choices=slot.user_parts, remedy=remedy)
     for caller, part in slot.part_class_by_selecting_field.items():
         value = field_values.get(caller)
@@ -331,7 +331,7 @@ def _unknown_field_error(name: str, value: Any, field_index: FieldIndex) -> Inva
         owner = next((other for other in known if name in field_names(other)), None)
         if owner is not None:
             rule = f"does not apply to {slot.name}={part.name!r}"
-            remedy = f"Leave it out, or set {slot.name}={owner.name!r}."
+            remedy = f"Omit {name}, or set {slot.name}={owner.name!r}."
             return InvalidValue(name, value, rule, remedy=remedy)
     remedy, rule = hint_for_unknown_field(name), "is not a field of a scene"
     # If the name is a known synonym of a field, a list of similar names would be misleading.

@@ -120,7 +120,7 @@ class SceneQuantities(SceneBase):
             )
         stiffness = float(ratio * self.critical_stiffness)
         if not stiffness > 0.0:
-            rule = "is so small that the stiffness would be rounded to 0"
+            rule = "is so small that the stiffness is rounded to 0"
             raise InvalidValue("stiffness_ratio", ratio, rule, remedy="Choose a larger ratio.")
         return stiffness
 

@@ -92,8 +92,11 @@ class SliderParameters(Part):
             )
             raise self.field_error("initial_stress", rule)
         if self.initial_state and scene.parts.law.state_count > 1:
-            rule = f"does not apply to {scene.parts.law.name}, because the law has several states"
-            remedy = "Leave it out, and reach the initial state by a loading protocol."
+            rule = (
+                f"does not apply to {scene.parts.law.name}, because the law has several "
+                "state variables"
+            )
+            remedy = "Omit initial_state, and use a loading protocol to reach the initial state."
             raise self.field_error("initial_state", rule, remedy)
 
 

@@ -332,7 +332,7 @@ def spring_response_to_normal_stress(
     if scene.parts.temperature.unknowns:
         remedy = "Set temperature='isothermal', or simulate the oscillation."
         name = scene.parts.temperature.name
-        raise InvalidValue("temperature", name, "has no linear response in rsfstudy", remedy=remedy)
+        raise InvalidValue("temperature", name, "has no linear response", remedy=remedy)
     still = scene.under_steady_loading
     steady = _require_steady_sliding(still, log_slip_rate)
     psis = (*steady.states, *(0.0 for _unknown in scene.pressure_source.unknowns))

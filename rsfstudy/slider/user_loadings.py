@@ -181,13 +181,11 @@ def protocol(segments: Sequence[Segment | Mapping[str, float]], name: str = "pro
         history.append(_parse_segment(stated, before, f"segment {number}"))
     for number, segment in enumerate(history[:-1], start=1):
         if segment.duration == math.inf:
-            remedy = (
-                "Set its duration or its distance, because only the last segment can be infinite."
-            )
+            remedy = "Set the duration or the distance of the segment."
             raise InvalidValue(
                 "duration",
                 math.inf,
-                "is infinite, but the segment is not the last one",
+                "must be finite, because only the last segment can have an infinite duration",
                 remedy=remedy,
             ).with_location(f"segment {number}")
     return Protocol(name=name, input_segments=tuple(history))
@@ -207,7 +205,7 @@ def _parse_segment(declared_segment: Any, previous_normal_stress: float, locatio
             raise InvalidValue("segment", declared_segment, "is not a segment", remedy=remedy)
         for key in declared_segment:
             if key not in SEGMENT_MAPPING_KEYS:
-                raise InvalidValue("segment", key, "is unknown", choices=SEGMENT_MAPPING_KEYS)
+                raise InvalidValue("key", key, "is unknown", choices=SEGMENT_MAPPING_KEYS)
         if "normal_stress" in declared_segment:
             previous_normal_stress = (
                 _read_positive_number(
@@ -257,7 +255,7 @@ def _build_validated_segment(
     if not _is_number(step) or not math.isfinite(step):
         raise InvalidValue("step", step, "must be a finite number")
     if not _is_number(duration) or not duration > 0.0:
-        remedy = "Remove segments without duration."
+        remedy = "Remove segments whose duration is zero."
         raise InvalidValue("duration", duration, "must be positive", remedy=remedy)
     if not _is_number(normal_stress) or not -1.0 < normal_stress < math.inf:
         rule = "must be greater than -1, because it is the imposed normal stress minus sigma_*"

@@ -97,7 +97,8 @@ def write_dataset(dataset: xr.Dataset, path: Path) -> xr.Dataset:
         with xr.open_dataset(beside, engine="netcdf4") as back:
             if not stored.identical(back.load()):
                 raise DataError(
-                    f"{path} was not written, because the data that were read back differ."
+                    f"{path} was not written, because the stored data differ from the computed "
+                    "data. Run the command again."
                 )
         with open(beside, "rb") as file:
             os.fsync(file.fileno())

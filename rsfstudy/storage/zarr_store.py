@@ -181,6 +181,9 @@ def _write_lattice(
         how = {"append_dim": first}
         back = xr.open_dataset(path, **ZARR_OPEN_OPTIONS)[list(slab)].isel({first: some})
         if not xr.Dataset(slab).equals(back.drop_vars(list(back.coords))):
-            raise DataError(f"{path} was not written, because the data that were read back differ.")
+            raise DataError(
+                f"{path} was not written, because the stored data differ from the computed "
+                "data. Run the command again."
+            )
         finished += int((columns.statuses != int(Status.PENDING)).sum())
     return finished

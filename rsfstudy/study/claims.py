@@ -133,11 +133,11 @@ class Claim:
         if self.relation not in CLAIM_RELATIONS:
             raise InvalidValue("relation", self.relation, "is unknown", choices=CLAIM_RELATIONS)
         if self.relation == "equals" and self.reason == TOLERANCE_REASON_OF_INEQUALITY:
-            rule = f"must give the reason for the tolerance {self.tolerance}"
+            rule = f"must explain the tolerance {self.tolerance}"
             raise self._invalid("reason", self.reason, rule)
         if self.expected not in _EXPECTED_VERDICTS:
             raise InvalidValue(
-                "expected", self.expected, "is not an expected verdict", choices=_EXPECTED_VERDICTS
+                "expected", self.expected, "is not a possible verdict", choices=_EXPECTED_VERDICTS
             )
         for name in ("published", "tolerance"):
             value = getattr(self, name)
@@ -145,12 +145,12 @@ class Claim:
                 raise self._invalid(name, value, "must be a number")
         for name in ("where", "baseline"):
             if not isinstance(getattr(self, name), Mapping):
-                rule = "must map coordinates to values"
+                rule = "must be a mapping from coordinates to values"
                 raise self._invalid(name, getattr(self, name), rule)
             for value in getattr(self, name).values():
                 if not isinstance(value, str) and not _is_number(value):
                     rule = "must be a string or a number"
-                    raise self._invalid(name, value, rule)
+                    raise self._invalid(f"coordinate value in {name}", value, rule)
 
     def _invalid(
         self, name: str, value: object, rule: str, *, choices: Iterable[str] = ()

@@ -122,7 +122,7 @@ def check_fields_not_solved_by_measure(measure: Measure, field_names: Sequence[s
     for name in field_names:
         if {name, RigAxes.RATIO_FIELD_BY_DIMENSIONAL_NAME.get(name)} & set(measure.solved_fields):
             rule = f"is computed by {measure.name}, so it cannot be an axis or an override"
-            raise InvalidValue(name, "...", rule, remedy="Leave it out.")
+            raise InvalidValue(name, ..., rule, remedy=f"Omit {name}.")
 
 
 def check_user_fields(
@@ -224,7 +224,10 @@ def check_outputs_are_same_in_all_cells(
         if _describe_measure_outputs(changed) != given:
             present = measure.plain_fields.items()
             guilty = [n for n, v in changed.plain_fields.items() if (n, v) not in present]
-            rule = "changes which results are computed, but all cells must have the same results"
+            rule = (
+                "determines which results are computed, but all cells of a study must have "
+                "the same results"
+            )
             remedy = "Create a separate study for each value."
             raise InvalidValue("axis", ", ".join(guilty), rule, remedy=remedy)
 

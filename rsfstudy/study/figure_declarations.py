@@ -299,7 +299,10 @@ def check_figure(plot: Any) -> None:
     if isinstance(plot, Figure):
         return
     if not hasattr(plot, "__name__") or not callable(getattr(plot, "draw", plot)):
-        rule = "must be a name, a Figure, or a user-defined function or module that draws"
+        rule = (
+            "must be a figure name, a Figure, or a user-defined function or module that "
+            "draws a figure"
+        )
         raise InvalidValue(
             "plot", plot, rule, remedy="Define, for example, def name(dataset, axes): ..."
         )

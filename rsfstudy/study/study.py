@@ -173,7 +173,11 @@ class Study:
             try:
                 json.dumps(value)
             except (TypeError, ValueError) as error:
-                raise InvalidValue(name, value, f"must be plain data ({error})") from error
+                raise InvalidValue(
+                    name,
+                    value,
+                    f"must consist of plain data, because they are stored as JSON ({error})",
+                ) from error
 
     @staticmethod
     @error_boundary
@@ -317,7 +321,7 @@ class Study:
         for axis in self.axes:
             for name in axis.fields:
                 if name in unused:
-                    raise InvalidValue(axis.dimension, name, "has no effect in any cell")
+                    raise InvalidValue("field", name, "has no effect in any cell")
 
     def cell(self, number: int) -> Cell:
         """Build one cell.

@@ -55,7 +55,7 @@ class FileComparison(CommandResult):
         """Sentence that summarises the comparison."""
         found = self.differences
         if not found.finished_cell_counts[0]:
-            return "nothing to compare: the files have no finished cell in common"
+            return "nothing to compare, because the files have no finished cell in common"
         wrong = [f"{name} differs beyond error estimates" for name in found.beyond_errors]
         if len(found.statuses):
             from rsfstudy.formatting import pluralize

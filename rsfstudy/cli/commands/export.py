@@ -45,7 +45,7 @@ def export(given: options.CommandOptions) -> int:
     writers = {"csv": to_csv, "mat": to_mat}
     asked = [ending for ending in writers if getattr(given, ending)]
     if not asked:
-        raise click.UsageError("pass --csv, --mat, or both")
+        raise click.UsageError("Pass --csv, --mat, or both.")
     dataset = read_dataset(given.file)
     paths = {ending: (given.output or given.file).with_suffix(f".{ending}") for ending in asked}
     for path in paths.values():

@@ -61,13 +61,13 @@ def _draw_figure(results: Path, figure_path: Path, given: options.CommandOptions
     dataset = read_results_file(results, given.study)
     if StoredDataset(dataset).is_of_single_scene:
         if given.variable is not None:
-            rule = "applies to results of a study only, and the file contains a motion"
+            rule = "applies only to results of a study, but the file contains a motion"
             raise InvalidValue("--variable", given.variable, rule, remedy="Use --against.")
         appearance = given.collect_option_values("against", "style", "width", "header")
         figure_files.write_figure(dataset.rsf.plot(**appearance), figure_path, given.style)
         return [figure_path]
     if given.against is not None:
-        rule = "applies to a motion only, and the file contains results of a study"
+        rule = "applies only to a motion, but the file contains results of a study"
         raise InvalidValue("--against", given.against, rule, remedy="Use --variable.")
     own = None if given.variable else figure_files.load_user_figure_or_default(dataset, given.study)
     return figure_files.draw_and_save_figure(dataset, figure_path, given, own)
@@ -85,13 +85,13 @@ def _figure_path_from_output_option(given: options.CommandOptions) -> Path | Non
         return None
     if ending in Defaults.FIGURE_FORMATS:
         if given.every or given.form not in (None, ending):
-            rule = "is a single figure and cannot be combined with --all or another --figure format"
+            rule = "is the path of a single figure. Omit --all and --figure, or pass a directory."
             raise click.UsageError(f"{output} {rule}")
         check_regular_file("--output", output)
         return output
     if not output.is_dir():
-        rule = "has a suffix that is not a figure format"
-        remedy = "To use it as a directory, create the directory first."
+        rule = "must have the suffix of a figure format"
+        remedy = "To write to a directory with this name, create the directory first."
         raise InvalidValue(
             "--output", str(output), rule, choices=Defaults.FIGURE_FORMATS, remedy=remedy
         )

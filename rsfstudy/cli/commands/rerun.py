@@ -76,7 +76,7 @@ def _print_agreement(agreement: pd.DataFrame) -> None:
         print_line(f"{name}: {in_file} in the file, {now} now", style="yellow")
     print_pieces([build_agreement_table(agreement)])
     if not agreement["values"].sum():
-        print_line("nothing to compare: the file has no finished cell")
+        print_line("nothing to compare, because the file contains no finished cell")
     else:
         same = _is_identical(agreement)
         print_line("all numbers are identical" if same else "some numbers differ")

@@ -39,7 +39,9 @@ def show(given: options.CommandOptions) -> int:
         declared = StudyDeclaration(study, given.output)
         return output_result(declared, print_study_declaration, given.as_json)
     if given.settings or given.changes_accuracy or given.rig_option_texts:
-        rule = "--set, --rtol and rig options cannot be used with a results file"
+        rule = (
+            "--set, --rtol and rig options cannot be used with a results file. Omit these options."
+        )
         raise click.UsageError(rule)
     dataset = study_options.read_results_file(Path(given.name), given.study)
     return output_result(FileSummary(dataset, given.name), print_file_summary, given.as_json)

@@ -43,9 +43,9 @@ _EXIT_STATUS_UNPHYSICAL_MOTION = 3
 @click.option(
     "--duration",
     metavar="QUANTITY",
-    help="Duration of the motion. Durations with units require a rig, and durations without "
-    "a rig are in D_c/V_*. Example: '100 s'.  [default: duration of the protocol if "
-    "there is one, otherwise 50]",
+    help="Duration of the motion. If a rig is defined, the duration has units or is in s. "
+    "Otherwise, the duration is in D_c/V_*. Example: '100 s'.  [default: duration of the "
+    "protocol if there is one, otherwise 50]",
 )
 @options.abscissa_option
 @options.rig_options

@@ -123,7 +123,10 @@ def _build_table_of_cells(cells: pd.DataFrame, name: str, decimal: str) -> Table
     ]
     layout = detect_layout([f"sep={_MARK}", *lines], decimal)
     if not layout.headings:
-        remedy = f"Write a first row such as {EXAMPLE_OF_TABLE_HEADER}."
+        remedy = (
+            "Add a first row with a heading for each column. In each heading, write the "
+            f"units in parentheses after the name, for example {EXAMPLE_OF_TABLE_HEADER}."
+        )
         raise InvalidValue("table", name, "has no header", remedy=remedy)
     # The line with the separator comes before the cells.
     body = cells.iloc[layout.body_line - 2 :]

@@ -120,7 +120,10 @@ def read_text(source: Source) -> Table:
     has_headings = layout.header_line > 0
     location = f"{name}, line {layout.header_line}" if has_headings else name
     if not layout.headings:
-        remedy = f"Write a first line such as {EXAMPLE_OF_TABLE_HEADER}."
+        remedy = (
+            "Add a first line with a heading for each column. In each heading, write the "
+            f"units in parentheses after the name, for example {EXAMPLE_OF_TABLE_HEADER}."
+        )
         raise InvalidValue("table", name, "has no header", remedy=remedy)
 
     def load(index: int, quantity_name: str) -> Column:
@@ -233,7 +236,7 @@ def _check_row_lengths(rows: _Rows, layout: TextLayout, name: str) -> None:
         while len(row) > size and not row[-1].strip():
             row.pop()
         if len(row) != size:
-            rule = f"has {len(row)} fields, but the header has {size}"
+            rule = f"must have as many fields as the header ({size}), but has {len(row)}"
             remedy = (
                 "Use decimal points, or pass decimal=',' (--decimal ',')."
                 if len(row) > size
@@ -285,7 +288,7 @@ class _FieldConverter(NamedTuple):
         pointed = text.replace(",", ".", 1) if self.decimal == "," and "." not in text else text
         found = parse_number(pointed)
         if found is None:
-            remedy = "Write only the number, for example 1.5e-3, and write the units in the header."
+            remedy = "Write only a number, for example 1.5e-3, and write the units in the header."
             if "," in text:
                 remedy = "Use a decimal point, or pass decimal=',' (--decimal ',')."
             wrong = InvalidValue(self.quantity_name, text, "is not a number", remedy=remedy)

@@ -368,5 +368,5 @@ class Inertia(Dynamics):
 
         See ``Part.rejection_error``.
         """
-        rule = "approximates inertia, but this scene has inertia"
+        rule = "approximates inertia, so it cannot be combined with inertia=True"
         return InvalidValue(name, value, rule, remedy="Omit one of the two.")

@@ -154,8 +154,8 @@ def declare_drainage_field() -> Any:
         "rate of pore pressure diffusion",
         "V_*/D_c",
         rule=POSITIVE,
-        remedy="Use a small value for nearly undrained conditions, because no steady state "
-        "exists without drainage.",
+        remedy="Without drainage, no steady state exists. For nearly undrained conditions, use "
+        "a small value.",
     )
 
 

@@ -33,5 +33,5 @@ class DrainedFluid(Fluid):
         """
         if name != "pressurisation":
             return super().rejection_error(name, value)
-        remedy = "Leave it out, or set fluid='thermal'."
+        remedy = "Omit pressurisation, or set fluid='thermal'."
         return InvalidValue(name, value, "does not apply when the fault is drained", remedy=remedy)

@@ -72,7 +72,8 @@ def declare_cutoff_velocity_field() -> Any:
         "1",
         "cut-off velocity of the evolution effect",
         rule=POSITIVE,
-        remedy="For a law without a cut-off velocity, set law to another law.",
+        remedy="If evolution should not have a cut-off velocity, choose a law other than "
+        "cut_off and composite.",
     )
 
 
@@ -147,7 +148,7 @@ class LawBase(Part):
         "1",
         "effect of shear stress on the state variable",
         rule=NON_NEGATIVE,
-        remedy="Zero removes the effect.",
+        remedy="With the value 0, shear stress does not affect the state variable.",
     )
     regularised: bool = flag(
         False, "1 if slip can reverse with the sign of the shear stress, otherwise 0"
@@ -257,16 +258,19 @@ class LawBase(Part):
         stress, fluid = scene.parts.normal_stress, scene.parts.fluid
         loading, source = scene.parts.loading, scene.pressure_source
         bends = stress.normal_stress is not None and not stress.coupling
-        unknown = fluid.name if fluid.unknowns else stress.name if bends else ""
+        unknown = f"normal_stress={stress.name!r}" if bends else ""
+        if fluid.unknowns:
+            unknown = f"fluid={fluid.name!r}"
         if not unknown and scene.changes_normal_stress:
-            unknown = "normal stress that the loading changes"
+            unknown = "loadings that change normal stress"
         if self.stress_dependence and unknown:
             rule = (
                 "requires normal stress that is proportional to shear stress, which is not "
                 f"the case for {unknown}"
             )
             remedy = (
-                "Leave it out, or define `coupling` if the ratio of the two stresses is constant."
+                "Omit stress_dependence. If the ratio of both stresses is constant, define "
+                "`coupling`."
             )
             raise self.field_error("stress_dependence", rule, remedy)
         pressed = source.unknowns and not loading.has_load_point_unknown
@@ -277,8 +281,8 @@ class LawBase(Part):
         )
         if self.regularised and one_way:
             rule = (
-                f"cannot be combined with {one_way.name}, because its equations contain ln V, "
-                "which requires forward slip"
+                f"cannot be combined with {one_way.name}, because the equations of "
+                f"{one_way.name} contain ln V and therefore require forward slip"
             )
             raise self.field_error("regularised", rule, "Omit one of the two.")
 
@@ -393,18 +397,18 @@ class Law(LawBase):
             raise self.field_error("b_over_a", rule, remedy)
         if not self.b_over_a and scene.parts.slider.initial_state:
             rule = "has no effect, because b_over_a is 0"
-            raise scene.parts.slider.field_error("initial_state", rule, "Leave initial_state out.")
+            raise scene.parts.slider.field_error("initial_state", rule, "Omit initial_state.")
         if 0.0 < abs(self.b_over_a) < MIN_B_OVER_A:
             raise self.field_error(
                 "b_over_a",
-                f"must be 0, or must have an absolute value of at least {MIN_B_OVER_A:g}",
-                "Give 0.",
+                f"must be 0 or have an absolute value of at least {MIN_B_OVER_A:g}",
+                "Pass 0.",
             )
         least = self.min_weakening_b_over_a
         if self.b_over_a <= least and lacks_critical_stiffness(scene):
             rule = (
-                f"must exceed {least:.6g}, because there is no critical stiffness without rate "
-                "weakening"
+                f"must exceed {least:.6g}, because only rate-weakening friction has a critical "
+                "stiffness"
             )
             raise self.field_error("b_over_a", rule, MISSING_CRITICAL_STIFFNESS_REMEDY)
 
@@ -416,8 +420,8 @@ B_OVER_A_STANDING_FOR_ZERO = 1e-60
 MIN_B_OVER_A = 1e-30
 #: Advice to the user in error messages about a missing critical stiffness.
 MISSING_CRITICAL_STIFFNESS_REMEDY = (
-    "Without a critical stiffness, sliding is stable at all stiffnesses or unstable at all "
-    "stiffnesses. Pass stiffness instead of stiffness_ratio."
+    "The value of stiffness_ratio is relative to the critical stiffness. Pass stiffness "
+    "instead of stiffness_ratio."
 )
 
 

@@ -137,8 +137,13 @@ class TwoStateLaw(LawBase):
         """
         super().check(scene)
         if not self.state_change_over_a:
-            rule = "must not be 0 if b1_over_a is 0, because no state would have an effect"
-            raise self.field_error("b2_over_a", rule, "Pass a nonzero value for one of them.")
+            rule = (
+                "must not be 0 if b1_over_a is 0, because otherwise no state variable "
+                "affects friction"
+            )
+            raise self.field_error(
+                "b2_over_a", rule, "Pass a nonzero value for b1_over_a or b2_over_a."
+            )
         if lacks_critical_stiffness(scene):
             rule = (
                 f"gives no critical stiffness with b1_over_a = {self.b1_over_a:g} and "

@@ -171,8 +171,13 @@ class FlashHeatingLaw(Law):
         """
         super().check(scene)
         if self.weakened_friction >= scene.mu_star:
-            rule = f"must be less than mu_star = {scene.mu_star:g}, because flash heating weakens"
-            raise self.field_error("weakened_friction", rule, "Decrease it, or increase mu_star.")
+            rule = (
+                f"must be less than mu_star = {scene.mu_star:g}, because flash heating "
+                "decreases friction"
+            )
+            raise self.field_error(
+                "weakened_friction", rule, "Decrease weakened_friction, or increase mu_star."
+            )
 
     def parameter_values(self, scene: SceneView) -> Numbers:
         r"""Return b and the parameters of the weakening.

@@ -77,6 +77,6 @@ class TwoStateSlownessLaw(TwoStateLaw):
         """
         for name in ("b1_over_a", "b2_over_a"):
             if not getattr(self, name):
-                remedy = "For a single state, set law='slowness'."
+                remedy = "For a single state variable, set law='slowness'."
                 raise InvalidValue(name, 0.0, "must not be 0", remedy=remedy)
         super().check(scene)

@@ -157,7 +157,7 @@ class Loading(Part):
         fluid, name = scene.parts.fluid, self.selected_by
         if self.unknowns and fluid.unknowns and not self.of_pressure:
             rule = f"does not apply to fluid={fluid.name!r}"
-            rule += ", whose pore pressure changes normal stress"
+            rule += ", because the pore pressure already changes the effective normal stress"
             value = getattr(self, name or "name")
             remedy = "Omit one of the two."
             raise InvalidValue(name or "loading", value, rule, remedy=remedy)
@@ -168,7 +168,7 @@ class Loading(Part):
             if ends - begins < MIN_SEGMENT_DURATION and ends > 0.0:
                 least = f"{MIN_SEGMENT_DURATION:g} D_c/V_*"
                 rule = f"must be at least {least}, and larger than the rounding error of the time"
-                remedy = "Remove segments without duration."
+                remedy = "Remove segments whose duration is zero."
                 wrong = InvalidValue("duration", self.segments[n].duration, rule, remedy=remedy)
                 raise wrong.with_location(f"segment {n + 1}")
 
@@ -278,7 +278,7 @@ class Loading(Part):
         """
         owners = (p for p in BUILT_IN_PARTS.values() if str(name) in p.__dataclass_fields__)
         wanted = " or ".join(p.selected_by for p in owners if p.selected_by not in ("", name))
-        remedy = f"Leave it out, or also set {wanted}." if wanted else "Leave it out."
+        remedy = f"Omit {name}, or also set {wanted}." if wanted else f"Omit {name}."
         # The name of a protocol is an attribute of the instance, not of the class.
         of = getattr(cls, "name", cls.__name__)
         return InvalidValue(name, value, f"does not apply to the loading {of!r}", remedy=remedy)

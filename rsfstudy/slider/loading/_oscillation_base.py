@@ -112,7 +112,7 @@ class OscillationBase(LoadingWithFinalLoadVelocity):
         "1",
         "number of cycles after which the oscillation ends",
         rule=POSITIVE,
-        remedy="Leave it out for an oscillation that does not end.",
+        remedy="For an oscillation without end, omit oscillation_cycles.",
         omit_if_default=True,
     )
 

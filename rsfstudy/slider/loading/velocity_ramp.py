@@ -45,7 +45,7 @@ class VelocityRamp(Loading):
         "change of load point velocity at a constant rate",
         "V_*",
         rule="must be -1 or greater",
-        remedy="With -1, the load point is at rest after the ramp.",
+        remedy="The value -1 stops the load point at the end of the ramp.",
     )
     velocity_ramp_duration: float = number(
         10.0,

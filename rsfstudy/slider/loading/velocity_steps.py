@@ -48,7 +48,8 @@ class VelocitySteps(Loading):
         "1",
         "load point velocity after the first step divided by V_star",
         rule=POSITIVE,
-        remedy="Use a value below 1 for a first step down, and hold_time to hold the load point.",
+        remedy="If the first step should be a step down, use a value below 1. To hold the load "
+        "point, set hold_time.",
     )
     displacement_between_steps: float = number(
         20.0,

@@ -119,7 +119,7 @@ class WhiteNoise(Noise):
             raise InvalidValue("loading_noise", self.name, rule, remedy=remedy)
         if self.unknowns and fluid.unknowns:
             rule = f"does not apply to fluid={fluid.name!r}"
-            rule += ", whose pore pressure changes normal stress"
+            rule += ", because the pore pressure already changes the effective normal stress"
             raise self.field_error("normal_stress_noise", rule, "Leave one of them out.")
 
     def parameter_values(self, scene: SceneView) -> Numbers:

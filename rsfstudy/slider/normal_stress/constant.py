@@ -33,8 +33,8 @@ class ConstantNormalStress(NormalStress):
         """
         if scene.changes_normal_stress:
             remedy = (
-                "Set normal_stress='imposed', or normal_stress='variable' if it also "
-                "depends on shear stress."
+                "Set normal_stress='imposed'. If normal stress also depends on shear stress, "
+                "set normal_stress='variable'."
             )
             rule = "cannot be combined with a loading or noise that changes normal stress"
             raise InvalidValue("normal_stress", self.name, rule, remedy=remedy)

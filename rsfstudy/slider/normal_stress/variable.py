@@ -124,7 +124,7 @@ class VariableNormalStress(NormalStressWithStateEffect):
         lowest = math.degrees(math.atan(scene.mu_star))
         if self.phi <= lowest:
             rule = (
-                f"must exceed atan(mu_star) = {lowest:.6g} degrees, because sigma_3 would be "
-                "negative"
+                f"must exceed atan(mu_star) = {lowest:.6g} degrees, because the principal "
+                "stress sigma_3 would otherwise be negative"
             )
             raise self.field_error("phi", rule, "Increase phi, or decrease mu_star.")

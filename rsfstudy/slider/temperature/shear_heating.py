@@ -107,8 +107,8 @@ class ShearHeating(Temperature):
         "cooling rate of the fault",
         "V_*/D_c",
         rule=POSITIVE,
-        remedy="Use a small value for nearly adiabatic conditions, because no steady state "
-        "exists without cooling.",
+        remedy="Without cooling, no steady state exists. For nearly adiabatic conditions, use "
+        "a small value.",
         omit_if_default=True,
     )
     direct_activation: float = number(
@@ -179,13 +179,14 @@ class ShearHeating(Temperature):
             law = scene.parts.law
             if law.state_count > 1:
                 name = "direct_activation" if self.direct_activation else "evolution_activation"
-                rule = f"requires a law with one state, but law={law.name!r} has {law.state_count}"
-                raise self.field_error(name, rule, "Leave it out, or choose another law.")
+                rule = "requires a law with one state variable, but "
+                rule += f"law={law.name!r} has {law.state_count} state variables"
+                raise self.field_error(name, rule, f"Omit {name}, or choose another law.")
             hottest = self.cooling / scene.mu_star
             if self.heating >= hottest:
                 rule = f"must be less than cooling/mu_star = {hottest:g}, because otherwise the "
                 rule += "surroundings would be colder than absolute zero"
-                raise self.field_error("heating", rule, "Decrease it, or increase cooling.")
+                raise self.field_error("heating", rule, "Decrease heating, or increase cooling.")
         if lacks_critical_stiffness(scene):
             rule = "gives no critical stiffness at V_*"
             raise self.field_error(
