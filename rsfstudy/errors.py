@@ -18,10 +18,10 @@ __getattr__ = build_getattr_for_former_names(__name__)
 #: Maximum number of characters of a value in a message, maximum number of listed choices, and
 #: maximum number of choices that are listed in addition to suggestions.
 _MAX_CHARACTERS_OF_VALUE, _MAX_CHOICES, _MAX_CHOICES_WITH_SUGGESTIONS = 200, 60, 20
-#: Kinds of objects that an error message identifies by name, as in "axis 'phi' is unknown".
+#: Kinds of objects that an error message identifies by name, as in "column 'speed' is unknown".
 _KINDS_OF_NAMED_OBJECTS = frozenset(
-    {"axis", "column", "dimension", "field", "heading", "override", "reduction", "sheet", "study"}
-    | {"variable", "variable of a reduction"}
+    {"axis", "column", "dimension", "directory", "header", "heading", "override", "problem"}
+    | {"reduction", "sheet", "study", "table", "variable"}
 )
 #: Maximum number of characters of a message.
 _MAX_MESSAGE_LENGTH = 5000
@@ -231,9 +231,10 @@ def _format_violation(name: str, value: object, shown_value: str, rule: str) -> 
     if rule.startswith("must ") and "(got " not in rule:
         requirement, conjunction, reason = rule.partition(", because")
         return f"{name} {requirement} (got {shown_value}){conjunction}{reason}."
-    if name == "field":
+    if name == "field" and rule.startswith(("is not a field", "is neither a field")):
         return f"{shown_value} {rule}."
-    relation = " " if name in _KINDS_OF_NAMED_OBJECTS else " = "
+    is_name = name in _KINDS_OF_NAMED_OBJECTS and isinstance(value, str)
+    relation = " " if is_name else " = "
     return f"{name}{relation}{shown_value} {rule}."
 
 

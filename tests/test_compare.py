@@ -133,7 +133,7 @@ def test_an_axis_that_the_other_lacks_is_matched_by_its_fixed_value(computed):
         assert sorted(found.finished_cell_counts) == [0, 4, 4]
         assert row(found)["identical"] == 4
     named = study(Axis("case", {"one": {"law": "slip"}, "two": {"law": "slowness"}}))
-    with pytest.raises(InvalidValue, match="axis = 'case' is an axis of only one of the datasets"):
+    with pytest.raises(InvalidValue, match="axis 'case' is an axis of only one of the datasets"):
         rsfstudy.compare(fixed, run(named))
 
 

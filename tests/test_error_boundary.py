@@ -141,7 +141,7 @@ def test_a_call_that_does_not_fit_lists_the_parameters(call, message, dataset):
             lambda r: reductions.apply_reductions(r, ()),
             "dataset = Record.*must be an xarray.Dataset",
         ),
-        (lambda r: rsfstudy.run("a" * 300), "study = 'aaa.*at most 255 bytes"),
+        (lambda r: rsfstudy.run("a" * 300), "study 'aaa.*at most 255 bytes"),
         (lambda r: rsfstudy.history({"time": [0, 1], "velocity": "="}), "velocity = '=' must"),
         (lambda r: study_of("s", LinearStability(), Axis("a", [0.1])).scene(-1), "number = -1 is"),
         (lambda r: rsfstudy.read_record({"time": np.datetime64("2020")}), "time = .*one dim"),

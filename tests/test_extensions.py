@@ -253,14 +253,14 @@ def test_without_the_study_file(outside, tmp_path, monkeypatch):
     as_lines = Path(figure).with_suffix(".png").read_bytes()
     assert call_main("plot", figure, "--study", outside["own_figure"].study).stderr == ""
     assert Path(figure).with_suffix(".png").read_bytes() != as_lines
-    assert call_main("plot", figure, "--study", gone).stderr.startswith("error: study = ")
+    assert call_main("plot", figure, "--study", gone).stderr.startswith("error: study '")
     with pytest.raises(InvalidValue, match="'saturating' is user-defined.*--study FILE.*mine.py"):
         rsfstudy.recompute_cell(saturating, PLACES["saturating_law"])
     with pytest.raises(InvalidValue, match="declares the study 'stiffness_map'"):
         rsfstudy.recompute_cell(
             saturating, PLACES["saturating_law"], study=outside["own_figure"].study
         )
-    with pytest.raises(InvalidValue, match="reduction = 'exponent'.*--study FILE"):
+    with pytest.raises(InvalidValue, match="reduction 'exponent'.*--study FILE"):
         rsfstudy.rerun(outside["power_law"].file, workers=0)
 
 
@@ -457,9 +457,7 @@ def test_two_parts_of_one_scene_share_no_field():
 @pytest.mark.parametrize("name", ["status", "slip", "steady_friction", "a_over_b_minus_a"])
 def test_a_field_that_would_be_mistaken_in_a_file(name):
     part = made(name="mistaken", **{name: number(1.0, "", "1", "another")})
-    with pytest.raises(
-        InvalidValue, match=f"field = '{name}' is already used for another quantity"
-    ):
+    with pytest.raises(InvalidValue, match=f"field '{name}' is already used for another quantity"):
         study_of("n", LinearStability(), Axis("phi", [60]), base=Scene(law=part))
 
 
@@ -516,7 +514,7 @@ def test_overrides_by_class_whatever_their_order():
                   study.with_(law=[Doubled]).with_(factor=[1.0, 2.0])):  # fmt: skip
         assert {cell.scene.factor for cell in other.cells()} == {1.0, 2.0}
         assert other.describe()["overrides"]["law"] in ("doubled", ["doubled"])
-    with pytest.raises(InvalidValue, match="override = 'factor' is neither an axis nor a field"):
+    with pytest.raises(InvalidValue, match="override 'factor' is neither an axis nor a field"):
         study.with_(factor=[1.0])
 
 

@@ -282,9 +282,9 @@ def test_any_variable_on_request():
     dataset = lattice(ANGLES, RATES)
     drawn = rsfstudy.plot(dataset, "steady_friction")
     assert any("friction coefficient" in text.replace("\n", " ") for text in texts(drawn))
-    with pytest.raises(InvalidValue, match="variable = 'friction' is not a numeric variable"):
+    with pytest.raises(InvalidValue, match="variable 'friction' is not a numeric variable"):
         rsfstudy.plot(dataset, "friction")
-    with pytest.raises(InvalidValue, match="variable = 'message'"):
+    with pytest.raises(InvalidValue, match="variable 'message'"):
         rsfstudy.plot(dataset, "message")
 
 

@@ -304,7 +304,9 @@ def test_the_scene_of_a_fit_moves_as_fitted() -> None:
         synthetic_record(seed=4), laws=["slowness"], free=("a", "mu_star"), **FIT_OPTIONS | held
     )
     assert some.squeeze().rsf.scene.b == pytest.approx(0.013, rel=1e-12)
-    with pytest.raises(InvalidValue, match="normal_stress is missing from the record"):
+    with pytest.raises(
+        InvalidValue, match="normal_stress is required, but the record has no normal stress"
+    ):
         _ = fit.rsf.rig
 
 

@@ -75,9 +75,9 @@ def test_a_cut_in_a_rupture_keeps_its_momentum():
 def test_what_has_no_end_is_refused():
     scene = SCENES["dilatant"]
     motion = simulate(scene, duration=1.0, engine=COMPILED)
-    with pytest.raises(InvalidValue, match="belongs to another scene"):
+    with pytest.raises(InvalidValue, match="must be the scene of the motion"):
         simulate(SCENES["mass"], duration=1.0, start=motion)
-    with pytest.raises(InvalidValue, match="is not a complete motion"):
+    with pytest.raises(InvalidValue, match="must be a complete motion"):
         simulate(scene, duration=1.0, start=motion.drop_attrs())
     with pytest.raises(InvalidValue, match="must increase from 1 or later"):
         simulate(scene, times=[0.5, 2.0], start=motion)

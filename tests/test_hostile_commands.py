@@ -167,7 +167,7 @@ def test_the_fuzzer_uses_every_command_and_every_option():
     ("answer", "kinds"),
     [
         (Answer(0, "wrote x\n", 0.1), []),
-        (Answer(2, "error: study = 'x' is unknown.\n", 0.1), []),
+        (Answer(2, "error: study 'x' is unknown.\n", 0.1), []),
         (Answer(2, "study.py raises RuntimeError: no\n", 0.1), []),
         (Answer(70, "", 0.1), ["status 70"]),
         (Answer(-9, "", 20.0, hangs=True), ["hang"]),

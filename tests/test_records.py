@@ -133,9 +133,9 @@ def test_a_table_in_memory_is_read_as_its_file(tmp_path: Path) -> None:
         record = rsfstudy.read_record(pd.read_csv(path), told)
         for name, values in rsfstudy.read_record(path, told).columns.items():
             np.testing.assert_array_equal(record.columns[name], values)
-    with pytest.raises(InvalidValue, match=r"^column = 'mu' is unknown. Choices: time, .*friction"):
+    with pytest.raises(InvalidValue, match=r"^column 'mu' is unknown. Choices: time, .*friction"):
         rsfstudy.read_record(path, {"mu": "mu"})
-    with pytest.raises(InvalidValue, match="column = 't' is not in the table"):
+    with pytest.raises(InvalidValue, match="column 't' is not a heading of the table"):
         rsfstudy.read_record(pd.read_csv(path), {"time": "t (s)"})
 
 
@@ -199,7 +199,7 @@ def test_a_binary_file_of_xlook(tmp_path: Path) -> None:
     with pytest.raises(InvalidValue, match="friction = .1,. has 1 samples, but time has 4"):
         rsfstudy.read_record(path, {**chosen, "friction": ("rest", "1")})
     with pytest.raises(
-        InvalidValue, match="column = 'tau' is not in the table.* Columns can also be"
+        InvalidValue, match="column 'tau' is not a heading of the table.* Columns can also be"
     ):
         rsfstudy.read_record(path, {**chosen, "friction": ("tau", "1")})
     with pytest.raises(InvalidValue, match=r"column 2: displacement = '1 bit' has units"):

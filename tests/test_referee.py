@@ -223,8 +223,8 @@ def test_conventions_of_the_problem_explain_a_difference(number, changes, explan
         ),
         (lambda rate: rate / (2.0 * math.pi), "growth_rate is 1/(2 pi) times the reference value"),
         # A factor combined with an offset would explain any value.
-        (lambda rate: 1.7 * rate, "no common difference of conventions explains the disagreement"),
-        (lambda rate: -1.3 * rate, "no common difference of conventions explains the disagreement"),
+        (lambda rate: 1.7 * rate, "no common difference in conventions explains the disagreement"),
+        (lambda rate: -1.3 * rate, "no common difference in conventions explains the disagreement"),
     ],
 )
 def test_a_single_value_is_explained_by_usual_factors_only(wrong, explanation, tmp_path):
@@ -276,7 +276,7 @@ def test_where_they_part_is_told(tmp_path):
     said = " ".join(ran.stdout.split())
     pattern = r"slip_rate 3\.0 digits, lowest agreement at time = [234]\d s; "
     assert re.search(pattern + "fewer digits than required from time = 25 s", said)
-    assert "no common difference of conventions explains the disagreement" in said
+    assert "no common difference in conventions explains the disagreement" in said
     assert "0 problems of 24" in said
     assert ran.returncode == 1
 
@@ -347,7 +347,7 @@ def test_zeros_agree_in_nothing_and_overflows_are_refused(tmp_path):
 @pytest.mark.parametrize(
     ("spoil", "error"),
     [
-        (lambda h, c: (["time (s)", "mu (1)", *h[2:]], c), "column = 'friction' is missing"),
+        (lambda h, c: (["time (s)", "mu (1)", *h[2:]], c), "column 'friction' is missing"),
         (lambda h, c: ([h[0], h[1], "slip_rate (MPa)", *h[3:]], c), "slip_rate"),
         (lambda h, c: ([h[0], h[1], "slip_rate (1)", *h[3:]], c), "has no units"),
         (lambda h, c: (h, [x[:-1] for x in c]), "number of rows = 40"),
@@ -368,7 +368,7 @@ def test_files_and_problems_that_are_not_there_are_said_so():
     ran = call_main("verify", "nowhere.csv", "--problem", "1", "--columns", "time=t (s)")
     assert (ran.returncode, "the file nowhere.csv does not exist" in ran.stderr) == (1, True)
     ran = call_main("verify", "nowhere.csv")
-    assert (ran.returncode, "problem = 'no' is not the number of a problem" in ran.stderr) == (
+    assert (ran.returncode, "problem 'no' is not the number of a problem" in ran.stderr) == (
         2,
         True,
     )

@@ -162,7 +162,7 @@ def test_python_names_the_page_and_refuses_what_is_none(tmp_path):
     with pytest.raises(InvalidValue, match="already exists and is not a report"):
         rsfstudy.report(tmp_path / "in", page)
     assert "mine" in page.read_text()
-    with pytest.raises(InvalidValue, match="is not a directory"):
+    with pytest.raises(InvalidValue, match="does not exist or is not a directory"):
         rsfstudy.report(tmp_path / "nowhere")
 
 

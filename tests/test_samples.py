@@ -423,5 +423,5 @@ def test_samples_are_drawn_as_histograms_and_scatters():
             line = axes.lines[-1]
             np.testing.assert_array_equal(line.get_xdata(), found[x].values.ravel()[-256:])
             np.testing.assert_array_equal(line.get_ydata(), found[y].values.ravel()[-256:])
-    with pytest.raises(InvalidValue, match="variable = 'nothing'.*critical_stiffness"):
+    with pytest.raises(InvalidValue, match="variable 'nothing'.*critical_stiffness"):
         plots.draw_figure(found, variable="nothing")

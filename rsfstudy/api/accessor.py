@@ -28,9 +28,9 @@ if TYPE_CHECKING:
     from rsfstudy.study import Study
 
 _NOT_AN_RSFSTUDY_DATASET_MESSAGE = (
-    "the dataset was not created by rsfstudy, because it has neither the attribute 'scene' nor "
-    "the attribute 'declaration'. Use a dataset from rsfstudy.simulate, critical_step, "
-    "limit_cycle, run or open, or from one of their files, and keep its attributes."
+    "the dataset has neither the attribute 'scene' nor the attribute 'declaration', so it was "
+    "not created by rsfstudy. Use a dataset from rsfstudy.simulate, critical_step, "
+    "limit_cycle, run or open, or from one of their files, and do not remove the attributes."
 )
 
 

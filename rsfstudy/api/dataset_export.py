@@ -73,15 +73,15 @@ def rerun_and_compare_motion(motion: xr.Dataset) -> pd.DataFrame:
         if times is not None:
             title, call = f"{title}, output at {times}", f"{call}, times=..."
         raise DataError(
-            "rerun can recompute the results of a study, and motions of rsfstudy.simulate "
-            f"(`rsfstudy simulate`) without times. The dataset belongs to one scene ({title}). To "
-            f"recompute it, call {call}, rtol={about.get('rtol', '...')}) with the original "
-            "options."
+            "rerun can only recompute results of studies, and motions that rsfstudy.simulate "
+            "(`rsfstudy simulate`) computed without times. The dataset belongs to a single "
+            f"scene ({title}). To recompute it, call {call}, rtol={about.get('rtol', '...')}) "
+            "with the original options."
         )
     if DatasetUnits.SCALES_ATTRIBUTE in about and "laboratory" not in about:
         raise DataError(
-            "the motion was converted to units without a rig. Store motions as simulate returns "
-            "them, or convert them with a rig"
+            "the units of the motion were converted without a rig. Store the motion before the "
+            "units are converted, or convert the units with a rig"
         )
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")

@@ -362,7 +362,7 @@ def _select_step_numbers(records: Sequence[Record], steps: Sequence[int]) -> tup
     count = max(len(one.loading_steps) for one in records)
     if not count:
         remedy = "Specify the steps: record.with_steps([(begins, ends, before, after)])."
-        rule = "has no step of load point velocity or normal stress"
+        rule = "has no step in load point velocity or normal stress"
         raise InvalidValue("record", records[0].name, rule, remedy=remedy)
     numbers = tuple(steps) or tuple(range(1, count + 1))
     for number in numbers:
@@ -590,7 +590,7 @@ def _find_common_filter(records: Sequence[Record], stated_filter: str) -> str:
     if not filters:
         return stated_filter
     if stated_filter:
-        remedy = "Leave averaging= and low_pass= out, or read the record without filter=."
+        remedy = "Omit averaging= and low_pass=, or read the record without filter=."
         raise InvalidValue(
             "filter",
             stated_filter,

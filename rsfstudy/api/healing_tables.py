@@ -102,8 +102,8 @@ def measure_motion_holds(motion: xr.Dataset) -> xr.Dataset:
     for name in ("time", *_MOTION_VARIABLES):
         if name not in motion or motion[name].dims != ("time",):
             text = (
-                "is missing, or does not have the dimension time. The dataset is not a motion "
-                "from simulate"
+                "is missing, or does not have the dimension time. Pass a motion from "
+                "rsfstudy.simulate"
             )
             raise DataError(f"{name} {text}")
     time, values = motion["time"].values, np.column_stack([motion[n] for n in _MOTION_VARIABLES])

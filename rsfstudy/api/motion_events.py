@@ -66,8 +66,8 @@ def find_motion_events(
     for name in names:
         if name not in motion or motion[name].dims != ("time",):
             raise DataError(
-                f"{name} is missing, or does not have the dimension time. The dataset is not a "
-                "motion from simulate"
+                f"{name} is missing, or does not have the dimension time. Pass a motion from "
+                "rsfstudy.simulate"
             )
     times, *rest = (np.asarray(motion[name], dtype=float) for name in names)
     arrest = _arrest_level(motion, scene)

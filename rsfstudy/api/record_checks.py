@@ -171,6 +171,6 @@ def check_normal_stress_changes_for_alpha(
         if not by_steps and not (loading_kind == "recorded" and np.ptp(stress) > 0.0):
             rule = "requires a normal stress that changes, but the "
             rule += f"fitted steps of {record.name} do not change the normal stress"
-            remedy = "Remove alpha, select a step of normal stress (steps=), or use the "
+            remedy = "Remove alpha, select a step in normal stress (steps=), or use the "
             remedy += "recorded normal stress with --loading recorded (loading=)."
             raise InvalidValue("free", "alpha", rule, remedy=remedy)

@@ -72,7 +72,7 @@ def find_results(study_or_file: str | Path, output_path: str | Path | None) -> P
         )
     except OSError as error:
         raise DataError(
-            f"cannot search for {shorten_text(study_or_file)}: {error.strerror}"
+            f"cannot search for the results of {shorten_text(study_or_file)}: {error.strerror}"
         ) from error
 
 

@@ -88,7 +88,7 @@ def _describe_unexpected_error(error: Exception) -> str:
         remedy = "Check that the directory exists, is writable, and has free space."
         return f"{error.strerror}{place}. {remedy}"
     if isinstance(error, MemoryError):
-        return "not enough memory. Use fewer or smaller values."
+        return "not enough memory. Reduce the number of values or their size."
     return (
         f"{format_exception(error)}. A file may be damaged or not writable. "
         "Set RSFSTUDY_TRACEBACK=1 to see the traceback."

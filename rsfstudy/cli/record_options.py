@@ -146,6 +146,9 @@ def _parse_rows(text: str) -> tuple[int, ...]:
     """Convert the value of the option ``--rows``."""
     numbers = [part.strip() for part in text.split(",")]
     if not all(number.isdecimal() and len(number) < 16 for number in numbers):
-        rule = "must be the numbers of the first and the last row, for example 100,4000"
+        rule = (
+            "must be the numbers of the first and the last row, separated by a comma, for "
+            "example 100,4000"
+        )
         raise InvalidValue("--rows", text, rule)
     return tuple(map(int, numbers))

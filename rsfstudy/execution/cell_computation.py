@@ -183,8 +183,9 @@ def _load_cell_task(serialized_task: bytes) -> CellTask:
         task: CellTask = cloudpickle.loads(serialized_task)
     except Exception as error:
         raise RunError(
-            f"a worker cannot load the measure or a part ({type(error).__name__}: {error}). Copy "
-            "the required files to the workers, or put them in the directory of the study file"
+            f"a worker process cannot load the measure or a scene part ({type(error).__name__}: "
+            f"{error}). Copy the required files to the workers, or put them in the directory of "
+            "the study file"
         ) from error
     used = *task.measure.code_classes, *task.user_parts, *task.user_stepper_classes
     ours = provenance.code_fingerprint(task.accuracy.engine, used)

@@ -263,7 +263,7 @@ class StudyRun:
                 cell = int(np.flatnonzero(self.plan.keys == np.void(key))[0])
                 warnings.warn(
                     f"cell {self.study.describe_cell(cell)} failed, {Status[status].label}: "
-                    f"{message}. The run continues",
+                    f"{message}. The run continues with the other cells.",
                     stacklevel=2,
                 )
 

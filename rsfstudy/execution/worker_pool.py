@@ -257,7 +257,7 @@ def make_dask_batch_mapper(
                 elif suspects:
                     warnings.warn(
                         f"a worker process ended unexpectedly. Its {len(suspects)} cells are "
-                        f"recomputed one at a time. See the log {log_path}",
+                        f"recomputed one at a time. See the log {log_path}.",
                         stacklevel=2,
                     )
                     yield from map(run_isolated, suspects)
@@ -344,8 +344,8 @@ def _wait_for_finished_futures(dask_client: Any, running_futures: Iterable[Any])
             elif waited > WARN_AFTER_SECONDS_WITHOUT_WORKER and not warned:
                 warned = True
                 warnings.warn(
-                    "the Dask cluster has no worker. The run waits "
-                    f"{GIVE_UP_AFTER_SECONDS_WITHOUT_WORKER:g} s for a worker",
+                    "the Dask cluster has no worker. The run will end if no worker connects "
+                    f"within {GIVE_UP_AFTER_SECONDS_WITHOUT_WORKER:g} s.",
                     stacklevel=2,
                 )
             elif waited > GIVE_UP_AFTER_SECONDS_WITHOUT_WORKER:

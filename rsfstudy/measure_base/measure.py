@@ -581,7 +581,7 @@ def _check_names_declared_by_measure(measure: Measure) -> None:
                 raise InvalidValue(
                     "dimension",
                     dim,
-                    f"is a dimension of the output {name!r}, but has no coordinate values",
+                    f"of the output {name!r} has no coordinate values",
                 )
     known = {*names, *measure.plain_fields}
     for about in measure.quantities:

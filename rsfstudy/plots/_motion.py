@@ -175,7 +175,7 @@ def _check_motion(motion: xr.Dataset, abscissa: str | None) -> None:
                 "must be numeric and have the dimensions of slip, "
                 f"{', '.join(map(str, motion['slip'].dims))}"
             )
-            raise DataError(f"{name} {text}. The dataset is not a motion from simulate")
+            raise DataError(f"{name} {text}. Pass a motion from rsfstudy.simulate")
     largest = float(np.abs(motion["log10_slip_rate"]).max())
     if largest > sys.float_info.max_10_exp:
         rule = f"must be at most {sys.float_info.max_10_exp} in absolute value"

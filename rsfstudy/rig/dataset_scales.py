@@ -134,7 +134,8 @@ def _resolve_scale_of_dataset(
     ):
         rule = f"differs from the value in the dataset, {_format_number_or_range(held)} {units}"
         remedy = (
-            "Each cell is converted with its own scale. To use another scale, set it in the scenes."
+            "Each cell is converted with its own scale. To use another scale, change the scale "
+            "in the scenes."
         )
         raise InvalidValue(argument_name, stated_value, rule, remedy=remedy)
     return held

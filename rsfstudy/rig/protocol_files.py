@@ -119,10 +119,7 @@ def history(
     """
     found = _read_history_columns(record, columns, rig, ReadingOptions.parse("history", reading))
     if "time" not in found or len(found) == 1:
-        remedy = (
-            'Pass the column "time" and at least one other column, for example '
-            '{"time": ..., "displacement": ...}.'
-        )
+        remedy = 'Pass, for example, {"time": ..., "displacement": ...}.'
         raise InvalidValue(
             "record",
             [*found],

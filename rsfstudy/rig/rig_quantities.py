@@ -236,15 +236,16 @@ def check_rig_quantities_are_consistent(rig_values: Mapping[str, Any]) -> None:
         raise InvalidValue(
             "mass",
             rig_values["mass"],
-            "requires a stiffness, because the period of free oscillation depends on both",
+            "requires a stiffness, because the period of free oscillation depends on mass and "
+            "stiffness",
             remedy=remedy,
         )
     if ("shear_modulus" in rig_values) != ("density" in rig_values):
-        remedy = "Pass both shear_modulus= and density=, or neither."
+        remedy = "Pass shear_modulus= and density= together, or omit both."
         raise InvalidValue(
             "density",
             rig_values.get("density"),
-            "requires shear_modulus, and shear_modulus requires density",
+            "requires shear_modulus, because both determine radiation damping",
             remedy=remedy,
         )
     given = [n for n in (*HEAT_QUANTITIES, *OPTIONAL_HEAT_QUANTITIES) if n in rig_values]
@@ -254,7 +255,7 @@ def check_rig_quantities_are_consistent(rig_values: Mapping[str, Any]) -> None:
             f"requires {' and '.join(missing)}, because all of these quantities determine "
             "shear heating"
         )
-        remedy = "Pass them too, or omit all quantities of shear heating."
+        remedy = "Pass these quantities as well, or omit all quantities of shear heating."
         raise InvalidValue(given[0], rig_values[given[0]], rule, remedy=remedy)
 
 

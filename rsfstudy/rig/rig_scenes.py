@@ -70,7 +70,7 @@ class LatticeScenesOnRig:
             if not isinstance(value, bool | str) and not _is_close_within_rounding(
                 theirs.get(name), value
             ):
-                rule = f"differs from the value of the rig, {value:g}"
+                rule = f"differs from the rig's value, {value:g}"
                 remedy = "Create the base scene with rig.scene(...)."
                 raise InvalidValue(name, theirs.get(name), rule, remedy=remedy)
         for along in self.axes:

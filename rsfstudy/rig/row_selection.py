@@ -97,7 +97,7 @@ class RowSelection:
             last = min(last, self._find_row("end", self.end, columns))
         if first >= last:
             stated = {"rows": self.rows, "begin": self.begin, "end": self.end}
-            rule = f"selects no row, because the record has {count:,} rows"
+            rule = f"selects no rows of the record, which has {count:,} rows"
             raise InvalidValue("selection", stated, rule)
         if (first, last) == (0, count):
             return dict(columns), []
@@ -125,7 +125,9 @@ class RowSelection:
             key = "slip"
         if key not in columns:
             rule = f"requires the column {key.replace('slip', 'displacement')}"
-            raise InvalidValue(name, limit, rule, remedy="Pass rows=(first, last).")
+            raise InvalidValue(
+                name, limit, rule, remedy="To select rows by number, pass rows=(first, last)."
+            )
         column = columns[key]
         si = "s" if key == "time" else "m"
         units = column.units or _DEFAULT_UNITS[key]
@@ -170,7 +172,7 @@ class RowSelection:
         found, processing = dict(columns), []
         if chosen := parse_filter(self.filter):
             if "time" not in found:
-                remedy = "Leave the filter out."
+                remedy = "Omit the filter."
                 raise InvalidValue("filter", self.filter, "requires the column time", remedy=remedy)
             time = found["time"]
             kept = chosen.complete_rows(time)

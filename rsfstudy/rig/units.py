@@ -256,9 +256,8 @@ def _parse_quantity(quantity_name: str, text: str, units: str) -> Fraction | flo
     powers = _parse_unit_powers(text.strip()[match.end() :].strip()) if match else None
     if match is None or powers is None:
         example = f"2.5 {units}".removesuffix(" 1")
-        remedy = (
-            f"Write a number with a decimal point, followed by its units, for example '{example}'."
-        )
+        units_hint = "" if units == "1" else ", followed by its units"
+        remedy = f"Write a number with a decimal point{units_hint}, for example '{example}'."
         raise InvalidValue(quantity_name, text, "is not a quantity", remedy=remedy)
     number = float(match[0])
     if not math.isfinite(number):

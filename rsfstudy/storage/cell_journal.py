@@ -113,7 +113,10 @@ class CellJournal:
     def _build_unusable_journal_error(self, error: Exception) -> DataError:
         """Build the error for a journal that cannot be opened."""
         if _is_database_locked_error(error):
-            rule = f"another run uses {self._path}. Wait until it ends, or choose another --output."
+            rule = (
+                f"another run uses {self._path}. Wait until that run ends, or choose another "
+                "--output."
+            )
             return DataError(rule)
         return DataError(f"cannot use {self._path}: {error}. {_UNUSABLE_JOURNAL_REMEDY}")
 

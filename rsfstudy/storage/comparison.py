@@ -265,7 +265,8 @@ def _add_axes_of_other_dataset(dataset: xr.Dataset, other: xr.Dataset) -> xr.Dat
             continue
         if dimension not in dataset.coords or dataset[dimension].ndim:
             rule = (
-                "is an axis of only one of the datasets, and the other dataset has no value of it"
+                "is an axis of only one of the datasets, and the other dataset contains no "
+                "value of this axis"
             )
             raise InvalidValue("axis", str(dimension), rule)
         measured = [n for n, values in dataset.data_vars.items() if cells <= set(values.dims)]

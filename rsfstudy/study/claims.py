@@ -149,8 +149,8 @@ class Claim:
                 raise self._invalid(name, getattr(self, name), rule)
             for value in getattr(self, name).values():
                 if not isinstance(value, str) and not _is_number(value):
-                    rule = "must be a string or a number"
-                    raise self._invalid(f"coordinate value in {name}", value, rule)
+                    rule = "must be strings or numbers"
+                    raise self._invalid(f"coordinate values in {name}", value, rule)
 
     def _invalid(
         self, name: str, value: object, rule: str, *, choices: Iterable[str] = ()

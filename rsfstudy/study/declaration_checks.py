@@ -89,7 +89,7 @@ def check_name_clashes(
             )
         if reduction.of not in known:
             raise InvalidValue(
-                "variable of a reduction",
+                "variable",
                 reduction.of,
                 "is not a result of the study",
                 choices=known,

@@ -144,8 +144,8 @@ def _study_in_module(module: ModuleType, study_name: str) -> Study:
         )
     if study.name in study_names():
         rule = (
-            f"has a study called {study.name!r}, which is the name of a study of rsfstudy, so "
-            "both studies would write the same files"
+            f"defines the study {study.name!r}, but rsfstudy already has a study with this "
+            "name, and both studies would write the same files"
         )
         raise InvalidValue("study", study_name, rule, remedy="Choose another name.")
     return study

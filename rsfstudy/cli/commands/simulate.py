@@ -122,8 +122,8 @@ def _parse_duration(text: str | None, rig: Rig | None) -> float | None:
     if time is not None and rig is not None:
         return rig.dimensionless(time, name="--duration")
     if isinstance(time, str):
-        remedy = "Pass a number in units of D_c/V_*, or define a rig."
-        raise InvalidValue("--duration", time, "has units, but no rig is defined", remedy=remedy)
+        remedy = "Pass a number in D_c/V_*, or define a rig."
+        raise InvalidValue("--duration", time, "has units, which require a rig", remedy=remedy)
     return time
 
 

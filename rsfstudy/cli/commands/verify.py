@@ -113,7 +113,7 @@ def verify(given: options.CommandOptions) -> int:
     from rsfstudy.referee import compare_file_with_known_answer
 
     if given.figure is None and (given.style, given.width) != (None, None):
-        raise click.UsageError("--style and --width apply to a figure. Add --figure FILE.")
+        raise click.UsageError("--style and --width require a figure. Add --figure FILE.")
     if math.isnan(given.digits):  # Click accepts NaN for any range.
         raise InvalidValue("--digits", given.digits, "must be a number, from 1 to 12")
     columns = assignment_parsing.parse_column_assignments(given.columns)
@@ -140,7 +140,7 @@ def _print_verification(result: Verification) -> None:
         for line in one.describe_agreements():
             print_line(line)
         if not one.has_required_digits:
-            unexplained = "no common difference of conventions explains the disagreement"
+            unexplained = "no common difference in conventions explains the disagreement"
             print_line(f"  {one.explanation_of_disagreement or unexplained}")
     print_line(summarise_comparisons(result.comparisons), style="bold")
 

@@ -26,6 +26,6 @@ def missing_library_error(source: Source, format_name: str, extra: str, library:
         Error with the command that installs the library.
     """
     return DataError(
-        f"{source.origin}: is {format_name}, which {library} reads. Install the library: "
-        f"pip install 'rsfstudy[{extra}]'."
+        f"{source.origin}: is {format_name}, which requires the library {library}. Install the "
+        f"library: pip install 'rsfstudy[{extra}]'."
     )

@@ -164,7 +164,7 @@ class Table:
         rule = (
             (f"is the heading of {len(found)} columns, but must be the heading of exactly one")
             if found
-            else "is not in the table"
+            else "is not a heading of the table"
         )
         remedy = f"Columns can also be selected by their numbers, from 1 to {len(self.headings)}."
         raise InvalidValue(
@@ -215,7 +215,7 @@ class Table:
         if scale == 1.0 and _differ_in_size(units, of_file):
             remedy = f"Write '{self.headings[index]}', or correct the heading in the file."
             raise InvalidValue(
-                quantity_name, units, f"contradicts the units {of_file} of the file", remedy=remedy
+                quantity_name, units, f"contradicts the units in the file, {of_file}", remedy=remedy
             ).with_location(self.location)
         column = self.load_values(index, quantity_name)
         values = column.values

@@ -90,7 +90,9 @@ def read_workbook(source: Source) -> Table:
     with book:
         names = [*map(str, book.sheet_names)]
         if source.sheet and source.sheet not in names:
-            raise InvalidValue("sheet", source.sheet, "is not in the workbook", choices=names)
+            raise InvalidValue(
+                "sheet", source.sheet, "is not a sheet of the workbook", choices=names
+            )
         sheet = source.sheet or names[0]
         try:
             cells = pd.read_excel(book, sheet_name=sheet, header=None)

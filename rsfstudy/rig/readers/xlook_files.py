@@ -62,8 +62,9 @@ def read_xlook(source: Source) -> Table:
     used = int.from_bytes(data[24:28], "big")
     if not 0 < used <= _MAX_COLUMNS:
         raise DataError(
-            f"{path}: has an unknown binary format. Formats that can be read: {_FORMATS}. Export "
-            f"the table as a CSV file. As an xlook file, it would have {used} columns."
+            f"{path}: has an unknown binary format. Formats that can be read: {_FORMATS}. "
+            "Export the table as a CSV file. If the file were an xlook file, it would have "
+            f"{used} columns."
         )
     if len(data) < _DATA_START_BYTE:
         raise DataError(f"{path}: ends within the headers of an xlook file")

@@ -116,7 +116,7 @@ def check_porosity_length(fluid: Fluid, scene: SceneView) -> None:
     """
     if getattr(fluid, "porosity_length", 1.0) == 1.0:
         return
-    loading, remedy = scene.parts.loading, "Leave porosity_length out."
+    loading, remedy = scene.parts.loading, "Omit porosity_length."
     if fluid.auxiliary_rates is not rates_with_porosity_length:
         rule = f"has no effect on the rates of the fluid {fluid.name!r}"
         raise fluid.field_error("porosity_length", rule, remedy)

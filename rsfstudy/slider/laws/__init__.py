@@ -393,7 +393,7 @@ class Law(LawBase):
                 "cannot be used if stress acts on the state variable, because its effects are "
                 "alpha/b and c/b"
             )
-            remedy = "Leave alpha and stress_dependence out, or pass another value of b_over_a."
+            remedy = "Omit alpha and stress_dependence, or pass another value of b_over_a."
             raise self.field_error("b_over_a", rule, remedy)
         if not self.b_over_a and scene.parts.slider.initial_state:
             rule = "has no effect, because b_over_a is 0"
@@ -420,8 +420,7 @@ B_OVER_A_STANDING_FOR_ZERO = 1e-60
 MIN_B_OVER_A = 1e-30
 #: Advice to the user in error messages about a missing critical stiffness.
 MISSING_CRITICAL_STIFFNESS_REMEDY = (
-    "The value of stiffness_ratio is relative to the critical stiffness. Pass stiffness "
-    "instead of stiffness_ratio."
+    "Pass stiffness instead of stiffness_ratio, which is relative to the critical stiffness."
 )
 
 

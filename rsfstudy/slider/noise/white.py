@@ -115,12 +115,12 @@ class WhiteNoise(Noise):
         loading, fluid = scene.parts.loading, scene.parts.fluid
         if loading.unknowns or loading.reported_segment_count < len(loading.segments) - 1:
             rule = f"cannot be added to the loading {loading.name!r}"
-            remedy = "Noise is added to steady loading, steps and protocols."
+            remedy = "Noise can only be added to steady loading, steps and protocols."
             raise InvalidValue("loading_noise", self.name, rule, remedy=remedy)
         if self.unknowns and fluid.unknowns:
             rule = f"does not apply to fluid={fluid.name!r}"
             rule += ", because the pore pressure already changes the effective normal stress"
-            raise self.field_error("normal_stress_noise", rule, "Leave one of them out.")
+            raise self.field_error("normal_stress_noise", rule, "Omit one of the two.")
 
     def parameter_values(self, scene: SceneView) -> Numbers:
         """Return the initial rate of change of the normal stress.
