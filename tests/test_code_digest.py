@@ -229,7 +229,9 @@ def test_a_worker_with_another_helper_is_refused(tmp_path, monkeypatch, cluster)
     monkeypatch.syspath_prepend(tmp_path)
     import shared_by_both
 
-    with pytest.raises(RunError, match="a worker cannot load the measure.*'shared_by_both'"):
+    with pytest.raises(
+        RunError, match="a worker process cannot load the measure.*'shared_by_both'"
+    ):
         rsfstudy.run(shared_by_both.study, client=cluster, output=None, progress=False)
     cluster.run(lambda place: sys.path.insert(0, place), str(tmp_path))
     assert rsfstudy.run(shared_by_both.study, client=cluster, output=None, progress=False)

@@ -86,7 +86,7 @@ def test_a_guarded_object_can_be_pickled(record):
 
 def test_calls_from_inside_rsfstudy_keep_the_original_exception():
     inner = error_boundary(lambda: {}["a"])
-    with pytest.raises(InvalidValue, match="fails for these arguments"):
+    with pytest.raises(InvalidValue, match="failed for these arguments"):
         inner()
     caller = {"__name__": "rsfstudy.somewhere", "inner": inner}
     exec("def call(): return inner()", caller)
@@ -184,7 +184,7 @@ def test_a_call_that_does_not_fit_lists_the_parameters(call, message, dataset):
 def test_the_argument_is_named(call, message, record):
     with pytest.raises(InvalidValue, match=message) as error:
         call(record)
-    assert "fails for these arguments" not in str(error.value)
+    assert "failed for these arguments" not in str(error.value)
 
 
 @pytest.mark.parametrize(
@@ -209,7 +209,7 @@ def test_a_function_of_the_user_that_fails_is_named(dataset):
         raise ZeroDivisionError("no")
 
     with pytest.raises(
-        InvalidValue, match="user_figure = <function .*fails when it is called .*: no"
+        InvalidValue, match="user_figure = <function .*raised an error when it was called .*: no"
     ):
         rsfstudy.plot(dataset, user_figure=draw)
 

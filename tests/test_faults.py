@@ -113,7 +113,7 @@ def sturdy(tmp_path_factory):
 def lost(*words, **options):
     """Run a study and check the warnings about a lost worker."""
     with (
-        pytest.warns(UserWarning, match="a worker ended. Its"),
+        pytest.warns(UserWarning, match="a worker process ended unexpectedly. Its"),
         pytest.warns(UserWarning, match="cell b_over_a = .* failed, .*The run continues"),
     ):
         return run_with_failures(*words, **options)
@@ -124,7 +124,7 @@ def test_a_cell_that_kills_its_worker(sturdy, monkeypatch):
     monkeypatch.setattr(CellBatchIterator, "compute_next_batch_size", lambda _self: 4)
     dataset = lost(faulty_study("segfaults", at=(2.5,)), client=sturdy[0])
     only_one_failed(dataset, "worker_lost")
-    assert "insufficient memory" in dataset.message.values[1]
+    assert "needed too much memory" in dataset.message.values[1]
 
 
 def test_a_cell_that_raises_keyboard_interrupt_on_a_worker(cluster):

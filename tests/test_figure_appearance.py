@@ -108,8 +108,8 @@ def test_commands_draw_figures_with_a_width_and_a_style(motion, results, tmp_pat
 @pytest.mark.parametrize(
     ("name", "option", "message"),
     [
-        ("motion", ["--variable", "slip"], "applies to results of a study only"),
-        ("study", ["--against", "time"], "applies to a motion only"),
+        ("motion", ["--variable", "slip"], "applies only to results of a study"),
+        ("study", ["--against", "time"], "applies only to a motion"),
         ("study", ["--width", "5 mm"], "must be from 60 mm to 600 mm"),
     ],
 )

@@ -86,7 +86,7 @@ def test_a_motion_that_differs_is_told(place, tmp_path):
     ],
 )
 def test_what_cannot_be_computed_again_says_what_is_and_how(place, name, why, call):
-    with pytest.raises(DataError, match="motions of rsfstudy.simulate") as refused:
+    with pytest.raises(DataError, match="motions that rsfstudy.simulate") as refused:
         rsfstudy.rerun(place / f"{name}.nc")
     assert f"{why})" in str(refused.value)
     assert f"rsfstudy.{call}rtol=" in str(refused.value)

@@ -264,7 +264,7 @@ def test_a_full_disk_while_cells_are_computed(tmp_path, monkeypatch):
     said = " ".join(ran.stderr.split())
     assert ran.returncode == 1
     assert "cannot write to" in said
-    assert "Run the same command again to resume" in said
+    assert "To resume the run, run the same command again" in said
     kept = count_journal_cells(tmp_path / "faulty.cells.sqlite")
     assert 0 < kept < 2000
     whole = run(faulty_study(cells=2000))

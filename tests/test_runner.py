@@ -182,7 +182,10 @@ def test_runs_share_processes_that_are_started_once(monkeypatch, tmp_path):
         assert not started
         assert ran("one") == 4 * ["OK"]
         assert ran("one") == 4 * ["OK"]  # The cells are read from the journal.
-        ended, failed = (pytest.warns(match=text) for text in ("a worker ended", "cell .* failed"))
+        ended, failed = (
+            pytest.warns(match=text)
+            for text in ("a worker process ended unexpectedly", "cell .* failed")
+        )
         with ended, failed:
             assert ran("two", "dies") == ["OK", "OK", "WORKER_LOST", "OK"]
         assert ran("three") == 4 * ["OK"]

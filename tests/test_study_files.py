@@ -66,7 +66,7 @@ def test_a_file_may_have_helpers_beside_it_and_not_the_name_of_a_named_study(tmp
     helped = "from my_angles import angles\n" + DECLARATION.replace("[55, 65]", "angles")
     assert study_loader.load_study(written(tmp_path, helped)).size == 2
     taken = DECLARATION.replace('"mine"', '"stress_drop"')
-    with pytest.raises(InvalidValue, match="the name of a study of rsfstudy"):
+    with pytest.raises(InvalidValue, match="rsfstudy already has a study with this name"):
         study_loader.load_study(written(tmp_path, taken))
 
 

@@ -755,7 +755,7 @@ def _run(words: Sequence[str], place: str, limit: float) -> None:
 _RICH_ESCAPES = re.compile(r"\x1b\[(?:[0-9;]*m|\?25[lh]|2K|1A)")
 _EXCEPTION = re.compile(r"(?<!raises )\b(?:[A-Z]\w*(?:Error|Exception|Halt)|Exception)\b(?::|\))")
 _CATCH_ALL_MESSAGES = (
-    "fails for these arguments (",
+    "failed for these arguments (",
     "cannot be had of this dataset",
     "A file may be damaged or not writable",
 )
