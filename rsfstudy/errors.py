@@ -20,8 +20,8 @@ __getattr__ = build_getattr_for_former_names(__name__)
 _MAX_CHARACTERS_OF_VALUE, _MAX_CHOICES, _MAX_CHOICES_WITH_SUGGESTIONS = 200, 60, 20
 #: Kinds of objects that an error message identifies by name, as in "column 'speed' is unknown".
 _KINDS_OF_NAMED_OBJECTS = frozenset(
-    {"axis", "column", "dimension", "directory", "header", "heading", "override", "problem"}
-    | {"reduction", "sheet", "study", "table", "variable"}
+    {"axis", "column", "dimension", "directory", "field", "header", "heading", "override"}
+    | {"problem", "reduction", "sheet", "study", "table", "variable"}
 )
 #: Maximum number of characters of a message.
 _MAX_MESSAGE_LENGTH = 5000
