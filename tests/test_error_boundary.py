@@ -75,7 +75,7 @@ def test_constructors_and_methods_are_within_the_boundary(kind):
 def test_functions_are_within_the_boundary():
     for name in rsfstudy.__all__:
         if inspect.isfunction(function := getattr(rsfstudy, name)) and name != "simulate":
-            with pytest.raises(CallError, match=rf"{name}\(\) .* It takes"):
+            with pytest.raises(CallError, match=rf"{name}\(\) .* Parameters:"):
                 function(*[None] * 40)
 
 
@@ -98,11 +98,11 @@ def test_calls_from_inside_rsfstudy_keep_the_original_exception():
 @pytest.mark.parametrize(
     ("call", "message"),
     [
-        (lambda d: d.rsf.plot(varible="zeta"), "'varible'. Did you mean 'variable'. It takes"),
-        (lambda d: d.rsf.to_si(x=1), r"to_si\(\) .*'x'. It takes dataset, normal_stress"),
+        (lambda d: d.rsf.plot(varible="zeta"), "'varible'. Did you mean 'variable'. Parameters:"),
+        (lambda d: d.rsf.to_si(x=1), r"to_si\(\) .*'x'. Parameters: dataset, normal_stress"),
         (lambda d: LinearFit("z", of="x", onn="y"), "'onn'.* Did you mean 'on'"),
-        (lambda d: Segment(1.0, duratoin=2.0), "'duratoin'.* It takes load_velocity"),
-        (lambda d: RIG.axis(units=5), r"axis\(\) .*'dimension'. It takes dimension"),
+        (lambda d: Segment(1.0, duratoin=2.0), "'duratoin'.* Parameters: load_velocity"),
+        (lambda d: RIG.axis(units=5), r"axis\(\) .*'dimension'. Parameters: dimension"),
         (lambda d: rsfstudy.recompute_cell("x", {}, studdy=1), "Did you mean 'study'"),
         (lambda d: rsfstudy.check(d, **{"\x1b[31m": 1}), r"'\\x1b\[31m'"),
     ],
@@ -119,10 +119,13 @@ def test_a_call_that_does_not_fit_lists_the_parameters(call, message, dataset):
     ("call", "message"),
     [
         (lambda r: r.window("5 s", "9 s"), "start must be a number"),
-        (lambda r: r.with_steps([(1, 2)]), r"step = \(1, 2\): (must be four|is not a step)"),
+        (lambda r: r.with_steps([(1, 2)]), r"step = \(1, 2\) is not a step"),
         (lambda r: r.with_steps(7), "steps must be a list"),
         (lambda r: rsfstudy.fit("rec.csv"), "record = 'rec.csv' is not a record. .*read_record"),
-        (lambda r: rsfstudy.fit(r, laws="slip", stiffness=1e-3), r"laws = 'slip': .*\['slip'\]"),
+        (
+            lambda r: rsfstudy.fit(r, laws="slip", stiffness=1e-3),
+            r"laws must be a list.*'slip'.*\['slip'\]",
+        ),
         (lambda r: RIG.axis("slip_distance", ["1 um"], units=5), "units must be a mapping"),
         (lambda r: RIG.in_units("x"), "dataset must be an xarray.Dataset"),
         (lambda r: Scene().with_segment(None), "segment must be a rsfstudy.Segment"),
@@ -135,17 +138,23 @@ def test_a_call_that_does_not_fit_lists_the_parameters(call, message, dataset):
         (lambda r: Panel(hue="law"), "hue must be a list"),
         (lambda r: Panel(log="z"), "log must contain only x and y"),
         (lambda r: Segment("a"), "load_velocity must be a number"),
-        (lambda r: ClosedFormRatio("z", of="x", form=np.ones(3)), "form = array.*must be a string"),
+        (
+            lambda r: ClosedFormRatio("z", of="x", form=np.ones(3)),
+            "form must be a string .got array",
+        ),
         (lambda r: LinearFit("z", of=None, on="x"), "of must be a string"),
         (
             lambda r: reductions.apply_reductions(r, ()),
-            "dataset = Record.*must be an xarray.Dataset",
+            "dataset must be an xarray.Dataset .got Record",
         ),
         (lambda r: rsfstudy.run("a" * 300), "study 'aaa.*at most 255 bytes"),
-        (lambda r: rsfstudy.history({"time": [0, 1], "velocity": "="}), "velocity = '=' must"),
+        (
+            lambda r: rsfstudy.history({"time": [0, 1], "velocity": "="}),
+            "velocity must be a list of numbers .got '='",
+        ),
         (lambda r: study_of("s", LinearStability(), Axis("a", [0.1])).scene(-1), "number = -1 is"),
-        (lambda r: rsfstudy.read_record({"time": np.datetime64("2020")}), "time = .*one dim"),
-        (lambda r: rsfstudy.Accuracy().with_rtol(np.timedelta64(1)), "rtol = .*must be a number"),
+        (lambda r: rsfstudy.read_record({"time": np.datetime64("2020")}), "time must have one dim"),
+        (lambda r: rsfstudy.Accuracy().with_rtol(np.timedelta64(1)), "rtol must be a number"),
         (
             lambda r: Rig(normal_stress=None, slip_distance=1e-5, reference_velocity=1e-6),
             "normal_stress is required",
@@ -156,16 +165,19 @@ def test_a_call_that_does_not_fit_lists_the_parameters(call, message, dataset):
             ),
             "stiffness_ratio = 5e-324 is so small",
         ),
-        (lambda r: Scene(a=np.timedelta64(1, "s")), "a = .*must be a number"),
-        (lambda r: Axis("a", [0.1]).with_rows(np, {}), "rows = <module 'numpy'.*must be a list"),
-        (lambda r: Figure(panels=np.ndarray), "panels = <class.*must be a list"),
+        (lambda r: Scene(a=np.timedelta64(1, "s")), "a must be a number"),
+        (lambda r: Axis("a", [0.1]).with_rows(np, {}), "rows must be a list.*got <module 'numpy'"),
+        (lambda r: Figure(panels=np.ndarray), "panels must be a list .got <class"),
         (lambda r: rsfstudy.read_table(STEP, {"time": 5}), "column must be a heading, or"),
         (
             lambda r: rsfstudy.read_table(STEP, {"time": []}),
             r"column must be a heading, or",
         ),
         (lambda r: rsfstudy.read_table(STEP, {"time": ("a", "s", "x")}), "must be a heading, or"),
-        (lambda r: rsfstudy.read_table(STEP, xr.Dataset({"time": 1.0})), "column = <xarray.Data"),
+        (
+            lambda r: rsfstudy.read_table(STEP, xr.Dataset({"time": 1.0})),
+            "column must be a heading.*got <DataArray",
+        ),
         (
             lambda r: reductions.Mean("z", of="x").compute(ARRAY),
             "of = .*has no dimension 'sample'. Ch",

@@ -196,7 +196,9 @@ def test_a_binary_file_of_xlook(tmp_path: Path) -> None:
     by_text = {"time": "Time (ms)", "displacement": "LP_Disp (um)", "friction": "mu"}
     plain = rsfstudy.read_record(path, by_text)
     np.testing.assert_allclose(plain.columns["displacement"], bits, rtol=1e-6)
-    with pytest.raises(InvalidValue, match="friction = .1,. has 1 samples, but time has 4"):
+    with pytest.raises(
+        InvalidValue, match="friction must have 4 samples, as many as time .got .1,"
+    ):
         rsfstudy.read_record(path, {**chosen, "friction": ("rest", "1")})
     with pytest.raises(
         InvalidValue, match="column 'tau' is not a heading of the table.* Columns can also be"
@@ -233,10 +235,10 @@ def test_slip_is_turned_into_displacement_of_the_load_point(
 
 def test_slip_without_stiffness_is_refused() -> None:
     arrays = {"time": TIME, "slip": MOVED, "friction": 0.6 + 0.0 * TIME}
-    with pytest.raises(InvalidValue, match=r"slip = .*requires a stiffness.*read_record"):
+    with pytest.raises(InvalidValue, match=r"slip requires a stiffness.*read_record"):
         rsfstudy.read_record(arrays)
     with pytest.raises(InvalidValue, match=r"stiffness = '0.04 MPa/um' requires a normal stress"):
         rsfstudy.read_record(arrays, stiffness="0.04 MPa/um")
     for wrong in (-1.0, 0.0, "0 1/um"):
-        with pytest.raises(InvalidValue, match=r"stiffness = .*must be positive"):
+        with pytest.raises(InvalidValue, match=r"stiffness must be positive"):
             rsfstudy.read_record(arrays, stiffness=wrong)

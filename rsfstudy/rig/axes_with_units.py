@@ -188,7 +188,7 @@ def convert_values_to_units(quantity_name: str, values: Sequence[Any], units: st
         if not _is_allowed_rig_number(quantity_name, number)
     ]
     if wrong:
-        of = f" ({len(wrong)} of {len(found)} values are not)" if len(found) > 1 else ""
+        of = f", but {len(wrong)} of {len(found)} values are not" if len(found) > 1 else ""
         raise InvalidValue(quantity_name, wrong[0], f"must be positive{of}")
     return found
 
