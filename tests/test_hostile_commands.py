@@ -173,7 +173,7 @@ def test_the_fuzzer_uses_every_command_and_every_option():
         (Answer(-9, "", 20.0, hangs=True), ["hang"]),
         (Answer(1, "Traceback (most recent call last):\n", 0.1), ["traceback"]),
         (Answer(0, "a\x1b[31mb", 0.1), ["control '\\x1b'"]),
-        (Answer(2, "fit fails for these arguments (TypeError: x)", 0.1), ["catch-all"]),
+        (Answer(2, "fit failed for these arguments (TypeError: x)", 0.1), ["catch-all"]),
         (Answer(2, "cannot be read (KeyError: 'x')", 0.1), ["raw KeyError:"]),
     ],
 )
