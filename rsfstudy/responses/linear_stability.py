@@ -157,6 +157,24 @@ class LinearStability(Measure):
         """
         return {"name": self.name, **({"growth_rate": True} if self.growth_rate else {})}
 
+    @classmethod
+    def fields_from_description(cls, described: dict[str, Any], path: str) -> dict[str, Any]:
+        """Return the default of ``growth_rate`` if a description omits it.
+
+        Parameters
+        ----------
+        described : dict
+            Description of a measure, as returned by ``describe``.
+        path : str
+            Location of the description in the file, for use in error messages.
+
+        Returns
+        -------
+        dict
+            Field values by name.
+        """
+        return {} if "growth_rate" in described else {"growth_rate": False}
+
     def compute(self, scene: Scene, integrator: Integrator) -> Outcome:
         """Compute the critical stiffness, and the growth rate if requested.
 
