@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from motion_helpers import cot_phi
 
 from rsfstudy import Scene
-from rsfstudy.responses.linear_stability import compute_jacobian, max_growth_rate
+from rsfstudy.responses.perturbation_growth import compute_jacobian, max_growth_rate
 from rsfstudy.slider import closed_forms, laws, stability, steady_state
 from rsfstudy.slider.equations import build_equations_against_displacement
 from rsfstudy.slider.friction import effective_normal_stress_at

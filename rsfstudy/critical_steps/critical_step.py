@@ -72,18 +72,25 @@ _MIN_EXCESS_IF_FIRST_PEAK_REACHES_NORM = 0.1
 #: negligible.
 _INSTABILITY_NORM_WITH_NEGLIGIBLE_INERTIA = 1e-3
 
+#: The measure ``LinearStability`` has an output of the same name, which includes inertia and
+#: radiation damping.
+_QUASI_STATIC_CRITICAL_STIFFNESS = Output(
+    "critical_stiffness",
+    r"$k_{cr}D_c/\sigma_*$",
+    "1",
+    "critical stiffness of quasi-static steady sliding at V_star, without inertia or radiation "
+    "damping",
+    "sigma_*/D_c",
+)
+
 
 @cache
 def _build_outputs_for_step_quantity(quantity: str) -> tuple[Output, ...]:
     """Return the outputs of a critical step of a given type."""
     critical = STEP_FAMILY_BY_QUANTITY[quantity].critical_output_name
     confirmed = (f"{critical}_stable", f"{critical}_unstable")
-    beside = (
-        *confirmed,
-        *STEP_FAMILY_BY_QUANTITY[quantity].extra_output_names,
-        "critical_stiffness",
-    )
-    return Output(critical, error=True), *map(Output, beside)
+    beside = (*confirmed, *STEP_FAMILY_BY_QUANTITY[quantity].extra_output_names)
+    return Output(critical, error=True), *map(Output, beside), _QUASI_STATIC_CRITICAL_STIFFNESS
 
 
 @wrap_methods_in_error_boundary

@@ -1,39 +1,47 @@
 """Linear stability of steady sliding.
 
 The critical stiffness is computed in three ways: from the friction relation, from the growth rates
-of small perturbations, and in closed form.
+of small perturbations, and in closed form. The growth rate at the stiffness of the scene is
+computed in two ways: from the friction relation, and from the equations of motion.
 """
 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
-from typing import ClassVar
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Any, ClassVar
 
-import numpy as np
 from scipy.optimize import brentq
 
 from rsfstudy.error_boundary import wrap_methods_in_error_boundary
 from rsfstudy.measure_base import Measure, Outcome
 from rsfstudy.motion import Integrator
 from rsfstudy.quantities import Output
-from rsfstudy.slider import Equations, Scene, SteadySliding, critical_stiffness_closed_form
+from rsfstudy.responses.perturbation_growth import (
+    GROWTH_OUTPUTS,
+    add_growth_rate,
+    compute_jacobian_of_steady_sliding,
+    max_growth_rate,
+)
+from rsfstudy.slider import Scene, SteadySliding, critical_stiffness_closed_form
 from rsfstudy.status import Status
 
-#: Step of the central differences, in units of the scale of an unknown. Rounding and truncation
-#: errors are of the same size at this step.
-_RELATIVE_DIFFERENCE_STEP = 1e-4
-#: Dimensionless slip rate above which growth rates are computed from the inertial equations of
-#: motion. At lower slip rates, the effect of inertia is smaller than the rounding errors of the
-#: inertial equations of motion. At lower slip rates, the slow manifold, which is of second order in
-#: the mass, is accurate enough.
-_MIN_SLIP_RATE_NORM_FOR_FULL_EQUATIONS = 1e-3
 #: Steady sliding is treated as unstable at any stiffness if the relative increase of the critical
 #: stiffness by inertia exceeds this number.
 _MAX_CRITICAL_STIFFNESS_RISE_BY_INERTIA = 1e6
 
+_CRITICAL_STIFFNESS = Output(
+    "critical_stiffness",
+    r"$k_{cr}D_c/\sigma_*$",
+    "1",
+    "critical stiffness of steady sliding at the load point velocity, with inertia or radiation "
+    "damping if the scene includes them",
+    "sigma_*/D_c",
+    error=True,
+)
 _OUTPUTS = (
-    Output("critical_stiffness", error=True),
+    _CRITICAL_STIFFNESS,
     Output("critical_stiffness_from_growth"),
     Output("critical_stiffness_explicit"),
     Output("relative_critical_stiffness"),
@@ -49,15 +57,26 @@ _OUTPUTS = (
 @wrap_methods_in_error_boundary
 @dataclass(frozen=True)
 class LinearStability(Measure):
-    r"""Critical stiffness of steady sliding at the load point velocity.
+    r"""Critical stiffness and growth rate at the load point velocity.
 
-    The critical stiffness is computed by three methods, whose results are compared. The first
-    result follows from the friction relation. The second result is the stiffness at which small
-    perturbations neither grow nor decay according to the equations of motion. The third result is
-    the quasi-static closed form, corrected for inertia and radiation damping.
+    The critical stiffness of steady sliding is computed by three methods, whose results are
+    compared. The first result follows from the friction relation. The second result is the
+    stiffness at which small perturbations neither grow nor decay according to the equations of
+    motion. The third result is the quasi-static closed form, corrected for inertia and radiation
+    damping.
 
     Stresses are in units of sigma_*, and stiffnesses are in units of sigma_*/D_c. The relative
-    critical stiffness is the critical stiffness divided by the critical stiffness at V_*.
+    critical stiffness is the critical stiffness divided by the critical stiffness at V_* without
+    inertia or radiation damping.
+
+    Parameters
+    ----------
+    growth_rate : bool, default: False
+        If True, the measure also computes the growth rate and the angular frequency of the least
+        stable small perturbation at the stiffness of the scene, in units of V_*/D_c. The main
+        result is then the growth rate, and the stiffness of the scene may be an axis of a study. If
+        the critical stiffness does not exist, the status is nevertheless ``ok``, and the message
+        contains the reason.
 
     Notes
     -----
@@ -67,8 +86,11 @@ class LinearStability(Measure):
 
     .. math:: K (1 + w^2 p^2) + \eta V p + G(p) = 0.
 
-    The stiffness is critical if :math:`p` is imaginary [1]_. Under the slip law and the slowness
-    law, the critical stiffness of quasi-static, drained motion at :math:`V_*` is
+    The growth rate and the angular frequency are the real part and the imaginary part of
+    :math:`p V/V_*`, for the root :math:`p` with the largest real part. If this root is real, the
+    angular frequency is zero. The stiffness is critical if :math:`p` is imaginary [1]_. Under the
+    slip law and the slowness law, the critical stiffness of quasi-static, drained motion at
+    :math:`V_*` is
 
     .. math:: K = \frac{b - a}{1 - (\mu_* - \alpha) \cot\varphi},
 
@@ -91,24 +113,75 @@ class LinearStability(Measure):
     >>> outcome = LinearStability()(scene, Accuracy())
     >>> round(outcome.values["critical_stiffness"], 6)
     0.005
+    >>> softer = scene.with_(stiffness_ratio=0.9)
+    >>> outcome = LinearStability(growth_rate=True)(softer, Accuracy())
+    >>> round(outcome.values["growth_rate"], 6)
+    0.025
     """
 
+    growth_rate: bool = False
     name: ClassVar[str] = "linear_stability"
-    primary_output = "critical_stiffness"
     typical_work = 100
-    outputs = _OUTPUTS
     needs_time: ClassVar[tuple[bool, ...]] = ()
 
     @property
+    def primary_output(self) -> str:
+        """Name of the main result, ``critical_stiffness`` or ``growth_rate``."""
+        return "growth_rate" if self.growth_rate else "critical_stiffness"
+
+    @property
+    def outputs(self) -> Sequence[Output]:
+        """Critical stiffness, properties of steady sliding, and the growth rate if requested."""
+        if not self.growth_rate:
+            return _OUTPUTS
+        return (*GROWTH_OUTPUTS, replace(_CRITICAL_STIFFNESS, optional=True), *_OUTPUTS[1:])
+
+    @property
     def solved_fields(self) -> tuple[str, ...]:
-        """Stiffness of the scene. The measure ignores this value."""
-        return ("stiffness_ratio",)
+        """Stiffness of the scene. The measure ignores this value unless it is needed.
+
+        The stiffness is needed for the growth rate.
+        """
+        return () if self.growth_rate else ("stiffness_ratio",)
+
+    def describe(self) -> dict[str, Any]:
+        """Return the definition of the measure as plain data.
+
+        The description contains ``growth_rate`` only if it is True. Declarations without growth
+        rates are therefore the same as the declarations of versions without this option.
+
+        Returns
+        -------
+        dict
+            Name of the measure, and values of its fields.
+        """
+        return {"name": self.name, **({"growth_rate": True} if self.growth_rate else {})}
+
+    @classmethod
+    def fields_from_description(cls, described: dict[str, Any], path: str) -> dict[str, Any]:
+        """Return the default of ``growth_rate`` if a description omits it.
+
+        Parameters
+        ----------
+        described : dict
+            Description of a measure, as returned by ``describe``.
+        path : str
+            Location of the description in the file, for use in error messages.
+
+        Returns
+        -------
+        dict
+            Field values by name.
+        """
+        return {} if "growth_rate" in described else {"growth_rate": False}
 
     def compute(self, scene: Scene, integrator: Integrator) -> Outcome:
-        """Compute the critical stiffness from friction and from growth rates.
+        """Compute the critical stiffness, and the growth rate if requested.
 
-        The error estimate is the difference between the critical stiffness from friction and the
-        critical stiffness from growth rates.
+        The error estimate of the critical stiffness is the difference between the critical
+        stiffness from friction and the critical stiffness from growth rates. The error estimate of
+        the growth rate is the difference between the growth rate from friction and the growth rate
+        from the equations of motion.
 
         Parameters
         ----------
@@ -134,6 +207,14 @@ class LinearStability(Measure):
                 "phi < atan(mu_ss): the slider locks while stress increases, and slips while "
                 "stress decreases",
             )
+        outcome = self._compute_critical_stiffness(scene, steady, integrator)
+        return add_growth_rate(outcome, scene, steady, integrator) if self.growth_rate else outcome
+
+    def _compute_critical_stiffness(
+        self, scene: Scene, steady: SteadySliding, integrator: Integrator
+    ) -> Outcome:
+        """Compute the critical stiffness from friction and from growth rates."""
+        load = steady.log_slip_rate
         sigma_ss = scene.effective_normal_stress_at(steady.frictional_stress)
         mu_ss = (scene.mu_star + steady.frictional_stress) / sigma_ss
         values = {"steady_friction": mu_ss, "steady_normal_stress": sigma_ss}
@@ -206,22 +287,12 @@ def _find_stiffness_at_zero_growth(
 
     The result is NaN if perturbations do not grow below this stiffness, or do not decay above it.
     """
-    with_mass = (
-        scene.dynamics.slip_rate_norm(scene, steady_state.log_slip_rate)
-        > _MIN_SLIP_RATE_NORM_FOR_FULL_EQUATIONS
-    )
 
     def growth_at(stiffness: float) -> float:
         changed = scene.with_(stiffness=stiffness)
-        if with_mass:
-            equations = changed.equations_against_inertial_time()
-            stress = steady_state.spring_stress
-            state = (stress, steady_state.log_slip_rate, stress, *steady_state.states[1:])
-        else:
-            equations = changed.equations_against_displacement()
-            state = (steady_state.spring_stress, *steady_state.states)
-        integrator.work_meter.charge(equations.regime, 2 * len(state))
-        return max_growth_rate(compute_jacobian(equations, state))
+        return max_growth_rate(
+            compute_jacobian_of_steady_sliding(changed, steady_state, integrator)
+        )
 
     # If the scene has several states, sliding may be stable again below the next smaller critical
     # stiffness.
@@ -234,47 +305,3 @@ def _find_stiffness_at_zero_growth(
     return float(
         brentq(growth_at, softer, 2.0 * stiffness_guess, xtol=1e-15 * stiffness_guess, rtol=1e-14)
     )
-
-
-def max_growth_rate(jacobian: np.ndarray) -> float:
-    """Return the growth rate of the fastest-growing perturbation.
-
-    Parameters
-    ----------
-    jacobian : ndarray, shape (n, n)
-        Jacobian of the right-hand side of the equations of motion.
-
-    Returns
-    -------
-    float
-        Growth rate per unit of the independent variable of the equations.
-    """
-    return float(np.linalg.eigvals(jacobian).real.max())
-
-
-def compute_jacobian(equations: Equations, unknowns: tuple[float, ...]) -> np.ndarray:
-    """Compute the Jacobian of the right-hand side by central differences.
-
-    Parameters
-    ----------
-    equations : Equations
-        Equations of motion.
-    unknowns : tuple of float
-        Unknowns at which the Jacobian is computed.
-
-    Returns
-    -------
-    ndarray, shape (n, n)
-        Derivatives of the right-hand side (rows) with respect to the unknowns (columns).
-    """
-    columns = []
-    for number, scale in enumerate(equations.unknown_scales):
-        step = _RELATIVE_DIFFERENCE_STEP * scale
-        ahead, behind = (
-            equations.evaluate_rates(
-                tuple(x + sign * step * (i == number) for i, x in enumerate(unknowns))
-            )
-            for sign in (1.0, -1.0)
-        )
-        columns.append([(u - v) / (2.0 * step) for u, v in zip(ahead, behind, strict=True)])
-    return np.array(columns).T

@@ -85,11 +85,13 @@ class Scene(SceneFunctions, SceneQuantities):
     mu_star : float, default: 0.76
         Steady-state friction coefficient at :math:`V_*`.
     stiffness_ratio : float, optional
-        Ratio of the stiffness to the critical stiffness at :math:`V_*` without radiation damping.
-        Steady sliding is stable at stiffness ratios above 1. If the scene has radiation damping,
-        steady sliding is also stable at stiffness ratios slightly below 1. If the law has several
-        states, steady sliding may also be stable at lower stiffness ratios. The default is 1 if
-        ``stiffness`` is not given.
+        Ratio of the stiffness to the critical stiffness at :math:`V_*` without inertia or radiation
+        damping (see ``critical_stiffness``). If the slider moves at :math:`V_*` without inertia,
+        steady sliding is stable at stiffness ratios above 1. With radiation damping, steady sliding
+        is also stable at stiffness ratios slightly below 1. With inertia, steady sliding is
+        unstable at stiffness ratios slightly above 1. If the law has several states, steady sliding
+        may also be stable at lower stiffness ratios. The default is 1 if ``stiffness`` is not
+        given.
     stiffness : float, optional
         Stiffness :math:`k D_c/\sigma_*`, as an alternative to ``stiffness_ratio``.
     period : float, default: 5.0
@@ -396,9 +398,13 @@ class Scene(SceneFunctions, SceneQuantities):
 
     @cached_attribute
     def critical_stiffness(self) -> float:
-        """Critical stiffness at V_*, in units of sigma_*/D_c.
+        """Quasi-static critical stiffness at V_*, in units of sigma_*/D_c.
 
-        See ``stability.critical_stiffness`` for the definition.
+        The value includes the law, the normal stress condition with alpha, the fluid and the
+        temperature. It does not include inertia, radiation damping, the loading or noise. For the
+        critical stiffness with inertia or radiation damping, or at another slip rate, use
+        ``critical_stiffness_at``. The value is 0 if steady sliding is stable at every stiffness,
+        and infinite if steady sliding is unstable at every stiffness.
         """
         slider, law, stress, pores, *_others, heat, _noise = self.parts
         return _critical_stiffness(slider.a, slider.mu_star, law, stress, pores, heat)

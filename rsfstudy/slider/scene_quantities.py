@@ -128,9 +128,11 @@ class SceneQuantities(SceneBase):
     def stiffness_ratio(self) -> float:
         """Ratio of the stiffness to the critical stiffness at V_*.
 
-        If the law is not rate weakening, steady sliding is stable at every stiffness, and the ratio
-        is infinite. If the law has several states, steady sliding may be unstable only in a range
-        of stiffness. In this case, a ratio below 1 does not imply that steady sliding is unstable.
+        The critical stiffness is ``Scene.critical_stiffness``, which does not include inertia or
+        radiation damping. If the law is not rate weakening, steady sliding is stable at every
+        stiffness, and the ratio is infinite. If the law has several states, steady sliding may be
+        unstable only in a range of stiffness. In this case, a ratio below 1 does not imply that
+        steady sliding is unstable.
         """
         given = self.parts.slider.stiffness_ratio
         if given is not None:

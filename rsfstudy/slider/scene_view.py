@@ -98,4 +98,4 @@ class SceneView(Protocol):
 
     @property
     def critical_stiffness(self) -> float:
-        """Critical stiffness in units of sigma_*/D_c."""
+        """Quasi-static critical stiffness at V_*, in units of sigma_*/D_c."""

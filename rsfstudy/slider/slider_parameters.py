@@ -21,7 +21,8 @@ class SliderParameters(Part):
     mu_star : float, default: 0.76
         Steady-state friction coefficient at the reference velocity :math:`V_*`.
     stiffness_ratio : float, optional
-        Ratio of the stiffness to the critical stiffness at :math:`V_*` without radiation damping.
+        Ratio of the stiffness to the critical stiffness at :math:`V_*` without inertia or radiation
+        damping.
     stiffness : float, optional
         Stiffness :math:`k D_c/\sigma_*`.
     period : float, default: 5.0
@@ -49,7 +50,8 @@ class SliderParameters(Part):
         None,
         r"$k/k_{cr}(V_*)$",
         "1",
-        "stiffness divided by the critical stiffness at V_star without radiation damping",
+        "stiffness divided by the critical stiffness at V_star without inertia or radiation "
+        "damping",
         rule=POSITIVE,
     )
     stiffness: float | None = number(

@@ -60,7 +60,8 @@ def critical_stiffness(
     log_slip_rate : float
         Natural logarithm of the slip rate, :math:`\ln(V/V_*)`.
     quasi_static : bool, default: False
-        If True, the function ignores inertia and radiation damping.
+        If True, the function ignores inertia and radiation damping. The property
+        ``Scene.critical_stiffness`` is the result of this option at :math:`V_*`.
 
     Returns
     -------
@@ -71,7 +72,7 @@ def critical_stiffness(
 
     Notes
     -----
-    For one state variable without inertia,
+    For one state variable, constant pore pressure, and no inertia or radiation damping,
 
     .. math::
 

@@ -35,6 +35,9 @@ def shear_coupled_normal_stress_excess(frictional_stress: float, p: Numbers) -> 
 
         \frac{\sigma}{\sigma_*} = 1 + e + \cot\phi \, \frac{\tau - \tau_*}{\sigma_*}.
 
+    Here :math:`\tau` is the frictional stress, which is the shear stress on the fault. It differs
+    from the spring stress if the slider has inertia or radiation damping.
+
     The change in :math:`\sigma_3` does not affect shear stress.
     """
     cot_phi = p[NORMAL_STRESS + 1]
@@ -62,6 +65,8 @@ class VariableNormalStress(NormalStressWithStateEffect):
     .. math::
 
         \sigma = \sigma_3 + \tau \cot\phi, \quad d\Theta = -\alpha \frac{d\sigma}{\sigma}.
+
+    Here :math:`\tau` is the frictional stress, not the spring stress.
 
     References
     ----------
