@@ -76,7 +76,10 @@ class Status(IntEnum):
     ERRORS_NOT_VALID = 19, "the values are valid, but their standard errors are not valid"
 
     # The statuses below are failures.
-    WORK_BUDGET_SPENT = 20, "the evaluation budget was exceeded before a result was found"
+    WORK_BUDGET_SPENT = (
+        20,
+        "the evaluation budget or a limit of the measure was exceeded before a result was found",
+    )
     INTEGRATION_FAILED = 21, "the integration failed, or a value is not finite"
     UNVERIFIED = (
         22,

@@ -4,6 +4,7 @@ A failing cell is detected, isolated and recorded, and its neighbours are not af
 Reductions ignore the failure only on request.
 """
 
+import re
 import shlex
 import signal
 import subprocess
@@ -31,7 +32,7 @@ from rsfstudy.critical_steps.critical_step import CriticalStep
 from rsfstudy.errors import IncompleteWarning, InvalidValue, RunError
 from rsfstudy.execution import clusters, study_run, worker_pool
 from rsfstudy.execution.cell_plan import CellBatchIterator
-from rsfstudy.reductions import LinearFit, apply_reductions
+from rsfstudy.reductions import LinearFit, Range, apply_reductions
 from rsfstudy.reporting import cell_tables
 from rsfstudy.status import Status
 
@@ -226,6 +227,26 @@ def test_a_run_says_which_cells_failed(tmp_path, capsys):
         told = call_main("run", FAULTY_STUDY_FILE, "--serial", "--quiet", "--output", tmp_path)
     assert "2 cells failed" in told.stdout
     assert told.stderr == ""
+
+
+@pytest.mark.parametrize(
+    ("failing", "note"),
+    [
+        ((2.5,), "spread: 1 of 4 values are missing (b_over_a = 2.5): some of the required cells"),
+        ((2.0, 2.5, 3.0, 3.5), "no spread: some of the required cells failed or are missing"),
+    ],
+)
+def test_missing_values_of_a_reduction_are_listed(failing, note, tmp_path):
+    """The note lists the missing values, unless all values of the reduction are missing."""
+    study = replace(
+        faulty_study("nan", at=failing),
+        axes=[*faulty_study().axes, Axis("phi", [45.0, 60.0])],
+        reductions=[Range(name="spread", of="total", over="phi")],
+    )
+    with pytest.warns(IncompleteWarning, match=re.escape(note)):
+        run(study, output=tmp_path)
+    shown = " ".join(call_main("show", tmp_path / "faulty.nc").stdout.split())
+    assert note.partition(": ")[2] in shown
 
 
 def test_it_goes_on_when_told_to():

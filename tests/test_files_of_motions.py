@@ -155,3 +155,27 @@ def test_a_table_of_a_study_has_a_row_a_cell():
     assert "load_velocity_ratio" not in table
     assert "status" not in table  # All statuses are OK.
     np.testing.assert_array_equal(table["static_stress_drop"], results["static_stress_drop"])
+
+
+def test_a_decoded_table_equals_the_table_that_is_exported(tmp_path):
+    """The columns of both tables are equal, with labels in place of codes."""
+    axis = rsfstudy.Axis("stiffness_ratio", [0.5, 2.0])
+    study = study_of("two", LimitCycle(phases=2), axis, base=SCENE)
+    results = rsfstudy.run(
+        study, workers=0, output=None, progress=False, engine="compiled", rtol=1e-3
+    )
+    table = results.rsf.to_dataframe(decoded=True)
+    assert table["slip_mode"].tolist() == ["stick_slip", "damped_oscillation"]
+    assert table["status"].tolist() == ["ok", "no_limit_cycle"]
+    units = table.attrs["units"]
+    assert units["recurrence_interval"] == "D_c/V_*"
+    assert not {"status", "slip_mode"} & set(units)
+    assert results.rsf.to_dataframe()["status"].tolist() == [0, 3]
+    export_files.to_csv(results, tmp_path / "it.csv")
+    exported = pd.read_csv(tmp_path / "it.csv")
+    assert list(exported) == [f"{n} ({units[n]})" if n in units else n for n in table]
+    for name, values in zip(table, exported.to_numpy().T, strict=True):
+        if name in units:
+            np.testing.assert_array_equal(table[name], values.astype(float))
+        else:
+            assert table[name].tolist() == ["" if pd.isna(v) else v for v in values]

@@ -90,6 +90,11 @@ def test_its_file_is_shown_drawn_and_exported(written):
     file = str(here / "fit.nc")
     shown = call_main("show", file)
     assert shown.returncode == 0
+    fixed = re.search(r"^fixed .*?^zero", shown.stdout, re.MULTILINE | re.DOTALL).group()
+    assert "normal_stress = constant" in fixed
+    # The fit has determined the other fields, or replaced them by the values of the record.
+    for name in ("a", "b_over_a", "mu_star", "stiffness", "reference_rate"):
+        assert not re.search(rf"\b{name} =", fixed), name
     table = [line for line in said.splitlines() if "+-" in line]
     assert table
     assert all(line.rstrip() in map(str.rstrip, shown.stdout.splitlines()) for line in table)
@@ -101,6 +106,11 @@ def test_its_file_is_shown_drawn_and_exported(written):
     assert call_main("export", file, "--csv").returncode == 0
     assert "slip_distance_stderr" in (here / "fit.csv").read_text().splitlines()[0]
     assert call_main("check", file).returncode == 0
+    units = rsfstudy.open(file).rsf.fit_table().attrs["units"]
+    told = {"a_stderr": "1", "Dc": "um", "Dc_stderr": "um", "trend": "um-1", "k": "um-1"}
+    assert told.items() <= units.items()
+    assert units["V0"] == "um s-1"
+    assert "law" not in units
 
 
 def test_steps_fitted_together_have_one_law_and_a_curve_each(written, tmp_path, monkeypatch):

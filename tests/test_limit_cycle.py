@@ -264,5 +264,6 @@ def test_a_spring_that_is_critical_is_told_from_one_that_takes_its_time():
     outcome = LimitCycle(events=10)(slow, Accuracy(1e-8))
     assert outcome.status is Status.WORK_BUDGET_SPENT
     assert "neither grow nor decay" in outcome.message
+    assert outcome.message.endswith("To compute more events, pass --set events=20 (events=)")
     near = LimitCycle(events=10)(slow.with_(stiffness=0.00594), Accuracy(1e-8))
     assert "To compute more events" in near.message

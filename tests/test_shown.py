@@ -1,5 +1,6 @@
 """Tests of HTML tables in notebooks, and of numbers in the terminal."""
 
+import io
 import math
 import re
 import xml.etree.ElementTree as ElementTree
@@ -14,6 +15,7 @@ from study_runs import call_main, run, study_of
 
 import rsfstudy
 from rsfstudy import Axis, Scene, Study
+from rsfstudy.cli.console import PlainConsole
 from rsfstudy.critical_steps.critical_step import CriticalStep
 from rsfstudy.errors import IncompleteWarning
 from rsfstudy.quantities import HtmlMarkup, html_symbol
@@ -266,3 +268,29 @@ def test_a_sample_has_both_ends_and_so_many_cells_at_most(sizes):
         assert at[name][0] == 0
         assert len(at[name]) == 1 or at[name][-1] == size - 1
     assert len(lattice_tables.select_thinned_points({"x": 5}, 24)["x"]) == 5
+
+
+def test_an_error_estimate_above_the_tolerance_of_a_claim_is_reported():
+    """The table contains a note, and the verdict is unchanged."""
+    about = {"variable": "zeta", "where": {}, "published": 2.0, "reason": "an example"}
+    claims = [
+        Claim(id=f"C{n}", statement="zeta is 2", source="eq. 1", tolerance=tolerance, **about)
+        for n, tolerance in enumerate((1e-4, 1e-2))
+    ]
+    dataset = xr.Dataset({"zeta": 1.9997, "zeta_error": 7.7e-4})
+    table = build_verdict_table(dataset, claims, {})
+    assert table["verdict"].tolist() == ["differs", "reproduced"]
+    assert "error estimate 0.00077 exceeds the tolerance 0.0001" in table["note"][0]
+    assert table["note"][1] == ""
+    assert "exceeds the tolerance" in table._repr_html_()
+    precise = build_verdict_table(dataset.assign(zeta_error=1e-9), claims, {})
+    assert "note" not in precise
+
+
+def test_redirected_output_has_lines_of_100_characters(monkeypatch):
+    """The environment variable ``COLUMNS`` takes precedence."""
+    monkeypatch.delenv("COLUMNS", raising=False)
+    redirected = PlainConsole(file=io.StringIO(), markup=False)
+    assert redirected.width == 100
+    monkeypatch.setenv("COLUMNS", "60")
+    assert PlainConsole(file=io.StringIO(), markup=False).width == 60

@@ -473,8 +473,15 @@ class DatasetAccessor:
         return simplify_dataset(self._dataset)
 
     @error_boundary
-    def to_dataframe(self) -> pd.DataFrame:
+    def to_dataframe(self, *, decoded: bool = False) -> pd.DataFrame:
         """Convert the dataset to a table, and omit constant columns.
+
+        Parameters
+        ----------
+        decoded : bool, default: False
+            If True, the table contains the labels of codes, for example ``ok`` instead of 0 and
+            ``stick_slip`` instead of 3. For the results of a study, the table is then equal to the
+            table that the command ``rsfstudy export --csv`` writes.
 
         Returns
         -------
@@ -482,7 +489,9 @@ class DatasetAccessor:
             Table with one row per cell of a study, or with one row per time of a motion. Variables
             with additional dimensions inside a cell, such as orbits, are omitted. For other
             datasets of one scene, the table has a single row. The dictionary ``attrs["constant"]``
-            of the table contains the values of the omitted columns.
+            of the table contains the values of the omitted columns. The dictionary
+            ``attrs["units"]`` contains the units of each numerical column. The units of a
+            normalised variable are its scale, such as ``D_c/V_*``.
 
         Raises
         ------
@@ -496,11 +505,13 @@ class DatasetAccessor:
         >>> table = simulate(scene, times=[0.5, 1.0]).rsf.to_dataframe()
         >>> table["load_point_displacement"].round(6).tolist()
         [1.0, 2.0]
+        >>> table.attrs["units"]["load_point_displacement"]
+        'D_c'
         """
         from rsfstudy.api.dataset_export import to_dataframe
 
         self._require_rsfstudy_dataset()
-        return to_dataframe(self._dataset)
+        return to_dataframe(self._dataset, decoded)
 
     @error_boundary
     def fit_table(self) -> pd.DataFrame:
@@ -513,6 +524,7 @@ class DatasetAccessor:
             errors (``a``, ``a_stderr``, ``b``, ``b_stderr``, ``Dc``, ``Dc_stderr`` and so on), the
             load point velocities ``V0`` before and ``V1`` after the step, ``law``, ``window``,
             ``R2``, ``p_value``, ``status`` and others. Lengths are in um and velocities in um/s.
+            The dictionary ``attrs["units"]`` contains the units of each numerical column.
 
         Raises
         ------

@@ -13,17 +13,21 @@ import xarray as xr
 
 from rsfstudy.api.simulation import simulate
 from rsfstudy.errors import DataError
+from rsfstudy.formatting import read_flag_meanings
+from rsfstudy.quantities import units_or_scale_of_variable
 from rsfstudy.rig import DatasetUnits, Rig
 from rsfstudy.storage import compare_same_lattice
 
 
-def to_dataframe(dataset: xr.Dataset) -> pd.DataFrame:
+def to_dataframe(dataset: xr.Dataset, decoded: bool = False) -> pd.DataFrame:
     """Convert a dataset to a table, and omit constant columns.
 
     Parameters
     ----------
     dataset : xarray.Dataset
         Results of a study, or a dataset of one scene.
+    decoded : bool, default: False
+        If True, the table contains the labels of codes, for example ``ok`` instead of 0.
 
     Returns
     -------
@@ -34,15 +38,24 @@ def to_dataframe(dataset: xr.Dataset) -> pd.DataFrame:
     along = [name for name in ("time",) if name in dataset.dims]
     along = list(map(str, dataset["status"].dims)) if "status" in dataset else along
     kept = [name for name, values in dataset.variables.items() if set(values.dims) <= set(along)]
-    if not along:
-        return pd.DataFrame({str(n): [dataset[n].values.item()] for n in kept})
-    table = dataset[kept].to_dataframe().reset_index()
-    if len(table) < 2:
-        return table
-    changing = [n for n in table if n in along or table[n].nunique(dropna=False) > 1]
-    constant = {str(n): table[n].iloc[0] for n in table if n not in changing}
-    table = table[changing]
-    table.attrs["constant"] = constant
+    if along:
+        table = dataset[kept].to_dataframe().reset_index()
+    else:
+        table = pd.DataFrame({str(n): [dataset[n].values.item()] for n in kept})
+    if decoded:
+        for name in table:
+            if labels := read_flag_meanings(dataset[name].attrs):
+                table[name] = table[name].map(labels)
+    if len(table) > 1:
+        changing = [n for n in table if n in along or table[n].nunique(dropna=False) > 1]
+        constant = {str(n): table[n].iloc[0] for n in table if n not in changing}
+        table = table[changing]
+        table.attrs["constant"] = constant
+    table.attrs["units"] = {
+        str(n): units_or_scale_of_variable(dataset[n].attrs) or "1"
+        for n in table
+        if table[n].dtype.kind in "iuf"
+    }
     return table
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from typing import Any
 
 from rich.console import Console, ConsoleDimensions
@@ -15,6 +16,8 @@ _MAX_PRINTED_CHARACTERS = 5000
 #: Bounds of the console width. The bounds are needed because the environment variable ``COLUMNS``
 #: can have any value.
 _MIN_WIDTH, _MAX_WIDTH = 16, 1000
+#: Width of lines in files and pipes.
+_WIDTH_OF_REDIRECTED_OUTPUT = 100
 
 
 class PlainConsole(Console):
@@ -28,9 +31,12 @@ class PlainConsole(Console):
     def size(self) -> ConsoleDimensions:
         """Size of the terminal, with a width that is limited to a fixed range.
 
-        The environment variable ``COLUMNS`` overrides the width of the terminal.
+        The environment variable ``COLUMNS`` overrides the width of the terminal. If the output is
+        redirected and ``COLUMNS`` is not set, the width is 100 characters.
         """
         found = super().size
+        if not self.is_terminal and not os.environ.get("COLUMNS", "").isdigit():
+            return ConsoleDimensions(_WIDTH_OF_REDIRECTED_OUTPUT, found.height)
         return ConsoleDimensions(min(max(found.width, _MIN_WIDTH), _MAX_WIDTH), found.height)
 
     @size.setter

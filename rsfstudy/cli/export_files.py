@@ -15,7 +15,6 @@ import numpy as np
 import xarray as xr
 
 from rsfstudy.errors import InvalidValue
-from rsfstudy.formatting import read_flag_meanings
 from rsfstudy.quantities import units_or_scale_of_variable
 
 
@@ -23,7 +22,8 @@ def to_csv(dataset: xr.Dataset, path: Path) -> None:
     """Write the table of a dataset to a CSV file.
 
     The header contains the name and the units of each column, in a form that ``read_table`` can
-    read. Numbers are written with full precision, and status codes are written as labels.
+    read. Numbers are written with full precision. For the results of a study, codes are written as
+    labels.
 
     Parameters
     ----------
@@ -32,16 +32,10 @@ def to_csv(dataset: xr.Dataset, path: Path) -> None:
     path : Path
         CSV file to write.
     """
-    table = dataset.rsf.to_dataframe()
-    for name in table if "status" in dataset else ():
-        if flags := read_flag_meanings(dataset[name].attrs):
-            table[name] = table[name].map(flags)
-    headed = {
-        n: f"{n} ({units_or_scale_of_variable(dataset[n].attrs) or 1})"
-        for n in table
-        if table[n].dtype.kind in "iuf"
-    }
-    table.rename(columns=headed).to_csv(path, index=False)
+    # ``read_table`` reads exported motions, and accepts only columns with units.
+    table = dataset.rsf.to_dataframe(decoded="status" in dataset)
+    headings = {name: f"{name} ({units})" for name, units in table.attrs["units"].items()}
+    table.rename(columns=headings).to_csv(path, index=False)
 
 
 def to_mat(dataset: xr.Dataset, path: Path) -> None:

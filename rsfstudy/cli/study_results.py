@@ -104,6 +104,8 @@ def collect_verdicts(studies: Sequence[StudyResults]) -> pd.DataFrame:
     if len(studies) == 1:
         return studies[0].verdicts
     together = pd.concat([one.verdicts.assign(study=one.name) for one in studies])
+    if "note" in together:  # Studies without notes have no such column.
+        together["note"] = together["note"].fillna("")
     number = together["id"].astype(str).str.extract(r"(\d+)", expand=False).astype(float)
     return together.assign(number=number).sort_values("number", kind="stable")
 
@@ -172,6 +174,8 @@ def print_unexpected_verdicts(verdicts: pd.DataFrame) -> None:
     """
     for row in verdicts[verdicts["verdict_changed"]].itertuples(index=False):
         print_line(f"{row.id}: {row.verdict}, expected {row.expected}: {row.claim}", style="red")
+        if note := getattr(row, "note", ""):
+            print_line(f"{row.id}: {note}", style="yellow")
 
 
 def print_failures(results: StudyResults, with_commands: bool = True) -> None:

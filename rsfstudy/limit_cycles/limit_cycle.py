@@ -138,10 +138,12 @@ class LimitCycle(RecordingMeasure):
     ``slip_mode`` is ``damped_oscillation``. If a motion settles without oscillations, ``slip_mode``
     is ``steady``.
 
-    The status is ``no_limit_cycle`` only if small perturbations of steady sliding decay. If the
-    largest growth rate of small perturbations is zero within its error, the status is
-    ``unverified``. The status is also ``unverified`` if an error estimate is more than a hundred
-    times the requested error.
+    The status is ``no_limit_cycle`` only if small perturbations of steady sliding decay. If a
+    motion approaches steady sliding and the largest growth rate of small perturbations is zero
+    within its error, the status is ``unverified``. The status is also ``unverified`` if an error
+    estimate is more than a hundred times the requested error. If a motion still oscillates after
+    ``events`` events and no event repeats, the status is ``work_budget_spent``. At the critical
+    stiffness, oscillations neither grow nor decay, so both statuses are possible.
 
     Parameters
     ----------
@@ -149,7 +151,8 @@ class LimitCycle(RecordingMeasure):
         Number of points of the orbit along ``phase``, distributed over the slow part and the
         rupture.
     events : int, default: 300
-        Maximum number of events until the motion repeats.
+        Maximum number of events until the motion repeats. If you increase the work budget, this
+        limit remains the same.
 
     Raises
     ------

@@ -153,10 +153,11 @@ class LimitCycleSearch:
                 if self._has_converged():
                     return True
                 if len(self.cycles) >= max_cycles:
-                    remedy = self._critical_stiffness_text or suggest_raising_event_limit(
-                        max_cycles
+                    remedy = suggest_raising_event_limit(max_cycles)
+                    text = (
+                        f"the motion does not repeat itself within {max_cycles} events"
+                        f"{self._critical_stiffness_text}. {remedy}"
                     )
-                    text = f"the motion does not repeat itself within {max_cycles} events. {remedy}"
                     raise MotionStopped(Status.WORK_BUDGET_SPENT, text)
                 if self._should_leap_to_fixed_point():
                     self._distance_at_leap = abs(
@@ -178,8 +179,8 @@ class LimitCycleSearch:
         if off > _CRITICAL_STIFFNESS_TOLERANCE:
             return ""
         return (
-            f"the stiffness differs from the critical stiffness by a fraction of {off:.0e}, so "
-            "oscillations neither grow nor decay"
+            ", because oscillations neither grow nor decay if the stiffness differs from the "
+            f"critical stiffness by a fraction of only {off:.0e}. Use a different stiffness="
         )
 
     @property

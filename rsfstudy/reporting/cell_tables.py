@@ -11,7 +11,10 @@ import pandas as pd
 import xarray as xr
 
 from rsfstudy.formatting import format_nonempty_fields, pluralize
-from rsfstudy.reporting.reduction_tables import find_refusal_reasons_of_reductions
+from rsfstudy.reporting.reduction_tables import (
+    find_refusal_reasons_of_reductions,
+    format_missing_results,
+)
 from rsfstudy.reporting.tables import TextTable
 from rsfstudy.status import Status
 from rsfstudy.storage import StoredDataset
@@ -110,9 +113,8 @@ def format_notes_on_incomplete_results(results: xr.Dataset) -> list[str]:
     list of str
         Notes for the user. The list is empty if no cell failed and all reductions have results.
     """
-    told = [
-        f"no {name}: {why}" for name, why in find_refusal_reasons_of_reductions(results).items()
-    ]
+    reasons = find_refusal_reasons_of_reductions(results)
+    told = [": ".join(note) for note in format_missing_results(results, reasons).items()]
     if failed := count_failures(results):
         each = ", ".join(f"{label} {number}" for label, number in failed.items())
         first = f"{sum(failed.values())} of {results['status'].size} cells failed: {each}"

@@ -16,6 +16,7 @@ from rsfstudy.fitting import (
     split_window_number,
 )
 from rsfstudy.former_data_names import TableWithFormerColumns, rename_former_variables
+from rsfstudy.quantities import units_or_scale_of_variable
 from rsfstudy.reporting.tables import format_units
 from rsfstudy.status import Status
 
@@ -120,6 +121,29 @@ def parameter_headings(fit: xr.Dataset) -> dict[str, str]:
     return found
 
 
+def scene_fields_set_by_fit(dataset: xr.Dataset) -> set[str]:
+    """Return the names of the scene fields that follow from a fit or from its record.
+
+    The declaration of a fit contains only the initial values of these fields.
+
+    Parameters
+    ----------
+    dataset : xarray.Dataset
+        Results of a study or of a fit.
+
+    Returns
+    -------
+    set of str
+        Names of scene fields. The set is empty if the dataset contains no fits.
+    """
+    if not is_fit(dataset):
+        return set()
+    fitted = {split_window_number(str(name))[0] for name in dataset["parameter"].values}
+    fields = fitted | {"stiffness", "stiffness_ratio", "reference_rate"}
+    fields |= {f"{n}_over_a" for n in ("b", "b1", "b2") if fitted & {"a", n}}
+    return fields | ({"length_ratio"} if fitted & {"slip_distance", "slip_distance_2"} else set())
+
+
 class FitTable(TableWithFormerColumns):
     """Table of fits, with one row per fit.
 
@@ -140,7 +164,8 @@ def fit_table(dataset: xr.Dataset) -> pd.DataFrame:
     Returns
     -------
     pandas.DataFrame
-        Table with one row per fit. Lengths are in um. Parameters that were not fitted are NaN.
+        Table with one row per fit. Lengths are in um. Parameters that were not fitted are NaN. The
+        dictionary ``attrs["units"]`` contains the units of each numerical column.
 
         - Columns ``<name>_stderr`` contain standard errors. The standard errors of a row with the
           status ``errors_not_valid`` are not valid.
@@ -155,25 +180,36 @@ def fit_table(dataset: xr.Dataset) -> pd.DataFrame:
         If the dataset contains no fits.
     """
     rows = []
+    units: dict[str, str] = {}
     for one in split_into_single_fits(dataset):
         row: dict[str, Any] = dict(record_and_step_of_fit(one))
         for name, short in parameter_headings(one).items():
-            row[short] = one[name].item()
-            row[f"{short}_stderr"] = one[f"{name}_stderr"].item()
-            if f"{name}_windows" in one:
-                row[f"{short}_windows"] = one[f"{name}_windows"].item()
-        row |= {"V0": one["velocity_before"].item(), "V1": one["velocity_after"].item()}
+            for suffix in ("", "_stderr", "_windows"):
+                if f"{name}{suffix}" in one:
+                    row[f"{short}{suffix}"] = one[f"{name}{suffix}"].item()
+                    units[f"{short}{suffix}"] = units_or_scale_of_variable(one[name].attrs)
+        for short, name in (("V0", "velocity_before"), ("V1", "velocity_after")):
+            row[short], units[short] = one[name].item(), units_or_scale_of_variable(one[name].attrs)
         row |= {"law": one["law"].item() if "law" in one.coords else ""}
-        row |= normal_stresses_in_mpa(one)
+        stresses = normal_stresses_in_mpa(one)
+        row |= stresses
+        units |= dict.fromkeys(stresses, "MPa")
         if "window_stiffness" in one and "stiffness" not in one["parameter"].values:
             row["k"] = one["window_stiffness"].item()
             if stderr := stderr_of_fixed_stiffness(one):
                 row["k_stderr"] = stderr
+            units |= dict.fromkeys(
+                ("k", "k_stderr"), units_or_scale_of_variable(one["window_stiffness"].attrs)
+            )
         row["window"] = f"{one['window_begins'].item():g} to {one['window_ends'].item():g}"
         row["R2"], row["aic"] = one["r_squared"].item(), one["aic"].item()
         row["p_value"], row["status"] = one["p_value"].item(), status_label_of_fit(one)
         rows.append(row)
-    return FitTable(rows)
+    table = FitTable(rows)
+    table.attrs["units"] = {
+        str(name): units.get(str(name), "1") for name in table if table[name].dtype.kind in "iuf"
+    }
+    return table
 
 
 def list_fit_values(dataset: xr.Dataset) -> list[dict[str, Any]]:

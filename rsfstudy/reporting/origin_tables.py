@@ -11,6 +11,7 @@ import xarray as xr
 from rsfstudy.formatting import format_nonempty_fields, pluralize
 from rsfstudy.measures import CriticalStep
 from rsfstudy.reporting.cell_tables import format_status_counts
+from rsfstudy.reporting.fit_tables import scene_fields_set_by_fit
 from rsfstudy.rig import DatasetUnits, Rig
 from rsfstudy.status import Status
 from rsfstudy.storage import StoredDataset
@@ -63,6 +64,8 @@ def describe_scene_and_rig_fields(
 def find_constant_fields(dataset: xr.Dataset) -> tuple[dict[str, Any], dict[str, float]]:
     """Find the scene fields and rig quantities that are equal in all cells.
 
+    Fields that a fit has determined are not included.
+
     Parameters
     ----------
     dataset : xarray.Dataset
@@ -80,7 +83,7 @@ def find_constant_fields(dataset: xr.Dataset) -> tuple[dict[str, Any], dict[str,
         str(n).removeprefix(DatasetUnits.DIMENSIONLESS_PREFIX)
         for n, along in dataset.coords.items()
         if along.dims
-    }
+    } | scene_fields_set_by_fit(dataset)
     scene = {n: v for n, v in declared.base.items() if n not in varied}
     rig = declared.laboratory or {}
     return scene, {name: rig[name] for name in Rig.convert_quantities_for_display(rig, varied)}

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
+import numpy as np
 import xarray as xr
 
 from rsfstudy.formatting import format_value
@@ -26,6 +27,8 @@ _COLUMNS_OF_SLOPE_TABLE = {
     "points": ("points", ".0f"),
     "error": ("numerical error", ".2g"),
 }
+#: Maximum number of points that a note on missing results lists.
+_MAX_MISSING_POINTS_SHOWN = 4
 #: Columns of the comparison of integrators.
 _INTEGRATOR_COLUMNS = (
     Column("cheapest integrator", "cheapest_integrator", str, "integrator"),
@@ -112,8 +115,8 @@ def build_reduction_tables_and_sentences(dataset: xr.Dataset) -> Iterator[TextTa
         Tables, followed by one sentence per reduction without results.
     """
     yield from build_reduction_tables(dataset)
-    for name, why in missing_result_reasons(dataset).items():
-        yield f"no {name}: {why}"
+    reasons = missing_result_reasons(dataset)
+    yield from (": ".join(note) for note in format_missing_results(dataset, reasons).items())
 
 
 def find_refusal_reasons_of_reductions(dataset: xr.Dataset) -> dict[str, str]:
@@ -138,6 +141,50 @@ def find_refusal_reasons_of_reductions(dataset: xr.Dataset) -> dict[str, str]:
         if name and "refused" in values.attrs:
             found.setdefault(name, str(values.attrs["refused"]))
     return found
+
+
+def format_missing_results(dataset: xr.Dataset, reasons: Mapping[str, str]) -> dict[str, str]:
+    """Describe the missing results of reductions.
+
+    Parameters
+    ----------
+    dataset : xarray.Dataset
+        Results of a study.
+    reasons : mapping of str to str
+        Reasons for missing results, by reduction name.
+
+    Returns
+    -------
+    dict of str to str
+        Descriptions by heading. If a reduction has no results, the heading is ``no NAME``. If only
+        some values are missing, the heading is ``NAME``, and the description lists their points.
+    """
+    notes = {}
+    for name, reason in reasons.items():
+        variables = [
+            str(n)
+            for n, values in dataset.data_vars.items()
+            if f"{n}_".startswith(f"{name}_") and "refused" in values.attrs
+        ]
+        values = dataset[min(variables, key=len)] if variables else xr.DataArray()
+        missing = values.isnull()
+        if 0 < (count := int(missing.sum())) < values.size:
+            points = [
+                _format_point(values, at.tolist())
+                for at in np.argwhere(missing.values)[:_MAX_MISSING_POINTS_SHOWN]
+            ]
+            points += ["..."] * (count > len(points))
+            which = f"{count} of {values.size} values are missing ({'; '.join(points)})"
+            notes[name] = f"{which}: {reason}"
+        else:
+            notes[f"no {name}"] = reason
+    return notes
+
+
+def _format_point(values: xr.DataArray, indices: Sequence[int]) -> str:
+    """Format the coordinates of a value on the dimensions of an array."""
+    point = values.isel(dict(zip(values.dims, indices, strict=True)))
+    return ", ".join(f"{d} = {format_value(point[d].item())}" for d in values.dims)
 
 
 def missing_result_reasons(dataset: xr.Dataset) -> dict[str, str]:

@@ -21,6 +21,7 @@ from rsfstudy.reporting.lattice_tables import build_primary_output_table
 from rsfstudy.reporting.reduction_tables import (
     build_reduction_tables,
     find_refusal_reasons_of_reductions,
+    format_missing_results,
 )
 from rsfstudy.reporting.tables import (
     MAX_CELLS_SHOWN,
@@ -55,9 +56,7 @@ def build_summary_tables_and_sentences(dataset: xr.Dataset) -> Iterator[SummaryT
     elif not StoredDataset(dataset).is_of_single_scene:
         yield build_primary_output_table(dataset)
         yield from build_reduction_tables(dataset)
-        yield {
-            f"no {name}": why for name, why in find_refusal_reasons_of_reductions(dataset).items()
-        }
+        yield format_missing_results(dataset, find_refusal_reasons_of_reductions(dataset))
         yield from filter(None, [origin_tables.note_on_norms_near_load_velocity(dataset)])
     elif is_motion(dataset):
         yield summarise_motion(dataset)

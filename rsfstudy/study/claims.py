@@ -263,6 +263,23 @@ class Claim:
         return computed, REPRODUCED_VERDICT if holds else DIFFERS_VERDICT
 
 
+def _note_on_large_error(dataset: xr.Dataset, claim: Claim) -> str:
+    """Return a note if the error estimate of a result exceeds the tolerance of an equality."""
+    values = [(claim.variable, claim.where)]
+    if claim.baseline:
+        values.append((claim.baseline_variable or claim.variable, claim.baseline))
+    try:
+        error = sum(_select_single_value(dataset, f"{name}_error", at) for name, at in values)
+    except KeyError:  # The variable has no error estimate.
+        return ""
+    if claim.relation != "equals" or not error > claim.tolerance:
+        return ""
+    return (
+        f"the error estimate {error:.2g} exceeds the tolerance {claim.tolerance:g}. Use a smaller "
+        "--rtol (rtol=)"
+    )
+
+
 def build_verdict_table(
     dataset: xr.Dataset, claims: list[Claim], study_overrides: Mapping[str, Any]
 ) -> VerdictTable:
@@ -286,19 +303,23 @@ def build_verdict_table(
     -------
     VerdictTable
         Table of the claims and verdicts. The column ``verdict_changed`` is True if an applicable
-        claim does not have the expected verdict.
+        claim does not have the expected verdict. If the error estimate of a result exceeds the
+        tolerance of its claim, the table has the column ``note``, which contains this information.
     """
     along = {str(name) for name in dataset.coords if dataset[name].ndim > 0}
     is_other_study = [
         name for name in study_overrides if name not in along
     ] or DatasetUnits.SCALES_ATTRIBUTE in dataset.attrs
-    rows = []
+    rows: list[tuple[Any, ...]] = []
+    notes: dict[int, str] = {}
     for claim in claims:
         computed, verdict = claim.verdict(dataset)
         if is_other_study or not _has_all_overridden_dimensions(
             dataset, claim.variable, study_overrides
         ):
             verdict = NOT_APPLICABLE_VERDICT
+        elif note := _note_on_large_error(dataset, claim):
+            notes[len(rows)] = note
         changed = verdict not in (claim.expected, NOT_APPLICABLE_VERDICT)
         about = claim.id, claim.statement, claim.source, claim.relation, claim.published, computed
         why = (
@@ -311,6 +332,8 @@ def build_verdict_table(
         )
         rows.append((*about, *why))
     table = pd.DataFrame(rows, columns=_VERDICT_TABLE_COLUMNS)
+    if notes:
+        table["note"] = [notes.get(number, "") for number in range(len(rows))]
     return VerdictTable(table.astype({"verdict_changed": bool}))
 
 

@@ -114,6 +114,8 @@ def format_verdict_row(verdict_row: dict[Any, Any]) -> dict[str, str]:
     reason = f"{verdict_row['tolerance']:.3g}: {verdict_row['reason']}"
     if verdict_row["difference_reason"]:
         reason += f". The result differs because {verdict_row['difference_reason']}"
+    if note := verdict_row.get("note", ""):
+        reason += f". Note: {note}"
     of = f"{verdict_row['study']}: " if "study" in verdict_row else ""
     return {
         "id": str(verdict_row["id"]),
