@@ -534,3 +534,10 @@ def test_a_reduction_keeps_the_attributes_of_coordinates():
     found = apply_reductions(dataset, (Bare("doubled", of="critical_velocity_ratio"),))
     assert found["b_over_a"].attrs == {"long_name": "ratio of a user", "units": "1"}
     assert found["doubled"].dims == ("b_over_a",)
+
+
+def test_the_ratio_to_a_closed_form_is_described_by_its_variable():
+    ratio = ClosedFormRatio("over_closed_form", of="step", form="velocity_step_of_the_family")
+    names = {about.name: about.long_name for about in ratio.quantities}
+    assert names["over_closed_form"] == "ratio of step to its closed-form value"
+    assert names["over_closed_form_closed_form"] == "closed-form value of step"

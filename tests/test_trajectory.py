@@ -64,7 +64,7 @@ def test_a_motion_that_cannot_go_on_says_why_and_keeps_what_it_has():
         cut = rsfstudy.simulate(Scene(load_velocity_ratio=1.2), duration=1e3, budget=500)
     assert cut.attrs["status"] == "work_budget_spent"
     assert cut.sizes["time"] > 10
-    assert cut.attrs["message"].endswith("--budget 2000 (budget=)")
+    assert cut.attrs["message"].endswith("--budget 2000 (in Python, Accuracy(budget=2000))")
     with pytest.warns(
         IncompleteWarning, match="after 0 of 50 .*: normal_stress_lost .*normal stress vanishes"
     ):

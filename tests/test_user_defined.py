@@ -16,7 +16,8 @@ from study_runs import run, study_of
 import rsfstudy
 from rsfstudy import Accuracy, Axis, Claim, Figure, Panel, Rig, Scene, Study
 from rsfstudy.critical_steps.critical_step import CriticalStep
-from rsfstudy.errors import InvalidValue
+from rsfstudy.errors import InvalidValue, NoResultWarning
+from rsfstudy.limit_cycles.limit_cycle import LimitCycle
 from rsfstudy.measures import Measure, Outcome
 from rsfstudy.motion.integrator import Integrator
 from rsfstudy.quantities import Output
@@ -229,3 +230,57 @@ def test_a_motion_with_radiation_damping_says_what_its_stress_leaves_out():
     rate = 10.0**damped.log10_slip_rate
     radiated = damped.shear_stress - damped.frictional_stress
     xr.testing.assert_allclose(radiated, 0.01 * (rate - 1.0), atol=1e-9)
+
+
+# ---- overflows of user-defined laws -------------------------------------------------------------
+def power_evolution(log_slip_rate, state, p):
+    """Return the evolution of d theta/dt = 1 - (V theta/D_c)^2."""
+    exponent = state / p[LAW] + log_slip_rate
+    return p[LAW] * (math.exp(-exponent) - math.exp(exponent))
+
+
+@dataclass(frozen=True, kw_only=True)
+class PowerLawEvolution(Law):
+    name = "power_evolution"
+    evolution = staticmethod(power_evolution)
+
+
+@pytest.mark.parametrize("engine", ["scipy", "python"])
+def test_steppers_reject_trial_steps_in_which_a_law_overflows(engine):
+    """The law overflows in a trial step at the beginning of a rupture.
+
+    The recurrence interval is the result of the compiled engine, in which exp(x) can be infinite.
+    """
+    scene = Scene(law=PowerLawEvolution, normal_stress="constant", b_over_a=1.5,
+                  stiffness_ratio=0.05, inertia=True)  # fmt: skip
+    motion = rsfstudy.limit_cycle(scene, engine=engine, rtol=1e-3)
+    assert float(motion.recurrence_interval) == pytest.approx(680.58956, rel=1e-3)
+
+
+def steep_evolution(log_slip_rate, state, p):
+    """Overflow if the slip rate is far from steady sliding."""
+    return -p[LAW] * math.sinh(1e3 * (state / p[LAW] + log_slip_rate)) / 1e3
+
+
+@dataclass(frozen=True, kw_only=True)
+class SteepLaw(Law):
+    name = "steep"
+    evolution = staticmethod(steep_evolution)
+
+
+@pytest.mark.parametrize("engine", ["scipy", "python", "compiled"])
+def test_an_overflow_at_the_start_of_a_step_names_the_law(engine):
+    scene = Scene(law=SteepLaw, normal_stress="constant", b_over_a=0.5, stiffness=1.0,
+                  load_velocity_ratio=1.0, initial_state=0.02)  # fmt: skip
+    outcome = LimitCycle()(scene, Accuracy(engine=engine))
+    assert outcome.status is Status.INTEGRATION_FAILED
+    assert "the function evolution of the part 'steep' overflows" in outcome.message
+    assert "log_slip_rate = " in outcome.message
+    assert ", state = 0.0" in outcome.message
+
+
+def test_an_overflow_during_a_motion_names_the_law():
+    scene = Scene(law=SteepLaw, normal_stress="constant", b_over_a=1.5, stiffness_ratio=0.3,
+                  inertia=True, load_velocity_ratio=10.0)  # fmt: skip
+    with pytest.warns(NoResultWarning, match="evolution of the part 'steep' overflows"):
+        rsfstudy.limit_cycle(scene, engine="python", rtol=1e-4)

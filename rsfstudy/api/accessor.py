@@ -570,6 +570,9 @@ class DatasetAccessor:
     def failures(self) -> pd.DataFrame:
         """Return a table of the cells without a result.
 
+        The table contains failed cells, and also cells whose status is an answer without a value,
+        such as ``unstable_at_any_step``. The property ``Status.is_answer`` distinguishes the two.
+
         Returns
         -------
         pandas.DataFrame

@@ -493,7 +493,7 @@ class CriticalStep(Measure):
             self._output_values(
                 step_family, stable_value=step_family.step_size_to_field_value(largest_size)
             ),
-            "stable for every step up to "
+            f"stable for every step {'up' if self.direction == 'up' else 'down'} to "
             f"{step_family.step_size_to_field_value(largest_size):.6g}{reason}",
         )
 

@@ -11,6 +11,9 @@ from __future__ import annotations
 def evaluate_function_into_array(function, y, rates, parameters, result):
     """Call a function that fills an output array.
 
+    If the equations overflow, for example in a user-defined law, the results remain NaN as in
+    compiled code. The stepper then rejects the step.
+
     Parameters
     ----------
     function : callable
@@ -20,7 +23,10 @@ def evaluate_function_into_array(function, y, rates, parameters, result):
     result : array
         Output array.
     """
-    function(y, rates, parameters, result)
+    try:
+        function(y, rates, parameters, result)
+    except OverflowError:
+        return  # The function has filled its results with NaN before it evaluated the equations.
 
 
 def array_as_pointer(array):

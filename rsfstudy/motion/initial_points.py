@@ -11,6 +11,7 @@ import math
 from scipy.optimize import newton
 
 from rsfstudy.motion import regime_switching
+from rsfstudy.motion.overflow_reports import convert_overflow_to_motion_stopped
 from rsfstudy.motion.work_meter import MotionStopped
 from rsfstudy.parts import Segment
 from rsfstudy.slider import MotionPoint, Numbers, Scene
@@ -19,6 +20,7 @@ from rsfstudy.status import Status
 _NAN_FOR_UNEVALUATED_POINT_FIELDS = (math.nan,) * len(MotionPoint._fields[5:-1])
 
 
+@convert_overflow_to_motion_stopped
 def initial_point(scene: Scene) -> MotionPoint:
     """Return the initial point of a motion, immediately after the loading step.
 
@@ -105,6 +107,7 @@ def point_without_derived_values(
     return MotionPoint._make((*known, *_NAN_FOR_UNEVALUATED_POINT_FIELDS, states))
 
 
+@convert_overflow_to_motion_stopped
 def compute_restart_point(scene: Scene, spring_stress: float, states: Numbers) -> MotionPoint:
     """Return a point on the slow manifold from which a motion can restart.
 
@@ -164,6 +167,7 @@ def _find_specified_initial_states(scene: Scene, steady_states: Numbers) -> tupl
     return (psi, *steady_states[1:]), begun(psi).log_slip_rate
 
 
+@convert_overflow_to_motion_stopped
 def point_after_loading_jump(scene: Scene, point: MotionPoint) -> MotionPoint:
     """Return the point of a motion immediately after a jump in the loading.
 

@@ -20,6 +20,7 @@ from rsfstudy.motion.engine_factory import create_stepper, import_compiled_engin
 from rsfstudy.motion.engines import COMPILED
 from rsfstudy.motion.event_spec_table import pack_event_specifications, pack_point
 from rsfstudy.motion.events import Event, EventSpecification
+from rsfstudy.motion.overflow_reports import describe_overflow
 from rsfstudy.motion.python_backend import PythonBackend
 from rsfstudy.motion.recording import (
     FIRST_STATE_COLUMN,
@@ -267,7 +268,12 @@ class MotionDriver:
                     arguments[_KINKS_ARGUMENT] = machine.as_loop_arguments(table)[0]
                     state.set_kinks_ahead(len(table))
         if end != array_layout.MOTION_ENDED:
-            raise _motion_stopped_error(end, state, regimes, stepper)
+            overflow = ""
+            if end in (array_layout.NO_STEP_POSSIBLE, array_layout.INVALID_STEP):
+                system = self._equations[int(state.get_state_field("regime"))]
+                unknowns = tuple(y[: len(system.unknown_names)].tolist())
+                overflow = describe_overflow(system.rate_function, unknowns, tuple(numbers))
+            raise _motion_stopped_error(end, state, regimes, stepper, overflow)
 
 
 def _shift_stresses_of_point(point: MotionPoint, stress_change: float) -> MotionPoint:
@@ -340,7 +346,11 @@ def _prepare_recording_tables(
 
 
 def _motion_stopped_error(
-    return_code: int, motion_state: Any, regime_names: Sequence[str], stepper: Any
+    return_code: int,
+    motion_state: Any,
+    regime_names: Sequence[str],
+    stepper: Any,
+    overflow: str,
 ) -> MotionStopped:
     """Return the exception for a motion that cannot continue."""
     if return_code == array_layout.TERMINATED:
@@ -351,6 +361,7 @@ def _motion_stopped_error(
     why = "the step size is zero, or a value is not finite"
     if return_code == array_layout.NO_STEP_POSSIBLE:
         why = stepper.failure if stepper else _STEP_TOO_SHORT_TEXT
+    why = overflow or why
     return MotionStopped(
         Status.INTEGRATION_FAILED,
         f"{regime_names[int(motion_state.get_state_field('regime'))]}: {why}",

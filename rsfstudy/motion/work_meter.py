@@ -97,7 +97,7 @@ class WorkMeter:
         """Last sentence of a message, which suggests a budget four times as large."""
         return (
             f". To continue, increase the budget to {4 * self.budget}: --budget "
-            f"{4 * self.budget} (budget=)"
+            f"{4 * self.budget} (in Python, Accuracy(budget={4 * self.budget}))"
         )
 
     def check_budget(self) -> None:

@@ -31,6 +31,7 @@ from rsfstudy.plots._text import (
     visible_length,
     wrap_text,
 )
+from rsfstudy.storage import StoredDataset
 from rsfstudy.study import read_quantities_not_in_vocabulary
 from rsfstudy.vocabulary import find_coverage_content_type, find_quantity
 
@@ -134,14 +135,14 @@ def measured_variables(dataset: xr.Dataset) -> list[str]:
     -------
     list of str
         Names of the numeric variables that have the dimensions of the lattice and at least one
-        finite value. The primary output is the first variable, and the order of the variables is
-        their order in the dataset. Error estimates, computational costs, and variables with the
+        finite value. The primary output is the first variable, and the other variables are in
+        the order of the dataset. Error estimates, computational costs, and variables with the
         suffix ``_stable`` or ``_unstable`` are excluded.
     """
     cells = set(dataset["status"].dims)
     values = {str(name): dataset[name] for name in dataset.data_vars}
     beside = tuple(f"{name}_{end}" for name in values for end in ("stable", "unstable"))
-    return [
+    measured = [
         name
         for name, found in values.items()
         if set(found.dims) == cells
@@ -150,6 +151,9 @@ def measured_variables(dataset: xr.Dataset) -> list[str]:
         and name not in beside
         and bool(np.isfinite(found).any())
     ]
+    declared = "declaration" in dataset.attrs
+    primary = StoredDataset(dataset).primary_output if declared else None
+    return sorted(measured, key=lambda name: name != primary)
 
 
 def varying_variables(dataset: xr.Dataset) -> list[str]:

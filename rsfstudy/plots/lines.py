@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from functools import partial
+from typing import Any
 
 import numpy as np
 import xarray as xr
@@ -109,6 +110,7 @@ def _draw_lines(variable_name: str, x_dimension: str, dataset: xr.Dataset, axes:
         style |= {} if numeric else {"linestyle": "none"}
         if coloured is None:
             axes.plot(x, np.atleast_1d(group.values), **style)
+            _draw_standard_errors(dataset, group, x, axes, style)
             continue
         shades = point_colours(dataset, coloured)
         for row, colour in zip(_iterate_values_at_points(group, [coloured]), shades, strict=True):
@@ -124,6 +126,26 @@ def _draw_lines(variable_name: str, x_dimension: str, dataset: xr.Dataset, axes:
         add_grey_legend_entry(
             axes, f"first {_MAX_LEGEND_LINES} of {len(curves)} curves", {"linestyle": "none"}
         )
+
+
+def _draw_standard_errors(
+    dataset: xr.Dataset, curve: xr.DataArray, x: np.ndarray, axes: Axes, style: dict[str, Any]
+) -> None:
+    """Draw the standard errors of a curve if the dataset contains them."""
+    name = f"{curve.name}_stderr"
+    if name not in dataset or not set(curve.dims) <= set(dataset[name].dims):
+        return
+    at = {
+        str(d): curve.coords[d]
+        for d in dataset[name].dims
+        if d in curve.coords and not curve[d].ndim
+    }
+    errors = np.atleast_1d(dataset[name].sel(at).values).astype(float)
+    if errors.shape == x.shape:
+        axes.errorbar(
+            x, np.atleast_1d(curve.values), errors, fmt="none", ecolor=style["color"],
+            elinewidth=0.8, capsize=3,
+        )  # fmt: skip
 
 
 def _choose_x_dimension(dataset: xr.Dataset, variable: xr.DataArray) -> str:

@@ -16,7 +16,7 @@ import numpy as np
 import xarray as xr
 from matplotlib.axes import Axes
 from matplotlib.collections import PolyCollection
-from matplotlib.colors import BoundaryNorm, LogNorm, Normalize
+from matplotlib.colors import BoundaryNorm, CenteredNorm, LogNorm, Normalize
 from matplotlib.contour import QuadContourSet
 from matplotlib.patheffects import withStroke
 from matplotlib.ticker import LogLocator, MaxNLocator
@@ -34,7 +34,7 @@ from rsfstudy.plots._axes import (
     measured_variables,
     read_flag_meanings_of_variable,
 )
-from rsfstudy.plots._text import to_mathtext
+from rsfstudy.plots._text import format_number, to_mathtext
 from rsfstudy.status import Status
 from rsfstudy.study import Panel
 
@@ -140,7 +140,9 @@ def draw_map(
     if found := colour_scale or _colour_scale(dataset[variable_name]):
         axes.grid(False)
         known = np.ma.masked_invalid(values.values)
-        drawn = axes.pcolormesh(*at, known, rasterized=True, norm=found[0])
+        # A diverging colour map is centred at zero if the values have both signs.
+        colour_map = "RdBu_r" if isinstance(found[0], CenteredNorm) else None
+        drawn = axes.pcolormesh(*at, known, rasterized=True, norm=found[0], cmap=colour_map)
         if meanings := read_flag_meanings_of_variable(dataset[variable_name]):
             for flag in found[1]:
                 colour = drawn.to_rgba(np.array(flag))
@@ -175,6 +177,8 @@ def _colour_scale(map_values: xr.DataArray) -> tuple[Normalize, Sequence[float]]
     if are_positive_and_span_decades(values):
         subs = (1.0, 3.0) if high < 1e4 * low else (1.0,)
         return LogNorm(low, high), LogLocator(subs=subs).tick_values(low, high)
+    if low < 0.0 < high:
+        return CenteredNorm(0.0, max(-low, high)), MaxNLocator(8).tick_values(low, high)
     return Normalize(low, high), MaxNLocator(8).tick_values(low, high)
 
 
@@ -204,7 +208,7 @@ def draw_contours(axes: Axes, values: xr.DataArray, contour_levels: Sequence[flo
             x, y, values, contour_levels, colors="white", linewidths=0.6, linestyles="-"
         )
     for text in axes.clabel(
-        found, fontsize=MIN_FONT_SIZE, fmt="%.3g", manual=_label_positions(axes, found)
+        found, fontsize=MIN_FONT_SIZE, fmt=format_number, manual=_label_positions(axes, found)
     ):
         text.set_path_effects([withStroke(linewidth=1.0, foreground="0.2")])
 

@@ -100,7 +100,8 @@ def check_name_clashes(
         check_fields_not_solved_by_measure(measure, axis.fields)
         for name in (axis.dimension, *axis.fields):
             if name in taken:
-                raise InvalidValue("axis", name, "is already the name of a result")
+                remedy = "Rename the result or the field of the axis."
+                raise InvalidValue("axis", name, "is already the name of a result", remedy=remedy)
 
 
 def check_fields_not_solved_by_measure(measure: Measure, field_names: Sequence[str]) -> None:

@@ -321,7 +321,10 @@ class Study:
         for axis in self.axes:
             for name in axis.fields:
                 if name in unused:
-                    raise InvalidValue("field", name, "has no effect in any cell")
+                    remedy = "Remove the axis, or add points at which the field has an effect."
+                    raise InvalidValue(
+                        "field", name, "has no effect in any cell of the study", remedy=remedy
+                    )
 
     def cell(self, number: int) -> Cell:
         """Build one cell.

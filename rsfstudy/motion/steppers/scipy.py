@@ -106,6 +106,8 @@ class SciPyStepper(Stepper):
             )
             self._solver = self._create_solver(motion, workspace, ends, begin, first_step=length)
         solver = self._solver
+        if not all(map(math.isfinite, workspace.rates[: workspace.unknown_count])):
+            return NO_STEP  # The solver would reduce the step size without end.
         solver.max_step = max_length
         if motion.next_step_length and isinstance(
             solver, DOP853
@@ -194,7 +196,10 @@ class SciPyStepper(Stepper):
                 motion.evaluations_fast += 1
             if motion.evaluations_slow + motion.evaluations_fast > self._max_evaluations:
                 raise _BudgetExceeded
-            changes: Numbers = rate_of(tuple(unknowns.tolist()), p)
+            try:
+                changes: Numbers = rate_of(tuple(unknowns.tolist()), p)
+            except OverflowError:  # The solver rejects a trial step with NaN.
+                return (math.nan,) * len(unknowns)
             return changes
 
         scales = np.array(workspace.scales[: workspace.unknown_count])

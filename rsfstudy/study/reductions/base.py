@@ -198,7 +198,7 @@ class Reduction(ConstructorKeywordCheckMixin):
     @property
     def quantities(self) -> Sequence[Quantity]:
         """Quantities of the results that have an entry in ``long_names``."""
-        words = {"name": self.name.replace("_", " ")}
+        words = {"name": self.name.replace("_", " "), "of": self.of.replace("_", " ")}
         given = self.long_names.items()
         return [Quantity(f"{self.name}{end}", "", "1", t.format(**words)) for end, t in given]
 

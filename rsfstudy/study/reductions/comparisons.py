@@ -6,6 +6,7 @@ or with a closed-form solution.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import ClassVar
 
@@ -384,6 +385,11 @@ class ClosedFormRatio(Reduction):
 
     form: str = ""
     kind: ClassVar[str] = "over_closed_form"
+    long_names: ClassVar[Mapping[str, str]] = {
+        "": "ratio of {of} to its closed-form value",
+        "_closed_form": "closed-form value of {of}",
+        "_error": "numerical error of the ratio of {of} to its closed-form value",
+    }
     unit_fields: ClassVar[UnitFieldsByResultSuffix] = {"_closed_form": ("of",)}
 
     def __post_init__(self) -> None:
