@@ -234,6 +234,62 @@ def test_samples_are_a_corner_plot():
     assert isinstance(samples.corner_figure(dataset), samples.CornerFigure)
 
 
+def test_a_field_of_a_corner_plot_is_drawn_once_with_its_symbol():
+    normal = np.random.default_rng(1).normal
+    table = {"a": 0.01 + 1e-3 * normal(size=40), "b_over_a": 2.0 + 0.1 * normal(size=40)}
+    dataset = lattice(Axis.cases(table, dimension="sample"))
+    assert samples.corner_figure(dataset, "a").columns == 2
+    lengths = xr.Dataset(
+        {"slip_distance": ((), 12.0, {"long_name": "characteristic slip distance", "units": "um"})}
+    )
+    assert samples._format_short_axis_label(lengths, "slip_distance") == r"$D_c$ ($\mu$m)"
+
+
+def test_the_figure_of_overlapping_windows():
+    """Each law has one strong residual curve, and pale curves where windows overlap."""
+    x = np.arange(200.0)
+    windows = np.array([(x < 120), (x > 60)])
+    values = np.where(windows, 0.1 * np.sin(x), np.nan)[None]
+    dataset = xr.Dataset(
+        {
+            "record_time": (("law", "step", "row"), np.tile(x, (1, 2, 1))),
+            "record_displacement": (("law", "step", "row"), np.tile(x, (1, 2, 1))),
+            "record_friction": (("law", "step", "row"), np.tile(0.6 + 0 * x, (1, 2, 1))),
+            "residual": (("law", "step", "row"), values),
+            "fitted_friction": (("law", "step", "row"), 0.6 + values),
+            "fitted_friction_stderr": (("law", "step", "row"), 0.0 * values + 1e-4),
+        },
+        {"law": ["slip"], "step": [1, 2]},
+    )
+    axes = plots.NotebookFigure().add_subplot()
+    fits._draw_residuals(dataset, axes)
+    curves = [line for line in axes.lines if line.get_label() == "slip law"]
+    assert curves[1].get_xdata().min() > curves[0].get_xdata().max()
+    assert "overlap of windows" in axes.get_legend_handles_labels()[1]
+    assert fits._step_title(dataset) == "Step 1 (of 2)"
+    assert fits._correlation_title(dataset) == "Correlation, step 1: slip law"
+    fits._draw_record_with_fits(dataset, record := plots.NotebookFigure().add_subplot())
+    low, high = record.get_xlim()
+    assert -10.0 < low < 0.0 < 199.0 < high < 210.0
+    assert record.get_ylim()[0] > 0.4  # The legend entry of the bands is not a curve.
+
+
+def test_posterior_draws_are_a_corner_plot():
+    attrs = {"long_name": "characteristic slip distance", "symbol": "$D_c$", "units": "um"}
+    dataset = xr.Dataset(
+        {
+            "posterior": (("draw", "parameter"), np.random.default_rng(1).normal(size=(30, 2))),
+            "a": ((), 0.01, {"long_name": "direct effect parameter", "symbol": "$a$"}),
+            "slip_distance": ((), 12.0, attrs),
+        },
+        {"parameter": ["a", "slip_distance"], "draw": np.arange(30)},
+    )
+    figure, drawn = samples.posterior_figure(dataset)
+    assert figure.places == [0, 2, 3]
+    assert figure.panels[1].y_label == r"$D_c$ ($\mu$m)"
+    assert np.array_equal(drawn.slip_distance, dataset.posterior[:, 1])
+
+
 def test_integrators_have_distinct_colours():
     with plots.style_context():
         colours = [plots.cycle_style(number)["color"] for number in range(len(INTEGRATORS))]

@@ -127,7 +127,9 @@ def test_steps_fitted_together_have_one_law_and_a_curve_each(written, tmp_path, 
     curves = [line for line in figure.axes[0].lines if line.get_label() == "slowness law"]
     symbols = [text.get_text() for text in figure.axes[-1].get_xticklabels()]
     assert len(curves) == 1  # Consecutive windows are drawn as a single curve.
-    assert symbols[3:] == [r"$\mu_*^{(1)}$", "$c_1^{(1)}$", r"$\mu_*^{(2)}$", "$c_1^{(2)}$"]
+    assert symbols[3:] == [
+        rf"${name}^{{({n})}}$" for n in "12" for name in (r"\mu_0", r"\mathrm{trend}")
+    ]
 
 
 def test_a_rerun_says_what_it_lacks(written):

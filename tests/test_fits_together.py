@@ -26,13 +26,14 @@ from synthetic_records import (
 )
 
 import rsfstudy
-from rsfstudy import Scene
+from rsfstudy import Axis, Scene
 from rsfstudy.errors import IncompleteWarning, InvalidValue
 from rsfstudy.fitting.joint_model import JointModel
 from rsfstudy.fitting.window_model import WindowModel
 from rsfstudy.motion.accuracy import Accuracy
 from rsfstudy.motion.engines import COMPILED
 from rsfstudy.motion.integrator import Integrator
+from rsfstudy.storage.dataset_files import write_dataset
 
 ENOUGH = 10**9
 SHARED = ("a", "b", "slip_distance")
@@ -356,6 +357,44 @@ def test_the_posterior_is_that_of_the_errors(free: tuple[str, ...], draws: int) 
     correlation = np.corrcoef(drawn.values, rowvar=False)
     assert np.abs(correlation - fit.correlation).max() < 5.0 / math.sqrt(draws) + slack
     assert 1.0 < fit.autocorrelation_time < 20.0
+
+
+def test_posterior_draws_are_cases_in_their_units(tmp_path: Path) -> None:
+    """A slip distance of 10 um is never interpreted as 10 m.
+
+    Tables that have lost the units of the draws are rejected.
+    """
+    options = FIT_OPTIONS | {"a": 0.01, "b_over_a": 1.3, "mu_star": 0.6}
+    one = synthetic_record(seed=4, count=200)
+    fits = rsfstudy.fit(
+        one, laws=["slowness"], free=("a", "slip_distance"), posterior=50, **options
+    )
+    write_dataset(fits, tmp_path / "fit.nc")
+    fit = rsfstudy.open(tmp_path / "fit.nc").squeeze()
+    assert "units" not in fit.posterior.attrs
+    assert fit.parameter_units.sel(parameter="slip_distance").item() == "um"
+    drawn = fit.rsf.sample_parameters(50, posterior=True)
+    for name in ("a", "slip_distance"):
+        assert np.array_equal(drawn[name], fit.posterior.sel(parameter=name))
+    some = fit.rsf.sample_parameters(20, seed=3, posterior=True).slip_distance.values
+    assert len({*some} & {*drawn.slip_distance.values}) == 20
+    selected = {name: fit.posterior.sel(parameter=name) for name in ("a", "slip_distance")}
+    for table in (drawn, selected):
+        assert Axis.cases(table, dimension="draw").units == {"slip_distance": "um"}
+    without_units = fit.posterior.to_dataset("parameter")
+    remedy = "sample_parameters(n, posterior=True)"
+    for table in (
+        without_units,
+        without_units[["slip_distance"]],
+        fit.posterior.reset_coords(drop=True).to_pandas(),
+    ):
+        with pytest.raises(InvalidValue, match=rf"has no units.* um\. .*{re.escape(remedy)}"):
+            Axis.cases(table)
+        Axis.cases(table, units={"slip_distance": "um"})
+    with pytest.raises(InvalidValue, match=r"n = 51: is larger than.* 50.*posterior=51"):
+        fit.rsf.sample_parameters(51, posterior=True)
+    with pytest.raises(InvalidValue, match=r"requires a fit with posterior draws.*posterior=5"):
+        fit.drop_vars("posterior").rsf.sample_parameters(5, posterior=True)
 
 
 def test_a_chain_that_is_too_short_is_refused() -> None:

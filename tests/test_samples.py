@@ -161,6 +161,9 @@ def _with_units(tmp_path):
         Axis.cases(pd.read_csv(tmp_path / "cases.csv")),
         RIG.axis("case", dataset),
         Axis.cases(columns, units={"slip_distance": "um"}),
+        Axis.cases(
+            dataset.rename(slip_distance="length"), fields={"a": "a", "slip_distance": "length"}
+        ),
         RIG.axis("case", {"a": columns["a"], "slip_distance": ["5 um", "0.01 mm"]}),
     ]
 

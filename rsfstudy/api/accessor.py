@@ -536,11 +536,12 @@ class DatasetAccessor:
         return fit_table(self._dataset)
 
     @error_boundary
-    def sample_parameters(self, n: int, seed: int = 0) -> xr.Dataset:
+    def sample_parameters(self, n: int, seed: int = 0, *, posterior: bool = False) -> xr.Dataset:
         """Draw samples of the parameters of a fit.
 
-        The samples follow a multivariate t distribution with the covariance matrix of the fit. Slip
-        distances and stiffness are sampled on a logarithmic scale and are therefore positive.
+        By default, the samples follow a multivariate t distribution with the covariance matrix of
+        the fit. Slip distances and stiffness are sampled on a logarithmic scale and are therefore
+        positive.
 
         Parameters
         ----------
@@ -548,23 +549,27 @@ class DatasetAccessor:
             Number of samples.
         seed : int, default: 0
             Seed of the random number generator.
+        posterior : bool, default: False
+            If True, the samples are selected at random and without replacement from the draws of
+            emcee, which the fit contains if it was computed with the argument ``posterior``.
 
         Returns
         -------
         xarray.Dataset
             Samples of each parameter along the dimension ``draw``, in the units of the parameter.
+            The attribute ``units`` of each variable is read by `rsfstudy.Axis.cases`.
 
         Raises
         ------
         DataError
             If the dataset is not a fit.
         InvalidValue
-            If more than one fit is selected, if ``n`` is not a positive integer, or if the fit has
-            no covariance matrix.
+            If more than one fit is selected, if ``n`` is not a positive integer, if the fit has no
+            covariance matrix, or if the fit has fewer than ``n`` posterior draws.
         """
         from rsfstudy.api.fitted_parameters import sample_parameters
 
-        return sample_parameters(self._dataset, n, seed)
+        return sample_parameters(self._dataset, n, seed, posterior=posterior)
 
     @error_boundary
     def failures(self) -> pd.DataFrame:

@@ -29,12 +29,14 @@ from rsfstudy.execution import ProgressCallback
 from rsfstudy.fitting import (
     LOW_PASS_ORDERS,
     MEAN,
+    PARAMETERS,
     TRAILING_MEAN,
     FitWindow,
     Record,
     check_free_parameters,
     compute_weighted_mean,
     parameters_of_law,
+    split_window_number,
 )
 from rsfstudy.measures import Fit
 from rsfstudy.motion import Accuracy, Engine
@@ -163,7 +165,8 @@ def fit(
         default, the fit assumes that friction was not filtered.
     posterior : int, default: 0
         Number of draws from the posterior distribution. The draws are stored in the variable
-        ``posterior`` along the dimension ``draw``. Sampling requires emcee. The prior of each
+        ``posterior`` along the dimensions ``draw`` and ``parameter``, and the coordinate
+        ``parameter_units`` contains their units. Sampling requires emcee. The prior of each
         parameter is uniform between the bounds of the parameter in the fit, and the noise model is
         fixed. A Markov chain requires the integration of about 1,000 to 10,000 motions. If the
         budget is exceeded before the chain is 50 autocorrelation times long, the status of the fit
@@ -342,6 +345,12 @@ def fit(
     fits = study_runs.run(
         study, workers=workers, output=None, progress=progress, keep_going=True, command=command
     )
+    if posterior:
+        units = [PARAMETERS[split_window_number(name)[0]].units for name in measure.parameters]
+        about = {"long_name": "units of the parameter"}
+        fits = fits.assign_coords(parameter_units=("parameter", np.array(units, object), about))
+        # The draws of different parameters have different units.
+        del fits["posterior"].attrs["units"]
     processing = [f"{one.name}: {text}" for one in records for text in one.processing]
     return fits.assign_attrs({"processing": "; ".join(processing)} if processing else {})
 

@@ -27,11 +27,13 @@ def _require_single_fit(dataset: xr.Dataset) -> xr.Dataset:
     return found[0]
 
 
-def sample_parameters(dataset: xr.Dataset, sample_count: int, seed: int = 0) -> xr.Dataset:
+def sample_parameters(
+    dataset: xr.Dataset, sample_count: int, seed: int = 0, *, posterior: bool = False
+) -> xr.Dataset:
     """Draw samples of the parameters of a fit.
 
-    The samples follow a multivariate t distribution. The logarithms of slip distances and stiffness
-    are sampled.
+    By default, the samples follow a multivariate t distribution, and the logarithms of slip
+    distances and stiffness are sampled.
 
     Parameters
     ----------
@@ -41,6 +43,8 @@ def sample_parameters(dataset: xr.Dataset, sample_count: int, seed: int = 0) -> 
         Number of samples.
     seed : int, default: 0
         Seed of the random number generator.
+    posterior : bool, default: False
+        If True, the samples are selected from the posterior draws that the dataset contains.
 
     Returns
     -------
@@ -50,32 +54,23 @@ def sample_parameters(dataset: xr.Dataset, sample_count: int, seed: int = 0) -> 
     Raises
     ------
     InvalidValue
-        If the dataset contains several fits, if ``sample_count`` is not a positive integer, or if
-        the covariance matrix is not finite.
+        If the dataset contains several fits, if ``sample_count`` is not a positive integer, if the
+        covariance matrix is not finite, or if there are fewer posterior draws than samples.
     """
     one = _require_single_fit(dataset)
     if not isinstance(sample_count, int) or sample_count < 1:
         raise InvalidValue("n", sample_count, "must be a whole number, 1 or more")
+    rng = np.random.default_rng(seed)
     # The covariance of parameters that the law does not have is NaN.
     has = one["covariance"].notnull().any("other_parameter").values
     names = [str(name) for name in one["parameter"].values[has]]
-    at = np.array([one[name].item() for name in names])
-    covariance = one["covariance"].values[np.ix_(has, has)]
-    if not (has.any() and np.isfinite(covariance).all()):
-        raise InvalidValue(
-            "dataset",
-            Status.labels_by_code()[int(one["status"])],
-            "has no covariance matrix for sampling",
+    drawn = (
+        _select_posterior_draws(one, sample_count, rng)[:, has]
+        if posterior
+        else _draw_from_t_distribution(
+            one.isel(parameter=has, other_parameter=has), sample_count, rng
         )
-    logs = np.array([name in LOGARITHMIC_PARAMETERS for name in names])
-    scales = np.where(logs, at, 1.0)
-    rng = np.random.default_rng(seed)
-    degrees = one["degrees_of_freedom"].item()
-    spread = rng.multivariate_normal(
-        np.zeros(len(at)), covariance / np.outer(scales, scales), sample_count
     )
-    spread /= np.sqrt(rng.chisquare(degrees, sample_count) / degrees)[:, None]
-    drawn = np.where(logs, at * np.exp(np.where(logs, spread, 0.0)), at + spread)
     data = {
         name: (
             "draw",
@@ -93,6 +88,43 @@ def sample_parameters(dataset: xr.Dataset, sample_count: int, seed: int = 0) -> 
     return copy_with_cf_encoding(
         xr.Dataset(data, {"draw": ("draw", np.arange(sample_count), number)}, about)
     )
+
+
+def _draw_from_t_distribution(
+    fit: xr.Dataset, sample_count: int, rng: np.random.Generator
+) -> np.ndarray:
+    """Draw samples of the parameters from a multivariate t distribution."""
+    names = [str(name) for name in fit["parameter"].values]
+    at = np.array([fit[name].item() for name in names])
+    covariance = fit["covariance"].values
+    if not (names and np.isfinite(covariance).all()):
+        raise InvalidValue(
+            "dataset",
+            Status.labels_by_code()[int(fit["status"])],
+            "has no covariance matrix for sampling",
+        )
+    logs = np.array([name in LOGARITHMIC_PARAMETERS for name in names])
+    scales = np.where(logs, at, 1.0)
+    degrees = fit["degrees_of_freedom"].item()
+    spread = rng.multivariate_normal(
+        np.zeros(len(at)), covariance / np.outer(scales, scales), sample_count
+    )
+    spread /= np.sqrt(rng.chisquare(degrees, sample_count) / degrees)[:, None]
+    return np.where(logs, at * np.exp(np.where(logs, spread, 0.0)), at + spread)
+
+
+def _select_posterior_draws(
+    fit: xr.Dataset, sample_count: int, rng: np.random.Generator
+) -> np.ndarray:
+    """Select posterior draws at random without replacement."""
+    remedy = f"Fit the record with posterior={sample_count}, or pass posterior=False."
+    if "posterior" not in fit or not fit["posterior"].notnull().any():
+        raise InvalidValue("posterior", True, "requires a fit with posterior draws", remedy=remedy)
+    draws = fit["posterior"].transpose("draw", "parameter").values
+    if sample_count > len(draws):
+        rule = f"is larger than the number of posterior draws, {len(draws)}"
+        raise InvalidValue("n", sample_count, rule, remedy=remedy)
+    return draws[np.sort(rng.choice(len(draws), sample_count, replace=False))]
 
 
 def fitted_scene(dataset: xr.Dataset) -> Scene:

@@ -286,7 +286,8 @@ class Axis:
             sets the field of the same name.
         units : mapping of str to str, optional
             Units of the fields, for a study that is based on a `Rig`. By default, the units of the
-            table are used, or SI units if the table has no units.
+            table are used, or SI units if the table has no units. A field that a function computes
+            has no units in the table.
         dimension : str, default: "case"
             Name of the dimension.
 
@@ -298,8 +299,8 @@ class Axis:
         Raises
         ------
         InvalidValue
-            If `table` does not consist of named columns, or if the units of a column contradict
-            each other.
+            If `table` does not consist of named columns, if the units of a column contradict each
+            other, or if the draws of a fitted slip distance or stiffness have no units.
 
         Examples
         --------
@@ -312,8 +313,15 @@ class Axis:
 
         columns, stated = axis_samples.read_table_columns_and_units(table)
         made = axis_samples.compute_field_values(columns, fields)
-        kept = {n: text for n, text in stated.items() if made.get(n) is columns[n]}
-        return cls(dimension, made, kept | dict(units or {}))
+        columns_by_field = {name: name for name in columns} if fields is None else fields
+        kept = {
+            name: stated[column]
+            for name, column in columns_by_field.items()
+            if isinstance(column, str) and column in stated
+        }
+        known = kept | dict(units or {})
+        axis_samples.check_draws_have_units(table, columns_by_field, known)
+        return cls(dimension, made, known)
 
     def _check_values(self) -> None:
         if not self.rows:

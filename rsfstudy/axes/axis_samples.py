@@ -30,6 +30,9 @@ _MIN_SAMPLED_PROBABILITY = 2.0**-40
 #: Tolerance for negative eigenvalues of a correlation matrix. Small negative eigenvalues result
 #: from rounding errors.
 _EIGENVALUE_ROUNDING_ERROR = 1e-10
+#: Dimension of the draws of fitted parameters, and units of the fitted parameters that are also
+#: fields with units.
+_DRAW_DIMENSION, _UNITS_BY_FITTED_PARAMETER = "draw", {"slip_distance": "um", "stiffness": "1/um"}
 
 
 def draw_samples(
@@ -321,6 +324,10 @@ def read_table_columns_and_units(table: Any) -> tuple[dict[str, Any], dict[str, 
     for key in getattr(table, "data_vars", table):
         heading, column = str(key), table[key]
         stated = getattr(column, "attrs", {}).get("units", getattr(column, "units", ""))
+        # The coordinate contains the units of a parameter that was selected from posterior draws.
+        of_parameter = getattr(column, "coords", {}).get("parameter_units")
+        if of_parameter is not None and not of_parameter.ndim:
+            stated = of_parameter.item()
         stated = stated.get(heading, "") if isinstance(stated, Mapping) else stated
         name, of_heading = split_heading_into_name_and_units(heading) or (heading, "")
         if name in found:
@@ -335,3 +342,47 @@ def read_table_columns_and_units(table: Any) -> tuple[dict[str, Any], dict[str, 
         if stated not in ("", "1"):
             units[name] = stated
     return found, units
+
+
+def check_draws_have_units(
+    table: Any,
+    columns_by_field: Mapping[str, QuantityNameOrFunction],
+    units_by_field: Mapping[str, str],
+) -> None:
+    """Check that draws of a fitted slip distance or stiffness have units.
+
+    Fits are in um, but fields without units are in SI units.
+
+    Parameters
+    ----------
+    table : mapping of str to sequence, DataFrame or Dataset
+        Table with named columns. Draws of fitted parameters have the dimension or the index
+        ``draw``.
+    columns_by_field : mapping of str to str or callable
+        Column of each field, or a function that computes the field.
+    units_by_field : mapping of str to str
+        Units of the fields that have units.
+
+    Raises
+    ------
+    InvalidValue
+        If a field without units is set to the draws of a parameter with units.
+    """
+    for name, column_name in columns_by_field.items():
+        if not isinstance(column_name, str) or name in units_by_field:
+            continue
+        units = _UNITS_BY_FITTED_PARAMETER.get(column_name)
+        if units and column_name in table and _contains_draws(table[column_name]):
+            raise InvalidValue(
+                name,
+                float(np.ravel(table[column_name])[0]),
+                f"has no units, although the draws of a fit are in {units}",
+                remedy="Pass fit.rsf.sample_parameters(n, posterior=True), whose columns have "
+                f"units, or add units={{{name!r}: {units!r}}}.",
+            )
+
+
+def _contains_draws(column: Any) -> bool:
+    """Return True if a column of a table contains draws of fitted parameters."""
+    index_name = getattr(getattr(column, "index", None), "name", None)
+    return _DRAW_DIMENSION in (*getattr(column, "dims", ()), index_name)

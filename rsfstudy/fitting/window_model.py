@@ -37,7 +37,7 @@ PARAMETERS = {
         Quantity("b2", "$b_2$", "1", "evolution effect parameter of the second state"),
         Quantity("slip_distance", "$D_c$", "um", "characteristic slip distance"),
         Quantity("slip_distance_2", "$L_2$", "um", "slip distance of the second state"),
-        Quantity("mu_star", r"$\mu_*$", "1", "friction coefficient before the first step"),
+        Quantity("mu_star", r"$\mu_0$", "1", "friction coefficient before the first step"),
         Quantity("stiffness", "$k$", "um-1", "stiffness divided by normal stress"),
         Quantity(
             "alpha", r"$\alpha$", "1", "parameter of the normal stress effect on the state variable"
@@ -47,7 +47,7 @@ PARAMETERS = {
         *(
             Quantity(
                 f"trend{n}",
-                f"$c_{n}$",
+                rf"$\mathrm{{trend{n if n > 1 else ''}}}$",
                 f"um-{n}",
                 f"coefficient of power {n} of displacement in the trend",
             )

@@ -56,6 +56,10 @@ def choose_figure(
     """
     name, sizes = StoredDataset(dataset).declaration.plot, dataset["status"].sizes
     study = load_study(name) if name in study_names() else None
+    if name == _NAME_OF_FITS_FIGURE and variable == "posterior" and variable in dataset:
+        from rsfstudy.plots import samples
+
+        return samples.posterior_figure(dataset)
     if name == _NAME_OF_FITS_FIGURE and user_figure is variable is None:
         return Declared(
             importlib.import_module(f"{__package__}.{_NAME_OF_FITS_FIGURE}").panels(dataset)

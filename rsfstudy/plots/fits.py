@@ -26,6 +26,8 @@ from rsfstudy.study import Panel
 #: Maximum lag of the autocorrelation, minimum number of rows that remain after a long record is
 #: thinned, and maximum number of panels that show a record.
 _MAX_AUTOCORRELATION_LAGS, _MAX_DRAWN_RECORD_ROWS, _MAX_RECORD_PANELS = 40, 20_000, 4
+#: Largest margin beyond the ends of the record as a fraction of the total extent of the windows.
+_MARGIN_FRACTION_BESIDE_RECORD = 0.02
 #: Margin on both sides of the fitted windows as a fraction of the total extent of the windows, and
 #: width of the moving average of residuals as a fraction of a window.
 _MARGIN_FRACTION_BESIDE_WINDOWS, _RESIDUAL_AVERAGING_FRACTION_OF_WINDOW = 0.15, 0.02
@@ -100,7 +102,14 @@ def _record_title(records: int, dataset: xr.Dataset) -> str:
 
 def _step_title(dataset: xr.Dataset) -> str:
     """Return the title of the first step if there are several steps."""
-    return f"Step {dataset['step'].values[0]:g}" if "step" in dataset.dims else ""
+    if "step" not in dataset.dims:
+        return ""
+    return f"Step {dataset['step'].values[0]:g}{_count_of_steps(dataset)}"
+
+
+def _count_of_steps(dataset: xr.Dataset) -> str:
+    """Return the number of steps in parentheses if there are several steps."""
+    return f" (of {dataset.sizes['step']})" if dataset.sizes.get("step", 1) > 1 else ""
 
 
 def _iterate_fits_with_law(
@@ -161,19 +170,25 @@ def _draw_record_with_fits(dataset: xr.Dataset, axes: Axes) -> None:
                 axes.axvspan(x[0], x[-1], color="0.94", lw=0, zorder=0, label="fitted window")
             windows += [x[0], x[-1]]
             band = {"color": style["color"], "alpha": 0.3, "lw": 0, "zorder": 2}
-            said = rf"$\pm${_CONFIDENCE_BAND_HALF_WIDTH_IN_STDERRS:g} standard errors"
             axes.fill_between(
                 x,
                 y - _CONFIDENCE_BAND_HALF_WIDTH_IN_STDERRS * error,
                 y + _CONFIDENCE_BAND_HALF_WIDTH_IN_STDERRS * error,
-                label=said,
                 **band,
             )
             axes.plot(x, y, **style)
     if windows:
         beside = _MARGIN_FRACTION_BESIDE_WINDOWS * (max(windows) - min(windows))
-        axes.set_xlim(min(windows) - beside, max(windows) + beside)
+        # The axis does not extend far beyond the ends of the record.
+        pad = _MARGIN_FRACTION_BESIDE_RECORD * (max(windows) - min(windows))
+        axes.set_xlim(
+            max(min(windows) - beside, float(np.min(record[0])) - pad),
+            min(max(windows) + beside, float(np.max(record[0])) + pad),
+        )
         _fit_y_limits_to_visible_lines(axes)
+    # The bands have the colours of the laws, so the legend entry is grey.
+    said = rf"$\pm${_CONFIDENCE_BAND_HALF_WIDTH_IN_STDERRS:g} standard errors"
+    add_grey_legend_entry(axes, said, {"linewidth": 5.0, "alpha": 0.3})
 
 
 def _fit_y_limits_to_visible_lines(axes: Axes) -> None:
@@ -189,16 +204,29 @@ def _fit_y_limits_to_visible_lines(axes: Axes) -> None:
 
 
 def _draw_residuals(dataset: xr.Dataset, axes: Axes) -> None:
-    """Draw the residuals of the fits and their moving averages."""
+    """Draw the residuals of the fits and their moving averages.
+
+    Where the window of a step overlaps the window of an earlier step, the average is pale.
+    """
+    previous_end, end, overlap = dict[int, float](), dict[int, float](), False
     axes.axhline(0.0, color="0.5", lw=0.8, zorder=2)
     for one, name, law in _iterate_fits_with_law(dataset):
         style = cycle_style(law) | {"label": name, "marker": "", "linewidth": 1.0, "zorder": 3}
+        previous_end[law] = end.get(law, -math.inf)
         for x, y in _iterate_columns_of_fit_windows(one, ("record_displacement", "residual")):
             if not law:
                 axes.plot(x, y, label=f"rows, {name}", **_LINE_STYLE_OF_RECORD_ROWS)
             count = max(1, round(_RESIDUAL_AVERAGING_FRACTION_OF_WINDOW * len(x)))
             mean = np.ones(count) / count
-            axes.plot(np.convolve(x, mean, "valid"), np.convolve(y, mean, "valid"), **style)
+            x_mean, y_mean = np.convolve(x, mean, "valid"), np.convolve(y, mean, "valid")
+            first = int(np.count_nonzero(x_mean <= previous_end[law]))
+            axes.plot(x_mean[first:], y_mean[first:], **style)
+            if first:
+                axes.plot(x_mean[:first], y_mean[:first], **style | {"alpha": 0.35, "label": None})
+            end[law] = max(x[-1], end.get(law, -math.inf))
+            overlap = overlap or first > 0
+    if overlap:
+        add_grey_legend_entry(axes, "overlap of windows", {"alpha": 0.35})
 
 
 def _draw_autocorrelation(dataset: xr.Dataset, axes: Axes) -> None:
@@ -227,12 +255,13 @@ def _compute_autocorrelation(values: np.ndarray) -> np.ndarray:
 
 
 def _correlation_title(dataset: xr.Dataset) -> str:
-    """Return the title of the correlation panel with friction law names."""
+    """Return the title of the correlation panel with the first step and friction law names."""
+    step = f", step {dataset['step'].values[0]:g}" if "step" in dataset.dims else ""
     laws = [describe_point(dataset.isel(law=n), "law") for n in range(dataset.sizes["law"])][:2]
     if len(laws) == 1:
-        return f"Correlation: {laws[0]}"
+        return f"Correlation{step}: {laws[0]}"
     first, second = (law.removesuffix(" law") for law in laws)
-    return f"Correlation: {first} below, {second} above"
+    return f"Correlation{step}: {first} below, {second} above"
 
 
 def _parameter_symbol(parameter_name: str) -> str:

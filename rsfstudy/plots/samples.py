@@ -31,6 +31,8 @@ from rsfstudy.vocabulary import find_quantity
 #: Maximum number of quantities in the corner plot, including the measured variable, and maximum
 #: number of ticks per axis.
 _MAX_SCATTERED_QUANTITIES, _MAX_TICKS = 4, 3
+#: Maximum number of parameters in the corner plot of posterior draws.
+_MAX_SCATTERED_PARAMETERS = 6
 #: Maximum number of columns of a figure that is as wide as one column of a journal page.
 _MAX_COLUMNS_IN_NARROW_FIGURE = 2
 #: Style of the points in scatter plots. The points are rasterised in vector graphics, because there
@@ -115,7 +117,9 @@ def corner_figure(dataset: xr.Dataset, variable: str | None = None) -> CornerFig
     if along is None or (variable is not None and not is_numeric_variable(dataset[variable])):
         return None
     measured = [variable] if variable else varying_variables(dataset)[:1]
-    sampled = [name for name in fields[along] if has_numeric_points(dataset, name)]
+    sampled = [
+        name for name in fields[along] if name not in measured and has_numeric_points(dataset, name)
+    ]
     # The last row shows the measured variable against each sampled field.
     names = sampled[: _MAX_SCATTERED_QUANTITIES - len(measured)] + measured
     panels = [
@@ -124,6 +128,32 @@ def corner_figure(dataset: xr.Dataset, variable: str | None = None) -> CornerFig
         for x in names[:number]
     ]
     return CornerFigure(panels, len(names)) if panels else None
+
+
+def posterior_figure(dataset: xr.Dataset) -> tuple[CornerFigure, xr.Dataset]:
+    """Build the corner plot of the posterior draws of a fit.
+
+    Parameters
+    ----------
+    dataset : xarray.Dataset
+        Results of ``rsfstudy.fit`` with the variable ``posterior``.
+
+    Returns
+    -------
+    figure : CornerFigure
+        Corner plot of the first parameters. Fits of several laws or steps have different colours.
+    dataset : xarray.Dataset
+        Dataset in which the draws of each parameter are a variable.
+    """
+    names = [str(n) for n in dataset["parameter"].values][:_MAX_SCATTERED_PARAMETERS]
+    draws = {n: dataset["posterior"].sel(parameter=n, drop=True) for n in names}
+    drawn = dataset.assign({n: draws[n].assign_attrs(dataset[n].attrs) for n in names})
+    panels = [
+        _build_panel(drawn, "draw", x, y)
+        for number, y in enumerate(names, start=1)
+        for x in names[:number]
+    ]
+    return CornerFigure(panels, len(names)), drawn
 
 
 def _sampled_fields(dataset: xr.Dataset) -> dict[str, list[str]]:

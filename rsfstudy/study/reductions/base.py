@@ -416,7 +416,7 @@ def read_quantities_not_in_vocabulary(dataset: xr.Dataset) -> dict[str, Quantity
     return {
         str(name): Quantity(
             str(name),
-            str(values.attrs.get("symbol", "")),
+            str(values.attrs.get("symbol", "")) or _symbol_in_other_units(str(name), values.attrs),
             str(values.attrs.get("units", "1")),
             str(values.attrs["long_name"]),
             str(values.attrs.get("scale", "")),
@@ -424,6 +424,16 @@ def read_quantities_not_in_vocabulary(dataset: xr.Dataset) -> dict[str, Quantity
         for name, values in dataset.variables.items()
         if values.attrs.get("long_name") and not _is_in_vocabulary(str(name), values.attrs)
     }
+
+
+def _symbol_in_other_units(variable_name: str, variable_attributes: Mapping[Any, Any]) -> str:
+    """Return the symbol of a quantity of the vocabulary that is stored in other units.
+
+    The symbol of a normalised quantity is a quotient, which is valid only without units.
+    """
+    about = QUANTITY_BY_NAME.get(variable_name)
+    same = about is not None and variable_attributes["long_name"] == about.long_name
+    return about.symbol if about and same and about.units not in ("", "1") else ""
 
 
 def _is_in_vocabulary(variable_name: str, variable_attributes: Mapping[Any, Any]) -> bool:
