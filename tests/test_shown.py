@@ -215,7 +215,7 @@ def test_a_table_of_samples_tells_what_was_drawn(tmp_path, monkeypatch):
 
 def test_a_large_lattice_is_thinned(map_of_stiffness, tmp_path, monkeypatch):
     said = told_of(map_of_stiffness, tmp_path, monkeypatch)
-    caption = "critical stiffness of steady sliding, in sigma_*/D_c (24 of 202 cells, "
+    caption = "in sigma_*/D_c (24 of 202 cells, "
     assert (
         f"{caption}12 of 101 b_over_a, from first to last; to write all cells, use rsfstudy "
         "export --csv)" in " ".join(said.split())
