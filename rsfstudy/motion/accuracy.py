@@ -47,7 +47,8 @@ class Accuracy:
         Maximum number of right-hand side evaluations when a measure is evaluated at one scene. If
         the budget is exceeded, the status of the outcome is ``work_budget_spent``.
     methods : tuple of (str, str), default: ()
-        Pairs of a regime and the SciPy solver for this regime. The default solver is DOP853.
+        Pairs of a regime name and the name of the SciPy solver for this regime. The default solver
+        is DOP853.
     engine : {"scipy", "python", "compiled"} or type, default: "scipy"
         Engine that integrates motions, or a subclass of ``Stepper``. After a subclass of
         ``Stepper`` has been passed once, its ``name`` is also a valid engine name.
@@ -114,7 +115,7 @@ class Accuracy:
             )
 
     def refined(self) -> Accuracy:
-        """Return the accuracy for a second run, which yields an error estimate.
+        """Return the accuracy settings of a second run for an error estimate.
 
         All tolerances of the second run are ten times smaller. With a method of order eight, the
         second run costs about a third more than the first run.
@@ -122,7 +123,7 @@ class Accuracy:
         Returns
         -------
         Accuracy
-            Copy of the accuracy with a smaller ``refinement``.
+            Copy of the accuracy settings with a smaller ``refinement``.
 
         Notes
         -----
@@ -132,7 +133,7 @@ class Accuracy:
         return _cached_copy_with_tolerances(self, self.rtol, 0.1 * self.refinement)
 
     def with_rtol(self, rtol: float) -> Accuracy:
-        """Return a copy with another relative error tolerance.
+        """Return a copy of the settings with a different relative error tolerance.
 
         Parameters
         ----------
@@ -142,13 +143,13 @@ class Accuracy:
         Returns
         -------
         Accuracy
-            Copy with the same budget, methods, engine and refinement.
+            Accuracy settings with the new tolerance. All other settings are unchanged.
         """
         return _cached_copy_with_tolerances(self, rtol, self.refinement)
 
     @property
     def digits(self) -> float:
-        """Number of digits of the requested accuracy."""
+        """Number of significant digits that corresponds to ``rtol``."""
         return -math.log10(self.rtol)
 
     @property
@@ -175,11 +176,10 @@ class Accuracy:
     def max_inertia_correction(self) -> float:
         """Maximum change in ln V due to inertia on the slow manifold.
 
-        If friction weakens strongly with slip, a motion reaches this limit of the change in ln V
-        before it reaches the limit ``max_inertia_weight``. If the maximum change in ln V is
-        :math:`d`, the error of a limit cycle is up to :math:`0.07 d^3` in random scenes, and
-        :math:`0.0014 d^3` for the slider of the published study. The test suite measures both
-        coefficients.
+        If friction weakens strongly with slip, a motion exceeds this limit before it exceeds the
+        limit ``max_inertia_weight``. If the maximum change in ln V is :math:`d`, the error of a
+        limit cycle is up to :math:`0.07 d^3` in random scenes, and :math:`0.0014 d^3` for the
+        slider of the published study. The test suite measures both coefficients.
         """
         return math.cbrt(15.0 * min(self.rtol, _MAX_REGIME_SWITCHING_RTOL) * self.refinement)
 
@@ -191,7 +191,7 @@ class Accuracy:
 
 @lru_cache(maxsize=256)
 def _cached_copy_with_tolerances(accuracy: Accuracy, rtol: float, refinement: float) -> Accuracy:
-    """Return a copy of an accuracy with other tolerances.
+    """Return a copy of the accuracy settings with different tolerances.
 
     The copy is cached, so all computations of a study share the same object.
     """
@@ -213,9 +213,9 @@ def estimate_error(
     refined_value : float
         Result of the refined run. See ``Accuracy.refined``.
     relative_error_floor : float
-        Minimum relative error. The error estimate includes this error even if both runs agree by
-        chance. The minimum relative error is a small fraction of the requested accuracy. It was
-        measured in the study ``coverage``.
+        Minimum relative error. This error is always added to the estimate, because the two runs may
+        agree by chance. The minimum relative error is a small fraction of the requested accuracy.
+        Its value was determined in the study ``coverage``.
     error_scale : float, optional
         Reference value by which relative errors are multiplied. The default is ``value``. Pass a
         scale if ``value`` may be close to zero.

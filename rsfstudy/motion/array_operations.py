@@ -17,7 +17,7 @@ def evaluate_function_into_array(function, y, rates, parameters, result):
     Parameters
     ----------
     function : callable
-        Function of ``in_place_functions.InPlaceFunctions``.
+        One of the functions in ``in_place_functions.InPlaceFunctions``.
     y, rates, parameters : array
         Arguments of the function.
     result : array
@@ -30,7 +30,7 @@ def evaluate_function_into_array(function, y, rates, parameters, result):
 
 
 def array_as_pointer(array):
-    """Return an array as an argument for ``advance_pointer_by_items``.
+    """Convert an array to an argument of ``advance_pointer_by_items``.
 
     Parameters
     ----------
@@ -69,7 +69,7 @@ def copy_values(source, target, item_count):
     Parameters
     ----------
     source, target : array
-        Arrays to read and to write.
+        Array to copy from, and array to copy to.
     item_count : int
         Number of items.
     """

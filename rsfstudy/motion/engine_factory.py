@@ -51,7 +51,7 @@ def create_stepper(
     engine_name : str
         Name of the engine.
     equations_by_regime : iterable of Equations
-        Equations of each regime. The compiled engine does not iterate over them.
+        Equations of each regime. The compiled engine ignores this argument.
     method_by_regime : mapping of str to str
         Name of the SciPy solver for each regime.
 
@@ -109,7 +109,7 @@ def import_compiled_engine() -> Any:
 def call_array_function_by_engine(
     function: Callable[..., None], engine_name: str, *arrays: np.ndarray
 ) -> None:
-    """Call an array function in plain Python, or compile and call it.
+    """Call an array function, which is first compiled for the compiled engine.
 
     Parameters
     ----------

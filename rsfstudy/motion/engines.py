@@ -40,8 +40,8 @@ def engine_name(engine: Any) -> str:
     Raises
     ------
     InvalidValue
-        If a name is not valid, or if a class is not a stepper, has no valid name, or has the name
-        of another engine.
+        If the engine name is unknown. The exception is also raised if a class is not a stepper, has
+        no valid name, or has the name of another engine.
     """
     if not isinstance(engine, type):
         if not isinstance(engine, str) or not (engine in ENGINES or is_variable_name(engine)):
@@ -137,8 +137,8 @@ class CompilationLog:
     total_compilation_seconds : float, default: 0.0
         Total compilation time in seconds.
     create_context_while_compiling : callable, optional
-        Function that returns a context manager for the compilation. With this context manager, a
-        time limit or a timer can exclude the compilation time. By default, the context manager does
+        Function that returns a context manager for the compilation. A time limit or a timer can use
+        the context manager to exclude the compilation time. By default, the context manager does
         nothing.
     """
 

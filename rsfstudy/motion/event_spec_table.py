@@ -88,7 +88,7 @@ def pack_event_specifications(
     table : ndarray of shape (specifications * 7,)
         Rows of the table. The columns are ``array_layout.EVENT_SPECIFICATION_COLUMNS``.
     events_by_code : list of (EventKind, EventSpecification or None)
-        Kind and specification of the events for each event code of the loop.
+        Event kind and event specification for each event code of the loop.
     """
     meanings = [
         *((spec.kind, spec) for spec in event_specs),

@@ -1,8 +1,8 @@
 """Events of a motion: kinds of events, and specifications of requested events.
 
-The module ``step_events`` detects and locates the events. The event table lists the events in the
-order of time, with the slip and the point of the motion (slip rate, stresses and states) at each
-event. A measure can request the following events:
+The module ``step_events`` detects and locates the events. The event table lists the events in
+chronological order. For each event, it contains the slip and the point of the motion (slip rate,
+stresses and states). A measure can request the following events:
 
     maximum(quantity), minimum(quantity)
                                 extremum of a quantity
@@ -203,7 +203,7 @@ def fall(
 def _specify_quantity_event(
     kind: EventKind, quantity: str, level: float = 0.0, *, terminal: bool, may_defer: bool
 ) -> EventSpecification:
-    """Create an event specification, and accept former names of quantities."""
+    """Create an event specification. Former quantity names are also accepted."""
     if quantity not in MotionPoint._fields:
         quantity = translate_former_member_name(MotionPoint, quantity)
     return EventSpecification(kind, quantity, level, terminal, may_defer)

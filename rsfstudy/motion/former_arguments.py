@@ -35,9 +35,9 @@ def accept_accuracy_and_meter(function: AnyFunction) -> AnyFunction:
     Parameters
     ----------
     function : callable or type
-        Function or method that is wrapped in the error boundary, which converts the arguments. If
-        the argument is the class of a measure, its method ``compute`` accepts the former arguments,
-        or a user-defined method with the former signature is adapted.
+        Function or method to modify. It must be wrapped in the error boundary, because the error
+        boundary converts the arguments. For a measure class, the method ``compute`` is modified,
+        and a user-defined ``compute`` method with the former signature is adapted.
 
     Returns
     -------

@@ -22,15 +22,15 @@ from rsfstudy.slider import Equations, Function, Numbers
 class InPlaceFunctions(NamedTuple):
     """Functions of a system of equations, ordered as in the function table.
 
-    Each function has the arguments ``(y, rates, p, result)``, and fills the array ``result``. Only
-    the function ``attempt_step`` has other arguments: ``(y, stages, p, step)``.
+    Each function has the arguments ``(y, rates, p, result)``, and fills the array ``result``. The
+    only exception is ``attempt_step``, whose arguments are ``(y, stages, p, step)``.
 
     Parameters
     ----------
     fill_rates : callable
         Function that fills in the derivatives of the unknowns.
     fill_point : callable
-        Function that fills in the array columns of a point of the motion.
+        Function that fills an array with the values of a point of the motion.
     attempt_step : callable
         Function that attempts one step. See ``steppers.unrolled_step``.
     fill_balance : callable or None
@@ -82,7 +82,7 @@ def _build_in_place_functions_cached(
     state_count: int,
     parameter_count: int,
 ) -> InPlaceFunctions:
-    """Convert the functions of equations once for each combination of scene parts."""
+    """Build the in-place functions once for each combination of scene parts."""
     of_unknowns, numbers = (
         build_array_unpacking_function(unknown_count),
         build_array_unpacking_function(parameter_count),
@@ -141,7 +141,7 @@ def build_fill_point_function(
     unpack_parameters: Function,
     state_count: int,
 ) -> Function:
-    """Build the function that fills in the array columns of a point of the motion.
+    """Build the function that fills an array with a point of the motion.
 
     Parameters
     ----------
@@ -214,7 +214,7 @@ def build_array_unpacking_function(item_count: int, first_index: int = 0) -> Cal
     Returns
     -------
     callable
-        Function of an array that returns a tuple of float.
+        Function that takes an array and returns a tuple of float.
     """
     made: dict[str, Any] = {}
     listed = ", ".join(f"y[{i}]" for i in range(first_index, first_index + item_count))

@@ -37,7 +37,8 @@ def initial_point(scene: Scene) -> MotionPoint:
     Returns
     -------
     MotionPoint
-        Initial point. Only the fields that ``point_without_derived_values`` sets are computed.
+        Initial point. Only the fields set by ``point_without_derived_values`` contain values. All
+        other fields are NaN.
 
     Raises
     ------
@@ -99,8 +100,8 @@ def point_without_derived_values(
     Returns
     -------
     MotionPoint
-        Point of the motion. All fields of the point that are not arguments of the function are NaN.
-        The first event of the motion contains the computed values of all fields.
+        Point of the motion. Fields that are not arguments of this function are NaN. The first event
+        of the motion contains the computed values of all fields.
     """
     psi = scene.friction_functions.state_sum(states)
     known = log_slip_rate, math.nan, spring_stress, frictional_stress, psi
@@ -123,7 +124,8 @@ def compute_restart_point(scene: Scene, spring_stress: float, states: Numbers) -
     Returns
     -------
     MotionPoint
-        Initial point. Only the fields that ``point_without_derived_values`` sets are computed.
+        Initial point. Only the fields set by ``point_without_derived_values`` contain values. All
+        other fields are NaN.
 
     Raises
     ------
@@ -152,7 +154,7 @@ def _reset_loading_unknowns(scene: Scene, states: Numbers) -> Numbers:
 def _find_specified_initial_states(scene: Scene, steady_states: Numbers) -> tuple[Numbers, float]:
     """Find the states and ln(V/V_*) for the initial stress and state of the scene.
 
-    The function solves for the value of Psi at which the state variable has its specified value.
+    The function solves for the value of Psi that gives the specified state variable.
     """
     before = scene.with_segment(Segment(1.0))
     others = steady_states[1 : before.state_count]
@@ -200,7 +202,7 @@ def point_after_loading_jump(scene: Scene, point: MotionPoint) -> MotionPoint:
 
 
 def point_with_slip_rate(scene: Scene, point: MotionPoint, log_slip_rate: float) -> MotionPoint:
-    r"""Return a copy of a point with another slip rate and the matching friction.
+    r"""Return a copy of a point with a new slip rate and the resulting friction.
 
     Parameters
     ----------

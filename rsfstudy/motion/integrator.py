@@ -1,4 +1,4 @@
-"""Integrator of the motions from which a measure computes its results.
+"""Integrator that computes the motions required by the measures.
 
 An ``Integrator`` stores the requested accuracy and counts right-hand side evaluations. The method
 ``Integrator.follow`` integrates a scene through its loading segments and yields events. A chain is
@@ -227,7 +227,7 @@ class Integrator:
             Result that was computed with the refined integrator.
         floor_over_tolerance : float
             Minimum relative error, as a fraction of the requested relative error. The minimum is
-            part of the error estimate even if both results agree by chance.
+            always added to the estimate, because the two results may agree by chance.
         error_scale : float, optional
             Reference value that converts relative errors to absolute errors. The default is
             ``value``.

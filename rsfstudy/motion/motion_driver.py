@@ -70,7 +70,8 @@ class MotionDriver:
     engine : str
         Name of the engine.
     methods : sequence of (str, str), default: ()
-        Pairs of a regime and the SciPy solver for this regime. The default solver is DOP853.
+        Pairs of a regime name and the name of the SciPy solver for this regime. The default solver
+        is DOP853.
     **fields : float
         Initial values of motion state fields. See ``array_layout.MOTION_STATE_DTYPE``.
     """
@@ -159,8 +160,8 @@ class MotionDriver:
         recording : Recording, optional
             Object that receives the recorded rows.
         kinks_and_reported_count : tuple of (ndarray, int), optional
-            Rows of the segment table for all loading segments after the first, and the number n of
-            segments whose starts are reported as events. These are the last n segments.
+            Segment table rows of all loading segments after the first, and a number ``n``. The
+            starts of the last ``n`` segments are reported as events.
         initial_imposed_stress : float, optional
             Initial value of the last unknown, if the load point oscillates. The imposed shear
             stress is the last unknown minus its initial value. The unknown ``spring_stress`` does
@@ -297,7 +298,7 @@ def get_motion_driver(
     engine : str
         Name of the engine.
     methods : tuple of (str, str)
-        Pairs of a regime and the SciPy solver for this regime.
+        Pairs of a regime name and the name of the SciPy solver for this regime.
     with_time : bool
         If True, time is one of the unknowns.
 

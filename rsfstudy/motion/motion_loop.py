@@ -25,10 +25,10 @@ The functions that start regimes and segments are in ``regime_starts``. The func
 step, end a step, record samples and detect events are in ``step_integration``, ``step_ends``,
 ``step_samples`` and ``step_events``, respectively.
 
-The header of ``array_layout`` lists the functions that write each field of ``motion``. The class
-``Workspace`` describes the arrays of a regime, and the header of ``workspace`` lists the functions
-that write these arrays. Steppers only take integration steps. The event loop detects and locates
-the events in the same way for all steppers.
+The docstring of the module ``array_layout`` lists the functions that write each field of
+``motion``. The class ``Workspace`` describes the arrays of a regime. The docstring of the module
+``workspace`` lists the functions that write these arrays. Steppers only take integration steps. The
+event loop detects and locates the events in the same way for all steppers.
 
 The code of these modules is limited to Python features that Numba can compile. To debug a rupture,
 simulate a scene with ``inertia=True`` and ``engine="scipy"``. To debug the stages of an integration
@@ -36,10 +36,10 @@ step, use ``engine="python"`` instead. Set a breakpoint in
 ``step_ends.truncate_step_at_end_of_regime_or_segment`` with the condition ``motion.regime == 1``
 (``FAST_REGIME``). The debugger then stops once in every step of the rupture. The arrays
 ``workspace.point_at_begin`` and ``workspace.point_at_end`` contain the points of the motion at both
-ends of the step. The array columns are numbered by ``array_layout.LOG_SLIP_RATE`` and the following
-constants. To stop at the end of a rupture, set a breakpoint with the same condition at
-``return REGIME_ENDED`` in ``integrate_one_regime``. To stop at the beginning of a rupture, set a
-breakpoint at ``return REGIME_ENDED`` with the condition ``motion.regime == 0``.
+ends of the step. The constant ``array_layout.LOG_SLIP_RATE`` and the constants defined after it are
+the column indices of these arrays. To stop at the end of a rupture, set a breakpoint with the same
+condition at ``return REGIME_ENDED`` in ``integrate_one_regime``. To stop at the beginning of a
+rupture, set a breakpoint at ``return REGIME_ENDED`` with the condition ``motion.regime == 0``.
 """
 
 from __future__ import annotations
@@ -132,7 +132,7 @@ def advance_motion(
     event_specs : array of shape (specifications * 7,)
         Event specifications. The columns are ``array_layout.EVENT_SPECIFICATION_COLUMNS``.
     kinks : array of shape (segments, 6)
-        Rows of the segment table for the loading segments after the first segment.
+        Segment table rows of all loading segments after the first.
     requested_samples : array
         Times or slips at which to record the motion.
     event_table : array of shape (rows, EVENT_POINT + FIRST_STATE + states)
@@ -255,7 +255,7 @@ def integrate_one_regime(
     -------
     int
         ``REGIME_ENDED``, ``SEGMENT_ENDED``, ``MOTION_ENDED``, ``TERMINATED``, ``PAUSED``, or the
-        return code of a step that could not be taken. See ``step_integration.take_step``.
+        return code of a failed step. See ``step_integration.take_step``.
     """
     if motion.pending_start:
         motion.time_per_step = 0.0

@@ -1,4 +1,4 @@
-"""Error estimate of the slow manifold approximation along a recorded motion.
+"""Error estimate of the slow-manifold approximation along a recorded motion.
 
 A comparison of two runs with different tolerances does not reveal the error of the slow-manifold
 approximation, because both runs use the same approximation.
@@ -75,8 +75,8 @@ def estimate_neglected_inertia_error(
       local error :math:`e` of ln V. The resulting change in spring stress and state is at most the
       integral of :math:`e` over :math:`(1 + K/a) \, d\delta + |d\Psi|/a`. Errors decay along the
       motion, so the largest :math:`e` is another upper bound.
-    - The slip in D_c that is neglected when the motion returns to the slow manifold, because ln V
-      jumps at the return. The state does not evolve over this slip.
+    - The slip, in D_c, that is neglected because ln V jumps when the motion returns to the slow
+      manifold. The state does not evolve over this slip.
     """
     if not scene.has_mass:
         return np.zeros(len(recorded_rows))

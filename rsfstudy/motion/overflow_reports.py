@@ -74,7 +74,7 @@ def convert_overflow_to_motion_stopped(
 
 
 def _describe_overflow_error(error: OverflowError) -> str:
-    """Describe the function of a part that overflowed, and its arguments."""
+    """Describe the part function that overflowed, and list its arguments."""
     for frame in _iterate_frames(error):
         if owner := _find_owner(frame):
             return (
@@ -94,7 +94,7 @@ def _iterate_frames(error: BaseException) -> Iterator[FrameType]:
 
 
 def _find_owner(frame: FrameType) -> str:
-    """Return the name of a part and of its function that a frame executes."""
+    """Return the names of the part and of the function executed in a frame."""
     for part in _iterate_subclasses(Part):
         for name, member in vars(part).items():
             function = getattr(member, "__func__", member)
@@ -112,7 +112,7 @@ def _iterate_subclasses(base: type[Any]) -> Iterator[type[Any]]:
 
 
 def _format_arguments(frame: FrameType) -> str:
-    """Return the names and the values of the arguments of the function of a frame."""
+    """Return the argument names and values of the function executed in a frame."""
     names, _args, _keywords, values = inspect.getargvalues(frame)
     return ", ".join(f"{name} = {_format_value(values[name])}" for name in names if name in values)
 

@@ -415,7 +415,7 @@ def resample_along_path(  # type: ignore[no-untyped-def]
 
 
 def move_nearest_row_position_to(row_positions: Any, row_position: float) -> None:
-    """Change the nearest inner row position to a given row position.
+    """Replace the nearest interior row position by a given row position.
 
     Parameters
     ----------
@@ -438,8 +438,8 @@ def find_extreme_position(
 ) -> float:
     """Find the fractional row number of an extremum.
 
-    The extremum of the polynomial that interpolates the samples of a step is found by Newton's
-    method.
+    The function interpolates the samples of a step by a polynomial, and finds the extremum of the
+    polynomial by Newton's method.
 
     Parameters
     ----------

@@ -51,7 +51,7 @@ def start_next_segment(motion, workspace, last_point, kinks, recording_table):
     last_point : array of shape (FIRST_STATE + states,)
         Output array for the last point of the previous segment.
     kinks : array of shape (segments, 6)
-        Rows of the segment table for the loading segments after the first segment.
+        Segment table rows of all loading segments after the first.
     recording_table : array of shape (rows, FIRST_STATE_COLUMN + states)
         Output table of recorded samples.
     """

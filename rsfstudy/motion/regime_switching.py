@@ -193,8 +193,8 @@ def slip_during_transition(
     Returns
     -------
     float
-        Upper bound on the slip in D_c, multiplied by the change in ln V. The formula contains the
-        larger of the two slip rate norms, so the result is an upper bound.
+        Upper bound on the slip in D_c, multiplied by the change in ln V. The result is an upper
+        bound because the formula uses the larger of the two slip rate norms.
 
     Notes
     -----
@@ -323,10 +323,11 @@ def should_switch_back_to_slow_manifold(
 
     The function also returns False shortly before an extremum of the slip rate. If the slip rate
     rises and friction exceeds spring stress, the slip rate on the slow manifold falls. The slip
-    rate then has a maximum before it meets the slow manifold, after a slip of several :math:`(K/a)
-    w^2` D_c. If the slip rate falls and spring stress exceeds friction, the slip rate on the slow
-    manifold rises. The slip rate then has a minimum above the present :math:`x_s`. The minimum lies
-    above :math:`x_s` by several times the inertial stress divided by :math:`a`.
+    rate then reaches a maximum before it meets the slow manifold. The maximum occurs after a slip
+    of several times :math:`(K/a) w^2` in D_c. If the slip rate falls and spring stress exceeds
+    friction, the slip rate on the slow manifold rises. The slip rate then has a minimum above the
+    present :math:`x_s`. The minimum lies above :math:`x_s` by several times the inertial stress
+    divided by :math:`a`.
     """
     norm = max(
         compute_slip_rate_norm(log_slip_rate, switch_thresholds),
@@ -411,9 +412,8 @@ def compute_margin_to_termination(
     Returns
     -------
     float
-        Smallest of several differences. Each difference is between ln V and a limit of ln V, or
-        between the logarithm of normal stress and a limit of this logarithm. The margin is positive
-        if the motion continues.
+        Smallest of the differences between ln V and its limits, and between the logarithm of normal
+        stress and its limits. The margin is positive if the motion continues.
     """
     stress = math.log(max(normal_stress, MIN_POSITIVE_NORMAL_STRESS))
     left = min(

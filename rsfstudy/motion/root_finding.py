@@ -15,15 +15,16 @@ def build_root_finder(function: Function) -> Function:
     Parameters
     ----------
     function : callable
-        Function ``function(x, given)`` of a float ``x`` and of additional arguments ``given``.
+        Function ``function(x, given)`` with a float argument ``x`` and additional arguments
+        ``given``.
 
     Returns
     -------
     callable
-        Function ``root(low, high, at_low, at_high, finest, relative, given)``. It returns a root
-        between ``low`` and ``high`` to the absolute tolerance ``finest`` plus the relative
-        tolerance ``relative``. The function values ``at_low`` and ``at_high`` must have opposite
-        signs.
+        Function ``root(low, high, at_low, at_high, finest, relative, given)``. The returned root
+        lies between ``low`` and ``high``. The error tolerance of the root is the sum of the
+        absolute tolerance ``finest`` and the relative tolerance ``relative``. The function values
+        ``at_low`` and ``at_high`` must have opposite signs.
 
     References
     ----------

@@ -47,9 +47,9 @@ def list_segment_chains(
 def find_remaining_segment_chains(
     scene: Scene, resume_from: Event
 ) -> tuple[Sequence[tuple[Scene, np.ndarray]], MotionPoint]:
-    """Return the remaining segment chains of a motion that is continued.
+    """Return the segment chains that remain when a motion is resumed.
 
-    If the motion ended at a jump in stress, the continued motion starts after this jump.
+    If the motion ended at a jump in stress, the resumed motion starts after this jump.
 
     Parameters
     ----------
@@ -115,14 +115,14 @@ def begin_noise(
     start : MotionPoint
         First point of the loading segment.
     segment_table : ndarray
-        Table with a single row, the loading segment without noise.
+        Table with a single row, which describes the loading segment without noise.
 
     Returns
     -------
     start : MotionPoint
-        First point, with the normal stress of the noise.
+        First point. Its normal stress includes the noise.
     parameters : tuple of float
-        Parameters during the first row of ``table``.
+        Parameters that apply during the first row of ``table``.
     table : ndarray
         First block of the segment table with noise.
     further_tables : iterator of ndarray
@@ -145,7 +145,7 @@ def iterate_segment_start_events(
     segment_scene: Scene,
     event_specs: Sequence[EventSpecification],
 ) -> Iterator[Event]:
-    """Yield the events at the jump in stress at the start of a segment chain.
+    """Yield the events at the stress jump that begins a segment chain.
 
     The first chain of a motion does not start with a jump in stress, so the function is not called
     for the first chain. The first event is the start of the loading segment. The other events are

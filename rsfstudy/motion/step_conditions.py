@@ -1,7 +1,7 @@
 """Conditions whose roots are located within a step.
 
-Each event occurs at a root of a function of time, for example a derivative of ln V. The end of a
-regime, a requested time and the termination of the motion are also represented by roots of
+An event occurs when a function of time, for example a derivative of ln V, becomes zero. The end of
+a regime, a requested time and the termination of the motion are also represented by roots of
 functions, which are called conditions. If a condition changes sign between the ends of the step,
 ``locate_sign_change`` finds the root with dense output.
 """
@@ -53,7 +53,7 @@ def evaluate_event_quantity(event_spec, point_columns, parameters):
     event_spec : array
         Row of the table of event specifications.
     point_columns : array of shape (FIRST_STATE + states,)
-        Point of the motion. The columns are numbered in ``array_layout``.
+        Point of the motion. The column indices are defined in ``array_layout``.
     parameters : array
         Parameters of the scene.
 
@@ -123,7 +123,7 @@ def compute_excess_over_switch_threshold(motion, workspace, point_columns):
     workspace : Workspace
         Arrays of the regime.
     point_columns : array of shape (FIRST_STATE + states,)
-        Point of the motion. The columns are numbered in ``array_layout``.
+        Point of the motion. The column indices are defined in ``array_layout``.
 
     Returns
     -------
@@ -177,7 +177,7 @@ def evaluate_condition_at_clock(clock, condition_context):
     Parameters
     ----------
     clock : float
-        Independent variable, between the beginning and the end of the step.
+        Value of the independent variable between the beginning and the end of the step.
     condition_context : tuple of (float, record, Workspace)
         Condition, state of the motion and arrays of the regime. The condition is the index of an
         event specification, ``SWITCH_CONDITION``, ``TIME_CONDITION`` or ``TERMINATION_CONDITION``.

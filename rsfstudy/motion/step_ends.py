@@ -138,7 +138,7 @@ def end_step_at_end_time(motion, workspace, clock):
     workspace : Workspace
         Arrays of the regime.
     clock : float
-        Estimate of the independent variable at the end time, from dense output.
+        Estimate of the independent variable at the end time, computed from dense output.
     """
     for _ in range(CORRECTION_COUNT_OF_SEGMENT_END_CLOCK):
         retake_step(motion, workspace, clock)

@@ -126,8 +126,8 @@ def append_start_events(motion, workspace, last_point, event_table):
     """Append the events at the start of a regime or segment.
 
     The first event is the start of the regime or segment. The start of a segment is omitted if the
-    loading does not report it. The function also appends requested events that occur at the jump
-    between the previous and the new regime or segment.
+    loading excludes it from the reported events. The function also appends requested events that
+    occur at the jump between the previous and the new regime or segment.
 
     Parameters
     ----------
@@ -177,7 +177,7 @@ def find_jump_side_of_event(
     point_after: Any,
     parameters_after: Any,
 ) -> int:
-    """Find the side of a jump at which a requested event is reported.
+    """Find the side of a jump on which a requested event is reported.
 
     Parameters
     ----------

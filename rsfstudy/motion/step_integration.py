@@ -265,7 +265,7 @@ def is_dense_output_accurate(motion, workspace):
 
 
 def evaluate_point_at_clock(motion, workspace, clock):
-    """Evaluate ``workspace.point_within`` at a clock value within the step.
+    """Compute ``workspace.point_within`` at a value of the independent variable.
 
     Parameters
     ----------
@@ -274,7 +274,7 @@ def evaluate_point_at_clock(motion, workspace, clock):
     workspace : Workspace
         Arrays of the regime.
     clock : float
-        Independent variable, between the beginning and the end of the step.
+        Value of the independent variable between the beginning and the end of the step.
     """
     interpolate_unknowns(motion, workspace, clock)
     count_evaluations(motion, 1)
@@ -304,7 +304,7 @@ def truncate_step_at_clock(motion, workspace, clock):
     workspace : Workspace
         Arrays of the regime.
     clock : float
-        Independent variable, between the beginning and the end of the step.
+        Value of the independent variable between the beginning and the end of the step.
     """
     if clock != motion.end:
         evaluate_point_at_clock(motion, workspace, clock)

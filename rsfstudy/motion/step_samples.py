@@ -99,8 +99,9 @@ def record_step(motion, workspace, recording_table, requested_samples, is_motion
     requested_samples : array
         Times in D_c/V_* or slips in D_c at which to record the motion, in increasing order.
     is_motion_over : bool
-        True if the motion or the loading segment ends with the step. Requested times up to
-        ``motion.end_time`` are then recorded in spite of rounding errors.
+        True if the motion or the loading segment ends with the step. All requested times up to
+        ``motion.end_time`` are then recorded, even if the step ends slightly earlier due to
+        rounding errors.
 
     Returns
     -------
@@ -210,7 +211,7 @@ def record_at_clock(motion, workspace, recording_table, clock):
     recording_table : array of shape (rows, FIRST_STATE_COLUMN + states)
         Output table of recorded samples.
     clock : float
-        Independent variable, between the beginning and the end of the step.
+        Value of the independent variable between the beginning and the end of the step.
     """
     evaluate_point_at_clock(motion, workspace, clock)
     passed = motion.regime_start_time + time_since_regime_start(
@@ -237,7 +238,7 @@ def append_recorded_row(motion, recording_table, clock, time, point_columns, par
     time : float
         Time since the start of the loading segment, in D_c/V_*.
     point_columns : array of shape (FIRST_STATE + states,)
-        Point of the motion. The columns are numbered in ``array_layout``.
+        Point of the motion. The column indices are defined in ``array_layout``.
     parameters : array
         Parameters of the scene.
     """

@@ -94,7 +94,7 @@ class WorkMeter:
 
     @property
     def budget_advice(self) -> str:
-        """Last sentence of a message, which suggests a budget four times as large."""
+        """Final sentence of an error message, which suggests a fourfold budget."""
         return (
             f". To continue, increase the budget to {4 * self.budget}: --budget "
             f"{4 * self.budget} (in Python, Accuracy(budget={4 * self.budget}))"
@@ -126,13 +126,14 @@ class WorkMeter:
             Name of the slow regime, followed by the name of the fast regime if there are two
             regimes.
         work_before, work_now : sequence of int
-            Cumulative counts of the motion at the previous call and now. The four counts are
-            evaluations in the slow regime, evaluations in the fast regime, steps, and Jacobians.
+            Cumulative counts of the motion at the previous call and at the current call. The four
+            counts are evaluations in the slow regime, evaluations in the fast regime, steps, and
+            Jacobians.
 
         Returns
         -------
         int
-            Number of right-hand side evaluations of other motions, counted by the same work meter.
+            Number of right-hand side evaluations that the work meter has counted for other motions.
         """
         others = self.evaluations - work_before[0] - work_before[1]
         if work_now[0] > work_before[0]:

@@ -88,8 +88,8 @@ class Workspace(NamedTuple):
         Values of the independent variable at the events of the step, or NaN for events that do not
         occur.
     functions : InPlaceFunctions
-        Functions of the equations, the row of the regime in the function table. In compiled code,
-        functions are represented by addresses.
+        Functions of the equations, which are the row of the regime in the function table. In
+        compiled code, functions are represented by addresses.
     event_specs : array
         Flattened table of event specifications.
     event_spec_count : int

@@ -29,12 +29,13 @@ has its own data structure:
    the fluid and the loading into the friction relation and the evolution of all states
    (``scene.friction_functions``).
 3. Equations: ``equations.Equations`` holds the rates, unknowns and parameters of a scene in one
-   regime. The rates and the points are built from friction and from the functions of the dynamics,
-   and the SciPy integrators call ``Equations.rate_function`` directly.
+   regime. The functions for the rates and for the points are built from the friction functions and
+   from the functions of the dynamics. The SciPy integrators call ``Equations.rate_function``
+   directly.
 4. In-place functions: ``motion.in_place_functions.InPlaceFunctions`` converts the functions of
    ``Equations``, which take and return tuples, to functions that fill arrays.
-5. Table: ``MotionDriver`` passes a table to the event loop, with one row of in-place functions, or
-   of their compiled addresses, per regime.
+5. Table: ``MotionDriver`` passes a function table with one row per regime to the event loop. A row
+   contains the in-place functions, or the addresses of the compiled functions.
 
 The equations of doi:10.1007/s11589-014-0098-4 are implemented in the following modules:
 

@@ -49,8 +49,8 @@ class Equations(NamedTuple):
     unknown_names : tuple of str
         Names of the unknowns.
     unknown_scales : tuple of float
-        Scale of each unknown. If an unknown changes by its scale, the effect on the motion is as
-        large as the effect of a change in :math:`\ln V` by 1.
+        Scale of each unknown. A change of an unknown by its scale affects the motion about as much
+        as a change of :math:`\ln V` by 1.
     rate_function : callable
         Function ``rate(state, p) -> tuple`` that returns the derivatives of the unknowns.
     point_function : callable
@@ -144,7 +144,7 @@ def equations_without_mass(scene: SceneView, *, with_time: bool) -> Equations:
     Parameters
     ----------
     scene : Scene
-        Scene to integrate. If the scene has inertia, the function ignores the inertia.
+        Scene to integrate. Any inertia of the scene is ignored.
     with_time : bool
         If True, time is an additional unknown.
 
@@ -230,7 +230,7 @@ def equations_in_rupture(scene: SceneView, *, with_time: bool = False) -> Equati
 def _build_rupture_equations(
     scene: SceneView, *, with_time: bool = False, along_path: bool = True
 ) -> Equations:
-    """Build the equations in ruptures. Raise TypeError if there is no inertia."""
+    """Build the rupture equations. Raise TypeError if the scene has no inertia."""
     a, friction, others = scene.a, scene.friction_functions, _state_names(scene)[1:]
     if scene.dynamics.build_rupture_rate_function is None:
         raise TypeError(
@@ -334,7 +334,7 @@ def quasi_static_log_slip_rate(scene: SceneView, spring_stress: float, state_sum
     Parameters
     ----------
     scene : Scene
-        Scene with friction parameters.
+        Scene that provides the friction parameters.
     spring_stress : float
         Deviation of the spring stress from :math:`\tau_*`, in units of :math:`\sigma_*`.
     state_sum : float
@@ -352,7 +352,7 @@ def quasi_static_log_slip_rate(scene: SceneView, spring_stress: float, state_sum
 
 
 def slow_manifold_point(scene: SceneView, spring_stress: float, states: Numbers) -> MotionPoint:
-    """Return the point on the slow manifold for a spring stress and states.
+    """Return the slow-manifold point for a given spring stress and given states.
 
     Parameters
     ----------
@@ -366,7 +366,7 @@ def slow_manifold_point(scene: SceneView, spring_stress: float, states: Numbers)
     Returns
     -------
     MotionPoint
-        Point with values of all fields.
+        Point in which all fields have values.
     """
     return equations_between_ruptures(scene, with_time=False).evaluate_point(
         (spring_stress, *states)

@@ -46,7 +46,7 @@ class StateEvolutionDerivatives(NamedTuple):
     relative_error: float
 
     def with_perturbed_derivatives(self, relative_change: float) -> StateEvolutionDerivatives:
-        r"""Return a copy in which all derivatives are changed by a small factor.
+        r"""Return a copy in which all derivatives are multiplied by factors near 1.
 
         Parameters
         ----------
@@ -85,7 +85,7 @@ def compute_state_evolution_derivatives(
     Parameters
     ----------
     scene : Scene
-        Scene with friction parameters.
+        Scene that provides the friction parameters.
     steady_state : SteadySliding
         Steady sliding of the scene.
 

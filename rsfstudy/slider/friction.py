@@ -9,13 +9,14 @@ The pore pressure :math:`P`, divided by :math:`\sigma_*`, reduces the effective 
 :math:`s = \sigma/\sigma_* - P`. Friction, and the effects of stress on the state, depend on
 :math:`\sigma` and :math:`P` only through the effective normal stress. In the tuple of states, the
 states of the law come first, and the pressure :math:`P` is the last element. A loading that imposes
-normal stress adds an unknown that acts like a pore pressure. If a scene has such a loading and also
-a fluid, the first element after the states of the law is the pressure around the fault.
+normal stress adds an unknown that acts like a pore pressure. If a scene has both such a loading and
+a fluid, the pressure around the fault is the first element after the states of the law.
 
-If the displacement of the load point exceeds its mean motion by :math:`D`, the spring adds the
-shear stress :math:`K D`. The unknowns f (spring stress) and g (frictional stress) do not include
-the stress :math:`K D`. The friction functions therefore add :math:`K D` to g. The equations for
-inertia and radiation damping do not need :math:`K D`, because they depend only on the difference f
+An oscillation of the load point adds a displacement :math:`D` to its mean motion. The spring
+converts this displacement to the additional shear stress :math:`K D`. The unknowns f (spring
+stress) and g (frictional stress) do not include the stress :math:`K D`. The friction functions
+therefore add :math:`K D` to g. The equations for inertia and radiation damping do not need :math:`K
+D`, because they depend only on the difference f
 - g.
 
 The functions take floats and the parameter tuple ``p`` (see ``parameter_layout``). Scenes with the
@@ -235,7 +236,7 @@ def build_friction_relation(
     Parameters
     ----------
     scene : Scene
-        Scene with friction parameters.
+        Scene that provides the friction parameters.
     states : tuple of float, optional
         States of the scene, from which the pore pressure and the temperature are read. By default,
         the function uses the states of steady sliding at :math:`V_*`.
@@ -258,7 +259,7 @@ def effective_normal_stress_at(
     Parameters
     ----------
     scene : Scene
-        Scene with friction parameters.
+        Scene that provides the friction parameters.
     frictional_stress : float
         Deviation of the frictional stress from :math:`\tau_*`, in units of :math:`\sigma_*`.
     states : tuple of float, optional
@@ -283,7 +284,7 @@ def build_state_evolution_function(scene: SceneView) -> Callable[[float, Numbers
     Parameters
     ----------
     scene : Scene
-        Scene with friction parameters.
+        Scene that provides the friction parameters.
 
     Returns
     -------
@@ -301,7 +302,7 @@ def compute_steady_states(scene: SceneView, log_slip_rate: float, state_shift: f
     Parameters
     ----------
     scene : Scene
-        Scene with friction parameters.
+        Scene that provides the friction parameters.
     log_slip_rate : float
         Natural logarithm of the slip rate, :math:`\ln(V/V_*)`.
     state_shift : float

@@ -142,8 +142,8 @@ def build_strength_function(
 ) -> Function:
     r"""Return the friction relation for variable normal stress.
 
-    The first argument is the function for the effective normal stress. The second argument is the
-    function for the effect of stress on the state.
+    The first argument is the function that computes the effective normal stress. The second
+    argument is the function that computes the effect of stress on the state.
 
     Notes
     -----
@@ -206,8 +206,8 @@ def sum_state_effects(first_effect: Function, second_effect: Function) -> Functi
 def extend_relation_to_reversed_slip(forward_relation: Function) -> Function:
     r"""Return the friction relation of a fault that may slip backwards.
 
-    The argument is the function for the friction relation of forward slip. In the returned friction
-    relation, the logarithm of the slip rate is :math:`\ln(|V|/V_*)`.
+    The argument is the function that computes the friction relation for forward slip. In the
+    returned friction relation, the logarithm of the slip rate is :math:`\ln(|V|/V_*)`.
 
     Notes
     -----
@@ -244,17 +244,17 @@ def build_pressure_derivatives_function(
 ) -> Function:
     r"""Return a function for the derivatives of strength with respect to pressure.
 
-    The first argument is the function for the effective normal stress. The second argument is the
-    function for the effect of stress on the state. The returned function ``(g, psis, p)`` computes
-    the derivatives of strength and of the shift with respect to pore pressure, at constant
-    frictional stress.
+    The first argument is the function that computes the effective normal stress. The second
+    argument is the function that computes the effect of stress on the state. The returned function
+    ``(g, psis, p)`` computes the derivatives of strength and of the shift with respect to pore
+    pressure, at constant frictional stress.
 
     Notes
     -----
-    The derivative of strength is :math:`(\mu_* + g)/s^2` plus the derivative of the shift. The
-    derivative of the shift is the difference between two slopes, which the function for the effect
-    of stress returns. The first slope is evaluated with a normal stress derivative of -1, and the
-    second slope with a normal stress derivative of 0.
+    The derivative of strength is :math:`(\mu_* + g)/s^2` plus the derivative of the shift. To
+    compute the derivative of the shift, the function for the effect of stress is called twice, and
+    the two returned slopes are subtracted. The first slope is evaluated with a normal stress
+    derivative of -1, and the second slope with a normal stress derivative of 0.
     """
 
     def pressure_derivatives(g: float, psis: Numbers, p: Numbers) -> tuple[float, float]:
@@ -296,9 +296,9 @@ def wrap_with_load_point_stress(friction_function: Function) -> Function:
 def build_load_point_derivatives_function(strength_function: Function) -> Function:
     """Return a function for derivatives with respect to the load point stress.
 
-    The argument is the function for the friction relation of the scene. The returned function ``(g,
-    psis, p)`` computes the derivatives of strength and of the shift with respect to :math:`K D`.
-    The derivatives are equal to the derivatives with respect to g.
+    The argument is the function that computes the friction relation of the scene. The returned
+    function ``(g, psis, p)`` computes the derivatives of strength and of the shift with respect to
+    :math:`K D`. The derivatives are equal to the derivatives with respect to g.
     """
 
     def load_point_derivatives(g: float, psis: Numbers, p: Numbers) -> tuple[float, float]:

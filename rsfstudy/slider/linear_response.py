@@ -85,7 +85,7 @@ def linear_friction_response(
     Parameters
     ----------
     scene : Scene
-        Scene with friction parameters.
+        Scene that provides the friction parameters.
     steady_state : SteadySliding
         Steady sliding of the scene.
     evolution_derivatives : StateEvolutionDerivatives, optional
@@ -133,8 +133,8 @@ def _log_slip_rate_change_by_each_state(
 ) -> tuple[list[float], dict[int, float]]:
     """Return the weight of each state in the friction relation.
 
-    The function also returns the derivatives of the shift with respect to the temperature and the
-    pore pressure, by the index of the state.
+    The function also returns a dictionary with the derivatives of the shift with respect to
+    temperature and pore pressure. The keys are the indices of the states.
     """
     law, fluid = scene.parts.law.state_count, len(scene.parts.fluid.unknowns)
     weights, shifts = [1.0] * law, dict[int, float]()

@@ -26,7 +26,8 @@ class MotionPoint(NamedTuple):
     frictional_stress : float
         Deviation :math:`g` of the frictional stress from :math:`\tau_*`, in :math:`\sigma_*`.
     psi : float
-        Sum of the states :math:`\Psi_i` of the law. These states exclude the effect of stress.
+        Sum of the states :math:`\Psi_i` of the law. The effect of stress is not included in these
+        states.
     state : float
         State variable :math:`\Theta`. If the law has several states, ``state`` is the sum of the
         states.

@@ -1,7 +1,7 @@
 """Check that a scene provides the quantities that its parts need.
 
-The attribute ``received_quantities`` of a part contains the quantities that the functions of the
-part receive. If effective normal stress is constant, shear stress can be computed from the friction
+The attribute ``received_quantities`` of a part lists the quantities that are passed to its
+functions. If effective normal stress is constant, shear stress can be computed from the friction
 coefficient and the normal stress. A part can list additional quantities in its attribute ``needs``.
 If a quantity in ``needs`` is unknown, the scene rejects the part, because the part would compute
 its rates from wrong values.
@@ -91,10 +91,10 @@ def check_needed_quantities(scene: SceneView) -> None:
 
 
 def quantities_known_to_part(scene: SceneView, part: Part) -> frozenset[str]:
-    """Return the quantities that are known to the functions of a part.
+    """Return the quantities that are available to the functions of a part.
 
-    The result contains the quantities that the functions receive, the quantities that are constant
-    in the scene, and the quantities that can be computed from the first two groups.
+    The result contains the quantities passed to the functions, the quantities that are constant in
+    the scene, and the quantities that can be computed from these two groups.
 
     Parameters
     ----------

@@ -45,7 +45,7 @@ class Path(NamedTuple):
     seed : int
         Seed of the random numbers.
     stream : int
-        Number of an independent path with the same seed.
+        Stream number. Paths with the same seed but different stream numbers are independent.
     correlation_time : float or None
         Correlation time :math:`t_c`, or None for a Wiener process.
     """
@@ -77,7 +77,7 @@ class Path(NamedTuple):
         return self._sample_level(base, level, first, first + count)
 
     def _sample_level(self, base: float, level: int, first: int, stop: int) -> np.ndarray:
-        """Return the path at the times ``base/2**level`` times first, ..., stop - 1."""
+        """Return the path at the times ``i * base/2**level`` for first <= i < stop."""
         if level == 0:
             return self._sample_base(base, stop)[first:]
         spacing = math.ldexp(base, 1 - level)
@@ -100,7 +100,7 @@ class Path(NamedTuple):
         return np.array(values[:stop])
 
     def _transition(self, spacing: float) -> tuple[float, float]:
-        """Return the factor of the last value, and the standard deviation of the next."""
+        """Return the weight of the last value and the random standard deviation."""
         if self.correlation_time is None:
             return 1.0, math.sqrt(spacing)
         decay = 2.0 * spacing / self.correlation_time
@@ -158,7 +158,7 @@ def iterate_segments(
     Yields
     ------
     ndarray of shape (rows, 7)
-        Successive rows of the segment table, whose columns ``parameter_layout`` defines.
+        Successive rows of the segment table. The columns are defined in ``parameter_layout``.
     """
     first = math.floor(start / interval + _MIN_DISTANCE_OVER_INTERVAL)
     stop, late = end / interval - _MIN_DISTANCE_OVER_INTERVAL, start - first * interval
@@ -183,7 +183,7 @@ def iterate_segments(
 def _values_and_rates(
     path: Path, amplitude: float, interval: float, first: int, count: int
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Return the noise at the samples, and its rates after the samples."""
+    """Return the noise at each sample, and its rate of change after each sample."""
     if not amplitude:
         return np.zeros(count), np.zeros(count)
     values = amplitude * path.sample(interval, first, count + 1)

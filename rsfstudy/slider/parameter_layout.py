@@ -67,7 +67,7 @@ SMALLEST_NORMAL_STRESS_EXCESS, LARGEST_NORMAL_STRESS_EXCESS = 1e-12 - 1.0, 1e12
 
 
 class _ParameterValueSource(Protocol):
-    """Protocol of parts and combinations of parts that provide parameters."""
+    """Protocol for parts, or combinations of parts, that provide parameters."""
 
     @property
     def name(self) -> str: ...
@@ -86,7 +86,7 @@ def pack_parameter_values(scene: SceneView) -> Numbers:
     Returns
     -------
     tuple of float
-        Parameters in the order that the constants of ``parameter_layout`` define.
+        Parameters in the order defined by the constants of ``parameter_layout``.
     """
     p = scene.friction_parameter_values
     of_load = scene.stiffness, scene.load_velocity, scene.log_load_velocity
@@ -104,7 +104,7 @@ def pack_friction_parameter_values(scene: SceneView) -> Numbers:
     Returns
     -------
     tuple of float
-        Parameters in the order that the constants of ``parameter_layout`` define. The elements that
+        Parameters in the order defined by the constants of ``parameter_layout``. The elements that
         describe the spring and the load point are NaN.
     """
     parts, slider, law = scene.parts, scene.parts.slider, scene.parts.law

@@ -47,11 +47,11 @@ class Slot:
     long_name : str
         Description of the slot.
     user_parts : dict of str to type or UserLoading, optional
-        User-defined parts by name that have been used in this process.
+        User-defined parts that have been used in this process, by name.
     omit_if_default : bool, default: False
-        If True, the keys of cells and stored scenes omit the name of the default part. Use True for
-        every slot that is added in a later version of rsfstudy, so that existing journals and files
-        stay valid.
+        If True, the name of the default part is omitted from the keys of cells and from stored
+        scenes. Use True for every slot that is added in a later version of rsfstudy, so that
+        existing journals and files stay valid.
     """
 
     name: str
@@ -236,7 +236,7 @@ def find_slot_of_part_class(part_class: type[Part]) -> Slot:
     Returns
     -------
     Slot
-        Slot whose base class the part is derived from.
+        Slot from whose base class the part is derived.
     """
     return next(slot for slot in SLOTS if issubclass(part_class, slot.base_class))
 
@@ -336,7 +336,7 @@ def _check_part_name(slot: Slot, part: UserPart) -> None:
 
 
 def _module_and_qualified_name(part: UserPart) -> tuple[str, str]:
-    """Return the module and the qualified name of the definition of a part.
+    """Return the module and the qualified name under which a part is defined.
 
     The names do not change if a notebook cell with the definition is run again.
     """

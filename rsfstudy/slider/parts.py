@@ -142,7 +142,7 @@ class Part:
         return ()
 
     def check(self, scene: SceneView) -> None:
-        """Check the field values against each other and against the scene.
+        """Check that the field values are consistent with each other and the scene.
 
         Parameters
         ----------
@@ -158,7 +158,7 @@ class Part:
 
     @property
     def effects(self) -> tuple[str, ...]:
-        """Names of the physical effects that are active in the part."""
+        """Names of the physical effects that the part includes."""
         return ()
 
     @classmethod
@@ -240,14 +240,15 @@ def number(
     scale : str, optional
         Scale of a dimensionless field, for example ``"sigma_*"``.
     rule : str, optional
-        Condition that values must satisfy, a key of ``CONDITION_BY_VALUE_RULE``.
+        Name of the condition that values must satisfy. The name is a key of
+        ``CONDITION_BY_VALUE_RULE``.
     remedy : str, optional
         Last sentence of the error message if a value violates the rule.
     omit_if_default : bool, default: False
-        If True, scenes of parts without the field do not list the field, and the keys of cells and
-        stored scenes omit the default value. Use True for every field that is added in a later
-        version of rsfstudy, so that existing journals and files stay valid. The default value of
-        such a field must never change.
+        If True, scenes whose parts lack the field do not list the field, and the default value is
+        omitted from the keys of cells and from stored scenes. Use True for every field that is
+        added in a later version of rsfstudy, so that existing journals and files stay valid. The
+        default value of such a field must never change.
 
     Returns
     -------
@@ -485,7 +486,7 @@ def discover_parts(package: str, package_path: Iterable[str]) -> dict[str, type[
     Returns
     -------
     dict of str to type
-        Classes of the parts by their names.
+        Part classes by name.
     """
     parts: dict[str, type[Part]] = {}
     for file in sorted(module.name for module in pkgutil.iter_modules(package_path)):

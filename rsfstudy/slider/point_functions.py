@@ -2,9 +2,9 @@ r"""Functions for the stress, slip rate and states at a point of a motion.
 
 The module builds functions ``(state, rates, p) -> MotionPoint`` from the friction functions of a
 scene. The argument ``state`` contains the unknowns of the equations of motion, ``rates`` contains
-the derivatives of the unknowns, and ``p`` contains the parameters of the scene. The equations
-between ruptures, the equations in ruptures and the equations of a rigid slider have different
-unknowns.
+the derivatives of the unknowns, and ``p`` contains the parameters of the scene. Three sets of
+equations with different unknowns are used: between ruptures, during ruptures, and for a rigid
+slider.
 """
 
 from __future__ import annotations
@@ -37,8 +37,8 @@ def build_motion_point_assembling_function(friction_functions: FrictionFunctions
 
     Notes
     -----
-    The friction coefficient that a laboratory rig measures is :math:`(\mu_* + f)/s`, with the
-    normal stress ratio :math:`s` outside the fault.
+    The friction coefficient that a laboratory rig measures is :math:`(\mu_* + f)/s`. The normal
+    stress ratio :math:`s` is computed with the pore pressure outside the fault.
     """
     steady_states, state_sum, counted = (
         friction_functions.steady_states,

@@ -67,19 +67,19 @@ class SampledHistory(UserLoading):
     name : str
         Name of the history in results.
     samples : bytes
-        Array of shape (samples, 4) as bytes. The columns are time, load point velocity, and
-        decrease and rate of normal stress.
+        Array of shape (samples, 4) as bytes. The columns are time, load point velocity, decrease in
+        normal stress, and the rate of this decrease.
     digest : str
         Digest of the samples.
     of_stress : bool
         If True, the samples include normal stress or pore pressure.
     of_pressure : bool, default: False
         If True, the samples include pore pressure but not normal stress. If the scene has a fluid
-        with pore pressure, the samples are the pressure around the fault. Fluid then flows until
-        the pore pressure in the fault equals the pressure around the fault.
+        with pore pressure, the samples specify the pressure around the fault. Fluid then flows
+        until the pore pressure in the fault equals the pressure around the fault.
     first_reversal : tuple of (str, float, str), optional
-        Name, value and position of the first sample that moves the load point backwards, for error
-        messages.
+        Name, value and position of the first sample that moves the load point backwards. Error
+        messages contain this information.
     """
 
     #: Number of columns of ``sample_table``.

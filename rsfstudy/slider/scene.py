@@ -100,8 +100,8 @@ class Scene(SceneFunctions, SceneQuantities):
     reference_rate : float, default: 1.17e-8
         Reference rate :math:`V_*/D_c` in 1/s.
     instability_norm : float, default: 5e-4
-        Threshold of instability. A motion is unstable if :math:`V T/(2 \pi D_c)` reaches the
-        threshold.
+        Threshold of instability. A motion is considered unstable if :math:`V T/(2 \pi D_c)` reaches
+        the threshold.
     initial_stress : float, default: 0.0
         Initial shear stress minus the shear stress of steady sliding at :math:`V_*`, in
         :math:`\sigma_*`. The initial stress applies before the first step of the loading.
@@ -112,7 +112,7 @@ class Scene(SceneFunctions, SceneQuantities):
         :math:`c \, d\tau/\sigma`.
     regularised : bool, default: False
         If True, the slip rate has the same sign as the shear stress, so slip can reverse (arcsinh
-        form of the friction law). Only quasi-static motions support reversed slip.
+        form of the friction law). Reversed slip requires quasi-static dynamics.
     b_over_a : float, default: 2.0
         Ratio :math:`b/a` of the evolution effect to the direct effect. Rate weakening requires
         :math:`b > a`. If friction is not rate weakening, there is no critical stiffness, and
@@ -176,8 +176,8 @@ class Scene(SceneFunctions, SceneQuantities):
         Time in :math:`D_c/V_*` at which an oscillation begins. By default an oscillation begins
         immediately.
     oscillation_phase : float, optional
-        Phase of an oscillation at its start, in degrees. By default an oscillation starts as a
-        sine.
+        Phase of an oscillation at its start, in degrees. By default, the phase is zero, so the
+        oscillation starts as a sine.
     oscillation_cycles : float, optional
         Number of cycles after which an oscillation ends. The number may be fractional. By default
         an oscillation has no end.
@@ -230,8 +230,8 @@ class Scene(SceneFunctions, SceneQuantities):
         select the dynamics, and motion is quasi-static if neither is set.
     loading : type or UserLoading, optional
         User-defined class of a loading, or a loading that ``rsfstudy.protocol``,
-        ``rsfstudy.history`` or ``rsfstudy.read_protocol`` returns. By default other fields select
-        the loading.
+        ``rsfstudy.history`` or ``rsfstudy.read_protocol`` returns. By default, the loading is
+        selected by other fields.
 
     Attributes
     ----------
@@ -385,7 +385,7 @@ class Scene(SceneFunctions, SceneQuantities):
 
     @cached_attribute
     def friction_parameter_values(self) -> Numbers:
-        """Parameters of functions that depend only on friction.
+        """Parameters for functions that depend only on friction.
 
         The elements that describe the spring and the load point are NaN.
         """
@@ -400,11 +400,11 @@ class Scene(SceneFunctions, SceneQuantities):
     def critical_stiffness(self) -> float:
         """Quasi-static critical stiffness at V_*, in units of sigma_*/D_c.
 
-        The value includes the law, the normal stress condition with alpha, the fluid and the
-        temperature. It does not include inertia, radiation damping, the loading or noise. For the
-        critical stiffness with inertia or radiation damping, or at another slip rate, use
-        ``critical_stiffness_at``. The value is 0 if steady sliding is stable at every stiffness,
-        and infinite if steady sliding is unstable at every stiffness.
+        The value includes the effects of the law, the normal stress condition (including
+        ``alpha``), the fluid and the temperature. It does not include inertia, radiation damping,
+        the loading or noise. For the critical stiffness with inertia or radiation damping, or at
+        another slip rate, use ``critical_stiffness_at``. The value is 0 if steady sliding is stable
+        at every stiffness, and infinite if steady sliding is unstable at every stiffness.
         """
         slider, law, stress, pores, *_others, heat, _noise = self.parts
         return _critical_stiffness(slider.a, slider.mu_star, law, stress, pores, heat)
@@ -424,8 +424,8 @@ def _critical_stiffness(
 ) -> float:
     """Compute the critical stiffness of all sliders with the same friction.
 
-    The stiffness of the slider does not affect the critical stiffness. The function sets the
-    stiffness of the slider to the value of a.
+    Because the critical stiffness does not depend on the stiffness of the slider, the function sets
+    this stiffness to the value of the parameter ``a``.
     """
     slider = SliderParameters(a=a, mu_star=mu_star, stiffness=a)
     others = QuasiStatic(), StepLoading(), temperature_part

@@ -122,7 +122,7 @@ def replace_field_values(
     Raises
     ------
     InvalidValue
-        If a value violates its rule or has no meaning for the parts.
+        If a value violates its rule or does not apply to the parts.
     """
     made: list[Any] = list(scene_parts)
     for place, values in _group_values_by_part_index(
@@ -202,13 +202,13 @@ class FieldIndex(NamedTuple):
     part_index_by_field : mapping of str to int
         Index of the part that owns each field.
     rejecting_part_class_by_field : mapping of str to type
-        Class of the part that rejects a field, by name of the field. The mapping contains the
-        fields that do not belong to any part of the scene.
+        Class of the part that rejects each field, by field name. The mapping contains the fields
+        that do not belong to any part of the scene.
     values_of_inactive_fields : mapping of str to object
         Values of the fields that do not belong to any part of the scene.
     inapplicable_fields : frozenset of str
-        Names of the fields that have no meaning in the scene, regardless of their value. Fields
-        that would select another part are not included.
+        Names of the fields that do not apply to the scene, whatever their values are. Fields that
+        would select another part are not included.
     names_of_slots_chosen_by_name : tuple of str
         Names of the slots whose parts are selected by name.
     all_field_names : tuple of str
@@ -277,7 +277,7 @@ def build_field_index(part_classes: tuple[type[Part], ...]) -> FieldIndex:
 def find_inapplicable_fields(
     field_values: Mapping[str, Any], user_parts: Iterable[UserPart] = ()
 ) -> frozenset[str]:
-    """Find the fields that have no meaning for the selected parts.
+    """Find the fields that do not apply to the selected parts.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Quantities of a scene that are computed from the fields of the scene."""
+"""Quantities computed from the fields of a scene."""
 
 from __future__ import annotations
 
@@ -86,7 +86,7 @@ class SceneQuantities(SceneBase):
 
     @property
     def effects(self) -> tuple[str, ...]:
-        """Names of the physical effects that are active in the scene."""
+        """Names of the physical effects that the scene includes."""
         return tuple(effect for part in self.parts for effect in part.effects)
 
     @cached_attribute
@@ -181,12 +181,12 @@ class SceneQuantities(SceneBase):
         """Time scale of inertia, T/(2 pi), in units of D_c/V_*.
 
         The instability norm is a limit of the product of this time scale and the slip rate in units
-        of :math:`V_*`. A motion is unstable if this product reaches the limit.
+        of :math:`V_*`. A motion is considered unstable if this product reaches the limit.
         """
         slider = self.parts.slider
         return slider.period * slider.reference_rate / (2.0 * math.pi)
 
     @cached_attribute
     def log_instability_rate(self) -> float:
-        """Natural logarithm of the slip rate V/V_* at the instability norm."""
+        """Natural logarithm of V/V_* at which a motion is considered unstable."""
         return math.log(self.parts.slider.instability_norm / self.inertial_time)

@@ -30,7 +30,7 @@ class SliderParameters(Part):
     reference_rate : float, default: 1.17e-8
         Reference rate :math:`V_*/D_c` in 1/s.
     instability_norm : float, default: 5e-4
-        Value of :math:`V T/(2 \pi D_c)` at which a motion is unstable.
+        Value of :math:`V T/(2 \pi D_c)` at which a motion is considered unstable.
     initial_stress : float, default: 0.0
         Deviation of the initial shear stress from steady sliding at :math:`V_*`, in
         :math:`\sigma_*`.

@@ -56,12 +56,13 @@ def critical_stiffness(
     Parameters
     ----------
     scene : Scene
-        Scene with friction parameters. The function does not use the stiffness of the scene.
+        Scene that provides the friction parameters. The function does not use the stiffness of the
+        scene.
     log_slip_rate : float
         Natural logarithm of the slip rate, :math:`\ln(V/V_*)`.
     quasi_static : bool, default: False
         If True, the function ignores inertia and radiation damping. The property
-        ``Scene.critical_stiffness`` is the result of this option at :math:`V_*`.
+        ``Scene.critical_stiffness`` is computed with this option at :math:`V_*`.
 
     Returns
     -------
@@ -105,7 +106,8 @@ def all_critical_stiffnesses(scene: SceneView, log_slip_rate: float) -> list[flo
     Parameters
     ----------
     scene : Scene
-        Scene with friction parameters. The function does not use the stiffness of the scene.
+        Scene that provides the friction parameters. The function does not use the stiffness of the
+        scene.
     log_slip_rate : float
         Natural logarithm of the slip rate, :math:`\ln(V/V_*)`.
 
@@ -328,7 +330,7 @@ def spring_response_to_normal_stress(
         p = \frac{i \omega D_c}{V},
 
     with stress in units of :math:`\sigma`. As :math:`K` decreases to its critical value, the
-    response has a resonance at :math:`\omega D_c/V = \sqrt{(b - a)/a}`.
+    response develops a resonance at :math:`\omega D_c/V = \sqrt{(b - a)/a}`.
     """
     if scene.parts.temperature.unknowns:
         remedy = "Set temperature='isothermal', or simulate the oscillation."

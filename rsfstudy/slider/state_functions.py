@@ -78,7 +78,7 @@ def find_law_functions(law: LawBase) -> tuple[Function, Function]:
     Parameters
     ----------
     law : LawBase
-        Law, which may define only ``evolution``.
+        Law. A law with one state may define only ``evolution``.
 
     Returns
     -------
@@ -231,7 +231,7 @@ def _tuple_sum_expression(tuple_name: str, term_count: int) -> str:
 
 
 def _build_function_from_expression(argument_names: str, expression: str) -> Function:
-    """Create a function from source code for its arguments and its return value.
+    """Create a function from the source code of its arguments and return value.
 
     The source code contains no loop, because the compiler cannot iterate over tuples.
     """

@@ -42,7 +42,7 @@ class SteadySliding:
     spring_stress : float
         Deviation of spring stress from :math:`\tau_*`, in units of :math:`\sigma_*`.
     states : tuple of float
-        States :math:`\Psi_i`. These states exclude the effect of stress.
+        States :math:`\Psi_i`. The effect of stress is not included in these states.
     """
 
     log_slip_rate: float
@@ -58,7 +58,7 @@ def steady_sliding(scene: SceneView, log_slip_rate: float) -> SteadySliding | No
     Parameters
     ----------
     scene : Scene
-        Scene with friction parameters.
+        Scene that provides the friction parameters.
     log_slip_rate : float
         Natural logarithm of the slip rate, :math:`\ln(V/V_*)`.
 
@@ -94,7 +94,7 @@ def steady_friction_minus_reference(scene: SceneView, log_slip_rate: float) -> f
     Parameters
     ----------
     scene : Scene
-        Scene with friction parameters.
+        Scene that provides the friction parameters.
     log_slip_rate : float
         Natural logarithm of the slip rate, :math:`\ln(V/V_*)`.
 
@@ -125,7 +125,7 @@ def frictional_stress_for_friction(
     Parameters
     ----------
     scene : Scene
-        Scene with friction parameters.
+        Scene that provides the friction parameters.
     friction_minus_reference : float
         Friction coefficient minus :math:`\mu_*`.
 
@@ -160,7 +160,7 @@ def frictional_stress_after_jump(
     Parameters
     ----------
     scene : Scene
-        Scene with friction parameters.
+        Scene that provides the friction parameters.
     strength : float
         Strength after the sudden change in stress or slip rate, in units of :math:`\sigma_*`.
     states : tuple of float, optional
@@ -234,7 +234,7 @@ def min_steady_log_slip_rate(scene: SceneView) -> float:
     Parameters
     ----------
     scene : Scene
-        Scene with friction parameters.
+        Scene that provides the friction parameters.
 
     Returns
     -------

@@ -15,8 +15,8 @@ parameters of the temperature follow the parameters of the law in the parameter 
 :math:`a q_a`, :math:`b q_b`, the pressurisation factor of the fluid, and the parameters that the
 temperature part declares.
 
-The function `build_replacements` is the main function. The returned functions have the arguments
-that are described in ``friction.FrictionFunctions``.
+The function `build_replacements` is the main function. The class ``friction.FrictionFunctions``
+describes the arguments of the returned functions.
 """
 
 from __future__ import annotations
@@ -73,12 +73,12 @@ def build_replacements(scene: SceneView, isothermal: Mapping[str, Any]) -> dict[
     scene : Scene
         Scene whose temperature is an unknown.
     isothermal : mapping of str to object
-        Attributes of the ``FrictionFunctions`` of the scene without the temperature.
+        Attributes of the ``FrictionFunctions`` that the scene would have at constant temperature.
 
     Returns
     -------
     dict of str to object
-        Attributes of ``FrictionFunctions`` with their new values.
+        Attributes of ``FrictionFunctions`` that replace the isothermal functions.
     """
     parts, source, law_states = scene.parts, scene.pressure_source, scene.parts.law.state_count
     first = LAW + len(collect_parameter_values(parts.law, scene))
@@ -157,7 +157,7 @@ def temperature_derivatives(rise: float, parameters: Numbers) -> tuple[float, fl
 
 @cache
 def _add_temperature_to_strength(strength_function: Function, places: _Places) -> Function:
-    """Return the friction relation with both activation terms."""
+    """Return a friction relation that includes both activation terms."""
     place, first, second = places.state, places.first_parameter, places.first_parameter + 1
 
     def thermal_strength(g: float, psis: Numbers, p: Numbers) -> tuple[float, float, float, float]:
@@ -170,7 +170,7 @@ def _add_temperature_to_strength(strength_function: Function, places: _Places) -
 
 @cache
 def _add_temperature_to_contribution(contribution_function: Function, places: _Places) -> Function:
-    """Return the contribution of state changes to friction, with temperature."""
+    """Return a function for the friction change due to states and temperature."""
     place, first, end = places.state, places.first_parameter, places.end
 
     def thermal_contribution(changes: Numbers, g: float, psis: Numbers, p: Numbers) -> float:
@@ -254,7 +254,7 @@ def _append_temperature_evolution(
     law_state_count: int,
     pressurisation_index: int,
 ) -> Function:
-    """Return the evolution of law states, temperature and other unknowns.
+    """Return an evolution function for law states, temperature and other unknowns.
 
     The pressurisation index is 0 if heat does not change the pore pressure.
     """
@@ -286,7 +286,7 @@ def _append_temperature_evolution(
 def _insert_steady_temperature(
     law_steady_states: Function, auxiliary_steady_states: Function | None
 ) -> Function:
-    """Return the steady states with NaN for the temperature rise.
+    """Return a steady-state function that sets the temperature rise to NaN.
 
     The temperature rise is not computed here, because ``steady_temperature_rise`` would have to
     solve an equation, and because the distance from steady sliding does not depend on the
@@ -310,9 +310,9 @@ def _insert_steady_temperature(
 def steady_temperature_rise(scene: SceneView, log_slip_rate: float) -> float:
     r"""Compute the temperature rise of steady sliding.
 
-    Several temperatures may be steady at the same slip rate. Among these temperatures, the function
-    selects the temperature that changes continuously from zero as the slip rate changes from
-    :math:`V_*` to the given slip rate.
+    Several temperatures may be steady at the same slip rate. The function selects the temperature
+    rise that changes continuously from zero as the slip rate changes from :math:`V_*` to the given
+    slip rate.
 
     Parameters
     ----------
@@ -376,7 +376,7 @@ def thermal_friction_change(scene: SceneView, states: Numbers) -> float:
     Parameters
     ----------
     scene : Scene
-        Scene with friction parameters.
+        Scene that provides the friction parameters.
     states : tuple of float
         States of steady sliding.
 

@@ -1,7 +1,7 @@
 """Protocols, which define a loading history by a list of segments.
 
 The main function is ``protocol``. In results, a protocol is identified by its name. The segments
-are part of the provenance of the results.
+are stored in the provenance of the results.
 """
 
 from __future__ import annotations
@@ -112,7 +112,7 @@ class Protocol(UserLoading):
 
     @property
     def duration(self) -> float:
-        """Total duration of the segments with a finite duration.
+        """Total duration of all segments whose duration is finite.
 
         The duration is in units of :math:`D_c/V_*`.
         """
@@ -238,7 +238,7 @@ def _parse_segment(declared_segment: Any, previous_normal_stress: float, locatio
 
 
 def _read_positive_number(declared_segment: Mapping[str, Any], key: str, rule: str) -> float:
-    """Return a value of a mapping, which must be positive and finite."""
+    """Return a value from a mapping. The value must be positive and finite."""
     value = declared_segment[key]
     if not (_is_number(value) and 0.0 < value < math.inf):
         raise InvalidValue(key, value, f"must be {rule}")

@@ -123,7 +123,7 @@ def copy_values(source, target, item_count):
     Parameters
     ----------
     source, target : pointer
-        Arrays to read and to write.
+        Array to copy from, and array to copy to.
     item_count : int
         Number of items.
     """

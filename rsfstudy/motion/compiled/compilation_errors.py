@@ -95,7 +95,7 @@ def compilation_error(error: Exception) -> InvalidValue:
 
 
 def _describe_parts_defined_in_file(source_file: str) -> str:
-    """Return a phrase for error messages that names the parts in a source file."""
+    """Return a phrase that lists the parts in a source file, for error messages."""
     names = [
         part.name
         for part in _iterate_named_part_subclasses()

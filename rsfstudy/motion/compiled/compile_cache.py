@@ -6,8 +6,9 @@ copy a Python function together with all functions that it calls, replace the fu
 
 Each compiled function is stored in a folder whose name contains a digest of the source functions,
 the compiler and the processor. The folder is first written under a temporary name and is renamed
-when it is complete. The renamed folder is never changed. The cache contains machine code that this
-process executes. Folders that other users can write to are therefore neither read nor written.
+when it is complete. The folder is never modified after it has been renamed. The cache contains
+machine code that this process executes. Folders that other users can write to are therefore neither
+read nor written.
 """
 
 from __future__ import annotations
@@ -78,7 +79,8 @@ def compute_code_digest(signature: Any, *functions: Callable[..., Any]) -> str:
     signature : object
         Numba signature of the functions.
     *functions : callable
-        Functions to digest. Functions called by these functions are included.
+        Functions from whose code the digest is computed. Functions called by these functions are
+        included.
 
     Returns
     -------
@@ -97,12 +99,12 @@ def compute_code_digest(signature: Any, *functions: Callable[..., Any]) -> str:
 
 
 def _digest_functions(*functions: Callable[..., Any]) -> ObjectDigest:
-    """Digest functions and the compiled replacements of their callees."""
+    """Compute a digest of functions and of the functions that they call."""
     return ObjectDigest(_is_module_digested, _compiled_replacement_of).add(functions)
 
 
 def _is_module_digested(module_name: str | None) -> bool:
-    """Return False for modules that are identified by their versions only."""
+    """Return True if the digest of a module includes its source code."""
     return (module_name or "").partition(".")[0] not in _PACKAGES_IDENTIFIED_BY_VERSION_ONLY
 
 
@@ -119,7 +121,7 @@ def compile_function(function: Callable[..., Any], signature: Any) -> Any:
     Returns
     -------
     Dispatcher
-        Compiled function, which Python can call.
+        Compiled function that can be called from Python.
     """
 
     def compile_for(entry: str) -> Any:
@@ -159,7 +161,7 @@ def compile_cfunc_addresses(functions: Sequence[Callable[..., Any]]) -> tuple[in
 
 
 class _ContentKeyedCache(FunctionCache):  # type: ignore[misc]
-    """Numba cache of a function. The file name contains a digest of the content.
+    """Numba cache of a function, whose file name contains a content digest.
 
     By default, Numba includes the closure values of a function in the cache key. Closure values
     include compiled functions, which differ between processes, so Numba would never find a cached
@@ -299,7 +301,7 @@ def _is_function(value: Any) -> bool:
 
 
 def _compiled_replacement_of(value: Any) -> Any:
-    """Return the compiled version of a function, or any other value unchanged."""
+    """Replace a function by its compiled version. Return other values unchanged."""
     return (
         COMPILED_REPLACEMENT_BY_PYTHON_FUNCTION.get(value, value) if _is_function(value) else value
     )

@@ -280,7 +280,7 @@ def compile_scalar_function(function: Function, *arguments: float | Numbers) -> 
     function : callable
         Function to compile.
     *arguments : float or tuple of float
-        Examples of the arguments, which define the argument types.
+        Example arguments, from which the argument types are determined.
 
     Returns
     -------

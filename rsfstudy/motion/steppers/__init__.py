@@ -56,7 +56,7 @@ class Stepper(ABC):
 
     @abstractmethod
     def begin_regime(self, motion: Any, workspace: Any) -> None:
-        """Begin the integration of the regime ``motion.regime``.
+        """Prepare the stepper for the integration of the regime ``motion.regime``.
 
         The method reads the initial unknowns ``workspace.y`` and must fill in their derivatives
         ``workspace.rates``. The independent variable ``motion.clock`` is 0. After a kink of the
@@ -75,7 +75,7 @@ class Stepper(ABC):
     def attempt_step(self, motion: Any, workspace: Any, max_length: float) -> float:
         """Take one step whose local error is within the tolerance.
 
-        The sign of ``motion.direction`` is the direction of the step. The method must set
+        The sign of ``motion.direction`` determines the direction of the step. The method must set
         ``workspace.y_end``, ``workspace.rates_at_end``, ``motion.end`` and ``motion.step_length``.
         The method must also call ``workspace.count_evaluations`` for its right-hand side
         evaluations.
@@ -128,7 +128,7 @@ class Stepper(ABC):
         workspace : Workspace
             Arrays of the regime.
         clock : float
-            Independent variable, between the beginning and the end of the step.
+            Value of the independent variable between the beginning and the end of the step.
         """
 
     @abstractmethod
@@ -149,7 +149,7 @@ class Stepper(ABC):
 
 
 def begin_regime(motion, workspace):
-    """Reset the independent variable, and let the stepper begin a regime.
+    """Reset the independent variable, and prepare the stepper for a regime.
 
     Parameters
     ----------
@@ -212,7 +212,7 @@ def interpolate_unknowns(motion, workspace, clock):
     workspace : Workspace
         Arrays of the regime.
     clock : float
-        Independent variable, between the beginning and the end of the step.
+        Value of the independent variable between the beginning and the end of the step.
     """
     workspace.stepper.interpolate_unknowns(motion, workspace, clock)
 

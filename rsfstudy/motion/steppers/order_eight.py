@@ -1,6 +1,6 @@
-"""Explicit Runge-Kutta stepper of order eight. Numba can compile the code.
+"""Explicit Runge-Kutta stepper of order eight, which Numba can compile.
 
-The tableau, the error estimate and the step size control are equal to those of
+The tableau, the error estimate and the step size control are the same as in
 ``scipy.integrate.DOP853``. The Python engine calls the functions as methods of
 ``OrderEightStepper``, and the compiled loop calls them directly.
 """
@@ -244,7 +244,7 @@ def interpolate_unknowns(motion, workspace, clock):
     workspace : Workspace
         Arrays of the regime.
     clock : float
-        Independent variable, between the beginning and the end of the step.
+        Value of the independent variable between the beginning and the end of the step.
     """
     if not motion.is_dense:
         prepare_dense_output(motion, workspace, motion.step_length)

@@ -1,4 +1,4 @@
-"""Source code of a Runge-Kutta step, unrolled for a number of unknowns.
+"""Source code of a Runge-Kutta step, unrolled for a given number of unknowns.
 
 The Butcher tableau is the same as in SciPy's DOP853 (Hairer, Norsett and Wanner 1993). Loops over
 stages and unknowns would take as much time as the equations of a simple scene. If the code is

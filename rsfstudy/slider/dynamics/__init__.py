@@ -33,9 +33,9 @@ class Dynamics(Part):
       the states ``psis``, and ``rates`` contains the derivatives of ``state``.
     - ``build_rupture_rate_function(friction)`` is optional. The returned function ``rate(state,
       p)`` contains the inertial equations of motion, which are integrated during ruptures. The
-      function ``rate`` returns derivatives with respect to inertial time. The differentiated
-      quantities are the spring stress f, the logarithm x = ln(V/V_*), the frictional stress g, and
-      all states except the first.
+      function ``rate`` returns derivatives with respect to inertial time. The unknowns are the
+      spring stress f, the logarithm x = ln(V/V_*), the frictional stress g, and all states except
+      the first.
 
     Examples
     --------
@@ -68,7 +68,7 @@ class Dynamics(Part):
         return ("build_slip_rate_functions",)
 
     def radiated_stress(self, log_slip_rate: float) -> float:
-        r"""Compute the stress that seismic waves radiate.
+        r"""Compute the stress reduction due to the radiation of seismic waves.
 
         Parameters
         ----------
@@ -110,8 +110,8 @@ class Dynamics(Part):
         Returns
         -------
         float
-            Norm :math:`w = V T/(2 \pi D_c)`. The base class returns zero, because the base class
-            has no inertia.
+            Norm :math:`w = V T/(2 \pi D_c)`. The base class returns zero, because it does not
+            include inertia.
         """
         return 0.0
 

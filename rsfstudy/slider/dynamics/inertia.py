@@ -117,7 +117,7 @@ def build_slip_rate_functions(friction_functions: FrictionFunctions) -> tuple[Fu
     def inertial_stress(spring_stress: float, psis: Numbers, alone: Numbers, p: Numbers) -> float:
         """Compute the stress in sigma_* that accelerates the mass.
 
-        The quasi-static motion is passed as the tuple that ``quasi_static_values`` returns.
+        The argument for the quasi-static motion is the tuple returned by ``quasi_static_values``.
         """
         x, growing, slope, weight, _shift = alone
         first = clamped_inertial_stress(weight, growing, p)
@@ -157,7 +157,7 @@ def build_slip_rate_functions(friction_functions: FrictionFunctions) -> tuple[Fu
         return x, growing, slope, compute_inertia_weight(x, slower, p), shift
 
     def log_slip_rate_offset(spring_stress: float, psis: Numbers, p: Numbers) -> float:
-        """Compute the difference of ln V from its quasi-static value.
+        """Compute the difference between ln V and its quasi-static value.
 
         The function does not subtract two values of ln V, because rounding errors would then be
         visible in the derivative of the difference.
@@ -221,7 +221,7 @@ def compute_inertia_weight(
 
     The inertia weight is the lag of :math:`\ln V` behind its quasi-static value, divided by the
     derivative of :math:`\ln V`. If possible, the function computes the slip rate from the ratio
-    ``load_to_slip_velocity_ratio``, to avoid the evaluation of an exponential function.
+    ``load_to_slip_velocity_ratio``, because this avoids evaluating an exponential function.
 
     Parameters
     ----------
@@ -297,7 +297,7 @@ def build_rupture_rate_function(friction_functions: FrictionFunctions) -> Functi
 
 
 def limit_rate_per_inertial_time(rate: float) -> float:
-    """Limit a rate to ``MAX_RATE_PER_INERTIAL_TIME`` in magnitude.
+    """Limit the magnitude of a rate to ``MAX_RATE_PER_INERTIAL_TIME``.
 
     Parameters
     ----------
@@ -345,7 +345,7 @@ class Inertia(Dynamics):
 
     @property
     def effects(self) -> tuple[str, ...]:
-        """Names of the physical effects that are active in the part."""
+        """Names of the physical effects that the part includes."""
         return ("inertia",)
 
     def parameter_values(self, scene: SceneView) -> Numbers:

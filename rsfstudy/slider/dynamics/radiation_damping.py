@@ -1,6 +1,6 @@
 """Radiation damping by seismic waves (quasi-dynamic motion).
 
-The radiated waves remove a stress that is proportional to the slip rate.
+The radiated waves reduce the stress on the fault by an amount proportional to the slip rate.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ _MAX_LOG_SLIP_RATE = 690.0
 
 
 def compute_radiated_stress(log_slip_rate: float, damping: float) -> float:
-    r"""Compute the stress that seismic waves radiate.
+    r"""Compute the stress reduction due to the radiation of seismic waves.
 
     Parameters
     ----------
@@ -151,7 +151,7 @@ class RadiationDamping(Dynamics):
 
     @property
     def effects(self) -> tuple[str, ...]:
-        """Names of the physical effects that are active in the part."""
+        """Names of the physical effects that the part includes."""
         return ("radiation_damping",)
 
     def parameter_values(self, scene: SceneView) -> Numbers:
@@ -162,7 +162,7 @@ class RadiationDamping(Dynamics):
         return (self.radiation_damping,)
 
     def radiated_stress(self, log_slip_rate: float) -> float:
-        """Compute the stress that seismic waves radiate.
+        """Compute the stress reduction due to the radiation of seismic waves.
 
         See ``Dynamics.radiated_stress``.
         """

@@ -79,8 +79,8 @@ class Fluid(Part):
         Returns
         -------
         float
-            Upper bound on the pore pressure P. The base class returns infinity, because the base
-            class knows no upper bound on the pore pressure.
+            Upper bound on the pore pressure P. The base class returns infinity, because it does not
+            define an upper bound.
         """
         return math.inf
 

@@ -115,7 +115,7 @@ class FluidWithBoundaryPressure:
 
     @property
     def excluded_from_distance(self) -> tuple[str, ...]:
-        """Names of the unknowns that the distance from steady sliding excludes.
+        """Names of the unknowns excluded from the distance from steady sliding.
 
         The tuple includes the excluded unknowns of both the loading and the fluid.
         """

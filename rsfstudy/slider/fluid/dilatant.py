@@ -59,8 +59,8 @@ def rates_with_porosity_length(
 ) -> Numbers:
     r"""Compute the rates if porosity has a separate slip distance.
 
-    The function differs from ``porosity_and_pressure_rates`` in the slip distance
-    :math:`L_\varphi` of the porosity. It reads :math:`D_c/L_\varphi` from ``p[FLUID + 2]``.
+    Unlike ``porosity_and_pressure_rates``, the function uses the slip distance :math:`L_\varphi`
+    for the porosity. It reads :math:`D_c/L_\varphi` from ``p[FLUID + 2]``.
 
     Notes
     -----
@@ -111,8 +111,8 @@ def check_porosity_length(fluid: Fluid, scene: SceneView) -> None:
     Raises
     ------
     InvalidValue
-        If the slip distance is not 1, and the loading has unknowns or a user-defined fluid has
-        other rates.
+        If the slip distance is not 1 but cannot be used, because the loading has unknowns or
+        because a user-defined fluid defines its own rates.
     """
     if getattr(fluid, "porosity_length", 1.0) == 1.0:
         return
@@ -147,7 +147,7 @@ class DilatantFluid(Fluid):
 
     The pores open when the slip rate increases, which decreases the pore pressure. If the dilatancy
     is negative, the pores close when the slip rate increases, which increases the pore pressure.
-    The initial pore pressure is the pressure of the surroundings, as in steady sliding.
+    As in steady sliding, the initial pore pressure equals the pressure of the surroundings.
 
     Parameters
     ----------
@@ -186,7 +186,7 @@ class DilatantFluid(Fluid):
     auxiliary_steady_states = staticmethod(steady_porosity_and_pressure)
 
     def __post_init__(self) -> None:
-        """Choose the rates of porosity, unless a subclass defines other rates."""
+        """Select the porosity rate function, unless a subclass defines its own."""
         if self.porosity_length != 1.0 and self.auxiliary_rates is porosity_and_pressure_rates:
             object.__setattr__(self, "auxiliary_rates", rates_with_porosity_length)
 
@@ -221,7 +221,7 @@ class DilatantFluid(Fluid):
 
     @property
     def effects(self) -> tuple[str, ...]:
-        """Names of the physical effects that are active in the part."""
+        """Names of the physical effects that the part includes."""
         return ("dilatancy",)
 
     def parameter_values(self, scene: SceneView) -> Numbers:

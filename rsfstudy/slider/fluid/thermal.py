@@ -134,7 +134,7 @@ class ThermalFluid(Fluid):
 
     @property
     def auxiliary_rates(self) -> Function:  # type: ignore[override]
-        """Function that computes the rates of the unknowns, except for heating."""
+        """Function that computes the rates of the unknowns without heating."""
         return choose_porosity_rates(self.porosity_length) if self.dilatancy else pressure_rate
 
     @property
@@ -143,7 +143,7 @@ class ThermalFluid(Fluid):
         return steady_porosity_and_pressure if self.dilatancy else steady_pressure
 
     def highest_pressure(self, log_slip_rate: float, states: Numbers) -> float:
-        """Compute an upper bound on the future pore pressure, except for heating.
+        """Compute an upper bound on the future pore pressure without heating.
 
         See ``Fluid.highest_pressure``.
         """
@@ -158,7 +158,7 @@ class ThermalFluid(Fluid):
 
     @property
     def effects(self) -> tuple[str, ...]:
-        """Names of the physical effects that are active in the part."""
+        """Names of the physical effects that the part includes."""
         return ("thermal_pressurisation", *("dilatancy",) * bool(self.dilatancy))
 
     def parameter_values(self, scene: SceneView) -> Numbers:

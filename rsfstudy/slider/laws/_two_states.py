@@ -65,7 +65,7 @@ class TwoStateLaw(LawBase):
 
         \tau = \sigma \left(\mu_* + a \ln\frac{V}{V_*} + \Theta_1 + \Theta_2\right).
 
-    Effects of stress on the state, such as :math:`\alpha \ln(\sigma/\sigma_*)`, are distributed to
+    Effects of stress on the state, such as :math:`\alpha \ln(\sigma/\sigma_*)`, are divided between
     the two states in proportion to :math:`\lvert b_i \rvert`. Experiments do not determine this
     distribution. With this distribution, two states with equal slip distances and coefficients
     :math:`b_i` of the same sign are equivalent to a single state. The share of a state in the

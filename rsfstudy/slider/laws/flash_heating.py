@@ -161,7 +161,7 @@ class FlashHeatingLaw(Law):
 
     @property
     def effects(self) -> tuple[str, ...]:
-        """Names of the physical effects that are active in the part."""
+        """Names of the physical effects that the part includes."""
         return ("flash_heating", *super().effects)
 
     def check(self, scene: SceneView) -> None:

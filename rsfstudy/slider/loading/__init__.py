@@ -216,7 +216,7 @@ class Loading(Part):
     def reported_segment_count(self) -> int:
         """Number of segment starts that are reported as events of a motion.
 
-        The reported segment starts belong to the last segments of the loading.
+        Only the starts of the last segments of the loading are reported.
         """
         return len(self.segments) - 1
 
@@ -320,7 +320,7 @@ class LoadingWithFinalLoadVelocity(Loading):
     def load_velocity(self) -> float:
         """Load point velocity divided by the reference velocity.
 
-        The load point velocity excludes oscillations.
+        Oscillations of the load point velocity are not included.
         """
         return 1.0 if self.load_velocity_ratio is None else self.load_velocity_ratio
 

@@ -77,7 +77,7 @@ class NormalStressOscillation(_oscillation_base.OscillationBase):
         super().check(scene)
 
     def initial_unknowns(self, scene: SceneView) -> Numbers:
-        """Return the unknowns y and P for the initial phase.
+        """Return the values of the unknowns y and P at the initial phase.
 
         See ``Loading.initial_unknowns``.
         """

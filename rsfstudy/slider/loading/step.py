@@ -17,8 +17,8 @@ from rsfstudy.slider.scene_caching import cached_attribute
 class StepLoading(LoadingWithFinalLoadVelocity):
     r"""Step of load velocity, load displacement or normal stress at time zero.
 
-    A displacement step changes the spring stress by :math:`k \Delta\delta_0`. Steps of velocity,
-    displacement and normal stress can be combined.
+    A displacement step changes the spring stress by :math:`k \Delta\delta_0`. You can combine steps
+    of velocity, displacement and normal stress.
 
     Parameters
     ----------

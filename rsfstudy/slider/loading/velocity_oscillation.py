@@ -86,7 +86,7 @@ class VelocityOscillation(_oscillation_base.OscillationBase):
         super().check(scene)
 
     def initial_unknowns(self, scene: SceneView) -> Numbers:
-        r"""Return the unknowns for the initial phase.
+        r"""Return the values of the unknowns at the initial phase.
 
         See ``Loading.initial_unknowns``. The last unknown is :math:`-K R \cos(\omega t + \phi_o)`.
         """

@@ -1,8 +1,8 @@
 r"""Noise of shear stress and normal stress that is added to the loading.
 
 Each module of this package defines one kind of noise. The function ``discover_parts`` finds the
-modules automatically. Noise is a sampled path that is added to the loading, and not an additional
-term in the equations of motion. Between two samples, the stress changes at a constant rate, and the
+modules automatically. Noise is added to the loading as a sampled path. It is not an additional term
+in the equations of motion. Between two samples, the stress changes at a constant rate, and the
 resulting motion is integrated to the requested tolerance. If the noise is independent of the
 motion, the motion converges to the solution of the stochastic differential equation as the sampling
 interval decreases (Wong-Zakai theorem). The module ``noise_paths`` computes the paths from the
@@ -92,7 +92,7 @@ class Noise(Part):
         Returns
         -------
         iterator of ndarray of shape (rows, 7)
-            Successive rows of the segment table, whose columns ``parameter_layout`` defines.
+            Successive rows of the segment table. The columns are defined in ``parameter_layout``.
 
         Raises
         ------

@@ -29,8 +29,9 @@ class WhiteNoise(Noise):
         Amplitude :math:`\epsilon` of the noise of shear stress, in :math:`\sigma_*` per
         :math:`\sqrt{D_c/V_*}`.
     normal_stress_noise : float, default: 0.0
-        Amplitude :math:`\epsilon_\sigma` of the noise of normal stress, in the same units. The
-        noise requires a normal stress that the loading can change.
+        Amplitude :math:`\epsilon_\sigma` of the noise of normal stress, in the same units. Noise of
+        normal stress requires a normal stress condition that allows the loading to change normal
+        stress.
     noise_interval : float, default: 0.05
         Sampling interval :math:`h` of the path in :math:`D_c/V_*`. The error of the motion is
         proportional to the interval.
@@ -50,8 +51,8 @@ class WhiteNoise(Noise):
     The Wiener processes :math:`W` and :math:`W_\sigma` start at zero. Between the samples at
     :math:`t_i = i h`, the paths are linear. The noise of shear stress does not directly change the
     state variable, so :math:`\ln V` has the same fluctuations as the shear stress. The seed, the
-    interval and the amplitudes define the paths. If the motion is longer, or if the interval is
-    halved, the motion has the same path.
+    interval and the amplitudes define the paths. The paths do not change if the motion is extended
+    or if the interval is halved.
 
     References
     ----------
@@ -98,12 +99,12 @@ class WhiteNoise(Noise):
 
     @property
     def changes_normal_stress(self) -> bool:
-        """True if the noise of normal stress has an amplitude above zero."""
+        """True if the amplitude of the normal stress noise is greater than zero."""
         return self.normal_stress_noise > 0.0
 
     @property
     def effects(self) -> tuple[str, ...]:
-        """Names of the physical effects that are active in the part."""
+        """Names of the physical effects that the part includes."""
         return ("noise",)
 
     def check(self, scene: SceneView) -> None:

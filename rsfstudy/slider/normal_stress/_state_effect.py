@@ -69,5 +69,5 @@ class NormalStressWithStateEffect(NormalStress):
 
     @property
     def effects(self) -> tuple[str, ...]:
-        """Names of the physical effects that are active in the part."""
+        """Names of the physical effects that the part includes."""
         return ("linker_dieterich",) if self.alpha else ()

@@ -30,7 +30,7 @@ class ImposedNormalStress(NormalStressWithStateEffect):
 
     Notes
     -----
-    The normal stress and its effect on the state variable, in addition to the evolution law, are
+    The normal stress, and the change in the state variable that is added to the evolution law, are
 
     .. math::
 

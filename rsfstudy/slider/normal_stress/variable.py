@@ -60,7 +60,7 @@ class VariableNormalStress(NormalStressWithStateEffect):
 
     Notes
     -----
-    The normal stress and its effect on the state variable, in addition to the evolution law, are
+    The normal stress, and the change in the state variable that is added to the evolution law, are
 
     .. math::
 
@@ -100,7 +100,7 @@ class VariableNormalStress(NormalStressWithStateEffect):
 
     @property
     def effects(self) -> tuple[str, ...]:
-        """Names of the physical effects that are active in the part."""
+        """Names of the physical effects that the part includes."""
         return ("inclined_driving", *super().effects)
 
     def parameter_values(self, scene: SceneView) -> Numbers:

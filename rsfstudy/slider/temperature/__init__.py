@@ -46,9 +46,9 @@ class Temperature(Part):
       followed by the other fields that the class declares with ``number``. The rate must be zero if
       the fault slides steadily at :math:`V_*` with a temperature rise of zero.
 
-    A motion has settled if the unknowns are close to their values in steady sliding. The
-    temperature rise is never part of this comparison, because the temperature rise in a rupture may
-    be extremely large.
+    A motion is considered settled if the unknowns are close to their values in steady sliding. The
+    temperature rise is excluded from this comparison, because it may be extremely large in a
+    rupture.
 
     Examples
     --------

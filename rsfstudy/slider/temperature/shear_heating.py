@@ -148,7 +148,7 @@ class ShearHeating(Temperature):
 
     @property
     def effects(self) -> tuple[str, ...]:
-        """Names of the physical effects that are active in the part."""
+        """Names of the physical effects that the part includes."""
         return ("shear_heating", *("thermal_activation",) * any(self.activation))
 
     def parameter_values(self, scene: SceneView) -> Numbers:
