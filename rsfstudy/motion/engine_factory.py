@@ -109,7 +109,7 @@ def import_compiled_engine() -> Any:
 def call_array_function_by_engine(
     function: Callable[..., None], engine_name: str, *arrays: np.ndarray
 ) -> None:
-    """Call an array function, which is first compiled for the compiled engine.
+    """Call an array function. The compiled engine compiles the function first.
 
     Parameters
     ----------

@@ -9,12 +9,12 @@ stresses and states). A measure can request the following events:
     rise(quantity, level), fall(quantity, level)
                                 upward or downward crossing of a level by a quantity
     approach_to_steady_state(fraction)
-                                decrease of the distance between the motion and steady sliding below
-                                a fraction of the largest value of this distance so far. The event
-                                is reported at the end of each integration step that meets this
-                                condition. Only steps in the last segment of loading are checked.
-                                The event is not reported if normal stress still changes or if
-                                steady sliding is unstable.
+                                approach of the motion to steady sliding: the distance from steady
+                                sliding falls below a fraction of its largest value so far. The
+                                event is reported at the end of each integration step that meets
+                                this condition. Only the last loading segment is checked. The event
+                                is not reported if normal stress still changes or if steady sliding
+                                is unstable.
 
 A requested event ends the motion if it is specified with ``terminal=True``. The available
 quantities are the attributes of a ``MotionPoint``. The attribute ``apparent_friction`` is the
@@ -76,13 +76,13 @@ class EventSpecification(NamedTuple):
     quantity : str, default: ""
         Attribute of ``MotionPoint``. Settling events have no quantity.
     level : float, default: 0.0
-        Level of a crossing. For a settling event, the level is a fraction of the largest distance
-        between the motion and steady sliding so far.
+        Level of a crossing. For a settling event, the level is the fraction that is passed to
+        ``approach_to_steady_state``.
     terminal : bool, default: False
         If True, the motion ends at the event.
     may_defer : bool, default: False
-        If True, the engine may report the event and the start of the motion later, together with
-        other events. The integration is then faster.
+        If True, the engine may delay the reports of the event and of the start of the motion, and
+        report several events together. This makes the integration faster.
     """
 
     kind: EventKind
@@ -105,8 +105,8 @@ def maximum(
     terminal : bool, default: False
         If True, the motion ends at the first maximum.
     may_defer : bool, default: False
-        If True, the engine may report the event later, together with other events. See
-        ``EventSpecification``.
+        If True, the engine may delay the report of the event and report several events together.
+        See ``EventSpecification``.
 
     Returns
     -------
@@ -131,8 +131,8 @@ def minimum(
     terminal : bool, default: False
         If True, the motion ends at the first minimum.
     may_defer : bool, default: False
-        If True, the engine may report the event later, together with other events. See
-        ``EventSpecification``.
+        If True, the engine may delay the report of the event and report several events together.
+        See ``EventSpecification``.
 
     Returns
     -------
@@ -159,8 +159,8 @@ def rise(
     terminal : bool, default: False
         If True, the motion ends at the first crossing.
     may_defer : bool, default: False
-        If True, the engine may report the event later, together with other events. See
-        ``EventSpecification``.
+        If True, the engine may delay the report of the event and report several events together.
+        See ``EventSpecification``.
 
     Returns
     -------
@@ -187,8 +187,8 @@ def fall(
     terminal : bool, default: False
         If True, the motion ends at the first crossing.
     may_defer : bool, default: False
-        If True, the engine may report the event later, together with other events. See
-        ``EventSpecification``.
+        If True, the engine may delay the report of the event and report several events together.
+        See ``EventSpecification``.
 
     Returns
     -------
@@ -213,10 +213,10 @@ def _specify_quantity_event(
 def approach_to_steady_state(fraction: float, *, terminal: bool = False) -> EventSpecification:
     """Create an event specification for the approach to steady sliding.
 
-    The event occurs if the distance between the motion and steady sliding falls below a fraction of
-    the largest value of this distance so far. The distance between the motion and steady sliding is
-    measured in ln V and in each state divided by b. The distance does not include unknowns that are
-    listed in the attribute ``excluded_from_distance`` of a scene part.
+    The event occurs when the distance between the motion and steady sliding falls below a fraction
+    of its largest value so far. The distance between the motion and steady sliding is measured in
+    ln V and in each state divided by b. The distance does not include unknowns that are listed in
+    the attribute ``excluded_from_distance`` of a scene part.
 
     Parameters
     ----------

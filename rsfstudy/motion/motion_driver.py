@@ -353,7 +353,7 @@ def _motion_stopped_error(
     stepper: Any,
     overflow: str,
 ) -> MotionStopped:
-    """Return the exception for a motion that cannot continue."""
+    """Create the exception for a motion that cannot continue."""
     if return_code == array_layout.TERMINATED:
         return build_termination_error(
             int(motion_state.get_state_field("termination")),

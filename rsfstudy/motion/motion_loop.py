@@ -121,8 +121,8 @@ def advance_motion(
     y : array of shape (2 * unknowns,)
         Unknowns, followed by their derivatives. The loop updates both in place.
     last_point : array of shape (FIRST_STATE + states,)
-        Last point of the motion in the previous regime. In the first call, the initial point of the
-        motion.
+        Last point of the motion in the previous regime. In the first call, pass the initial point
+        of the motion.
     workspace_block : array
         Memory for the workspace of a regime. See ``workspace.workspace_size``.
     loop_constants : tuple
@@ -221,7 +221,7 @@ def are_tables_full(motion, event_spec_count, event_table, recording_table):
     Returns
     -------
     bool
-        True if a table has fewer free rows than one step may fill.
+        True if a table has fewer free rows than a single step may require.
     """
     full = len(event_table) - motion.event_rows < 2 * event_spec_count + 4
     return full or (

@@ -29,10 +29,9 @@ def resample_motion_along_path(
 ) -> dict[str, np.ndarray]:
     """Resample a recorded motion at points along its path.
 
-    Half of the points are spaced evenly in path length. The path length is computed from time, ln V
-    and stress. The other half of the points have the same distribution as the integration steps.
-    The integration steps are short where the path bends. The points include all extrema of slip
-    rate and stress.
+    Half of the points are evenly spaced in path length, which is computed from time, ln V and
+    stress. The other half are distributed in the same way as the integration steps. The integration
+    steps are short where the path bends. The points include all extrema of slip rate and stress.
 
     Parameters
     ----------

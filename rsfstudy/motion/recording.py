@@ -54,9 +54,10 @@ class Recording:
     regime_names : list of str, optional
         Names of the regimes in the order of their first occurrence.
     sample_times : ndarray, optional
-        Requested times in D_c/V_* in increasing order. For a rigid slider, requested slips in D_c.
-        If a loading segment begins at a requested time, the end of the previous segment is
-        recorded. By default, samples are recorded at even intervals within each step.
+        Requested times in D_c/V_*, in increasing order. For a rigid slider, pass the requested
+        values of slip in D_c. If a loading segment begins at a requested time, the end of the
+        previous segment is recorded. By default, samples are recorded at even intervals within each
+        step.
     """
 
     #: Names of the first columns of a recorded motion, and of all recorded variables.
@@ -350,7 +351,7 @@ def resample_along_path(  # type: ignore[no-untyped-def]
 ):
     """Resample a recorded motion at points along its path.
 
-    Half of the path length is due to changes in time, ln V and stress, and the other half is
+    Changes in time, ln V and stress contribute half of the path length. The other half is
     proportional to the number of rows. The points closest to extrema of slip rate and stress are
     moved to the extrema.
 

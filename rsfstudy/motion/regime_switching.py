@@ -180,8 +180,8 @@ def slip_during_transition(
 ) -> float:
     r"""Compute the slip during a transition between two slip rates.
 
-    If the transition is approximated by a jump of the slip rate, the evolution of the states over
-    this slip is neglected.
+    Approximating the transition by a jump of the slip rate neglects the evolution of the states
+    over this slip.
 
     Parameters
     ----------
@@ -325,9 +325,9 @@ def should_switch_back_to_slow_manifold(
     rises and friction exceeds spring stress, the slip rate on the slow manifold falls. The slip
     rate then reaches a maximum before it meets the slow manifold. The maximum occurs after a slip
     of several times :math:`(K/a) w^2` in D_c. If the slip rate falls and spring stress exceeds
-    friction, the slip rate on the slow manifold rises. The slip rate then has a minimum above the
-    present :math:`x_s`. The minimum lies above :math:`x_s` by several times the inertial stress
-    divided by :math:`a`.
+    friction, the slip rate on the slow manifold rises. The slip rate then reaches a minimum, at
+    which ln V exceeds the present :math:`x_s` by several times the inertial stress divided by
+    :math:`a`.
     """
     norm = max(
         compute_slip_rate_norm(log_slip_rate, switch_thresholds),
@@ -365,8 +365,8 @@ def find_termination_status(
 ) -> int:
     r"""Find the termination status of a motion.
 
-    The shear stress may change its sign when a rupture overshoots. A change of sign of the shear
-    stress does not terminate the motion, because the equations remain valid.
+    The shear stress may change its sign when a rupture overshoots. This change of sign does not
+    terminate the motion, because the equations remain valid.
 
     Parameters
     ----------
@@ -425,7 +425,7 @@ def compute_margin_to_termination(
 
 
 def build_termination_error(termination_status: int, normal_stress: float) -> MotionStopped:
-    """Return the exception for a terminated motion.
+    """Create the exception that reports the termination of a motion.
 
     Parameters
     ----------

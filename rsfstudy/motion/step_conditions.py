@@ -92,7 +92,7 @@ def get_event_specification(workspace, spec_index):
 
 
 def has_deferrable_event(workspace):
-    """Return True if the report of any requested event may be deferred.
+    """Return True if any requested event may be reported later than it occurs.
 
     Parameters
     ----------

@@ -41,8 +41,7 @@ CORRECTION_COUNT_OF_SEGMENT_END_CLOCK = 2
 def is_step_end_valid(motion, workspace):
     """Return True if the motion is valid during at least part of the step.
 
-    If the motion terminates within the step, the function truncates the step at the time of
-    termination.
+    If the motion terminates within the step, the function truncates the step at the termination.
 
     Parameters
     ----------

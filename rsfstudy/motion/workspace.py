@@ -180,7 +180,7 @@ def create_workspace(
     functions : sequence
         Row of the function table.
     members_shared_by_regimes : tuple
-        Last six fields of the workspace. Both regimes share these fields.
+        Values of the last six fields of the workspace, which both regimes share.
 
     Returns
     -------

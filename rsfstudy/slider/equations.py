@@ -258,9 +258,9 @@ def build_equations_against_displacement(scene: SceneView) -> Equations:
     """Return the equations between ruptures as functions of displacement.
 
     The independent variable is the sum of slip and load point displacement. Close to steady
-    sliding, the derivatives of the unknowns are nearly linear functions of the unknowns. The
-    derivatives with respect to displacement are nearly linear over a wider range than the
-    derivatives with respect to path length.
+    sliding, the derivatives of the unknowns are nearly linear functions of the unknowns. This
+    linear range is wider for derivatives with respect to displacement than for derivatives with
+    respect to path length.
 
     Parameters
     ----------

@@ -79,8 +79,8 @@ def compute_state_evolution_derivatives(
     r"""Compute the derivatives of the state evolution in steady sliding.
 
     The step size of the finite differences is halved until two successive estimates agree. The
-    derivatives are therefore accurate even if the state evolution of a law varies strongly when
-    :math:`\ln V` changes by less than 1.
+    derivatives are therefore accurate even for a law whose state evolution varies strongly over
+    changes in :math:`\ln V` of less than 1.
 
     Parameters
     ----------
@@ -172,8 +172,8 @@ def _central_differences_at_zero(
     derivatives : list of float
         Derivative of each component of the function.
     sizes : list of float
-        For each component, the largest ratio of a function value to the magnitude of the argument
-        of the function. The rounding errors of the derivatives are proportional to this ratio.
+        For each component, the largest ratio of the function value to the magnitude of the
+        argument. The rounding errors of the derivatives are proportional to this ratio.
     """
     slopes = [0.0] * len(function(step))
     sizes = [*slopes]

@@ -15,9 +15,8 @@ a fluid, the pressure around the fault is the first element after the states of 
 An oscillation of the load point adds a displacement :math:`D` to its mean motion. The spring
 converts this displacement to the additional shear stress :math:`K D`. The unknowns f (spring
 stress) and g (frictional stress) do not include the stress :math:`K D`. The friction functions
-therefore add :math:`K D` to g. The equations for inertia and radiation damping do not need :math:`K
-D`, because they depend only on the difference f
-- g.
+therefore add :math:`K D` to g. The equations for inertia and radiation damping do not need this
+stress, because they depend only on the difference between f and g.
 
 The functions take floats and the parameter tuple ``p`` (see ``parameter_layout``). Scenes with the
 same combination of parts share the friction functions, so that each function is compiled only once.

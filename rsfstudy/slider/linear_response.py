@@ -11,12 +11,12 @@ Consider a small perturbation of slip, :math:`du`, that grows as :math:`\exp(p s
 Here :math:`D` and :math:`S` are the derivatives of strength and of the shift with respect to
 frictional stress. The matrix :math:`M` and the vectors :math:`E_x` and :math:`E_s` contain the
 derivatives of the state evolution with respect to the states, to :math:`x = \ln V` and to the
-shift. The sum of the states of the law acts on friction, so the vector of weights is :math:`1^T`.
-If the scene has a fluid, the pore pressure :math:`P` is the last state. The weight of :math:`P` is
-the negative derivative of strength with respect to :math:`P`, and the weight of porosity is 0.
-Because the pressure also changes the shift, the last column of :math:`M` includes the product of
-:math:`E_s` and the derivative of the shift with respect to :math:`P`. A changing temperature is
-treated in the same way.
+shift. Friction depends on the sum of the states of the law, so the vector of weights is
+:math:`1^T`. If the scene has a fluid, the pore pressure :math:`P` is the last state. The weight of
+:math:`P` is the negative derivative of strength with respect to :math:`P`, and the weight of
+porosity is 0. Because the pressure also changes the shift, the last column of :math:`M` includes
+the product of :math:`E_s` and the derivative of the shift with respect to :math:`P`. If the
+temperature changes, it is treated in the same way as the pore pressure.
 
 If the loading changes the normal stress by :math:`-dP`, the frictional stress changes by the
 additional term

@@ -43,8 +43,8 @@ class MotionPoint(NamedTuple):
     normal_stress : float
         Effective normal stress in :math:`\sigma_*`.
     apparent_friction : float
-        Friction coefficient that an experimenter measures: the spring stress, divided by the
-        difference between normal stress and the pore pressure outside the fault.
+        Friction coefficient that is measured in an experiment. It is the spring stress divided by
+        the difference between normal stress and the pore pressure outside the fault.
     apparent_friction_derivative : float
         Derivative of ``apparent_friction`` with respect to the independent variable.
     psis : tuple of float

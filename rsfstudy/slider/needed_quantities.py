@@ -3,8 +3,8 @@
 The attribute ``received_quantities`` of a part lists the quantities that are passed to its
 functions. If effective normal stress is constant, shear stress can be computed from the friction
 coefficient and the normal stress. A part can list additional quantities in its attribute ``needs``.
-If a quantity in ``needs`` is unknown, the scene rejects the part, because the part would compute
-its rates from wrong values.
+If a quantity in ``needs`` is unavailable, the scene rejects the part, because the part would
+compute its rates from wrong values.
 """
 
 from __future__ import annotations

@@ -100,7 +100,7 @@ class Path(NamedTuple):
         return np.array(values[:stop])
 
     def _transition(self, spacing: float) -> tuple[float, float]:
-        """Return the weight of the last value and the random standard deviation."""
+        """Return the decay factor of a step, and the standard deviation of its noise."""
         if self.correlation_time is None:
             return 1.0, math.sqrt(spacing)
         decay = 2.0 * spacing / self.correlation_time

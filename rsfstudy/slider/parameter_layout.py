@@ -2,10 +2,11 @@
 
 The tuple starts with the parameters that every scene has. The parameters of the parts follow in the
 order of the slots. The parameters of the law are ``p[LAW]``, ``p[LAW + 1]`` and so on. The
-parameters of the law come last, because a law can have any number of parameters. If the temperature
-changes, the parameters of the temperature come after the parameters of the law. In a scene with
-noise, the last two parameters are the inertial time and the rate at which noise changes the spring
-stress. The module also defines the columns of segment tables and limits that prevent overflow.
+parameters of the law follow the parameters of all other parts, because a law can have any number of
+parameters. If the temperature changes, the parameters of the temperature come after the parameters
+of the law. In a scene with noise, the last two parameters are the inertial time and the rate at
+which noise changes the spring stress. The module also defines the columns of segment tables, and
+limits that prevent numerical overflow.
 """
 
 from __future__ import annotations

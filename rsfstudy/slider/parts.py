@@ -158,7 +158,7 @@ class Part:
 
     @property
     def effects(self) -> tuple[str, ...]:
-        """Names of the physical effects that the part includes."""
+        """Names of the active physical effects of the part."""
         return ()
 
     @classmethod

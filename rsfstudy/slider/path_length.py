@@ -72,7 +72,7 @@ def velocity_ratios(log_slip_rate: float, p: Numbers) -> VelocityRatios:
     If :math:`\ln(V/V_*)` is below its lower limit, the contact is treated as stationary. At low
     slip rates, the derivative of the state with respect to slip may grow in proportion to
     :math:`1/V`. The product of this derivative and the fraction :math:`V/(V + V_0)` remains finite.
-    If the slip rate had no lower limit, the derivative would overflow and the fraction would
+    Without the lower limit, however, the derivative would overflow and the fraction would
     underflow.
     """
     least = p[LOG_LOAD_VELOCITY] - MAX_LOG_LOAD_OVER_SLIP_VELOCITY

@@ -63,7 +63,7 @@ def find_roots_with_one_distant_root(polynomial: PolynomialCoefficients) -> np.n
     """Find the roots of a polynomial in which one root is very large.
 
     If the mass of the slider is small, one root is about 1e20 times larger than the other roots. If
-    all roots were computed together, the small roots would lose digits. The function therefore
+    all roots were computed together, the small roots would lose accuracy. The function therefore
     computes the small roots from the polynomial without its leading coefficient. Finally, the
     function refines all roots by Newton iterations.
     """

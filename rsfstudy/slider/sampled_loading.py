@@ -247,8 +247,7 @@ class SampledHistory(UserLoading):
     def reported_segment_count(self) -> int:
         """Number of segments whose start is reported as an event.
 
-        Only the end of the record is reported as an event, because otherwise every sample would be
-        an event.
+        Only the end of the record is reported as an event, to avoid one event per sample.
         """
         return min(1, len(self.sample_table) - 1)
 

@@ -64,9 +64,9 @@ class Scene(SceneFunctions, SceneQuantities):
         fields of the scene.
     normal_stress : str or type, default: "variable"
         Normal stress condition. With "constant", normal stress is constant. With "imposed", the
-        loading determines the normal stress. With "variable", the driving stress is inclined at the
-        angle ``phi``, and normal stress changes with shear stress. A user-defined class is also
-        accepted.
+        normal stress is prescribed by the loading. With "variable", the driving stress is inclined
+        at the angle ``phi``, and normal stress changes with shear stress. A user-defined class is
+        also accepted.
     fluid : str or type, default: "drained"
         Pore fluid. With "drained", pore pressure is constant. With "dilatant", pore pressure falls
         when the slip rate increases. With "thermal", pore pressure rises when the fault heats up. A
@@ -79,7 +79,7 @@ class Scene(SceneFunctions, SceneQuantities):
         the shear stress heats the fault. A user-defined class is also accepted.
     loading_noise : str or type, default: "none"
         Noise that is added to the loading. With "white", the noise of the stresses is a Wiener
-        process. With "correlated", the noise is bounded and has a correlation time.
+        process. With "correlated", the noise has a correlation time and a limited variance.
     a : float, default: 0.0145
         Direct effect parameter.
     mu_star : float, default: 0.76
@@ -111,12 +111,13 @@ class Scene(SceneFunctions, SceneQuantities):
         Coefficient :math:`c` of Nagata et al. (2012). Shear stress decreases the state variable by
         :math:`c \, d\tau/\sigma`.
     regularised : bool, default: False
-        If True, the slip rate has the same sign as the shear stress, so slip can reverse (arcsinh
-        form of the friction law). Reversed slip requires quasi-static dynamics.
+        If True, the regularised (arcsinh) form of the friction law is used. The slip rate then has
+        the sign of the shear stress, so slip can reverse. Reversed slip requires quasi-static
+        dynamics.
     b_over_a : float, default: 2.0
         Ratio :math:`b/a` of the evolution effect to the direct effect. Rate weakening requires
-        :math:`b > a`. If friction is not rate weakening, there is no critical stiffness, and
-        ``stiffness`` must be given.
+        :math:`b > a`. If friction is not rate weakening, there is no critical stiffness, so you
+        must pass ``stiffness``.
     cutoff_velocity_ratio : float, default: 100.0
         Cut-off velocity :math:`V_c/V_*` of the composite law and of the law with a cut-off. Above
         this velocity, the composite law has no healing, and the law with a cut-off has no evolution

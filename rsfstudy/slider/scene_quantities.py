@@ -86,7 +86,7 @@ class SceneQuantities(SceneBase):
 
     @property
     def effects(self) -> tuple[str, ...]:
-        """Names of the physical effects that the scene includes."""
+        """Names of the active physical effects of the scene."""
         return tuple(effect for part in self.parts for effect in part.effects)
 
     @cached_attribute

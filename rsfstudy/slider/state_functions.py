@@ -3,8 +3,8 @@
 The tuple of states starts with the states of the law, whose sum acts on friction. If the loading
 changes normal stress, the unknowns of the loading follow the states of the law. The unknowns of a
 fluid are the last elements. The last unknown is the pore pressure P, or the stress that the loading
-imposes. Most functions of this module return other functions, which are specialised for the number
-of states so that Numba can compile them.
+imposes. Most functions of this module return other functions. The returned functions are
+specialised for the number of states, so that Numba can compile them.
 """
 
 from __future__ import annotations
@@ -310,8 +310,8 @@ def check_steady_states(scene: SceneView) -> None:
     """Check the steady states of a user-defined law.
 
     The states must not change in steady sliding, must add up to zero at :math:`V_*` and must be
-    stable at constant slip rate. If a law violated these conditions, the computed critical
-    stiffness would contradict the computed limit cycles.
+    stable at constant slip rate. Otherwise, the computed critical stiffness would contradict the
+    computed limit cycles.
 
     Parameters
     ----------

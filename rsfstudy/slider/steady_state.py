@@ -239,8 +239,9 @@ def min_steady_log_slip_rate(scene: SceneView) -> float:
     Returns
     -------
     float
-        Smallest :math:`\ln(V/V_*)` of steady sliding. At this slip rate, the steady stress becomes
-        infinite. The result is ``-inf`` if steady sliding exists at all slip rates.
+        Smallest :math:`\ln(V/V_*)` of steady sliding. The steady stress becomes infinite as the
+        slip rate decreases to this value. The result is ``-inf`` if steady sliding exists at all
+        slip rates.
 
     Notes
     -----

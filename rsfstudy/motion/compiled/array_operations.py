@@ -2,7 +2,7 @@
 
 The compiled loop uses pointers instead of arrays, and calls the equations through their addresses.
 The loop is therefore compiled only once for all systems of equations. Pointers are also faster,
-because Numba would pass each array as ten machine words and count references to it.
+because Numba passes each array as ten machine words and counts the references to the array.
 """
 
 from __future__ import annotations

@@ -104,7 +104,7 @@ def _digest_functions(*functions: Callable[..., Any]) -> ObjectDigest:
 
 
 def _is_module_digested(module_name: str | None) -> bool:
-    """Return True if the digest of a module includes its source code."""
+    """Return True if digests include the source code of a module."""
     return (module_name or "").partition(".")[0] not in _PACKAGES_IDENTIFIED_BY_VERSION_ONLY
 
 

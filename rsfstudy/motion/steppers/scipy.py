@@ -242,7 +242,7 @@ class SciPyStepper(Stepper):
     def _get_current_solver_rates(self) -> np.ndarray:
         """Return the derivatives at the current point of the solver.
 
-        Most solvers have already computed these derivatives.
+        Most solvers have already computed and stored these derivatives.
         """
         known = getattr(self._solver, "f", None)
         if known is None:

@@ -1,9 +1,9 @@
 """Source code of a Runge-Kutta step, unrolled for a given number of unknowns.
 
-The Butcher tableau is the same as in SciPy's DOP853 (Hairer, Norsett and Wanner 1993). Loops over
-stages and unknowns would take as much time as the equations of a simple scene. If the code is
-unrolled and the equations are inlined, the compiler can also share expressions between the stages.
-``build_step_attempt_function`` is the main function.
+The Butcher tableau is the same as in SciPy's DOP853 (Hairer, Norsett and Wanner 1993). For a simple
+scene, loops over stages and unknowns would take as much time as the evaluation of the equations. If
+the code is unrolled and the equations are inlined, the compiler can also share expressions between
+the stages. ``build_step_attempt_function`` is the main function.
 
 The results of a step are stored in two arrays. The first array contains the derivatives at all
 stages. The second array, called the block, contains a header, the unknowns at the end of the step,

@@ -1,9 +1,9 @@
 """Dynamics of the slider.
 
 Each module of this package defines one choice of dynamics. The function ``discover_parts`` finds
-the modules automatically. The dynamics define which forces, in addition to friction, balance the
-force of the spring. The balance of forces determines how the slip rate depends on spring stress and
-state. The base class is ``Dynamics``.
+the modules automatically. The dynamics define the forces that, together with friction, balance the
+spring force. This force balance determines how the slip rate depends on spring stress and state.
+The base class is ``Dynamics``.
 """
 
 from __future__ import annotations

@@ -159,8 +159,8 @@ def build_slip_rate_functions(friction_functions: FrictionFunctions) -> tuple[Fu
     def log_slip_rate_offset(spring_stress: float, psis: Numbers, p: Numbers) -> float:
         """Compute the difference between ln V and its quasi-static value.
 
-        The function does not subtract two values of ln V, because rounding errors would then be
-        visible in the derivative of the difference.
+        The function does not subtract two values of ln V, because rounding errors would then affect
+        the derivative of the difference.
         """
         taken = inertial_stress(spring_stress, psis, quasi_static_values(spring_stress, psis, p), p)
         return -strength(spring_stress - 0.5 * taken, psis, p)[1] * taken / p[A]
@@ -168,9 +168,8 @@ def build_slip_rate_functions(friction_functions: FrictionFunctions) -> tuple[Fu
     def growth(state: Numbers, rates: Numbers, x: float, g: float, p: Numbers) -> float:
         """Compute the derivative of ln V along the motion.
 
-        The derivative includes the change of ``log_slip_rate_offset``. If the change of
-        ``log_slip_rate_offset`` were omitted, the peak slip rate would occur too early, by a slip
-        distance of ``(K/a) w**2`` in D_c.
+        The derivative includes the change of ``log_slip_rate_offset``. Without this contribution,
+        the peak slip rate would occur too early, by a slip distance of ``(K/a) w**2`` in D_c.
         """
         spring_stress, psis = state[0], state[1:]
         slope = strength(spring_stress, psis, p)[1]
@@ -193,8 +192,8 @@ def clamped_inertial_stress(
     r"""Compute the bounded stress that accelerates the mass.
 
     The magnitude of the stress is limited to :math:`a`. A motion leaves the slow manifold long
-    before the accelerating stress reaches this limit. Only trial steps of the integrator exceed the
-    limit. In such trial steps, the limited stress is finite and has the correct sign.
+    before the accelerating stress reaches this limit. The limit is exceeded only in trial steps of
+    the integrator. In such trial steps, the limited stress is finite and has the correct sign.
 
     Parameters
     ----------
@@ -345,7 +344,7 @@ class Inertia(Dynamics):
 
     @property
     def effects(self) -> tuple[str, ...]:
-        """Names of the physical effects that the part includes."""
+        """Names of the active physical effects of the part."""
         return ("inertia",)
 
     def parameter_values(self, scene: SceneView) -> Numbers:

@@ -1,4 +1,4 @@
-"""Quasi-static motion, in which only friction balances the force of the spring."""
+"""Quasi-static motion, in which only friction balances the spring force."""
 
 from __future__ import annotations
 

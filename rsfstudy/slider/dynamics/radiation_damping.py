@@ -151,7 +151,7 @@ class RadiationDamping(Dynamics):
 
     @property
     def effects(self) -> tuple[str, ...]:
-        """Names of the physical effects that the part includes."""
+        """Names of the active physical effects of the part."""
         return ("radiation_damping",)
 
     def parameter_values(self, scene: SceneView) -> Numbers:

@@ -45,7 +45,7 @@ class Fluid(Part):
     The distance between the unknowns and their values in steady sliding determines whether a motion
     has settled and whether a cycle repeats. The attribute ``excluded_from_distance`` lists the
     names of unknowns that do not contribute to the distance from steady sliding. Exclude an unknown
-    from the distance if its steady value at the slip rate of a rupture is extremely large.
+    from the distance if its steady value is extremely large at the slip rates of ruptures.
 
     Examples
     --------

@@ -97,9 +97,9 @@ def choose_porosity_rates(porosity_length: float) -> Function:
 def check_porosity_length(fluid: Fluid, scene: SceneView) -> None:
     """Check that the scene supports the slip distance of the porosity.
 
-    The parameters of a loading with unknowns occupy elements of the parameter tuple that are
-    reserved for the fluid. With such a loading, the tuple has no free element for the slip distance
-    of the porosity.
+    If a loading has unknowns, its parameters occupy elements of the parameter tuple that are
+    otherwise used by the fluid. The tuple then has no free element for the slip distance of the
+    porosity.
 
     Parameters
     ----------
@@ -208,7 +208,7 @@ class DilatantFluid(Fluid):
         See ``Fluid.highest_pressure``. The upper bound follows from the drainage rate and from the
         largest rate at which pores can close. The closing rate is :math:`V (\varphi - \varphi_0 -
         \epsilon \ln(V/V_*)) D_c/L_\varphi`. If the dilatancy is negative, the porosity may first
-        increase while slip is slow, and the closing rate is largest when the slip rate increases
+        increase while slip is slow. The closing rate is then largest when the slip rate increases
         again. The upper bound therefore includes the steady porosity at the lowest slip rate.
         """
         closing = max(
@@ -221,7 +221,7 @@ class DilatantFluid(Fluid):
 
     @property
     def effects(self) -> tuple[str, ...]:
-        """Names of the physical effects that the part includes."""
+        """Names of the active physical effects of the part."""
         return ("dilatancy",)
 
     def parameter_values(self, scene: SceneView) -> Numbers:

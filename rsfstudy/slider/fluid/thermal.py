@@ -158,7 +158,7 @@ class ThermalFluid(Fluid):
 
     @property
     def effects(self) -> tuple[str, ...]:
-        """Names of the physical effects that the part includes."""
+        """Names of the active physical effects of the part."""
         return ("thermal_pressurisation", *("dilatancy",) * bool(self.dilatancy))
 
     def parameter_values(self, scene: SceneView) -> Numbers:

@@ -42,7 +42,7 @@ LARGEST_EVOLUTION_EXPONENT = 700.0
 def fast_expm1(exponent: float) -> float:
     """Compute exp(x) - 1 to full precision, faster than ``math.expm1``.
 
-    For arguments that are not close to zero, the function subtracts 1 from ``math.exp``, which
+    For arguments that are not close to zero, the function subtracts 1 from ``math.exp(x)``. This
     takes a third of the time of ``math.expm1``.
 
     Parameters
@@ -85,7 +85,7 @@ class LawBase(Part):
     Laws with a single parameter b are derived from ``Law``, which is a subclass of this class.
 
     The functions of a law receive :math:`\ln(V/V_*)`, the state variables and the parameters of the
-    law. From these arguments, a function can compute the friction coefficient of forward slip,
+    law. From these arguments, a function can compute the friction coefficient for forward slip,
     :math:`\tau/\sigma = \mu_* + a \ln(V/V_*) + \sum_i \Theta_i`. The functions do not receive shear
     stress, normal stress or pore pressure. If the state evolution depends on one of these
     quantities, list the quantity in ``needs``, for example ``needs = {"shear_stress"}``. A scene
@@ -102,17 +102,17 @@ class LawBase(Part):
     change in the state variable per unit slip in :math:`D_c` at constant normal stress. The default
     steady state is :math:`\Theta = -b \ln(V/V_*)`. If the steady state of a law differs from the
     default, the law also defines ``steady_states(log_slip_rate, shift, p)``, which returns the
-    states :math:`\Psi` in steady sliding. The argument ``shift`` is the decrease in the state
-    variable that stress causes. In steady sliding at :math:`V_*`, the state variables must add up
-    to zero, because the friction coefficient is :math:`\mu_*`. A scene rejects a law if the states
-    are not constant in steady sliding.
+    states :math:`\Psi` in steady sliding. The argument ``shift`` is the stress-induced decrease in
+    the state variable. In steady sliding at :math:`V_*`, the state variables must add up to zero,
+    because the friction coefficient is :math:`\mu_*`. A scene rejects a law if the states are not
+    constant in steady sliding.
 
     A law with several states sets the attribute ``state_count``, for example ``state_count = 3``. A
     law with several states must also define ``steady_states`` and ``evolutions(log_slip_rate, psis,
     shift, fraction, p)``. The function ``evolutions`` returns a tuple with the change of each state
     per unit slip, multiplied by ``fraction``. The argument ``fraction`` is the slip per unit of the
     independent variable of the integration. The functions ``evolutions`` and ``steady_states``
-    distribute the decrease ``shift`` among the states. The shares of all states must add up to
+    divide the decrease ``shift`` among the states. The decreases of all states must add up to
     ``shift``. The field or property ``b_over_a`` is the total evolution effect of all states,
     divided by the direct effect a. See the module ``two_slip_states`` for an example.
 
@@ -125,7 +125,8 @@ class LawBase(Part):
         Effect :math:`c` of shear stress on the state variable. A change :math:`d\tau` of shear
         stress decreases the state variable by :math:`c \, d\tau/\sigma`. Zero disables the effect.
     regularised : bool, default: False
-        If True, slip reverses with the sign of shear stress (regularised friction law).
+        If True, the regularised friction law is used, in which slip reverses when the shear stress
+        changes sign.
 
     References
     ----------
@@ -220,7 +221,7 @@ class LawBase(Part):
 
     @property
     def state_change_over_a(self) -> float:
-        """Change in the states per unit of ln V, divided by a.
+        """Magnitude of the steady-state change per unit change of ln V, divided by a.
 
         The value is always positive.
         """
@@ -300,14 +301,15 @@ class Law(LawBase):
     The function returns the change in :math:`\Theta` per unit slip in :math:`D_c` at constant
     normal stress. See ``LawBase`` for a description of the arguments. The element ``p[LAW]`` is b,
     where the constant ``LAW`` can be imported from ``rsfstudy.parts``. Declare the parameters of
-    the law as fields, with ``rsfstudy.parts.number``. The parameters follow b in the order of their
-    declaration, as ``p[LAW + 1]``, ``p[LAW + 2]`` and so on. Two methods are optional::
+    the law as fields with ``rsfstudy.parts.number``. In the tuple ``p``, these parameters follow b
+    in the order of their declaration, as ``p[LAW + 1]``, ``p[LAW + 2]`` and so on. Two methods are
+    optional::
 
         parameter_values(self, scene) -> tuple[float, ...]
         check(self, scene) -> None
 
-    Override ``parameter_values`` if ``evolution`` uses values other than the fields, such as
-    logarithms of the fields. The overriding method must return
+    Override ``parameter_values`` if ``evolution`` uses values that are derived from the fields,
+    such as logarithms of the fields. The overriding method must return
     ``(*super().parameter_values(scene), ...)``. Override ``check`` to raise ``InvalidValue`` if
     field values contradict each other. The class attribute ``name`` is the name of the law. The
     attributes ``relaxation``, ``steady_states`` and ``state_effect`` are also optional. A law with
@@ -319,7 +321,7 @@ class Law(LawBase):
     stress_dependence : float, default: 0.0
         Effect :math:`c` of shear stress on the state variable (see ``LawBase``).
     regularised : bool, default: False
-        If True, slip reverses with the sign of shear stress.
+        If True, slip reverses when the shear stress changes sign.
     b_over_a : float, default: 2.0
         Ratio :math:`b/a` of the evolution effect to the direct effect.
 

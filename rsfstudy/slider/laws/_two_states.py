@@ -66,10 +66,10 @@ class TwoStateLaw(LawBase):
         \tau = \sigma \left(\mu_* + a \ln\frac{V}{V_*} + \Theta_1 + \Theta_2\right).
 
     Effects of stress on the state, such as :math:`\alpha \ln(\sigma/\sigma_*)`, are divided between
-    the two states in proportion to :math:`\lvert b_i \rvert`. Experiments do not determine this
-    distribution. With this distribution, two states with equal slip distances and coefficients
-    :math:`b_i` of the same sign are equivalent to a single state. The share of a state in the
-    effect of stress never exceeds 1, even if :math:`b_1 + b_2` is small.
+    the two states in proportion to :math:`\lvert b_i \rvert`. Experiments do not constrain this
+    choice. It makes two states with equal slip distances and coefficients :math:`b_i` of the same
+    sign equivalent to a single state. The share of a state in the effect of stress never exceeds 1,
+    even if :math:`b_1 + b_2` is small.
 
     References
     ----------

@@ -161,7 +161,7 @@ class FlashHeatingLaw(Law):
 
     @property
     def effects(self) -> tuple[str, ...]:
-        """Names of the physical effects that the part includes."""
+        """Names of the active physical effects of the part."""
         return ("flash_heating", *super().effects)
 
     def check(self, scene: SceneView) -> None:
@@ -180,9 +180,9 @@ class FlashHeatingLaw(Law):
             )
 
     def parameter_values(self, scene: SceneView) -> Numbers:
-        r"""Return b and the parameters of the weakening.
+        r"""Return b and the weakening parameters.
 
-        See ``Part.parameter_values``. The parameters of the weakening are :math:`f_w`,
+        See ``Part.parameter_values``. The weakening parameters are :math:`f_w`,
         :math:`\ln(V_w/V_*)`, :math:`n` and :math:`\ln[1 + (V_*/V_w)^n]`.
         """
         logarithm, exponent = math.log(self.weakening_velocity_ratio), self.weakening_exponent

@@ -204,8 +204,8 @@ class Loading(Part):
         -------
         Loading or Segment
             Segment with this index. If the loading has only one segment, the method returns the
-            loading itself. The method also returns the loading itself if the loading has unknowns
-            and the index is 0.
+            loading itself. The loading itself is also returned for index 0 if the loading has
+            unknowns.
         """
         history = self.segments
         if len(history) == 1 or (self.unknowns and segment_index == 0):
@@ -239,7 +239,7 @@ class Loading(Part):
         """True for each segment that starts with a jump of the loading.
 
         A jump of the loading is a sudden change in load point displacement or normal stress. The
-        end of a segment with unknowns also counts as a jump of the loading.
+        end of a segment with unknowns is also treated as a jump of the loading.
         """
         before, found = 0.0, []
         for place, segment in enumerate(self.segments):

@@ -168,8 +168,8 @@ class OscillationBase(LoadingWithFinalLoadVelocity):
         """True for every segment.
 
         The loading may change suddenly at the start of the oscillation, because the initial phase
-        may be nonzero. The end of the oscillation also counts as a jump of the loading, because the
-        oscillation has unknowns.
+        may be nonzero. The end of the oscillation is also treated as a jump of the loading, because
+        the oscillation has unknowns.
         """
         return [True] * len(self.segments)
 

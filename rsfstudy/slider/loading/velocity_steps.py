@@ -13,8 +13,8 @@ from rsfstudy.slider.parts import NON_NEGATIVE_INTEGER, POSITIVE, number
 class VelocitySteps(Loading):
     r"""Alternating steps of the load point velocity between two values.
 
-    The velocity alternates between :math:`V_*` and :math:`r V_*`. The load point moves by the same
-    displacement between successive steps. After the last step, the velocity remains constant.
+    The velocity alternates between :math:`V_*` and :math:`r V_*`. The load point displacement
+    between successive steps is constant. After the last step, the velocity remains constant.
 
     Parameters
     ----------

@@ -104,7 +104,7 @@ class WhiteNoise(Noise):
 
     @property
     def effects(self) -> tuple[str, ...]:
-        """Names of the physical effects that the part includes."""
+        """Names of the active physical effects of the part."""
         return ("noise",)
 
     def check(self, scene: SceneView) -> None:

@@ -69,5 +69,5 @@ class NormalStressWithStateEffect(NormalStress):
 
     @property
     def effects(self) -> tuple[str, ...]:
-        """Names of the physical effects that the part includes."""
+        """Names of the active physical effects of the part."""
         return ("linker_dieterich",) if self.alpha else ()

@@ -100,7 +100,7 @@ class VariableNormalStress(NormalStressWithStateEffect):
 
     @property
     def effects(self) -> tuple[str, ...]:
-        """Names of the physical effects that the part includes."""
+        """Names of the active physical effects of the part."""
         return ("inclined_driving", *super().effects)
 
     def parameter_values(self, scene: SceneView) -> Numbers:

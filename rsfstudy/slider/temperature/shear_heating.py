@@ -81,9 +81,9 @@ class ShearHeating(Temperature):
 
     Notes
     -----
-    In steady sliding, :math:`\vartheta = (H/C) (\mu s V/V_* - \mu_*)`. If :math:`Q_a = Q_b = Q`, a
-    higher temperature has the same effect as a lower slip rate. Friction is then rate weakening at
-    low slip rates, and rate strengthening at slip rates at which heating exceeds about
+    In steady sliding, :math:`\vartheta = (H/C) (\mu s V/V_* - \mu_*)`. If :math:`Q_a = Q_b = Q`, an
+    increase in temperature has the same effect as a decrease in slip rate. Friction is then rate
+    weakening at low slip rates, and rate strengthening at slip rates at which heating exceeds about
     :math:`R T^2/Q`.
 
     References
@@ -148,7 +148,7 @@ class ShearHeating(Temperature):
 
     @property
     def effects(self) -> tuple[str, ...]:
-        """Names of the physical effects that the part includes."""
+        """Names of the active physical effects of the part."""
         return ("shear_heating", *("thermal_activation",) * any(self.activation))
 
     def parameter_values(self, scene: SceneView) -> Numbers:
