@@ -1,10 +1,10 @@
 """Monotonic rise of slip rate to a fast load point velocity.
 
-If seismic waves radiate most of the stress, the slip rate V rises over a slip of eta V_0/(K D_c),
-which is many times D_c. During the rise of the slip rate, the state stays close to its steady
-state. An explicit integrator would need steps of about D_c during the whole rise of the slip rate.
-The functions of this module test whether the slip rate rises monotonically to the load point
-velocity. If the rise is monotonic, the integration ends early.
+If seismic waves radiate most of the stress, the slip rate V rises gradually. The slip during this
+rise is eta V_0/(K D_c), which is many times D_c. During the rise of the slip rate, the state stays
+close to its steady state. An explicit integrator would need steps of about D_c during the whole
+rise of the slip rate. The functions of this module test whether the slip rate rises monotonically
+to the load point velocity. If the rise is monotonic, the integration ends early.
 
 The test uses two curves in the plane of ln V and state. The two curves meet only at the point of
 steady sliding. The first curve is the steady state as a function of ln V. On the second curve, the

@@ -62,8 +62,8 @@ class StepFamily:
     min_size : float
         Smallest size of the search.
     max_size : float
-        Largest size of the search. If the loading itself reaches the norm, there are no sizes to
-        search, and the largest size does not exceed the smallest size.
+        Largest size of the search. If the loading itself reaches the norm, there are no step sizes
+        to search, and ``max_size`` is not greater than ``min_size``.
     """
 
     #: Name of the scene field that contains the step.
@@ -134,7 +134,7 @@ class StepFamily:
         raise TypeError(f"{type(self).__name__} does not define this method")
 
     def size_tolerance(self, step_size: float, value_tolerance: float) -> float:
-        r"""Return the tolerance of the size for a tolerance of the step value.
+        r"""Convert a tolerance of the step value to a tolerance of the step size.
 
         If the size has the returned relative error, the change in the step value has the relative
         error ``value_tolerance``. The size tolerance is at most ``value_tolerance``.
@@ -180,7 +180,7 @@ class StepFamily:
     def find_sizes_by_critical_path(
         self, local_tolerances: Iterable[float], integrator: Integrator
     ) -> Iterator[float]:
-        """Yield sizes of the step at which the critical path starts.
+        """Yield estimates of the step size at which the critical path starts.
 
         Parameters
         ----------
@@ -192,7 +192,7 @@ class StepFamily:
         Yields
         ------
         float
-            Size for the next tolerance. The iterator ends early if there is no critical path.
+            Step size for the next tolerance. The iterator ends early if there is no critical path.
         """
         raise TypeError(f"{type(self).__name__} does not define this method")
 
@@ -211,7 +211,7 @@ class StepFamily:
         Returns
         -------
         iterator of float
-            Size for each tolerance. The iterator is empty if no limit cycle touches the norm.
+            Step size for each tolerance. The iterator is empty if no limit cycle touches the norm.
         """
         return iter(())
 
@@ -328,7 +328,7 @@ class ShootingStepFamily(StepFamily):
     sign_of_triggering_steps: ClassVar[int]
 
     def compute_field_value_error(self, step_size: float, relative_error: float) -> float:
-        """Return the error of the step value, which is the exponential of the size.
+        """Return the error of a step value that is the exponential of the step size.
 
         See ``StepFamily.compute_field_value_error``.
         """
@@ -337,7 +337,7 @@ class ShootingStepFamily(StepFamily):
     def find_sizes_by_critical_path(
         self, local_tolerances: Iterable[float], integrator: Integrator
     ) -> Iterator[float]:
-        """Yield sizes of the step at which the critical path starts.
+        """Yield estimates of the step size at which the critical path starts.
 
         At the critical step, the critical path begins with the state before the step. An
         approximate root of the misfit, and the slope of the misfit at the root, are computed first
@@ -499,8 +499,8 @@ def _find_misfit_root(
     """Find the root ln(step size) of a misfit, and the slope of the misfit.
 
     If there is no critical path, only the sign of the misfit is known. The root and the slope are
-    computed from misfits whose magnitude is known. The result is None if the magnitude of too few
-    misfits is known.
+    computed from misfits whose magnitude is known. The result is None if too few misfits have a
+    known magnitude.
     """
     try:
         brentq(misfit_function, *bracket, xtol=1e-4)

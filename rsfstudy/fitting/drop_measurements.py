@@ -31,7 +31,7 @@ _MIN_EXCESS_SLIP_SIGMAS, _MIN_EXCESS_SLIP_FRACTION = 3.0, 0.1
 
 
 class DropSampleIndices(NamedTuple):
-    """Location of a drop among the samples.
+    """Indices of the samples that belong to a stress drop.
 
     Parameters
     ----------
@@ -58,9 +58,8 @@ class DropMeasurements(NamedTuple):
     detection : Detection
         Result of the detection.
     displacement_shows_slip : bool
-        False if a check found that the displacement rate is not higher during the drops than before
-        and after the drops. True if the rate is higher during the drops, or if the rate was not
-        checked.
+        True if the displacement rate is higher during the drops than before and after the drops, or
+        if the rate was not checked. Otherwise, the value is False.
     """
 
     event_rows: list[EventNumbers]
@@ -162,7 +161,7 @@ def displacement_follows_drops(
 def find_sample_indices_of_drop(
     times: np.ndarray, fitted_candidate: FittedDropCandidate, neighbour_limits: tuple[float, float]
 ) -> DropSampleIndices:
-    """Locate a drop among the samples.
+    """Find the samples that belong to a stress drop.
 
     The averaging window is shortened if it would overlap a neighbouring drop or extend beyond the
     record.

@@ -137,7 +137,7 @@ class FitWindow:
 
     @property
     def window_properties(self) -> dict[str, float]:
-        """Velocities, ends of the window in um, normal stress and load point noise."""
+        """Velocities, window limits in um, normal stress and load point noise."""
         record, rows = self.record, self.record_row_indices
         moved, time = record.columns["displacement"][rows], record.time[rows]
         return {
@@ -243,7 +243,7 @@ class FitWindow:
         return found
 
     def _earliest_start_time(self, step: LoadingStep) -> float:
-        """Return the earliest possible start of a window in s.
+        """Return the earliest time in s at which a window can start.
 
         If friction before the step is not linear, the window begins later than the earliest
         possible start.

@@ -137,8 +137,8 @@ def select_values_of_window(values: Mapping[str, ValueType], number: int) -> dic
     Returns
     -------
     dict
-        Values of the shared parameters and of the parameters of the window. The names do not
-        include window numbers.
+        Values of the shared parameters, and of the parameters that are specific to the window. The
+        names do not include window numbers.
 
     Examples
     --------

@@ -36,9 +36,9 @@ def loading_history(
         Times in s.
     use_recorded_rows : bool
         If True, each row of the record begins a segment. The recorded displacement is first
-        replaced by the closest sequence of displacements that never decreases. If False, the load
-        point velocity and the normal stress are constant between the steps, and change at a
-        constant rate during a step.
+        replaced by the closest nondecreasing sequence of displacements. If False, the load point
+        velocity and the normal stress are constant between the steps, and change at a constant rate
+        during a step.
 
     Returns
     -------
