@@ -47,7 +47,6 @@ def slow_manifold_relative_error(scene: Scene) -> float:
     with the stiffness :math:`K` and the instability norm :math:`w`. Inertia changes a critical step
     by up to :math:`0.8 (K/a) w^2`, if the instability norm corresponds to a slip rate of a few
     :math:`V_*`. The error of the slow manifold is at most 0.9 times the square of the effect of
-    inertia on the critical step. Both coefficients were determined numerically, and are checked by
-    the test suite.
+    inertia on the critical step. The test suite measures both coefficients.
     """
     return 3.0 * (scene.stiffness / scene.a * scene.instability_norm**2) ** 2

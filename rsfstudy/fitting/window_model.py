@@ -306,8 +306,8 @@ class WindowModel:
         -------
         ndarray, shape (rows,)
             Friction of the model. All values are NaN if the simulation fails. All values are also
-            NaN if the simulation needs far more evaluations than usual, because such a motion
-            cannot fit a record.
+            NaN if the simulation needs far more evaluations than usual, because such a motion is
+            unlikely to fit a record.
 
         Raises
         ------
