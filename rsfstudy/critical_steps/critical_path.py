@@ -181,7 +181,8 @@ class CriticalPath(NamedTuple):
         tolerance : float
             Local error tolerance of the integration.
         crossing_quantity_and_level : tuple of str and float
-            Quantity and level whose crossing defines the start of the path.
+            Name and level of a quantity. The path starts at a point at which the quantity crosses
+            this level.
         is_start_of_step : callable
             Function that returns True if a point at the crossing is the start of the requested
             step.

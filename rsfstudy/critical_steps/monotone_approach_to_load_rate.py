@@ -70,8 +70,8 @@ def build_events_testing_monotone_rise(scene: Scene) -> list[EventSpecification]
     list of EventSpecification
         Events at which ln V rises through levels below ln V_0. The function
         ``rises_monotonically_to_load_rate`` tests the motion at these events. The list of events is
-        empty if the slip rate does not rise slowly. The list is also empty if the scene has several
-        states or inertia, because the test is not valid for such scenes.
+        empty if the slip rate rises quickly. The list is also empty if the scene has several states
+        or inertia, because the test is not valid for such scenes.
     """
     load = scene.log_load_velocity
     if scene.state_count > 1 or scene.has_mass:

@@ -60,10 +60,10 @@ class StepFamily:
     Attributes
     ----------
     min_size : float
-        Smallest size of the search.
+        Smallest step size of the search.
     max_size : float
-        Largest size of the search. If the loading itself reaches the norm, there are no step sizes
-        to search, and ``max_size`` is not greater than ``min_size``.
+        Largest step size of the search. If the loading itself reaches the norm, there are no step
+        sizes to search, and ``max_size`` is not greater than ``min_size``.
     """
 
     #: Name of the scene field that contains the step.
@@ -124,7 +124,7 @@ class StepFamily:
         step_size : float
             Size of the step.
         relative_error : float
-            Relative error of the size.
+            Relative error of the step size.
 
         Returns
         -------
@@ -136,8 +136,9 @@ class StepFamily:
     def size_tolerance(self, step_size: float, value_tolerance: float) -> float:
         r"""Convert a tolerance of the step value to a tolerance of the step size.
 
-        If the size has the returned relative error, the change in the step value has the relative
-        error ``value_tolerance``. The size tolerance is at most ``value_tolerance``.
+        A relative error of the step size that equals the returned tolerance causes a relative error
+        ``value_tolerance`` in the change of the step value. The size tolerance is at most
+        ``value_tolerance``.
 
         Parameters
         ----------
@@ -149,7 +150,7 @@ class StepFamily:
         Returns
         -------
         float
-            Relative tolerance of the size.
+            Relative tolerance of the step size.
 
         Notes
         -----
@@ -216,7 +217,7 @@ class StepFamily:
         return iter(())
 
     def inertia_shifts_critical_size(self, step_size: float, tolerance: float) -> bool:
-        """Return True if inertia changes the critical size significantly.
+        """Return True if inertia changes the critical step size significantly.
 
         If the scene has inertia, the motion after the step reaches the critical path only after a
         delay.
@@ -224,9 +225,9 @@ class StepFamily:
         Parameters
         ----------
         step_size : float
-            Size at which the critical path starts.
+            Step size at which the critical path starts.
         tolerance : float
-            Requested relative accuracy of the size.
+            Requested relative accuracy of the step size.
 
         Returns
         -------
@@ -339,10 +340,10 @@ class ShootingStepFamily(StepFamily):
     ) -> Iterator[float]:
         """Yield estimates of the step size at which the critical path starts.
 
-        At the critical step, the critical path begins with the state before the step. An
-        approximate root of the misfit, and the slope of the misfit at the root, are computed first
-        with a loose tolerance. For each smaller tolerance, one to three paths are integrated. If
-        the scene has several states, there are no critical paths. See
+        If the step is critical, the state at the start of the critical path is the state before the
+        step. An approximate root of the misfit, and the slope of the misfit at the root, are
+        computed first with a loose tolerance. One to three paths are then integrated for each
+        smaller tolerance. If the scene has several states, there are no critical paths. See
         ``StepFamily.find_sizes_by_critical_path``.
         """
         path_at = self.build_critical_path_factory(integrator)
@@ -469,7 +470,7 @@ class ShootingStepFamily(StepFamily):
         return outwards(way) or outwards(-way) if way else outwards(1, -1)
 
     def _search_direction(self, misfit_at_guess: float) -> int:
-        """Return the direction in which the critical size is expected.
+        """Return the direction in which the critical step size is expected.
 
         The result is 1 for larger sizes, -1 for smaller sizes, and 0 if the misfit does not
         indicate a direction.

@@ -103,7 +103,7 @@ class LoadVelocityStepFamily(ShootingStepFamily):
         return -1.0 if _reaches_norm_at_loose_tolerance(scene, integrator) else 1.0
 
     def _compute_max_size(self) -> float:
-        """Return the largest size of the search.
+        """Return the largest step size of the search.
 
         After the largest upward step, the load point velocity corresponds to the instability norm.
         After the largest downward step, the load point has the smallest velocity at which sliding
@@ -154,7 +154,7 @@ class DisplacementStepFamily(StepFamily):
         return step_size * relative_error
 
     def inertia_shifts_critical_size(self, step_size: float, tolerance: float) -> bool:
-        """Return True if inertia changes the critical size significantly.
+        """Return True if inertia changes the critical step size significantly.
 
         If the scene has inertia, the slider follows the critical path with a delay, which changes
         the critical step size in two ways. The load point moves during the delay, and the state
@@ -220,7 +220,7 @@ class DisplacementStepFamily(StepFamily):
             yield abs(start.spring_stress / self.scene.stiffness)
 
     def _compute_max_size(self) -> float:
-        """Return the largest size of the search.
+        """Return the largest step size of the search.
 
         The largest upward step raises the slip rate to the instability norm immediately. If the
         scene has inertia, the range of step sizes is extended, because the slip rate rises with a
@@ -282,7 +282,7 @@ class NormalStressStepFamily(ShootingStepFamily):
         return math.expm1(self.sign * step_size)
 
     def inertia_shifts_critical_size(self, step_size: float, tolerance: float) -> bool:
-        """Return True if inertia changes the critical size significantly.
+        """Return True if inertia changes the critical step size significantly.
 
         If the scene has inertia, the slip rate rises with a delay after the step. The effect of
         inertia on the critical step size depends on the slip rate immediately after the step. See
@@ -326,7 +326,7 @@ class NormalStressStepFamily(ShootingStepFamily):
         return dict(zip(self.extra_output_names, (rate,), strict=True))
 
     def _guess_critical_size(self) -> float:
-        """Return a guess of the critical size.
+        """Return a guess of the critical step size.
 
         For a decrease in normal stress, the guess is the change in Coulomb stress that reaches the
         threshold of the slip law. For an increase in normal stress, the guess is the step after
@@ -357,7 +357,7 @@ class NormalStressStepFamily(ShootingStepFamily):
             return math.nan
 
     def _compute_max_size(self) -> float:
-        """Return the largest size of the search.
+        """Return the largest step size of the search.
 
         The largest step raises the slip rate to the instability norm immediately. With inertia, the
         range of step sizes is extended, because the slip rate rises with a delay while stress

@@ -75,9 +75,9 @@ def confidence_interval(
     Parameters
     ----------
     problem : FitProblem
-        Problem with the model of the record.
+        Least-squares problem that contains the model of the record.
     solution : FitSolution
-        Solution of the problem.
+        Solution of the least-squares problem.
     parameter_name : str
         Name of a free parameter.
 
@@ -113,9 +113,9 @@ class LikelihoodProfile:
     Parameters
     ----------
     problem : FitProblem
-        Problem with the model of the record.
+        Least-squares problem that contains the model of the record.
     solution : FitSolution
-        Solution of the problem.
+        Solution of the least-squares problem.
     parameter_name : str
         Name of a free parameter.
 

@@ -1,4 +1,4 @@
-"""Detection of drops of shear stress in a noisy record.
+"""Detection of shear stress drops in a noisy record.
 
 The function ``detect_drops`` compares the mean stress in a window before each sample with the mean
 stress in a window after the sample. The windows have lengths of 4, 8, 16, ... sampling intervals.
@@ -57,7 +57,7 @@ _MIN_RELATIVE_PROMINENCE = 0.5
 
 
 class DropCandidate(NamedTuple):
-    """Detected drop of stress.
+    """Detected stress drop.
 
     Parameters
     ----------
@@ -201,7 +201,7 @@ def window_mean_decreases(values: np.ndarray, window_samples: int) -> np.ndarray
 
 
 def detect_drops(time: np.ndarray, stress: np.ndarray) -> Detection:
-    """Detect drops of stress in a record.
+    """Detect stress drops in a record.
 
     Parameters
     ----------

@@ -61,7 +61,7 @@ _MIN_SAMPLES_BESIDE_DROP = 3
 
 
 class FittedStressDrop(NamedTuple):
-    """Fitted drop of stress.
+    """Fitted stress drop.
 
     Errors are half widths of 95 % confidence intervals.
 
@@ -77,7 +77,7 @@ class FittedStressDrop(NamedTuple):
     stress_before_error, stress_after_error : float
         Errors of ``stress_before`` and ``stress_after``.
     drop_error : float
-        Error of the drop ``stress_before - stress_after``.
+        Error of the stress drop ``stress_before - stress_after``.
     residual_sd : float
         Standard deviation of the residuals.
     starts_before_record, ends_after_record : bool

@@ -1,4 +1,4 @@
-"""Times, stresses and slip of the stress drops in a record.
+"""Measurement of the times, stresses and slip of the stress drops in a record.
 
 The function ``read_drops`` finds the stress drops in a record, and computes the properties of each
 drop with their errors.
@@ -126,7 +126,7 @@ def displacement_follows_drops(
     times, displacement : ndarray, shape (samples,)
         Times and displacements of the samples.
     drop_sample_indices : sequence of DropSampleIndices
-        Locations of the drops.
+        Indices of the samples in each drop.
 
     Returns
     -------
@@ -209,7 +209,7 @@ def measure_drop(
     fitted_candidate : FittedDropCandidate
         Fitted drop.
     sample_indices : DropSampleIndices
-        Location of the drop.
+        Indices of the samples in the drop.
     neighbour_limits : (float, float)
         End of the previous drop, and start of the next drop.
 

@@ -85,7 +85,7 @@ class Fit(Measure):
     Parameters
     ----------
     records : tuple of Record
-        Records to choose from. The options ``record`` and ``together`` select the fitted records.
+        Available records. The options ``record`` and ``together`` select the fitted records.
     free : tuple of str, default: ("a", "b", "slip_distance", "mu_star", "trend1")
         Names of the free parameters (see ``rsfstudy.fitting.PARAMETERS``). The other parameters are
         fixed at their values in the scene.
@@ -472,7 +472,7 @@ class Fit(Measure):
         problem : FitProblem
             Least-squares problem for the model of all windows.
         solution : FitSolution
-            Solution of the problem.
+            Solution of the least-squares problem.
 
         Raises
         ------
@@ -511,7 +511,7 @@ class Fit(Measure):
         problem : FitProblem
             Least-squares problem for the model of all windows.
         solution : FitSolution
-            Solution of the problem.
+            Solution of the least-squares problem.
 
         Returns
         -------

@@ -1,8 +1,8 @@
 """Tests of whether the standard errors of a fit are valid.
 
 If the standard errors are not valid, the status of the fit is ``errors_not_valid``, but the
-parameter values can still be used. If a check fails, it returns a string that describes the
-violated condition and a remedy. The string has no final full stop.
+parameter values can still be used. Each check that fails returns a string that describes the
+violated condition and suggests a remedy. The string has no final full stop.
 """
 
 from __future__ import annotations
@@ -71,8 +71,8 @@ def describe_asymmetric_intervals(
     """Describe the parameters with very asymmetric confidence intervals.
 
     A record may provide only a lower or an upper limit for a parameter, for example for the
-    stiffness of a very stiff machine. In this case, the standard errors of all correlated
-    parameters are too small.
+    stiffness of a very stiff machine. In this case, the standard errors of all parameters that are
+    correlated with this parameter are too small.
 
     Parameters
     ----------

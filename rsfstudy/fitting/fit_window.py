@@ -79,8 +79,8 @@ class FitWindow:
 
     Notes
     -----
-    If friction before the step is not a linear function of time, the window begins where friction
-    becomes linear. The window of a hold includes the sliding after the hold.
+    If friction before the step is not a linear function of time, the window begins at the time from
+    which friction is linear. The window of a hold includes the sliding after the hold.
 
     Examples
     --------
@@ -435,7 +435,7 @@ def guess_parameters(
         Names of the free parameters. The fixed parameters have the values of the scene.
     slip_distance_guesses : (float, float)
         Slip distances of the first and the second state variable in um. The first slip distance is
-        the unit of slip in the scene.
+        also the unit of slip in the scene.
 
     Returns
     -------

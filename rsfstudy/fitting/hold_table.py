@@ -95,7 +95,7 @@ def build_hold_table(
 def fit_healing_rate(
     durations: np.ndarray, healing: np.ndarray, covariance: np.ndarray
 ) -> tuple[float, float, float]:
-    """Fit healing against the decimal logarithm of the hold duration.
+    """Fit a line to healing against the decimal logarithm of the hold duration.
 
     Parameters
     ----------

@@ -225,7 +225,7 @@ class JointModel:
         Returns
         -------
         float
-            Largest delay of the loading in s, for the window to which the step time belongs.
+            Largest delay of the loading in s, in the window whose step time has this name.
         """
         return self.models[max(split_window_number(parameter_name)[1] - 1, 0)].max_loading_delay
 

@@ -292,7 +292,7 @@ def fit_noise(
     min_noise_sd: float = 0.0,
     averaging_time: float = 0.0,
 ) -> NoiseModel:
-    """Estimate the noise from the residuals of a fit by REML.
+    """Estimate the noise by REML from the residuals of a fit.
 
     Parameters
     ----------
@@ -375,7 +375,7 @@ def guess_noise_by_moments(
     min_noise_sd: float = 0.0,
     averaging_time: float = 0.0,
 ) -> tuple[NoiseModel, float]:
-    """Estimate the noise from the residuals of a fit by the method of moments.
+    """Estimate the noise by the method of moments from the residuals of a fit.
 
     Parameters
     ----------

@@ -20,10 +20,10 @@ where :math:`\mu_1` and :math:`v_1` are the values at :math:`x = 0`. The curve i
 generalised least squares with correlated noise. The parameters :math:`a` and :math:`g` have broad
 prior distributions, so the standard error of :math:`k` includes the uncertainty of the slip.
 
-Friction may have a trend during sliding. If the trend depends on load point displacement, it
-contributes to the slope of a locked portion. If the trend depends on slip, it does not contribute.
-Half of the trend is subtracted from the stiffness, and the other half is included in the standard
-error.
+Friction may have a trend during sliding. A trend with load point displacement contributes to the
+slope of a locked portion, whereas a trend with slip does not. The fit does not distinguish between
+the two cases. Half of the trend is therefore subtracted from the stiffness, and the other half is
+included in the standard error.
 """
 
 from __future__ import annotations

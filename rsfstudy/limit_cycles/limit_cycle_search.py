@@ -283,10 +283,11 @@ class LimitCycleSearch:
     def _should_leap_to_fixed_point(self) -> bool:
         """Return True if the search should leap to the extrapolated fixed point.
 
-        A leap to the extrapolated fixed point is useless if the next cycle would come equally close
-        to the fixed point. A long leap towards the fixed point is avoided, because the motion may
-        settle to steady sliding after a long leap. If a leap does not halve the change in spring
-        stress per cycle, no further leap follows, because repeated leaps may form a loop.
+        The search does not leap to the extrapolated fixed point if the next cycle would come
+        equally close to the fixed point without a leap. The search also avoids long leaps, because
+        the motion may settle to steady sliding after a long leap. If a leap does not halve the
+        change in spring stress per cycle, no further leap follows, because repeated leaps may form
+        a loop.
         """
         cycle = self.cycles[-1]
         left = abs(cycle.end_point.spring_stress - cycle.start_point.spring_stress)

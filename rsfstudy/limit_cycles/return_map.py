@@ -14,10 +14,10 @@ which small perturbations grow during one orbit. An orbit repels nearby motions 
 value of a multiplier exceeds 1. When a multiplier passes through -1, an orbit with twice the number
 of cycles branches off (period doubling).
 
-If the effect of inertia is small, a perturbation along the motion only shifts the time. The number
-of independent perturbations is therefore one less than the number of unknowns of a section. A
-perturbation along the motion changes the states at constant spring stress, because spring stress
-has a maximum at a section.
+If the effect of inertia is small, a perturbation in the direction of the motion only shifts the
+motion in time. The number of independent perturbations is therefore one less than the number of
+unknowns of a section. A perturbation along the motion changes the states at constant spring stress,
+because spring stress has a maximum at a section.
 
 Notes
 -----
@@ -567,8 +567,9 @@ class ReturnMap:
     ) -> float:
         """Return the largest scaled component of a change in a section.
 
-        The unknowns of a fluid may have large values. If the value of a fluid unknown exceeds the
-        scale of the states, its change is divided by the ratio of the value to the scale.
+        The unknowns of a fluid may have large values. If a fluid unknown exceeds the scale of the
+        states, the change in the unknown is therefore divided by the ratio of the unknown to the
+        scale.
         """
         changes, first = np.abs(section_change), 1 + self.scene.parts.law.state_count
         changes[first:] /= np.maximum(1.0, np.abs(section[first:]) / state_scale)

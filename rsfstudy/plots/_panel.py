@@ -427,7 +427,7 @@ def _resolve_text_or_function(
 ) -> str:
     """Return a label or title of a panel, or a default if the text is None.
 
-    If the label or title is a function, the function is called with the dataset.
+    If the label or title is a function, it is called with the dataset as its argument.
     """
     if text_or_function is None:
         return default_text

@@ -204,7 +204,7 @@ def _fit_y_limits_to_visible_lines(axes: Axes) -> None:
 
 
 def _draw_residuals(dataset: xr.Dataset, axes: Axes) -> None:
-    """Draw the residuals of the fits and their moving averages.
+    """Draw the residuals of the fits, and the moving averages of the residuals.
 
     If the window of a step overlaps the window of an earlier step, the moving average in the
     overlap is drawn in a pale colour.

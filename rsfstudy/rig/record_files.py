@@ -1,4 +1,4 @@
-"""Laboratory records from files and arrays.
+"""Reading of laboratory records from files and arrays.
 
 `read_record` is the main function.
 """
